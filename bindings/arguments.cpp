@@ -1,0 +1,104 @@
+#include "arguments.hpp"
+
+#include <utility>
+
+namespace sidestep::python {
+namespace {
+
+std::string shape_text(const Array& array) {
+  std::string text = "(";
+  for (std::size_t i = 0; i < array.ndim(); ++i) {
+    text += std::to_string(array.shape(i)) + (i + 1 < array.ndim() ? ", " : "");
+  }
+  return text + (array.ndim() == 1 ? ",)" : ")");
+}
+
+[[noreturn]] void raise_shape(const char* name, const Array& array, const std::string& expected) {
+  throw nb::value_error((std::string(name) + " has shape " + shape_text(array) + ", expected " + expected).c_str());
+}
+
+nb::object make_numpy(std::unique_ptr<double[]> data, std::initializer_list<std::size_t> shape) {
+  double* raw = data.release();
+  nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, double>(raw, shape, owner));
+}
+
+}  // namespace
+
+Array as_array(nb::handle value, const char* name) {
+  Array array;
+  if (nb::try_cast<Array>(value, array, false)) {
+    return array;
+  }
+  try {
+    const nb::module_ numpy = nb::module_::import_("numpy");
+    return nb::cast<Array>(numpy.attr("ascontiguousarray")(value, numpy.attr("float64")));
+  } catch (const nb::python_error&) {
+    throw nb::type_error((std::string(name) + " must be an array of real numbers").c_str());
+  }
+}
+
+Eigen::VectorXd as_vector(nb::handle value, const char* name, Eigen::Index size) {
+  const Array array = as_array(value, name);
+  if (array.ndim() != 1 || (size >= 0 && static_cast<Eigen::Index>(array.shape(0)) != size)) {
+    raise_shape(name, array, size >= 0 ? "(" + std::to_string(size) + ",)" : "(N,)");
+  }
+  return Eigen::Map<const Eigen::VectorXd>(array.data(), static_cast<Eigen::Index>(array.shape(0)));
+}
+
+Eigen::VectorXd as_filled_vector(nb::handle value, const char* name, Eigen::Index size) {
+  double scalar = 0.0;
+  if (nb::try_cast<double>(value, scalar)) {
+    return Eigen::VectorXd::Constant(size, scalar);
+  }
+  return as_vector(value, name, size);
+}
+
+Eigen::MatrixXd as_square_matrix(nb::handle value, const char* name, Eigen::Index size) {
+  double scalar = 0.0;
+  if (nb::try_cast<double>(value, scalar)) {
+    return scalar * Eigen::MatrixXd::Identity(size, size);
+  }
+  const Array array = as_array(value, name);
+  if (array.ndim() == 1) {
+    return as_vector(value, name, size).asDiagonal();
+  }
+  return as_matrix(value, name, size, size);
+}
+
+Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols) {
+  const Array array = as_array(value, name);
+  if (array.ndim() != 2 || static_cast<Eigen::Index>(array.shape(0)) != rows ||
+      static_cast<Eigen::Index>(array.shape(1)) != cols) {
+    raise_shape(name, array, "(" + std::to_string(rows) + ", " + std::to_string(cols) + ")");
+  }
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  return Eigen::Map<const RowMajor>(array.data(), rows, cols);
+}
+
+Eigen::Matrix3Xd as_points(nb::handle value, const char* name) {
+  const Array array = as_array(value, name);
+  if (array.ndim() != 2 || array.shape(1) != 3) {
+    raise_shape(name, array, "(N, 3)");
+  }
+  return Eigen::Map<const Eigen::Matrix3Xd>(array.data(), 3, static_cast<Eigen::Index>(array.shape(0)));
+}
+
+nb::object to_numpy(const Eigen::Ref<const Eigen::VectorXd>& vector) {
+  auto data = std::make_unique<double[]>(static_cast<std::size_t>(vector.size()));
+  Eigen::Map<Eigen::VectorXd>(data.get(), vector.size()) = vector;
+  return make_numpy(std::move(data), {static_cast<std::size_t>(vector.size())});
+}
+
+nb::object to_numpy_matrix(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  auto data = std::make_unique<double[]>(static_cast<std::size_t>(matrix.size()));
+  Eigen::Map<RowMajor>(data.get(), matrix.rows(), matrix.cols()) = matrix;
+  return make_numpy(std::move(data), {static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols())});
+}
+
+nb::object to_numpy_points(const Eigen::Ref<const Eigen::Matrix3Xd>& points) {
+  return to_numpy_matrix(points.transpose());
+}
+
+}  // namespace sidestep::python

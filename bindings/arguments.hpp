@@ -1,0 +1,39 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+
+namespace sidestep::python {
+
+namespace nb = nanobind;
+
+/// An array-like argument as contiguous float64; raises TypeError or ValueError that names the argument.
+using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+Array as_array(nb::handle value, const char* name);
+
+/// A vector argument of `size` entries (any size if -1); raises ValueError with the shape got and the shape allowed.
+Eigen::VectorXd as_vector(nb::handle value, const char* name, Eigen::Index size = -1);
+
+/// A scalar or a vector of `size` entries, as a vector.
+Eigen::VectorXd as_filled_vector(nb::handle value, const char* name, Eigen::Index size);
+
+/// A scalar, a vector (diagonal) or a matrix, as a `size` × `size` matrix.
+Eigen::MatrixXd as_square_matrix(nb::handle value, const char* name, Eigen::Index size);
+
+/// An (N, 3) array of points as 3 × N.
+Eigen::Matrix3Xd as_points(nb::handle value, const char* name);
+
+/// A matrix argument of exactly this shape.
+Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols);
+
+/// A numpy array that owns a copy of the data.
+nb::object to_numpy(const Eigen::Ref<const Eigen::VectorXd>& vector);
+nb::object to_numpy_matrix(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
+/// 3 × N points as an (N, 3) array.
+nb::object to_numpy_points(const Eigen::Ref<const Eigen::Matrix3Xd>& points);
+
+}  // namespace sidestep::python

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "sidestep/kinematics/robot.hpp"
+
+namespace sidestep {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+/// A spatial motion or its time derivative, taken at the world origin and expressed in the world:
+/// the body-fixed point now at x moves with `linear + angular × x`.
+struct SpatialMotion {
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();
+};
+
+/// A wrench (or any covector on spatial motions) about the world origin, expressed in the world.
+struct SpatialForce {
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();
+};
+
+/// Pose, velocity and bias acceleration of every joint's child at (q, v).
+///
+/// Mutable workspace, allocated once. `bias` is the time derivative of the spatial velocity when q̈ = 0
+/// (Featherstone 2008, eq. 5.14, at the world origin):
+///     V_i = V_p + S_i q̇_i,   A_i = A_p + V_i × (S_i q̇_i).
+class KinematicState {
+ public:
+  explicit KinematicState(const Robot& robot);
+
+  /// Computes everything at (q, v); q and v have `robot.num_coordinates()` entries. No allocation.
+  void update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v) noexcept;
+
+  struct Link {
+    Eigen::Matrix3d R_WL;       ///< orientation in the world
+    Eigen::Vector3d p_WL;       ///< origin in the world [m]
+    SpatialMotion screw;        ///< column of the Jacobian of this joint's own coordinate (multiplier included)
+    SpatialMotion velocity;
+    SpatialMotion bias;
+  };
+  const Link& link(int joint) const noexcept { return links_[static_cast<std::size_t>(joint)]; }
+  int num_links() const noexcept { return static_cast<int>(links_.size()); }
+
+ private:
+  std::vector<Link> links_;
+};
+
+/// Pose X_WF of a frame.
+Eigen::Isometry3d frame_pose(const Robot& robot, const KinematicState& state, int frame);
+
+/// Jacobian (6 × nv) of a frame: rows 0–2 the velocity of the frame's origin [m/s], rows 3–5 the angular
+/// velocity [rad/s], both expressed in the world.
+Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, int frame);
+
+/// J̇ v (6) of a frame, in the rows' order of `frame_jacobian`: its acceleration when q̈ = 0.
+Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state, int frame);
+
+/// Projects a wrench on link `joint` to the joint coordinates: generalised_force += J_jointᵀ wrench.
+void accumulate_generalised_force(const Robot& robot, const KinematicState& state, int joint,
+                                  const SpatialForce& wrench, Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept;
+
+}  // namespace sidestep

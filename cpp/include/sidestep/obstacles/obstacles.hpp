@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace sidestep {
+
+/// Obstacle points in the world, each a ball with a radius that may be zero, moving with a constant velocity.
+class Obstacles {
+ public:
+  /// points (3 × N) [m], radii (N) [m] >= 0, velocities (3 × N) [m/s]; all finite and N >= 1.
+  /// Throws std::invalid_argument that names the first point at fault. For a free workspace use `none()`.
+  Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities);
+
+  /// A workspace that is known to be free.
+  static Obstacles none() { return Obstacles(); }
+
+  Eigen::Index size() const noexcept { return points_.cols(); }
+  const Eigen::Matrix3Xd& points() const noexcept { return points_; }
+  const Eigen::VectorXd& radii() const noexcept { return radii_; }
+  const Eigen::Matrix3Xd& velocities() const noexcept { return velocities_; }
+
+  /// Moves every point along its velocity: x += s * duration. No allocation.
+  void advance(double duration) noexcept { points_ += duration * velocities_; }
+
+ private:
+  Obstacles() : points_(3, 0), radii_(0), velocities_(3, 0) {}
+
+  Eigen::Matrix3Xd points_;
+  Eigen::VectorXd radii_;
+  Eigen::Matrix3Xd velocities_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,104 @@
+#include "sidestep/kinematics/kinematic_state.hpp"
+
+#include <cmath>
+
+namespace sidestep {
+
+KinematicState::KinematicState(const Robot& robot) : links_(robot.joints().size()) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.num_coordinates());
+  update(robot, zero, zero);
+}
+
+void KinematicState::update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd> q,
+                            Eigen::Ref<const Eigen::VectorXd> v) noexcept {
+  static const Link base{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), {}, {}, {}};
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    const Joint& joint = robot.joints()[i];
+    const Link& parent = joint.parent < 0 ? base : links_[static_cast<std::size_t>(joint.parent)];
+    Link& link = links_[i];
+    const double position = joint.multiplier * q[joint.coordinate] + joint.offset;
+    const double velocity = v[joint.coordinate];
+
+    const Eigen::Matrix3d R_WJ = parent.R_WL * joint.X_PJ.linear();
+    const Eigen::Vector3d p_WJ = parent.p_WL + parent.R_WL * joint.X_PJ.translation();
+    const Eigen::Vector3d axis_W = R_WJ * joint.axis;
+    if (joint.type == JointType::revolute) {
+      // Rodrigues: R_WJ exp(position [axis]×), with the axis in the joint frame.
+      const Eigen::Vector3d& a = joint.axis;
+      const double s = std::sin(position);
+      const double c = std::cos(position);
+      const Eigen::Vector3d b = (1.0 - c) * a;
+      Eigen::Matrix3d rotation;
+      rotation << c + b.x() * a.x(), b.x() * a.y() - s * a.z(), b.x() * a.z() + s * a.y(),  //
+          b.y() * a.x() + s * a.z(), c + b.y() * a.y(), b.y() * a.z() - s * a.x(),          //
+          b.z() * a.x() - s * a.y(), b.z() * a.y() + s * a.x(), c + b.z() * a.z();
+      link.R_WL.noalias() = R_WJ * rotation;
+      link.p_WL = p_WJ;
+      link.screw.angular = joint.multiplier * axis_W;
+      link.screw.linear = p_WJ.cross(link.screw.angular);
+    } else {
+      link.R_WL = R_WJ;
+      link.p_WL = p_WJ + position * axis_W;
+      link.screw.angular.setZero();
+      link.screw.linear = joint.multiplier * axis_W;
+    }
+
+    const Eigen::Vector3d joint_angular = velocity * link.screw.angular;
+    const Eigen::Vector3d joint_linear = velocity * link.screw.linear;
+    link.velocity.angular = parent.velocity.angular + joint_angular;
+    link.velocity.linear = parent.velocity.linear + joint_linear;
+    // V × (S q̇), the motion cross product, at the world origin.
+    link.bias.angular = parent.bias.angular + link.velocity.angular.cross(joint_angular);
+    link.bias.linear = parent.bias.linear + link.velocity.angular.cross(joint_linear) +
+                       link.velocity.linear.cross(joint_angular);
+  }
+}
+
+Eigen::Isometry3d frame_pose(const Robot& robot, const KinematicState& state, int frame) {
+  const Frame& f = robot.frames().at(static_cast<std::size_t>(frame));
+  if (f.joint < 0) {
+    return f.X_JF;
+  }
+  Eigen::Isometry3d X_WL = Eigen::Isometry3d::Identity();
+  X_WL.linear() = state.link(f.joint).R_WL;
+  X_WL.translation() = state.link(f.joint).p_WL;
+  return X_WL * f.X_JF;
+}
+
+Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, int frame) {
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(6, robot.num_coordinates());
+  const Eigen::Vector3d p = frame_pose(robot, state, frame).translation();
+  for (int j = robot.frames().at(static_cast<std::size_t>(frame)).joint; j >= 0;
+       j = robot.joints()[static_cast<std::size_t>(j)].parent) {
+    const SpatialMotion& screw = state.link(j).screw;
+    const int column = robot.joints()[static_cast<std::size_t>(j)].coordinate;
+    jacobian.col(column).head<3>() += screw.linear + screw.angular.cross(p);
+    jacobian.col(column).tail<3>() += screw.angular;
+  }
+  return jacobian;
+}
+
+Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state, int frame) {
+  Vector6d acceleration = Vector6d::Zero();
+  const int joint = robot.frames().at(static_cast<std::size_t>(frame)).joint;
+  if (joint >= 0) {
+    const KinematicState::Link& link = state.link(joint);
+    const Eigen::Vector3d p = frame_pose(robot, state, frame).translation();
+    const Eigen::Vector3d p_dot = link.velocity.linear + link.velocity.angular.cross(p);
+    acceleration.head<3>() = link.bias.linear + link.bias.angular.cross(p) + link.velocity.angular.cross(p_dot);
+    acceleration.tail<3>() = link.bias.angular;
+  }
+  return acceleration;
+}
+
+void accumulate_generalised_force(const Robot& robot, const KinematicState& state, int joint,
+                                  const SpatialForce& wrench,
+                                  Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept {
+  for (int j = joint; j >= 0; j = robot.joints()[static_cast<std::size_t>(j)].parent) {
+    const SpatialMotion& screw = state.link(j).screw;
+    generalised_force[robot.joints()[static_cast<std::size_t>(j)].coordinate] +=
+        screw.angular.dot(wrench.angular) + screw.linear.dot(wrench.linear);
+  }
+}
+
+}  // namespace sidestep

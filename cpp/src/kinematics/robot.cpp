@@ -1,0 +1,113 @@
+#include "sidestep/kinematics/robot.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace sidestep {
+namespace {
+
+constexpr double unit_axis_tolerance = 1e-9;       // rounding of a normalised double vector, with margin
+constexpr double orthonormality_tolerance = 1e-9;  // the same for a rotation matrix built from angles
+
+void check_placement(const Eigen::Isometry3d& X, const std::string& owner) {
+  const Eigen::Matrix3d R = X.linear();
+  if (!X.matrix().allFinite() ||
+      !(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), orthonormality_tolerance) || R.determinant() < 0.0) {
+    throw std::invalid_argument(owner + ": placement is not a rigid transform with finite entries");
+  }
+}
+
+void check_limit(const Eigen::VectorXd& limit, const char* what, const std::vector<std::string>& names) {
+  if (limit.size() != static_cast<Eigen::Index>(names.size())) {
+    throw std::invalid_argument(std::string(what) + " limits: got " + std::to_string(limit.size()) +
+                                " values, expected one per coordinate (" + std::to_string(names.size()) + ")");
+  }
+  for (Eigen::Index i = 0; i < limit.size(); ++i) {
+    if (!(limit[i] > 0.0)) {
+      throw std::invalid_argument(std::string(what) + " limit of '" + names[static_cast<std::size_t>(i)] + "' is " +
+                                  std::to_string(limit[i]) + ", must be positive");
+    }
+  }
+}
+
+}  // namespace
+
+JointLimits JointLimits::unlimited(int num) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const Eigen::VectorXd upper = Eigen::VectorXd::Constant(num, infinity);
+  return {-upper, upper, upper, upper, upper};
+}
+
+Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> frames,
+             std::vector<std::string> coordinate_names, JointLimits limits)
+    : name_(std::move(name)),
+      joints_(std::move(joints)),
+      frames_(std::move(frames)),
+      coordinate_names_(std::move(coordinate_names)),
+      limits_(std::move(limits)) {
+  const int nv = num_coordinates();
+  if (nv == 0) {
+    throw std::invalid_argument("robot '" + name_ + "' has no movable joint");
+  }
+  std::vector<bool> driven(coordinate_names_.size(), false);
+  for (int i = 0; i < num_joints(); ++i) {
+    const Joint& joint = joints_[static_cast<std::size_t>(i)];
+    const std::string owner = "joint '" + joint.name + "'";
+    if (joint.parent < -1 || joint.parent >= i) {
+      throw std::invalid_argument(owner + ": parent index " + std::to_string(joint.parent) +
+                                  " must be -1 (base) or that of an earlier joint (joint index " + std::to_string(i) +
+                                  ")");
+    }
+    if (joint.coordinate < 0 || joint.coordinate >= nv) {
+      throw std::invalid_argument(owner + ": coordinate " + std::to_string(joint.coordinate) + " is outside 0.." +
+                                  std::to_string(nv - 1));
+    }
+    if (!(std::abs(joint.axis.norm() - 1.0) < unit_axis_tolerance)) {
+      throw std::invalid_argument(owner + ": axis must have unit length");
+    }
+    if (!std::isfinite(joint.multiplier) || !std::isfinite(joint.offset)) {
+      throw std::invalid_argument(owner + ": mimic multiplier and offset must be finite");
+    }
+    check_placement(joint.X_PJ, owner);
+    driven[static_cast<std::size_t>(joint.coordinate)] = true;
+  }
+  for (std::size_t i = 0; i < driven.size(); ++i) {
+    if (!driven[i]) {
+      throw std::invalid_argument("coordinate '" + coordinate_names_[i] + "' drives no joint");
+    }
+  }
+  for (const Frame& frame : frames_) {
+    if (frame.joint < -1 || frame.joint >= num_joints()) {
+      throw std::invalid_argument("frame '" + frame.name + "': joint index " + std::to_string(frame.joint) +
+                                  " is outside -1.." + std::to_string(num_joints() - 1));
+    }
+    check_placement(frame.X_JF, "frame '" + frame.name + "'");
+  }
+  check_limit(limits_.velocity, "velocity", coordinate_names_);
+  check_limit(limits_.acceleration, "acceleration", coordinate_names_);
+  check_limit(limits_.effort, "effort", coordinate_names_);
+  if (limits_.lower.size() != nv || limits_.upper.size() != nv) {
+    throw std::invalid_argument("position limits: expected one value per coordinate (" + std::to_string(nv) + ")");
+  }
+  for (int i = 0; i < nv; ++i) {
+    if (!(limits_.lower[i] < limits_.upper[i])) {
+      throw std::invalid_argument("position limits of '" + coordinate_names_[static_cast<std::size_t>(i)] +
+                                  "': lower " + std::to_string(limits_.lower[i]) + " must be below upper " +
+                                  std::to_string(limits_.upper[i]));
+    }
+  }
+}
+
+int Robot::frame_index(const std::string& frame) const {
+  std::string known;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (frames_[i].name == frame) {
+      return static_cast<int>(i);
+    }
+    known += (i == 0 ? "" : ", ") + frames_[i].name;
+  }
+  throw std::invalid_argument("robot '" + name_ + "' has no link '" + frame + "'; its links are: " + known);
+}
+
+}  // namespace sidestep

@@ -1,0 +1,37 @@
+#include "sidestep/obstacles/obstacles.hpp"
+
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace sidestep {
+
+Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities)
+    : points_(std::move(points)), radii_(std::move(radii)), velocities_(std::move(velocities)) {
+  const Eigen::Index num = points_.cols();
+  if (num == 0) {
+    throw std::invalid_argument(
+        "obstacles: the cloud is empty; a sensor that sees nothing is not a free workspace. "
+        "Use Obstacles.none() if the workspace is known to be free");
+  }
+  if (radii_.size() != num || velocities_.cols() != num) {
+    throw std::invalid_argument("obstacles: " + std::to_string(num) + " points, " + std::to_string(radii_.size()) +
+                                " radii and " + std::to_string(velocities_.cols()) +
+                                " velocities; the numbers must be equal");
+  }
+  for (Eigen::Index i = 0; i < num; ++i) {
+    const std::string owner = "obstacles: point " + std::to_string(i);
+    if (!points_.col(i).allFinite()) {
+      throw std::invalid_argument(owner + " is not finite");
+    }
+    if (!(radii_[i] >= 0.0) || !(radii_[i] < std::numeric_limits<double>::infinity())) {
+      throw std::invalid_argument(owner + " has radius " + std::to_string(radii_[i]) + ", must be finite and >= 0");
+    }
+    if (!velocities_.col(i).allFinite()) {
+      throw std::invalid_argument(owner + " has a velocity that is not finite");
+    }
+  }
+}
+
+}  // namespace sidestep
