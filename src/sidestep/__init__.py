@@ -6,12 +6,24 @@ from typing import TYPE_CHECKING
 from sidestep._core import __version__
 
 if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is imported on first use, see below
-    pass
+    from sidestep.robot import Geometry as Geometry
+    from sidestep.robot import Inertial as Inertial
+    from sidestep.robot import Link as Link
+    from sidestep.robot import Robot as Robot
+    from sidestep.robot import planar_arm as planar_arm
+    from sidestep.robot import robots as robots
 
 # A public name and the module it comes from. Loaded on first use, so that the command line starts at once.
-_EXPORTS: dict[str, str] = {}
+_EXPORTS: dict[str, str] = {
+    "Geometry": "sidestep.robot",
+    "Inertial": "sidestep.robot",
+    "Link": "sidestep.robot",
+    "Robot": "sidestep.robot",
+    "planar_arm": "sidestep.robot",
+    "robots": "sidestep.robot",
+}
 
-__all__ = ["__version__"]
+__all__ = ["Geometry", "Inertial", "Link", "Robot", "__version__", "planar_arm", "robots"]
 
 
 def __getattr__(name: str) -> object:

@@ -1,0 +1,100 @@
+"""Links: inertia and geometry, in the link frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+GeometryKind = Literal["mesh", "box", "cylinder", "sphere"]
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass properties of a link.
+
+    Args:
+        mass: [kg].
+        com: centre of mass (3,) in the link frame [m].
+        inertia: rotational inertia (3, 3) about the centre of mass, in the link axes [kg m^2].
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """A mesh file or a primitive shape, placed in a link frame.
+
+    Args:
+        kind: "mesh", "box", "cylinder" (along z) or "sphere".
+        placement: pose (4, 4) of the shape in the link frame.
+        size: box: edge lengths (x, y, z); cylinder: (radius, length); sphere: (radius,); mesh: (). [m]
+        path: the mesh file, None for a primitive.
+        scale: factor per axis (3,) on the file's vertices, before `placement`.
+    """
+
+    kind: GeometryKind
+    placement: Array
+    size: tuple[float, ...] = ()
+    path: Path | None = None
+    scale: Array = field(default_factory=lambda: np.ones(3))
+
+    def mesh(self) -> trimesh.Trimesh:
+        """The shape as triangles in the link frame [m]; loaded once, copy it before you change it.
+
+        Raises:
+            ValueError: the file holds no triangles or cannot be read as a mesh.
+        """
+        return self._mesh
+
+    @cached_property
+    def _mesh(self) -> trimesh.Trimesh:
+        if self.path is not None:
+            mesh = _file_mesh(self.path).copy()
+            mesh.apply_transform(np.diag([*self.scale, 1.0]))
+        elif self.kind == "box":
+            mesh = trimesh.creation.box(extents=self.size)
+        elif self.kind == "cylinder":
+            mesh = trimesh.creation.cylinder(radius=self.size[0], height=self.size[1])
+        else:
+            mesh = trimesh.creation.icosphere(radius=self.size[0])
+        mesh.apply_transform(self.placement)
+        return mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A URDF link: a named frame with inertia and geometry, everything in that frame."""
+
+    name: str
+    inertial: Inertial | None = None
+    collisions: tuple[Geometry, ...] = ()
+    visuals: tuple[Geometry, ...] = ()
+
+    @property
+    def geometries(self) -> tuple[Geometry, ...]:
+        """The link's collision geometry or, where it has none, its visual geometry."""
+        return self.collisions or self.visuals
+
+
+@lru_cache(maxsize=256)
+def _file_mesh(path: Path) -> trimesh.Trimesh:
+    """The triangles of a mesh file in metres (a COLLADA file's unit is applied, its up axis is not, as in ROS)."""
+    try:
+        mesh = trimesh.load_mesh(path)
+    except Exception as error:  # the readers behind trimesh raise anything; the user needs the file's name
+        raise ValueError(f"mesh file {path} cannot be read: {error}") from error
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise ValueError(f"mesh file {path} holds no triangles")
+    if path.suffix.lower() == ".dae" and mesh.units is not None:
+        mesh.apply_scale(trimesh.units.unit_conversion(mesh.units, "meters"))
+    return mesh

@@ -1,0 +1,243 @@
+"""The robot: the core's kinematic tree with links, meshes, limits and dynamics around it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import trimesh
+from numpy.typing import ArrayLike
+
+from sidestep import _core
+from sidestep.robot import catalogue
+from sidestep.robot.dynamics import Dynamics
+from sidestep.robot.link import Array, Link
+from sidestep.robot.source import read_description
+from sidestep.robot.tree import KinematicTree, build_tree
+from sidestep.robot.urdf import parse_urdf
+
+_HASH_DECIMALS = (
+    9  # [m, rad] lengths and angles are hashed to 1e-9: below any mesh's accuracy, above rounding
+)
+
+
+class Robot(_core.Robot):
+    """An arm read from a URDF: kinematics in the core, links with geometry and inertia, limits, dynamics.
+
+    nq = nv = `num_coordinates`: continuous joints are plain angles, mimic joints share their source's coordinate,
+    whose limits are the source's. Make one with `from_urdf` or `named`.
+    """
+
+    def __init__(self, name: str, tree: KinematicTree) -> None:
+        super().__init__(
+            name,
+            joints=list(tree.joints),
+            frames=list(tree.frames),
+            coordinate_names=list(tree.coordinate_names),
+            limits=tree.limits,
+        )
+        self._links = tree.links
+        self._link_by_name = {link.name: link for link in tree.links}
+        self._meshes: dict[str, trimesh.Trimesh | None] = {}
+
+    @classmethod
+    def from_urdf(
+        cls,
+        source: str | Path,
+        *,
+        package_dirs: Sequence[str | Path] = (),
+        base_pose: ArrayLike | None = None,
+        tip: str | None = None,
+        locked: Mapping[str, float] | None = None,
+        acceleration_limits: ArrayLike | None = None,
+        velocity_limits: ArrayLike | None = None,
+        effort_limits: ArrayLike | None = None,
+        name: str | None = None,
+        xacro_arguments: Mapping[str, str] | None = None,
+    ) -> Robot:
+        """Reads a robot from a URDF or xacro file, or from URDF text.
+
+        Joints may be revolute, continuous, prismatic, fixed, mimic, and may branch. Mesh files are looked up now
+        and loaded when first used.
+
+        Args:
+            source: a path, or the XML text itself (starts with `<`).
+            package_dirs: folders that hold the packages of `package://` references (or are such a package); the
+                folders above the URDF are searched too.
+            base_pose: pose (4, 4) of the root link in the world, identity by default.
+            tip: a link; keeps the joints from the root to it, and links fixed rigidly to links before it. What
+                hangs on the tip itself, and every other branch that moves, is dropped.
+            locked: joints held at a value [rad | m]; joints that mimic them are held too.
+            acceleration_limits: number or (nv,) [rad/s^2 | m/s^2]; 10 by default (URDF has none).
+            velocity_limits: number or (nv,) [rad/s | m/s], in place of the file's.
+            effort_limits: number or (nv,) [Nm | N], in place of the file's.
+            name: in place of the file's.
+            xacro_arguments: values of `<xacro:arg>`.
+
+        Raises:
+            FileNotFoundError: the description or a mesh is missing. ValueError: anything wrong in the file or the
+            arguments, named together with what is allowed.
+        """
+        description = read_description(source, package_dirs=package_dirs, xacro_arguments=xacro_arguments)
+        urdf = parse_urdf(description)
+        tree = build_tree(
+            urdf,
+            base_pose=base_pose,
+            tip=tip,
+            locked=locked,
+            acceleration_limits=acceleration_limits,
+            velocity_limits=velocity_limits,
+            effort_limits=effort_limits,
+        )
+        return cls(name or urdf.name, tree)
+
+    @classmethod
+    def named(cls, name: str) -> Robot:
+        """One of the robots listed by `sidestep.robots()`, such as "fr3", "fr3_arm", "panda" or "planar2".
+
+        Raises:
+            ValueError: unknown name. FileNotFoundError: its package is not installed; says what to install.
+        """
+        recipe = catalogue.recipe(name)
+        return cls.from_urdf(
+            recipe.source(),
+            tip=recipe.tip,
+            locked=recipe.locked,
+            acceleration_limits=recipe.acceleration_limits,
+            velocity_limits=recipe.velocity_limits,
+            effort_limits=recipe.effort_limits,
+            name=name,
+        )
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """Every link, in the order of `frames`."""
+        return self._links
+
+    def link(self, name: str) -> Link:
+        """The link called `name`; raises ValueError that lists the links."""
+        if name not in self._link_by_name:
+            known = ", ".join(self._link_by_name)
+            raise ValueError(f"robot {self.name!r} has no link {name!r}; its links are: {known}")
+        return self._link_by_name[name]
+
+    def collision_mesh(self, link: str) -> trimesh.Trimesh | None:
+        """The surface of a link in its own frame [m]; None for a link without geometry.
+
+        Collision geometry, or the visual geometry of a link that has no collision geometry; several shapes are put
+        side by side in one mesh. Loaded once: copy it before you change it.
+
+        Raises:
+            ValueError: unknown link, or no link of the robot has any geometry.
+        """
+        geometries = self.link(link).geometries
+        if not any(item.geometries for item in self._links):
+            raise ValueError(
+                f"robot {self.name!r} has no geometry: no link of its URDF has a <collision> or <visual> element"
+            )
+        if link not in self._meshes:
+            meshes = [geometry.mesh() for geometry in geometries]
+            self._meshes[link] = trimesh.util.concatenate(meshes) if meshes else None
+        return self._meshes[link]
+
+    @cached_property
+    def neutral(self) -> Array:
+        """A configuration (nv,) inside the limits: the middle of a joint's interval, near 0 for an unbounded one."""
+        lower, upper = self._finite_interval()
+        return 0.5 * (lower + upper)
+
+    def random_configuration(self, rng: np.random.Generator) -> Array:
+        """A configuration (nv,), uniform within the limits (within ±pi, ±pi m, of 0 or a bound where unbounded)."""
+        lower, upper = self._finite_interval()
+        return rng.uniform(lower, upper)
+
+    def check_configuration(self, q: ArrayLike, name: str = "q") -> Array:
+        """`q` as an array (nv,) after checking its shape, that it is finite, and the position limits.
+
+        Raises:
+            ValueError: names `name`, the joint, its value and the interval allowed.
+        """
+        try:
+            array = np.asarray(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise TypeError(f"{name} must be an array of {self.num_coordinates} real numbers") from None
+        if array.shape != (self.num_coordinates,):
+            raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
+        limits = self.limits
+        for joint, value, lower, upper in zip(
+            self.coordinate_names, array, limits.lower, limits.upper, strict=True
+        ):
+            if not (np.isfinite(value) and lower <= value <= upper):
+                raise ValueError(f"{name}: joint {joint!r} is {value}, allowed: [{lower}, {upper}]")
+        return array
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Joint-space inertia M(q) (nv, nv) [kg m^2 for revolute coordinates]; rotor inertias are not in a URDF."""
+        return self._dynamics.mass_matrix(self._vector(q, "q"))
+
+    def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Coriolis, centrifugal and gravity force h(q, v) = C(q, v) v + g(q) (nv,) [Nm | N], gravity 9.81 along -z.
+
+        M(q) a + h(q, v) = torque; no friction.
+        """
+        return self._dynamics.bias(self._vector(q, "q"), self._vector(v, "v"))
+
+    @property
+    def pinocchio(self) -> pin.Model:
+        """The same tree as a Pinocchio model, one coordinate per moving joint (mimic joints have their own)."""
+        return self._dynamics.model
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash (64 hex digits) of kinematics and geometry, mesh files by content; not of limits, inertias, names of
+        files or the base pose, none of which a fitted body depends on."""
+        digest = hashlib.sha256()
+
+        def add(*items: object) -> None:
+            for item in items:
+                if isinstance(item, np.ndarray):
+                    item = (np.round(item, _HASH_DECIMALS) + 0.0).tolist()  # + 0.0 makes -0.0 into 0.0
+                digest.update(repr(item).encode() + b"\n")
+
+        base = np.linalg.inv(self.frames[0].placement)
+        for joint in self.joints:
+            placement = base @ joint.placement if joint.parent < 0 else joint.placement
+            add("joint", joint.name, joint.type.name, joint.parent, placement, joint.axis, joint.coordinate)
+            add(joint.multiplier, joint.offset)
+        for frame, link in zip(self.frames, self._links, strict=True):
+            add(
+                "link",
+                frame.name,
+                frame.joint,
+                base @ frame.placement if frame.joint < 0 else frame.placement,
+            )
+            for geometry in link.geometries:
+                add(geometry.kind, geometry.placement, geometry.size, geometry.scale)
+                if geometry.path is not None:
+                    add(hashlib.sha256(geometry.path.read_bytes()).hexdigest())
+        return digest.hexdigest()
+
+    @cached_property
+    def _dynamics(self) -> Dynamics:
+        return Dynamics(self, self._links)
+
+    def _vector(self, value: ArrayLike, name: str) -> Array:
+        array = np.asarray(value, dtype=np.float64)
+        if array.shape != (self.num_coordinates,):
+            raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} must be finite, got {array}")
+        return array
+
+    def _finite_interval(self) -> tuple[Array, Array]:
+        """The position limits, with 2 pi from the one bound, or ±pi, where a coordinate is not bounded."""
+        lower, upper = np.array(self.limits.lower), np.array(self.limits.upper)
+        free = np.isinf(lower) & np.isinf(upper)
+        lower[free], upper[free] = -np.pi, np.pi
+        below, above = np.isinf(lower), np.isinf(upper)
+        lower[below], upper[above] = upper[below] - 2.0 * np.pi, lower[above] + 2.0 * np.pi
+        return lower, upper

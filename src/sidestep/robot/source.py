@@ -1,0 +1,157 @@
+"""Where a robot description comes from: URDF text, xacro macros, and the files it refers to."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+import tempfile
+import types
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+_XACRO_MARKS = ("ros.org/wiki/xacro", "ros.org/xacro")  # namespaces that xacro documents declare
+
+
+@dataclass(frozen=True)
+class Description:
+    """The XML tree of a robot description and the folders its file references are looked up in."""
+
+    root: ElementTree.Element
+    label: str  # what errors call the description: its path, or "URDF string"
+    folder: Path | None  # of the URDF file, None for a string
+    package_dirs: tuple[Path, ...]
+
+    def resolve(self, uri: str, owner: str) -> Path:
+        """The file behind `package://NAME/REST`, `file://PATH` or a plain path.
+
+        A package is looked up as PARENT/NAME and as a folder itself called NAME, first in `package_dirs`, then
+        in the folders above the URDF; a relative path in the URDF's folder, then in `package_dirs`.
+
+        Raises:
+            FileNotFoundError: names `owner`, the reference and the folders searched.
+            ValueError: another scheme.
+        """
+        parsed = urlparse(uri)
+        parents = () if self.folder is None else (self.folder, *self.folder.parents)
+        if parsed.scheme == "package":
+            package, rest = unquote(parsed.netloc), unquote(parsed.path).lstrip("/")
+            searched = [*self.package_dirs, *parents]
+            candidates = [
+                path
+                for base in searched
+                for path in ([base / rest] if base.name == package else []) + [base / package / rest]
+            ]
+        elif parsed.scheme == "file":
+            searched, candidates = [], [Path(unquote(parsed.path))]
+        elif "://" in uri:
+            raise ValueError(f"{owner} refers to {uri!r}; allowed: package://, file:// and plain paths")
+        else:
+            searched = [*parents[:1], *self.package_dirs]
+            candidates = [Path(uri)] if Path(uri).is_absolute() else [base / uri for base in searched]
+        for candidate in candidates:
+            if candidate.is_file():
+                return candidate.resolve()
+        folders = ", ".join(str(base) for base in searched) or "no folder (pass package_dirs)"
+        raise FileNotFoundError(f"{owner} refers to {uri!r}, which does not exist; searched in: {folders}")
+
+
+def read_description(
+    source: str | Path, *, package_dirs: Sequence[str | Path], xacro_arguments: Mapping[str, str] | None
+) -> Description:
+    """Reads a URDF or xacro file, or a string that starts with `<`, and expands xacro where the text uses it.
+
+    Raises:
+        FileNotFoundError: no such file. ValueError: malformed XML, a failed xacro expansion.
+    """
+    directories = tuple(Path(directory).resolve() for directory in package_dirs)
+    for directory in directories:
+        if not directory.is_dir():
+            raise FileNotFoundError(f"package_dirs: {directory} is not a folder")
+    folder: Path | None = None
+    if isinstance(source, str) and source.lstrip().startswith("<"):
+        label, text = "URDF string", source
+    else:
+        path = Path(source).resolve()
+        if not path.is_file():
+            raise FileNotFoundError(f"robot description {path} does not exist or is not a file")
+        label, text, folder = str(path), path.read_text(encoding="utf-8"), path.parent
+    root = _parse(text, label)
+    if any(mark in tag for mark in _XACRO_MARKS for tag in _qualified_names(root)):
+        root = _parse(_expand(text, label, folder, directories, dict(xacro_arguments or {})), label)
+    elif xacro_arguments:
+        raise ValueError(f"{label} uses no xacro, but xacro_arguments are given: {sorted(xacro_arguments)}")
+    return Description(root, label, folder, directories)
+
+
+def _parse(text: str, label: str) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(text.lstrip().encode("utf-8"))
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{label} is not well-formed XML: {error}") from error
+    if root.tag != "robot":
+        raise ValueError(f"{label}: the root element is <{root.tag}>, must be <robot>")
+    return root
+
+
+def _qualified_names(root: ElementTree.Element) -> Iterator[str]:
+    """Names of elements; a namespace stands in braces in front. A declared but unused namespace does not show."""
+    return (element.tag for element in root.iter() if isinstance(element.tag, str))
+
+
+def _expand(
+    text: str, label: str, folder: Path | None, package_dirs: tuple[Path, ...], arguments: dict[str, str]
+) -> str:
+    try:
+        import xacro
+    except ImportError as error:
+        raise ImportError(f"{label} uses xacro: pip install xacro") from error
+
+    messages = io.StringIO()  # xacro prints its warnings; they go into the error, or nowhere
+    with tempfile.TemporaryDirectory() as temporary:
+        path = Path(label)
+        if folder is None:
+            path = Path(temporary) / "robot.xacro"
+            path.write_text(text, encoding="utf-8")
+        try:
+            with contextlib.redirect_stderr(messages), _findable_packages(package_dirs, folder):
+                document = xacro.process_file(str(path), mappings=arguments)
+        except Exception as error:  # xacro evaluates expressions, so any exception can come out of it
+            detail = f"{error} {messages.getvalue()}".strip()
+            raise ValueError(f"{label}: xacro expansion failed: {type(error).__name__}: {detail}") from error
+        return str(document.toxml())
+
+
+@contextlib.contextmanager
+def _findable_packages(package_dirs: tuple[Path, ...], folder: Path | None) -> Iterator[None]:
+    """Answers xacro's `$(find NAME)`, which asks ROS's ament index, from the same folders as `package://`."""
+    name = "ament_index_python.packages"
+    parents = () if folder is None else (folder, *folder.parents)
+
+    def get_package_share_directory(package: str) -> str:
+        for base in (*package_dirs, *parents):
+            for candidate in (base, base / package):
+                if candidate.name == package and candidate.is_dir():
+                    return str(candidate)
+        searched = (
+            ", ".join(str(base) for base in (*package_dirs, *parents)) or "no folder (pass package_dirs)"
+        )
+        raise FileNotFoundError(f"$(find {package}): no such package; searched in: {searched}")
+
+    stand_in = types.ModuleType(name)
+    stand_in.get_package_share_directory = get_package_share_directory  # type: ignore[attr-defined]
+    parent = types.ModuleType("ament_index_python")
+    parent.packages = stand_in  # type: ignore[attr-defined]
+    saved = {key: sys.modules.get(key) for key in ("ament_index_python", name)}
+    sys.modules.update({"ament_index_python": parent, name: stand_in})
+    try:
+        yield
+    finally:
+        for key, module in saved.items():
+            if module is None:
+                del sys.modules[key]
+            else:
+                sys.modules[key] = module

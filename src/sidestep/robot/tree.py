@@ -1,0 +1,262 @@
+"""From URDF to the core's tree: pruned to a tip, joints locked, fixed joints folded, mimic joints resolved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from sidestep._core import Frame, Joint, JointLimits, JointType
+from sidestep.robot.link import Array, Link
+from sidestep.robot.urdf import Urdf, UrdfJoint
+
+DEFAULT_ACCELERATION_LIMIT = 10.0
+"""Acceleration limit where none is given, [rad/s^2] or [m/s^2]. URDF has no such limit; 10 is the FR3's official
+value on every joint and that of the thesis's controller, and no arm of the catalogue has been rated below 7.5."""
+
+
+@dataclass(frozen=True, eq=False)
+class KinematicTree:
+    """What the core's robot is built from; `links` in the order of `frames`."""
+
+    joints: tuple[Joint, ...]
+    frames: tuple[Frame, ...]
+    coordinate_names: tuple[str, ...]
+    limits: JointLimits
+    links: tuple[Link, ...]
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """What a moving joint follows: multiplier * position of joint `source` + offset; a constant if source is None."""
+
+    source: str | None
+    multiplier: float
+    offset: float
+
+
+def build_tree(
+    urdf: Urdf,
+    *,
+    base_pose: ArrayLike | None,
+    tip: str | None,
+    locked: Mapping[str, float] | None,
+    acceleration_limits: ArrayLike | None,
+    velocity_limits: ArrayLike | None,
+    effort_limits: ArrayLike | None,
+) -> KinematicTree:
+    """Folds `urdf` into moving joints and frames; see `Robot.from_urdf` for the arguments and the rules."""
+    drives = _drives(urdf, _checked_locks(urdf, locked or {}))
+    kept = _kept_joints(urdf, drives, tip)
+    names = [joint.name for joint in kept if joint.moves and drives[joint.name].source == joint.name]
+    if not names:
+        raise ValueError(f"{urdf.label} has no movable joint left; give another tip or lock fewer joints")
+    coordinates = {name: index for index, name in enumerate(names)}
+
+    joints: list[Joint] = []
+    root_pose = np.eye(4) if base_pose is None else _rigid(base_pose, "base_pose")
+    placed: dict[str, tuple[int, Array]] = {
+        urdf.root: (-1, root_pose)
+    }  # link -> its joint, pose in that joint
+    for joint in kept:
+        parent, X_PL = placed[joint.parent]
+        X_PJ = X_PL @ joint.placement
+        if not joint.moves:
+            placed[joint.child] = (parent, X_PJ)
+            continue
+        drive = drives[joint.name]
+        if drive.source is None:
+            placed[joint.child] = (parent, X_PJ @ _motion(joint, drive.offset))
+            continue
+        if drive.source not in coordinates:
+            raise ValueError(
+                f"{urdf.label}: joint {joint.name!r} mimics {drive.source!r}, which is not on the way to the tip "
+                f"{tip!r}; lock {drive.source!r}"
+            )
+        joints.append(
+            Joint(
+                joint.name,
+                JointType.prismatic if joint.type == "prismatic" else JointType.revolute,
+                parent=parent,
+                placement=X_PJ,
+                axis=joint.axis,
+                coordinate=coordinates[drive.source],
+                multiplier=drive.multiplier,
+                offset=drive.offset,
+            )
+        )
+        placed[joint.child] = (len(joints) - 1, np.eye(4))
+
+    limits = _limits(
+        [urdf.joints[name] for name in names],
+        label=urdf.label,
+        acceleration=DEFAULT_ACCELERATION_LIMIT if acceleration_limits is None else acceleration_limits,
+        velocity=velocity_limits,
+        effort=effort_limits,
+    )
+    frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
+    return KinematicTree(
+        tuple(joints), frames, tuple(names), limits, tuple(urdf.links[link] for link in placed)
+    )
+
+
+def _checked_locks(urdf: Urdf, locked: Mapping[str, float]) -> dict[str, float]:
+    movable = [joint.name for joint in urdf.joints.values() if joint.moves and joint.mimic is None]
+    for name, value in locked.items():
+        if name not in movable:
+            kind = "mimics another; lock that one" if name in urdf.joints else "does not exist"
+            if name in urdf.joints and not urdf.joints[name].moves:
+                kind = "is fixed already"
+            raise ValueError(
+                f"locked: joint {name!r} {kind}; joints that can be locked: {', '.join(movable)}"
+            )
+        limit = urdf.joints[name].limit
+        lower, upper = (-math.inf, math.inf) if limit is None else (limit.lower, limit.upper)
+        if not math.isfinite(value) or not lower <= value <= upper:
+            raise ValueError(f"locked: {name!r} = {value} is outside its limits [{lower}, {upper}]")
+    return {name: float(value) for name, value in locked.items()}
+
+
+def _drives(urdf: Urdf, locks: dict[str, float]) -> dict[str, _Drive]:
+    """Follows every mimic chain to its end: a joint with its own coordinate, or a locked one."""
+    drives: dict[str, _Drive] = {}
+    for joint in urdf.joints.values():
+        if not joint.moves:
+            continue
+        multiplier, offset, current, seen = 1.0, 0.0, joint, [joint.name]
+        while current.mimic is not None:
+            offset += multiplier * current.mimic.offset
+            multiplier *= current.mimic.multiplier
+            current = urdf.joints[current.mimic.joint]
+            if current.name in seen:
+                raise ValueError(
+                    f"{urdf.label}: mimic joints form a loop: {' -> '.join([*seen, current.name])}"
+                )
+            seen.append(current.name)
+        if not current.moves:
+            raise ValueError(f"{urdf.label}: joint {joint.name!r} mimics {current.name!r}, which is fixed")
+        if current.name in locks:
+            drives[joint.name] = _Drive(None, 0.0, multiplier * locks[current.name] + offset)
+        else:
+            drives[joint.name] = _Drive(current.name, multiplier, offset)
+    return drives
+
+
+def _kept_joints(urdf: Urdf, drives: dict[str, _Drive], tip: str | None) -> list[UrdfJoint]:
+    """The joints that stay, parents before children, in the order of the file.
+
+    With a tip: the way from the root to it, and what hangs rigidly (fixed or locked joints only) on a link of that
+    way other than the tip itself.
+    """
+    if tip is not None and tip not in urdf.links:
+        raise ValueError(f"tip {tip!r} is no link of {urdf.label}; its links are: {', '.join(urdf.links)}")
+    children: dict[str, list[UrdfJoint]] = {link: [] for link in urdf.links}
+    to_parent: dict[str, UrdfJoint] = {}
+    for joint in urdf.joints.values():
+        children[joint.parent].append(joint)
+        to_parent[joint.child] = joint
+    way: set[str] = set()
+    link = tip
+    while link is not None and link in to_parent:
+        way.add(to_parent[link].name)
+        link = to_parent[link].parent
+
+    kept: list[UrdfJoint] = []
+    open_links = [urdf.root]
+    while open_links:
+        link = open_links.pop()
+        stay = [
+            joint
+            for joint in children[link]
+            if tip is None
+            or joint.name in way
+            or (link != tip and (not joint.moves or drives[joint.name].source is None))
+        ]
+        kept.extend(stay)
+        open_links.extend(joint.child for joint in reversed(stay))
+    return kept
+
+
+def _motion(joint: UrdfJoint, value: float) -> Array:
+    motion = np.eye(4)
+    if joint.type == "prismatic":
+        motion[:3, 3] = value * joint.axis
+    else:
+        motion[:3, :3] = Rotation.from_rotvec(value * joint.axis).as_matrix()
+    return motion
+
+
+def _rigid(value: ArrayLike, name: str) -> Array:
+    pose = np.asarray(value, dtype=np.float64)
+    if pose.shape != (4, 4):
+        raise ValueError(f"{name} has shape {pose.shape}, expected (4, 4)")
+    rotation = pose[:3, :3]
+    rigid = (
+        np.isfinite(pose).all()
+        and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)  # the core's own tolerance
+        and np.linalg.det(rotation) > 0.0
+        and np.array_equal(pose[3], [0.0, 0.0, 0.0, 1.0])
+    )
+    if not rigid:
+        raise ValueError(f"{name} is not a rigid transform (rotation, translation, last row 0 0 0 1)")
+    return pose
+
+
+def _limits(
+    joints: list[UrdfJoint],
+    *,
+    label: str,
+    acceleration: ArrayLike,
+    velocity: ArrayLike | None,
+    effort: ArrayLike | None,
+) -> JointLimits:
+    unlimited = math.inf
+    for joint in joints:
+        limit = joint.limit
+        if limit is None:
+            continue
+        if not limit.lower < limit.upper:
+            raise ValueError(
+                f"{label}: joint {joint.name!r}: lower limit {limit.lower} must be below upper limit {limit.upper}"
+            )
+        for what, value, given in (("velocity", limit.velocity, velocity), ("effort", limit.effort, effort)):
+            if given is None and not value > 0.0:
+                raise ValueError(
+                    f"{label}: joint {joint.name!r}: {what} limit is {value}, must be positive; correct the file, "
+                    f"pass {what}_limits or lock the joint"
+                )
+    names = [joint.name for joint in joints]
+    return JointLimits(
+        lower=np.array([-unlimited if j.limit is None else j.limit.lower for j in joints]),
+        upper=np.array([unlimited if j.limit is None else j.limit.upper for j in joints]),
+        velocity=_per_coordinate(
+            [unlimited if j.limit is None else j.limit.velocity for j in joints]
+            if velocity is None
+            else velocity,
+            "velocity_limits",
+            names,
+        ),
+        acceleration=_per_coordinate(acceleration, "acceleration_limits", names),
+        effort=_per_coordinate(
+            [unlimited if j.limit is None else j.limit.effort for j in joints] if effort is None else effort,
+            "effort_limits",
+            names,
+        ),
+    )
+
+
+def _per_coordinate(value: ArrayLike, what: str, names: list[str]) -> Array:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape not in ((), (len(names),)):
+        raise ValueError(
+            f"{what} has shape {array.shape}, expected a number or ({len(names)},) for {', '.join(names)}"
+        )
+    array = np.broadcast_to(array, (len(names),)).copy()
+    for name, entry in zip(names, array, strict=True):
+        if not entry > 0.0:
+            raise ValueError(f"{what}: {entry} for {name!r}, must be positive")
+    return array
