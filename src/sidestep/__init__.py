@@ -5,13 +5,16 @@ from typing import TYPE_CHECKING
 
 from sidestep._core import __version__
 
-if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is imported on first use, see below
+if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is imported on first use
     from sidestep.robot import Geometry as Geometry
     from sidestep.robot import Inertial as Inertial
     from sidestep.robot import Link as Link
     from sidestep.robot import Robot as Robot
     from sidestep.robot import planar_arm as planar_arm
     from sidestep.robot import robots as robots
+    from sidestep.scenario import Scenario as Scenario
+    from sidestep.scenario import ScenarioError as ScenarioError
+    from sidestep.scenario import shipped_scenarios as shipped_scenarios
 
 # A public name and the module it comes from. Loaded on first use, so that the command line starts at once.
 _EXPORTS: dict[str, str] = {
@@ -21,9 +24,23 @@ _EXPORTS: dict[str, str] = {
     "Robot": "sidestep.robot",
     "planar_arm": "sidestep.robot",
     "robots": "sidestep.robot",
+    "Scenario": "sidestep.scenario",
+    "ScenarioError": "sidestep.scenario",
+    "shipped_scenarios": "sidestep.scenario",
 }
 
-__all__ = ["Geometry", "Inertial", "Link", "Robot", "__version__", "planar_arm", "robots"]
+__all__ = [
+    "Geometry",
+    "Inertial",
+    "Link",
+    "Robot",
+    "Scenario",
+    "ScenarioError",
+    "__version__",
+    "planar_arm",
+    "robots",
+    "shipped_scenarios",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -1,0 +1,327 @@
+"""A scenario: everything that is needed to repeat one run, as a YAML file."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import types
+import typing
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+
+from sidestep.scenario.validation import ScenarioError, check_document, parse_yaml
+
+Vector3 = tuple[float, float, float]
+Mode = Literal["torque", "kinematic"]
+SwitchType = Literal["none", "harmonic_only", "geodesic_only", "binary", "sigmoid", "distance"]
+
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class BasePose:
+    """Pose of the robot's base in the world: position [m], roll, pitch, yaw about fixed x, y, z [deg]."""
+
+    position: Vector3
+    rotation_deg: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class RobotChoice:
+    """A robot by name, or by URDF file with the joints `locked` [rad | m], a `tip` and a `base`."""
+
+    name: str | None = None
+    urdf: str | None = None
+    package_dirs: tuple[str, ...] = ()
+    tip: str | None = None
+    locked: dict[str, float] | None = None
+    base: BasePose | None = None
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Joint coordinates (nv,) in `unit` ("deg" or "rad"; prismatic coordinates are always in metres)."""
+
+    unit: Literal["deg", "rad"]
+    position: tuple[float, ...]
+    velocity: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class BodyChoice:
+    """How the Gaussian mixtures of the links are fitted."""
+
+    components: int | str | dict[str, int] = 4
+    covariance: Literal["spherical", "diagonal", "full"] = "full"
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A sphere, box, cylinder, mesh file or point file; sizes in metres."""
+
+    type: Literal["sphere", "box", "cylinder", "mesh", "points"]
+    radius: float | None = None
+    length: float | None = None
+    size: Vector3 | None = None
+    file: str | None = None
+    scale: float | None = None
+
+
+@dataclass(frozen=True)
+class StraightMove:
+    """From the obstacle's position to `to` [m], at constant speed between `begin` and `end` [s]."""
+
+    to: Vector3
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """One obstacle: what it is, where, how it moves, and what the controller sees of it."""
+
+    shape: Shape
+    position: Vector3
+    name: str | None = None
+    rotation_deg: Vector3 = (0.0, 0.0, 0.0)
+    velocity: Vector3 = (0.0, 0.0, 0.0)
+    motion: StraightMove | None = None
+    free: bool = False
+    points: Literal["centre", "ball", "surface"] = "centre"
+    spacing: float = 0.03
+
+
+@dataclass(frozen=True)
+class JointLimitChoice:
+    """Slope and height of the joint-limit potential (thesis, equation 5.7)."""
+
+    slope: float = 30.0
+    height: float = 1.0
+
+
+@dataclass(frozen=True)
+class EmbeddingChoice:
+    """The extra coordinates of the embedded joint space."""
+
+    density: Literal["sum", "average"] = "sum"
+    joint_limits: JointLimitChoice | None = None
+    combine: Literal["sum", "stack"] = "sum"
+
+
+@dataclass(frozen=True)
+class SwitchChoice:
+    """Between the harmonic and the geodesic term: threshold of psi, or of each link's distance [m]."""
+
+    type: SwitchType = "none"
+    threshold: float | None = None
+    thresholds: tuple[float, ...] | None = None
+    slope: float | None = None
+
+
+@dataclass(frozen=True)
+class SystemChoice:
+    """Stiffness, damping and switch of the dynamical system."""
+
+    stiffness: float = 0.5
+    damping: float = 1.5
+    damping_form: Literal["plain", "metric"] = "plain"
+    switch: SwitchChoice = field(default_factory=SwitchChoice)
+
+
+@dataclass(frozen=True)
+class SimulationChoice:
+    """How the run is simulated: mode, control period [s], longest time [s], integrator, tolerance [rad]."""
+
+    mode: Mode = "torque"
+    period: float = 0.001
+    duration: float = 15.0
+    integrator: Literal["semi_implicit_euler", "second_order", "runge_kutta_4"] = "semi_implicit_euler"
+    tolerance: float = 0.05
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One run of one arm, as written in a scenario file (`sidestep schema` prints the format).
+
+    Args:
+        name: letters, digits, dot, dash, underscore.
+        robot, start, goal, body, obstacles, embedding, system, simulation: the parts, see their classes.
+        description, source: what happens, and where it comes from.
+        folder: what relative file names refer to; not part of the file.
+    """
+
+    name: str
+    robot: RobotChoice
+    start: JointState
+    goal: JointState
+    description: str = ""
+    source: str = ""
+    body: BodyChoice = field(default_factory=BodyChoice)
+    obstacles: tuple[Obstacle, ...] = ()
+    embedding: EmbeddingChoice = field(default_factory=EmbeddingChoice)
+    system: SystemChoice = field(default_factory=SystemChoice)
+    simulation: SimulationChoice = field(default_factory=SimulationChoice)
+    folder: Path = field(default_factory=Path.cwd, compare=False, repr=False)
+
+    @classmethod
+    def load(cls, source: str | Path) -> Scenario:
+        """Read a scenario file, or a shipped scenario by its name.
+
+        Args:
+            source: path of a YAML file, or one of `shipped_scenarios()`.
+
+        Raises:
+            FileNotFoundError: neither a file nor a shipped scenario; the message lists the shipped ones.
+            ScenarioError: not a valid scenario; the message names the file, the place and the value.
+        """
+        path = Path(source)
+        if not path.is_file():
+            shipped = shipped_scenarios()
+            if str(source) not in shipped:
+                raise FileNotFoundError(
+                    f"no scenario {str(source)!r}: no such file; shipped scenarios are {', '.join(shipped)}"
+                )
+            path = _shipped_folder() / f"{source}.yaml"
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ScenarioError(f"{path}: cannot be read as UTF-8 text: {error}") from error
+        return cls.from_text(text, file=str(path), folder=path.resolve().parent)
+
+    @classmethod
+    def from_text(cls, text: str, *, file: str = "scenario", folder: Path | None = None) -> Scenario:
+        """The scenario in a YAML text; `file` is its name in error messages.
+
+        Raises:
+            ScenarioError: the text is not a valid scenario.
+        """
+        document = parse_yaml(text, file=file)
+        check_document(document, file=file)
+        document.pop("format")
+        scenario: Scenario = _build(cls, document)
+        for index, item in enumerate(scenario.obstacles):
+            if item.motion is not None and not item.motion.begin < item.motion.end:
+                raise ScenarioError(
+                    f"{file}: obstacles[{index}].motion: end is {item.motion.end}; it must be after begin "
+                    f"({item.motion.begin})"
+                )
+            if (item.motion is not None or any(item.velocity)) and item.free:
+                raise ScenarioError(
+                    f"{file}: obstacles[{index}].free is true; a free obstacle starts at rest: leave out "
+                    "velocity and motion"
+                )
+            if item.motion is not None and any(item.velocity):
+                raise ScenarioError(f"{file}: obstacles[{index}]: give either velocity or motion, not both")
+            if item.points == "ball" and item.shape.type != "sphere":
+                raise ScenarioError(
+                    f"{file}: obstacles[{index}].points is 'ball'; a {item.shape.type} allows centre, surface"
+                )
+            if item.shape.type == "points" and item.free:
+                raise ScenarioError(
+                    f"{file}: obstacles[{index}].free is true; a point cloud can only be fixed"
+                )
+        return dataclasses.replace(scenario, folder=folder or Path.cwd())
+
+    def to_document(self) -> dict[str, Any]:
+        """The scenario as plain dictionaries and lists, as in the file, without what equals the default."""
+        return {"format": FORMAT_VERSION, **_plain(self)}
+
+    def save(self, path: str | Path) -> None:
+        """Write the scenario as YAML; file names in it stay valid from the new place."""
+        target = Path(path).resolve()
+        document = self._moved_to(target.parent).to_document()
+        target.write_text(
+            yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None),
+            encoding="utf-8",
+        )
+
+    def file(self, name: str) -> Path:
+        """The path of a file that the scenario names."""
+        return (self.folder / name).resolve()
+
+    def _moved_to(self, folder: Path) -> Scenario:
+        if folder == self.folder.resolve():
+            return self
+
+        def moved(name: str) -> str:
+            return Path(os.path.relpath(self.file(name), folder)).as_posix()
+
+        robot = self.robot
+        if robot.urdf is not None:
+            robot = dataclasses.replace(
+                robot, urdf=moved(robot.urdf), package_dirs=tuple(moved(d) for d in robot.package_dirs)
+            )
+        obstacles = tuple(
+            o if o.shape.file is None
+            else dataclasses.replace(o, shape=dataclasses.replace(o.shape, file=moved(o.shape.file)))
+            for o in self.obstacles
+        )  # fmt: skip
+        return dataclasses.replace(self, robot=robot, obstacles=obstacles, folder=folder)
+
+
+def shipped_scenarios() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package."""
+    return tuple(sorted(p.stem for p in _shipped_folder().glob("*.yaml")))
+
+
+def rotation_matrix(rotation_deg: Vector3) -> npt.NDArray[np.float64]:
+    """Rotation (3, 3) R = Rz(yaw) Ry(pitch) Rx(roll) by angles [deg] (roll, pitch, yaw), fixed axes."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(np.deg2rad(rotation_deg)), np.sin(np.deg2rad(rotation_deg))
+    rx = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    ry = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    rz = np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(rz @ ry @ rx, dtype=np.float64)
+
+
+def _shipped_folder() -> Path:
+    return Path(str(resources.files("sidestep.scenario"))) / "shipped"
+
+
+def _build(kind: Any, value: Any) -> Any:
+    """The value of a checked document as the annotated type: mappings to dataclasses, lists to tuples."""
+    if isinstance(kind, types.UnionType):
+        if value is None:
+            return None
+        for option in kind.__args__:
+            is_tuple = typing.get_origin(option) is tuple
+            if dataclasses.is_dataclass(option) or (is_tuple and isinstance(value, list)):
+                return _build(option, value)
+        return _numbers(value, kind.__args__)
+    if dataclasses.is_dataclass(kind):
+        hints = typing.get_type_hints(kind)
+        return kind(**{key: _build(hints[key], item) for key, item in value.items()})  # type: ignore[operator]
+    if typing.get_origin(kind) is tuple:
+        item_kind = typing.get_args(kind)[0]
+        return tuple(_build(item_kind, item) for item in value)
+    return _numbers(value, (kind,))
+
+
+def _numbers(value: Any, kinds: tuple[Any, ...]) -> Any:
+    if isinstance(value, dict):
+        return {k: float(v) if dict[str, float] in kinds else int(v) for k, v in value.items()}
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value) if float in kinds else int(value) if int in kinds else value
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """The reverse of _build, without what equals the default."""
+    if dataclasses.is_dataclass(value):
+        plain: dict[str, Any] = {}
+        for entry in dataclasses.fields(value):
+            item = getattr(value, entry.name)
+            factory = entry.default_factory
+            default = entry.default if factory is dataclasses.MISSING else factory()
+            if entry.compare and item != default:
+                plain[entry.name] = _plain(item)
+        return plain
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return dict(value) if isinstance(value, dict) else value
