@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from sidestep._core import __version__
 
 if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is imported on first use
+    from sidestep.body import Body as Body
     from sidestep.robot import Geometry as Geometry
     from sidestep.robot import Inertial as Inertial
     from sidestep.robot import Link as Link
@@ -18,18 +19,20 @@ if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is i
 
 # A public name and the module it comes from. Loaded on first use, so that the command line starts at once.
 _EXPORTS: dict[str, str] = {
+    "Body": "sidestep.body",
     "Geometry": "sidestep.robot",
     "Inertial": "sidestep.robot",
     "Link": "sidestep.robot",
     "Robot": "sidestep.robot",
-    "planar_arm": "sidestep.robot",
-    "robots": "sidestep.robot",
     "Scenario": "sidestep.scenario",
     "ScenarioError": "sidestep.scenario",
+    "planar_arm": "sidestep.robot",
+    "robots": "sidestep.robot",
     "shipped_scenarios": "sidestep.scenario",
 }
 
 __all__ = [
+    "Body",
     "Geometry",
     "Inertial",
     "Link",

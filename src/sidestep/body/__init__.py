@@ -1,0 +1,23 @@
+"""Bodies: a Gaussian mixture per link, fitted to the robot's meshes."""
+
+from sidestep.body.body import Body
+from sidestep.body.fitting import FitSettings, LinkFit
+from sidestep.body.mixture import Mixture, fit_mixture
+from sidestep.body.report import FitRow, fit_table, plot_fit
+from sidestep.body.sampling import sample_link, sample_surface
+from sidestep.body.selection import CriterionCurve, criterion_curve
+
+__all__ = [
+    "Body",
+    "CriterionCurve",
+    "FitRow",
+    "FitSettings",
+    "LinkFit",
+    "Mixture",
+    "criterion_curve",
+    "fit_mixture",
+    "fit_table",
+    "plot_fit",
+    "sample_link",
+    "sample_surface",
+]
