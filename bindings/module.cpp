@@ -6,4 +6,5 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_kinematics(m);
   sidestep::python::bind_body(m);
   sidestep::python::bind_obstacles(m);
+  sidestep::python::bind_control(m);
 }

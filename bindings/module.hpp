@@ -8,5 +8,6 @@ namespace sidestep::python {
 void bind_kinematics(nanobind::module_& m);
 void bind_body(nanobind::module_& m);
 void bind_obstacles(nanobind::module_& m);
+void bind_control(nanobind::module_& m);
 
 }  // namespace sidestep::python

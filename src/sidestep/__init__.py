@@ -7,6 +7,12 @@ from sidestep._core import __version__
 
 if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is imported on first use
     from sidestep.body import Body as Body
+    from sidestep.control import Limit as Limit
+    from sidestep.control import TorqueController as TorqueController
+    from sidestep.control import TorqueFault as TorqueFault
+    from sidestep.control import TorqueSolution as TorqueSolution
+    from sidestep.control import TorqueStatus as TorqueStatus
+    from sidestep.control import acceleration_bounds as acceleration_bounds
     from sidestep.robot import Geometry as Geometry
     from sidestep.robot import Inertial as Inertial
     from sidestep.robot import Link as Link
@@ -19,6 +25,12 @@ if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is i
 
 # A public name and the module it comes from. Loaded on first use, so that the command line starts at once.
 _EXPORTS: dict[str, str] = {
+    "Limit": "sidestep.control",
+    "TorqueController": "sidestep.control",
+    "TorqueFault": "sidestep.control",
+    "TorqueSolution": "sidestep.control",
+    "TorqueStatus": "sidestep.control",
+    "acceleration_bounds": "sidestep.control",
     "Body": "sidestep.body",
     "Geometry": "sidestep.robot",
     "Inertial": "sidestep.robot",
@@ -35,11 +47,17 @@ __all__ = [
     "Body",
     "Geometry",
     "Inertial",
+    "Limit",
     "Link",
     "Robot",
     "Scenario",
     "ScenarioError",
+    "TorqueController",
+    "TorqueFault",
+    "TorqueSolution",
+    "TorqueStatus",
     "__version__",
+    "acceleration_bounds",
     "planar_arm",
     "robots",
     "shipped_scenarios",

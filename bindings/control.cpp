@@ -1,0 +1,206 @@
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "arguments.hpp"
+#include "module.hpp"
+#include "sidestep/control/acceleration_bounds.hpp"
+#include "sidestep/control/quadratic_program.hpp"
+#include "sidestep/control/torque_controller.hpp"
+
+namespace sidestep::python {
+namespace {
+
+struct QuadraticSolution {
+  QuadraticProgramStatus status;
+  Eigen::VectorXd x, multipliers;
+  int iterations;
+  double residual;
+};
+
+void bind_quadratic_program(nb::module_& m) {
+  nb::enum_<QuadraticProgramStatus>(m, "QuadraticProgramStatus", "How a quadratic program ended.")
+      .value("solved", QuadraticProgramStatus::solved)
+      .value("infeasible", QuadraticProgramStatus::infeasible)
+      .value("max_iterations", QuadraticProgramStatus::max_iterations)
+      .value("not_positive_definite", QuadraticProgramStatus::not_positive_definite)
+      .value("not_finite", QuadraticProgramStatus::not_finite)
+      .value("wrong_size", QuadraticProgramStatus::wrong_size)
+      .def("__str__", [](QuadraticProgramStatus status) { return name(status); });
+
+  nb::class_<QuadraticSolution>(m, "QuadraticSolution", "What one solve of a QuadraticProgram gives.")
+      .def_ro("status", &QuadraticSolution::status)
+      .def_prop_ro("x", [](const QuadraticSolution& s) { return to_numpy(s.x); }, "The minimiser (n,).")
+      .def_prop_ro("multipliers", [](const QuadraticSolution& s) { return to_numpy(s.multipliers); },
+                   "(n + m,): of the bounds, then of the rows; positive at an upper, negative at a lower limit.")
+      .def_ro("iterations", &QuadraticSolution::iterations)
+      .def_ro("residual", &QuadraticSolution::residual,
+              "Largest relative violation of the optimality conditions; NaN unless solved.");
+
+  nb::class_<QuadraticProgram>(m, "QuadraticProgram",
+                               "A dense strictly convex quadratic program of fixed size, solved by the dual active-set\n"
+                               "method: minimise 1/2 x'Hx + g'x subject to lower <= x <= upper and\n"
+                               "row_lower <= A x <= row_upper. Source: Goldfarb and Idnani (1983).")
+      .def(nb::init<int, int>(), nb::arg("num_variables"), nb::arg("num_rows") = 0)
+      .def_prop_ro("num_variables", &QuadraticProgram::num_variables)
+      .def_prop_ro("num_rows", &QuadraticProgram::num_rows)
+      .def(
+          "solve",
+          [](QuadraticProgram& qp, nb::handle H, nb::handle g, nb::handle lower, nb::handle upper, nb::handle A,
+             nb::handle row_lower, nb::handle row_upper) {
+            const int n = qp.num_variables(), rows = qp.num_rows();
+            QuadraticProgramData data(n, rows);
+            data.H = as_matrix(H, "H", n, n);
+            data.g = as_vector(g, "g", n);
+            if (!lower.is_none()) data.lower = as_filled_vector(lower, "lower", n);
+            if (!upper.is_none()) data.upper = as_filled_vector(upper, "upper", n);
+            if (!A.is_none()) data.A = as_matrix(A, "A", rows, n);
+            if (!row_lower.is_none()) data.row_lower = as_filled_vector(row_lower, "row_lower", rows);
+            if (!row_upper.is_none()) data.row_upper = as_filled_vector(row_upper, "row_upper", rows);
+            const QuadraticProgramStatus status = qp.solve(data);
+            const bool solved = status == QuadraticProgramStatus::solved;
+            return QuadraticSolution{status, qp.solution(), qp.multipliers(), qp.iterations(),
+                                     solved ? optimality_residual(data, qp) : std::numeric_limits<double>::quiet_NaN()};
+          },
+          nb::arg("H"), nb::arg("g"), nb::kw_only(), nb::arg("lower").none() = nb::none(),
+          nb::arg("upper").none() = nb::none(), nb::arg("A").none() = nb::none(),
+          nb::arg("row_lower").none() = nb::none(), nb::arg("row_upper").none() = nb::none(),
+          "H (n, n) symmetric positive definite; g (n,); bounds scalar or (n,), rows A (m, n), scalar or (m,);\n"
+          "None or infinite means no bound, equal bounds an equality. Returns a QuadraticSolution; data that cannot\n"
+          "be solved give a status. Raises ValueError on wrong shapes.");
+}
+
+void bind_acceleration_bounds(nb::module_& m) {
+  nb::enum_<Limit>(m, "Limit", "Limits of one joint; a flag, so a set of them is one value.", nb::is_flag())
+      .value("position_lower", Limit::position_lower)
+      .value("position_upper", Limit::position_upper)
+      .value("velocity_lower", Limit::velocity_lower)
+      .value("velocity_upper", Limit::velocity_upper)
+      .value("acceleration_lower", Limit::acceleration_lower)
+      .value("acceleration_upper", Limit::acceleration_upper)
+      .value("torque_lower", Limit::torque_lower)
+      .value("torque_upper", Limit::torque_upper);
+
+  m.def(
+      "acceleration_bounds",
+      [](nb::handle robot_or_limits, nb::handle q, nb::handle v, double period, double position_margin) {
+        const JointLimits& limits = nb::isinstance<Robot>(robot_or_limits)
+                                        ? nb::cast<const Robot&>(robot_or_limits).limits()
+                                        : nb::cast<const JointLimits&>(robot_or_limits);
+        const int nv = static_cast<int>(limits.velocity.size());
+        const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
+        if (!position.allFinite() || !velocity.allFinite()) {
+          throw nb::value_error("q and v must be finite");
+        }
+        if (!(period > 0.0) || !std::isfinite(period)) {
+          throw nb::value_error(("period is " + std::to_string(period) + ", must be finite and positive").c_str());
+        }
+        AccelerationBounds bounds(nv);
+        bounds.update(limits, position, velocity, period, position_margin);
+        return nb::make_tuple(to_numpy(bounds.lower), to_numpy(bounds.upper));
+      },
+      nb::arg("limits"), nb::arg("q"), nb::arg("v"), nb::arg("period"), nb::kw_only(), nb::arg("position_margin") = 0.0,
+      nb::sig("def acceleration_bounds(limits: Robot | JointLimits, q: numpy.typing.ArrayLike, "
+              "v: numpy.typing.ArrayLike, period: float, *, position_margin: float = 0.0) "
+              "-> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"),
+      "Accelerations (lower, upper), each (nv,) [/s^2], that keep every joint inside its limits for ever.\n\n"
+      "limits: a Robot or its JointLimits; q (nv,) [rad | m]; v (nv,) [/s]; period [s]: how long an acceleration is\n"
+      "held. Outside the limits they steer back. Never empty. Raises ValueError on wrong shapes or values that are\n"
+      "not finite. Source: Del Prete (2018), made exact for held accelerations.");
+}
+
+void bind_torque_controller(nb::module_& m) {
+  nb::enum_<TorqueStatus>(m, "TorqueStatus", "How a control step ended, from best to worst.")
+      .value("ok", TorqueStatus::ok, "tracked, no limit in the way")
+      .value("limited", TorqueStatus::limited, "optimal, with a limit in the way")
+      .value("relaxed", TorqueStatus::relaxed, "the torque limits do not allow the acceleration bounds")
+      .value("fallback_invalid_input", TorqueStatus::fallback_invalid_input, "unusable input, damped stop")
+      .value("fallback_solver", TorqueStatus::fallback_solver, "program not solved, damped stop")
+      .def("__str__", [](TorqueStatus status) { return name(status); })
+      .def_prop_ro("is_fallback", [](TorqueStatus s) { return s >= TorqueStatus::fallback_invalid_input; });
+  nb::enum_<TorqueFault>(m, "TorqueFault", "Which input of a control step is unusable.")
+      .value("none", TorqueFault::none)
+      .value("position", TorqueFault::position)
+      .value("velocity", TorqueFault::velocity)
+      .value("acceleration", TorqueFault::acceleration)
+      .value("mass_matrix", TorqueFault::mass_matrix)
+      .value("bias", TorqueFault::bias)
+      .def("__str__", [](TorqueFault fault) { return name(fault); });
+
+  nb::class_<TorqueSolution>(m, "TorqueSolution", "What one control step gives.")
+      .def_ro("status", &TorqueSolution::status)
+      .def_ro("fault", &TorqueSolution::fault)
+      .def_prop_ro("torque", [](const TorqueSolution& s) { return to_numpy(s.torque); },
+                   "(nv,) [Nm | N], within the effort limits, always finite.")
+      .def_prop_ro("acceleration", [](const TorqueSolution& s) { return to_numpy(s.acceleration); },
+                   "(nv,) [/s^2] that the torque gives; NaN where M or the bias is unusable.")
+      .def_prop_ro("slack", [](const TorqueSolution& s) { return to_numpy(s.slack); },
+                   "(nv,) [/s^2] signed acceleration beyond its bounds; 0 unless relaxed.")
+      .def_prop_ro("lower", [](const TorqueSolution& s) { return to_numpy(s.lower); },
+                   "(nv,) [/s^2] lower acceleration bounds.")
+      .def_prop_ro("upper", [](const TorqueSolution& s) { return to_numpy(s.upper); },
+                   "(nv,) [/s^2] upper acceleration bounds.")
+      .def_prop_ro("active", [](const TorqueSolution& s) { return nb::tuple(nb::cast(s.active)); },
+                   nb::sig("def active(self) -> tuple[Limit, ...]"), "The limits in the way of each joint.");
+
+  nb::class_<TorqueController>(m, "TorqueController",
+                               "Torque that tracks a wanted acceleration within every limit of the arm:\n"
+                               "minimise 1/2 (x - a)'Q(x - a) + 1/2 t'Rt with t = torque / effort limit, subject to\n"
+                               "M x + h = torque, |torque| <= effort limit, lower(q, v) <= x <= upper(q, v).\n"
+                               "Source: Bosc, equation T6.3, corrected. One object per thread.")
+      .def(
+          "__init__",
+          [](TorqueController* self, const Robot& robot, double period, nb::handle tracking_weight,
+             nb::handle torque_weight, double slack_weight, double position_margin, double stop_time,
+             double stop_damping) {
+            const int nv = robot.num_coordinates();
+            TorqueControllerSettings settings;
+            settings.period = period;
+            settings.tracking_weight = as_filled_vector(tracking_weight, "tracking_weight", nv);
+            settings.torque_weight = as_filled_vector(torque_weight, "torque_weight", nv);
+            settings.slack_weight = slack_weight;
+            settings.position_margin = position_margin;
+            settings.stop_time = stop_time;
+            settings.stop_damping = stop_damping;
+            new (self) TorqueController(robot, std::move(settings));
+          },
+          nb::arg("robot"), nb::kw_only(), nb::arg("period") = TorqueControllerSettings().period,
+          nb::arg("tracking_weight") = TorqueControllerSettings().tracking_weight[0],
+          nb::arg("torque_weight") = TorqueControllerSettings().torque_weight[0],
+          nb::arg("slack_weight") = TorqueControllerSettings().slack_weight,
+          nb::arg("position_margin") = TorqueControllerSettings().position_margin,
+          nb::arg("stop_time") = TorqueControllerSettings().stop_time,
+          nb::arg("stop_damping") = TorqueControllerSettings().stop_damping,
+          "period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];\n"
+          "torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the\n"
+          "steepest tracking cost; position_margin [rad | m]: position limits are moved inwards by it;\n"
+          "stop_time [s]: time constant of the damped stop; stop_damping [-]: its damping without a mass matrix, over\n"
+          "effort limit / velocity limit. Raises ValueError that names the setting.")
+      .def(
+          "solve",
+          [](TorqueController& controller, nb::handle q, nb::handle v, nb::handle acceleration, nb::handle mass_matrix,
+             nb::handle bias) {
+            const int nv = controller.num_coordinates();
+            TorqueSolution solution(nv);
+            static_cast<void>(controller.solve(as_vector(q, "q", nv), as_vector(v, "v", nv),
+                                               as_vector(acceleration, "acceleration", nv),
+                                               as_matrix(mass_matrix, "mass_matrix", nv, nv),
+                                               as_vector(bias, "bias", nv), solution));
+            return solution;
+          },
+          nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::arg("mass_matrix"), nb::arg("bias"),
+          "One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),\n"
+          "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity). Returns a TorqueSolution; values that are not\n"
+          "finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.")
+      .def_prop_ro("num_coordinates", &TorqueController::num_coordinates)
+      .def("count", &TorqueController::count, nb::arg("status"), "Number of solves that ended with this status.");
+}
+
+}  // namespace
+
+void bind_control(nb::module_& m) {
+  bind_quadratic_program(m);
+  bind_acceleration_bounds(m);
+  bind_torque_controller(m);
+}
+
+}  // namespace sidestep::python

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+namespace sidestep {
+
+/// Writes the lower triangular L with A = L L' into `L` (of A's size; above the diagonal untouched), reading A's lower
+/// triangle. False if A is not positive definite to working precision. Allocates nothing at any size, which Eigen's
+/// blocked factorisation does not promise.
+inline bool cholesky(const Eigen::MatrixXd& A, Eigen::MatrixXd& L) noexcept {
+  // A pivot below this fraction of its diagonal entry is all cancellation.
+  constexpr double singular = 1e-14;
+  const Eigen::Index n = A.rows();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const double pivot = A(j, j) - L.row(j).head(j).squaredNorm();
+    if (!(pivot > singular * A(j, j)) || !(A(j, j) > 0.0)) {
+      return false;
+    }
+    const double diagonal = std::sqrt(pivot);
+    L(j, j) = diagonal;
+    for (Eigen::Index i = j + 1; i < n; ++i) {
+      L(i, j) = (A(i, j) - L.row(i).head(j).dot(L.row(j).head(j))) / diagonal;
+    }
+  }
+  return true;
+}
+
+}  // namespace sidestep
