@@ -14,8 +14,9 @@ from sidestep.robot.link import Array, Link
 class Dynamics:
     """Mass matrix and bias force of a tree whose mimic joints follow other coordinates.
 
-    Pinocchio's model has one coordinate per moving joint, q' = S q + c with S from the mimic multipliers (the
-    identity without mimic joints). Virtual work gives M = S^T M' S and, as S is constant, h = S^T h'(q', S v).
+    Pinocchio's model has one coordinate per moving joint, q' = S q + c, where S holds the mimic multipliers (it
+    is the identity without mimic joints). By virtual work M = S^T M' S and, S being constant,
+    h = S^T h'(q', S v).
     Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 and 6.
 
     Args:
@@ -46,7 +47,7 @@ class Dynamics:
 
 
 def _model(robot: _core.Robot, links: Sequence[Link]) -> pin.Model:
-    """The tree as a Pinocchio model: coordinate i is that of `robot.joints[i]`, frames carry the links' names."""
+    """The tree as a Pinocchio model; coordinate i belongs to `robot.joints[i]`, frames are called as links."""
     model = pin.Model()
     model.name = robot.name
     indices: list[int] = []

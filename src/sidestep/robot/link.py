@@ -88,7 +88,7 @@ class Link:
 
 @lru_cache(maxsize=256)
 def _file_mesh(path: Path) -> trimesh.Trimesh:
-    """The triangles of a mesh file in metres (a COLLADA file's unit is applied, its up axis is not, as in ROS)."""
+    """The triangles of a mesh file in metres. COLLADA: its unit is applied, its up axis is not, as in ROS."""
     try:
         mesh = trimesh.load_mesh(path)
     except Exception as error:  # the readers behind trimesh raise anything; the user needs the file's name
@@ -96,5 +96,5 @@ def _file_mesh(path: Path) -> trimesh.Trimesh:
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise ValueError(f"mesh file {path} holds no triangles")
     if path.suffix.lower() == ".dae" and mesh.units is not None:
-        mesh.apply_scale(trimesh.units.unit_conversion(mesh.units, "meters"))
+        mesh.apply_transform(np.diag([*[trimesh.units.unit_conversion(mesh.units, "meters")] * 3, 1.0]))
     return mesh

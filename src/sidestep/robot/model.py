@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -20,16 +21,14 @@ from sidestep.robot.source import read_description
 from sidestep.robot.tree import KinematicTree, build_tree
 from sidestep.robot.urdf import parse_urdf
 
-_HASH_DECIMALS = (
-    9  # [m, rad] lengths and angles are hashed to 1e-9: below any mesh's accuracy, above rounding
-)
+_HASH_DECIMALS = 9  # lengths [m] and angles are hashed to 1e-9: below any mesh's accuracy, above rounding
 
 
 class Robot(_core.Robot):
     """An arm read from a URDF: kinematics in the core, links with geometry and inertia, limits, dynamics.
 
-    nq = nv = `num_coordinates`: continuous joints are plain angles, mimic joints share their source's coordinate,
-    whose limits are the source's. Make one with `from_urdf` or `named`.
+    nq = nv = `num_coordinates`: continuous joints are plain angles; mimic joints share the coordinate and the
+    limits of their source. Make one with `from_urdf` or `named`.
     """
 
     def __init__(self, name: str, tree: KinematicTree) -> None:
@@ -61,16 +60,16 @@ class Robot(_core.Robot):
     ) -> Robot:
         """Reads a robot from a URDF or xacro file, or from URDF text.
 
-        Joints may be revolute, continuous, prismatic, fixed, mimic, and may branch. Mesh files are looked up now
-        and loaded when first used.
+        Joints may be revolute, continuous, prismatic, fixed or mimic, and may branch. Mesh files are looked
+        up now and loaded when first used.
 
         Args:
             source: a path, or the XML text itself (starts with `<`).
-            package_dirs: folders that hold the packages of `package://` references (or are such a package); the
-                folders above the URDF are searched too.
+            package_dirs: folders that hold the packages of `package://` references (or are such a package);
+                the folders above the URDF are searched too.
             base_pose: pose (4, 4) of the root link in the world, identity by default.
-            tip: a link; keeps the joints from the root to it, and links fixed rigidly to links before it. What
-                hangs on the tip itself, and every other branch that moves, is dropped.
+            tip: a link; keeps the joints from the root to it, and links fixed rigidly to links before it.
+                What hangs on the tip itself, and every other branch that moves, is dropped.
             locked: joints held at a value [rad | m]; joints that mimic them are held too.
             acceleration_limits: number or (nv,) [rad/s^2 | m/s^2]; 10 by default (URDF has none).
             velocity_limits: number or (nv,) [rad/s | m/s], in place of the file's.
@@ -79,8 +78,8 @@ class Robot(_core.Robot):
             xacro_arguments: values of `<xacro:arg>`.
 
         Raises:
-            FileNotFoundError: the description or a mesh is missing. ValueError: anything wrong in the file or the
-            arguments, named together with what is allowed.
+            FileNotFoundError: the description or a mesh is missing.
+            ValueError: anything wrong in the file or the arguments, named together with what is allowed.
         """
         description = read_description(source, package_dirs=package_dirs, xacro_arguments=xacro_arguments)
         urdf = parse_urdf(description)
@@ -128,8 +127,8 @@ class Robot(_core.Robot):
     def collision_mesh(self, link: str) -> trimesh.Trimesh | None:
         """The surface of a link in its own frame [m]; None for a link without geometry.
 
-        Collision geometry, or the visual geometry of a link that has no collision geometry; several shapes are put
-        side by side in one mesh. Loaded once: copy it before you change it.
+        Collision geometry, or the visual geometry of a link that has no collision geometry; several shapes
+        are put side by side in one mesh. Loaded once: copy it before you change it.
 
         Raises:
             ValueError: unknown link, or no link of the robot has any geometry.
@@ -137,21 +136,22 @@ class Robot(_core.Robot):
         geometries = self.link(link).geometries
         if not any(item.geometries for item in self._links):
             raise ValueError(
-                f"robot {self.name!r} has no geometry: no link of its URDF has a <collision> or <visual> element"
+                f"robot {self.name!r} has no geometry: no link of its URDF has a <collision> or <visual>"
             )
         if link not in self._meshes:
             meshes = [geometry.mesh() for geometry in geometries]
-            self._meshes[link] = trimesh.util.concatenate(meshes) if meshes else None
+            merged: Any = trimesh.util.concatenate(meshes) if meshes else None
+            self._meshes[link] = merged
         return self._meshes[link]
 
     @cached_property
     def neutral(self) -> Array:
-        """A configuration (nv,) inside the limits: the middle of a joint's interval, near 0 for an unbounded one."""
+        """A configuration (nv,) inside the limits: the middle of each interval, 0 without limits."""
         lower, upper = self._finite_interval()
         return 0.5 * (lower + upper)
 
     def random_configuration(self, rng: np.random.Generator) -> Array:
-        """A configuration (nv,), uniform within the limits (within ±pi, ±pi m, of 0 or a bound where unbounded)."""
+        """A configuration (nv,), uniform within the limits; within ±pi where a coordinate has none."""
         lower, upper = self._finite_interval()
         return rng.uniform(lower, upper)
 
@@ -176,25 +176,27 @@ class Robot(_core.Robot):
         return array
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """Joint-space inertia M(q) (nv, nv) [kg m^2 for revolute coordinates]; rotor inertias are not in a URDF."""
+        """Joint-space inertia M(q) (nv, nv) [kg m^2, kg m, kg]; without rotor inertias."""
         return self._dynamics.mass_matrix(self._vector(q, "q"))
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
-        """Coriolis, centrifugal and gravity force h(q, v) = C(q, v) v + g(q) (nv,) [Nm | N], gravity 9.81 along -z.
+        """Coriolis, centrifugal and gravity force (nv,) [Nm | N], gravity 9.81 m/s^2 along the world's -z.
 
-        M(q) a + h(q, v) = torque; no friction.
+        h(q, v) = C(q, v) v + g(q), so that M(q) a + h(q, v) = torque; no friction.
         """
         return self._dynamics.bias(self._vector(q, "q"), self._vector(v, "v"))
 
     @property
     def pinocchio(self) -> pin.Model:
-        """The same tree as a Pinocchio model, one coordinate per moving joint (mimic joints have their own)."""
+        """The same tree for Pinocchio, with a coordinate per moving joint (mimic joints have their own)."""
         return self._dynamics.model
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash (64 hex digits) of kinematics and geometry, mesh files by content; not of limits, inertias, names of
-        files or the base pose, none of which a fitted body depends on."""
+        """Hash (64 hex digits) of kinematics and geometry, mesh files by content.
+
+        Limits, inertias, file names and the base pose, on which a fitted body does not depend, do not enter.
+        """
         digest = hashlib.sha256()
 
         def add(*items: object) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 _WIDTH = (
     0.08  # [m] edge of the square cross section: a slender link, as in the thesis's drawings of planar arms
 )
@@ -15,8 +17,8 @@ _PEAK_ACCELERATION = (
 def planar_arm(num_joints: int, link_length: float = 0.5) -> str:
     """URDF text of an arm in the x-y plane: equal box links along x, joints about z, limits ±pi.
 
-    The links are `base`, `link1` … `linkN` (frame at the joint, box from there along x) and `tip`, the end of the
-    last link. Gravity (along z) does not load the joints.
+    The links are `base`, `link1` … `linkN` (frame at the joint, box from there along x) and `tip`, the end of
+    the last link. Gravity (along z) does not load the joints.
 
     Args:
         num_joints: number of joints and links, at least 1.
@@ -44,7 +46,7 @@ def planar_arm(num_joints: int, link_length: float = 0.5) -> str:
     <child link="link{i}"/>
     <origin xyz="{shift:.12g} 0 0"/>
     <axis xyz="0 0 1"/>
-    <limit lower="-3.141592653589793" upper="3.141592653589793" velocity="{_VELOCITY_LIMIT}" effort="{effort:.6g}"/>
+    <limit lower="{-math.pi}" upper="{math.pi}" velocity="{_VELOCITY_LIMIT}" effort="{effort:.6g}"/>
   </joint>
   <link name="link{i}">
     <inertial>

@@ -28,8 +28,8 @@ class Description:
     def resolve(self, uri: str, owner: str) -> Path:
         """The file behind `package://NAME/REST`, `file://PATH` or a plain path.
 
-        A package is looked up as PARENT/NAME and as a folder itself called NAME, first in `package_dirs`, then
-        in the folders above the URDF; a relative path in the URDF's folder, then in `package_dirs`.
+        A package is looked up as PARENT/NAME and as a folder itself called NAME, first in `package_dirs`,
+        then in the folders above the URDF; a relative path in the URDF's folder, then in `package_dirs`.
 
         Raises:
             FileNotFoundError: names `owner`, the reference and the folders searched.
@@ -98,7 +98,7 @@ def _parse(text: str, label: str) -> ElementTree.Element:
 
 
 def _qualified_names(root: ElementTree.Element) -> Iterator[str]:
-    """Names of elements; a namespace stands in braces in front. A declared but unused namespace does not show."""
+    """Names of elements, the namespace in braces in front; a declared but unused namespace does not show."""
     return (element.tag for element in root.iter() if isinstance(element.tag, str))
 
 

@@ -1,4 +1,4 @@
-"""From URDF to the core's tree: pruned to a tip, joints locked, fixed joints folded, mimic joints resolved."""
+"""From URDF to the core's tree: pruned to a tip, joints locked, fixed ones folded, mimic ones resolved."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from sidestep.robot.link import Array, Link
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
 DEFAULT_ACCELERATION_LIMIT = 10.0
-"""Acceleration limit where none is given, [rad/s^2] or [m/s^2]. URDF has no such limit; 10 is the FR3's official
-value on every joint and that of the thesis's controller, and no arm of the catalogue has been rated below 7.5."""
+"""Acceleration limit where none is given, [rad/s^2] or [m/s^2], as URDF has none: the FR3's official value on
+every joint, that of the thesis's controller, and the order of what other arms of this size are rated for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class KinematicTree:
 
 @dataclass(frozen=True)
 class _Drive:
-    """What a moving joint follows: multiplier * position of joint `source` + offset; a constant if source is None."""
+    """What a moving joint follows: multiplier * position of `source` + offset; `offset` alone without source."""
 
     source: str | None
     multiplier: float
@@ -74,8 +74,8 @@ def build_tree(
             continue
         if drive.source not in coordinates:
             raise ValueError(
-                f"{urdf.label}: joint {joint.name!r} mimics {drive.source!r}, which is not on the way to the tip "
-                f"{tip!r}; lock {drive.source!r}"
+                f"{urdf.label}: joint {joint.name!r} mimics {drive.source!r}, which is not on the way to the "
+                f"tip {tip!r}; lock {drive.source!r}"
             )
         joints.append(
             Joint(
@@ -147,10 +147,10 @@ def _drives(urdf: Urdf, locks: dict[str, float]) -> dict[str, _Drive]:
 
 
 def _kept_joints(urdf: Urdf, drives: dict[str, _Drive], tip: str | None) -> list[UrdfJoint]:
-    """The joints that stay, parents before children, in the order of the file.
+    """The joints that stay, depth first (Pinocchio needs every subtree contiguous), siblings in file order.
 
-    With a tip: the way from the root to it, and what hangs rigidly (fixed or locked joints only) on a link of that
-    way other than the tip itself.
+    With a tip: the way from the root to it, and what hangs rigidly (fixed or locked joints only) on a link of
+    that way other than the tip itself.
     """
     if tip is not None and tip not in urdf.links:
         raise ValueError(f"tip {tip!r} is no link of {urdf.label}; its links are: {', '.join(urdf.links)}")
@@ -165,19 +165,17 @@ def _kept_joints(urdf: Urdf, drives: dict[str, _Drive], tip: str | None) -> list
         way.add(to_parent[link].name)
         link = to_parent[link].parent
 
+    def stays(joint: UrdfJoint) -> bool:
+        rigid = not joint.moves or drives[joint.name].source is None
+        return tip is None or joint.name in way or (rigid and joint.parent != tip)
+
     kept: list[UrdfJoint] = []
-    open_links = [urdf.root]
-    while open_links:
-        link = open_links.pop()
-        stay = [
-            joint
-            for joint in children[link]
-            if tip is None
-            or joint.name in way
-            or (link != tip and (not joint.moves or drives[joint.name].source is None))
-        ]
-        kept.extend(stay)
-        open_links.extend(joint.child for joint in reversed(stay))
+    open_joints = children[urdf.root][::-1]
+    while open_joints:
+        joint = open_joints.pop()
+        if stays(joint):
+            kept.append(joint)
+            open_joints.extend(children[joint.child][::-1])
     return kept
 
 
@@ -221,13 +219,13 @@ def _limits(
             continue
         if not limit.lower < limit.upper:
             raise ValueError(
-                f"{label}: joint {joint.name!r}: lower limit {limit.lower} must be below upper limit {limit.upper}"
+                f"{label}: joint {joint.name!r}: lower limit {limit.lower} must be below upper {limit.upper}"
             )
         for what, value, given in (("velocity", limit.velocity, velocity), ("effort", limit.effort, effort)):
             if given is None and not value > 0.0:
                 raise ValueError(
-                    f"{label}: joint {joint.name!r}: {what} limit is {value}, must be positive; correct the file, "
-                    f"pass {what}_limits or lock the joint"
+                    f"{label}: joint {joint.name!r}: {what} limit is {value}, must be positive; correct the "
+                    f"file, pass {what}_limits or lock the joint"
                 )
     names = [joint.name for joint in joints]
     return JointLimits(

@@ -238,7 +238,7 @@ def _geometry(element: ElementTree.Element, description: Description, owner: str
 
 
 def _placement(element: ElementTree.Element, owner: str) -> Array:
-    """The pose (4, 4) of <origin>: fixed-axis roll, pitch, yaw, then translation; identity without the element."""
+    """The pose (4, 4) of <origin>: roll, pitch, yaw about fixed axes, translation; identity if absent."""
     placement = np.eye(4)
     origin = element.find("origin")
     if origin is not None:
