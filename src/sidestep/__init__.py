@@ -22,9 +22,27 @@ if TYPE_CHECKING:  # what type checkers and editors see; at run time a name is i
     from sidestep.scenario import Scenario as Scenario
     from sidestep.scenario import ScenarioError as ScenarioError
     from sidestep.scenario import shipped_scenarios as shipped_scenarios
+    from sidestep.simulation import Arrival as Arrival
+    from sidestep.simulation import Evaluation as Evaluation
+    from sidestep.simulation import ExactClearance as ExactClearance
+    from sidestep.simulation import KinematicRun as KinematicRun
+    from sidestep.simulation import SceneObject as SceneObject
+    from sidestep.simulation import Simulation as Simulation
+    from sidestep.simulation import SimulationRun as SimulationRun
+    from sidestep.simulation import evaluate as evaluate
+    from sidestep.simulation import run_kinematically as run_kinematically
 
 # A public name and the module it comes from. Loaded on first use, so that the command line starts at once.
 _EXPORTS: dict[str, str] = {
+    "run_kinematically": "sidestep.simulation",
+    "evaluate": "sidestep.simulation",
+    "SimulationRun": "sidestep.simulation",
+    "Simulation": "sidestep.simulation",
+    "SceneObject": "sidestep.simulation",
+    "KinematicRun": "sidestep.simulation",
+    "ExactClearance": "sidestep.simulation",
+    "Evaluation": "sidestep.simulation",
+    "Arrival": "sidestep.simulation",
     "Limit": "sidestep.control",
     "TorqueController": "sidestep.control",
     "TorqueFault": "sidestep.control",
@@ -44,22 +62,31 @@ _EXPORTS: dict[str, str] = {
 }
 
 __all__ = [
+    "Arrival",
     "Body",
+    "Evaluation",
+    "ExactClearance",
     "Geometry",
     "Inertial",
+    "KinematicRun",
     "Limit",
     "Link",
     "Robot",
     "Scenario",
     "ScenarioError",
+    "SceneObject",
+    "Simulation",
+    "SimulationRun",
     "TorqueController",
     "TorqueFault",
     "TorqueSolution",
     "TorqueStatus",
     "__version__",
     "acceleration_bounds",
+    "evaluate",
     "planar_arm",
     "robots",
+    "run_kinematically",
     "shipped_scenarios",
 ]
 

@@ -1,0 +1,28 @@
+"""Physics, exact clearance, and what a run achieved."""
+
+from sidestep.simulation.clearance import Clearance, ExactClearance, PathClearance
+from sidestep.simulation.evaluation import Evaluation, LimitViolations, evaluate
+from sidestep.simulation.model import SimulationModel, build_model
+from sidestep.simulation.run import Arrival, Contact, KinematicRun, Run, SimulationRun
+from sidestep.simulation.scene import SceneObject, seen_obstacles
+from sidestep.simulation.simulation import Simulation, run_kinematically
+
+__all__ = [
+    "Arrival",
+    "Clearance",
+    "Contact",
+    "Evaluation",
+    "ExactClearance",
+    "KinematicRun",
+    "LimitViolations",
+    "PathClearance",
+    "Run",
+    "SceneObject",
+    "Simulation",
+    "SimulationModel",
+    "SimulationRun",
+    "build_model",
+    "evaluate",
+    "run_kinematically",
+    "seen_obstacles",
+]

@@ -1,0 +1,399 @@
+"""Exact distances between the robot's meshes and the scene: the truth that the controller is judged by.
+
+The controller sees the body as Gaussians; this file never does. Distances are computed by Coal (Pan, Chitta,
+Manocha, "FCL: A general purpose library for collision and proximity queries", 2012; Montaut et al., 2024) on
+the triangles of the collision meshes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from sidestep._core import JointType
+from sidestep.robot import Robot
+from sidestep.simulation.pose import pose_vector, rotation_matrix
+from sidestep.simulation.scene import SceneObject, check_scene
+
+Array = npt.NDArray[np.float64]
+
+POINT_RADIUS = 1e-9  # [m] Coal has no point; a sphere this small stands for the centre of a ball
+MAX_CONTACTS = 10_000  # contacts kept for a penetration depth: more than the triangles of any overlap
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """The closest pair of a robot and a scene.
+
+    Attributes:
+        distance: [m], negative when the two overlap; infinite when the scene is empty.
+        link, obstacle: their names; empty when the scene is empty.
+        point_on_link, point_on_obstacle: (3,) [m], world.
+    """
+
+    distance: float
+    link: str
+    obstacle: str
+    point_on_link: Array
+    point_on_obstacle: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PathClearance:
+    """The smallest clearance along a whole motion, between the samples too.
+
+    Attributes:
+        clearance: the closest pair at the sample found to be worst.
+        sample: its position along the trajectory, in samples (4.25: a quarter of the way from 4 to 5).
+        lower_bound: [m] no moment of the motion has a smaller clearance than this.
+        checks: number of distance computations that this took.
+    """
+
+    clearance: Clearance
+    sample: float
+    lower_bound: float
+    checks: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A rigid shape for Coal. A ball is kept as its centre and `radius` is subtracted afterwards."""
+
+    name: str
+    shape: coal.CollisionGeometry
+    radius: float
+    surface: (
+        Array | None
+    )  # (F, 3, 3) triangles, hollow for Coal; None for primitives, which it takes as solid
+    reference: Array  # (3,) a point of the shape, in its frame
+    bounding_radius: float
+
+
+class ExactClearance:
+    """Signed distance between a robot and a scene, on exact meshes, by Coal.
+
+    The distance is positive when apart. When a link and a ball (or point) overlap it is exactly minus the
+    depth: the length of the shortest push of the ball's centre out of the mesh, plus the radius. For the
+    other shapes it is minus the largest depth that Coal reports over the overlapping triangles, which says
+    that there is contact and about how deep, not the exact separating distance. Meshes are hollow for Coal;
+    what is wholly inside one is found by the winding number and counts as overlap.
+
+    Args:
+        robot: with collision meshes; links without one are left out.
+        objects: the scene.
+        include_immobile: also measure links that no joint moves (the base).
+
+    Raises:
+        ValueError: no link has a collision mesh, or two objects share a name.
+    """
+
+    def __init__(
+        self, robot: Robot, objects: Sequence[SceneObject], *, include_immobile: bool = False
+    ) -> None:
+        self.robot = robot
+        self.objects = check_scene(objects)
+        joint_of = {frame.name: frame.joint for frame in robot.frames}
+        self._links: list[_Solid] = []
+        self._travel: list[Array] = []
+        for link in robot.links:
+            mesh = robot.collision_mesh(link.name)
+            if mesh is None or (joint_of[link.name] < 0 and not include_immobile):
+                continue
+            self._links.append(_mesh_solid(link.name, mesh))
+            self._travel.append(travel_per_joint(robot, link.name, mesh))
+        if not self._links:
+            raise ValueError(f"robot {robot.name!r} has no moving link with a collision mesh to measure from")
+        self._objects = [_object_solid(item) for item in self.objects]
+
+    def distance(self, q: Array, object_poses: Array | None = None) -> Clearance:
+        """The closest pair at one configuration.
+
+        Args:
+            q: (nv,) configuration.
+            object_poses: (num_objects, 7) position [m] and quaternion (w, x, y, z) of each object in the
+                world; None takes the poses at time 0.
+        """
+        poses = self._start_poses() if object_poses is None else np.asarray(object_poses, dtype=float)
+        best = _nothing()
+        for i, link in enumerate(self._links):
+            X_WL = self.robot.pose(q, link.name)
+            for j in range(len(self._objects)):
+                centers_apart = float(np.linalg.norm(X_WL[:3, 3] - poses[j, :3]))
+                if centers_apart - link.bounding_radius - self._objects[j].bounding_radius >= best.distance:
+                    continue  # even their bounding balls are farther apart than the closest pair so far
+                found = self._pair(i, j, X_WL, poses[j])
+                if found.distance < best.distance:
+                    best = found
+        return best
+
+    def minimum_over(
+        self, trajectory: Array, object_poses: Array | None = None, *, tolerance: float = 1e-3
+    ) -> PathClearance:
+        """The smallest clearance of a motion that is linear in the joints from each sample to the next.
+
+        Between two checks of a pair, neither can come closer than the distance its points can travel,
+            |d(t) - d(t')| <= sum_j L_j |q_j(t) - q_j(t')| + (travel of the object),
+        with L_j the longest lever arm of the link about joint j. So after a check that found d, the pair is
+        skipped until that bound has grown to d - (smallest so far) + tolerance. Nothing is missed: the true
+        minimum lies in [reported - tolerance, reported]; where the reported one is above `tolerance`, nothing
+        touched, however thin. (Below zero the lower end holds for balls only, see the class.)
+
+        Args:
+            trajectory: (T, nv) samples.
+            object_poses: (T, num_objects, 7) as in `distance`; objects move linearly (and turn at a constant
+                rate) between samples. None: at their poses at time 0.
+            tolerance: [m].
+
+        Raises:
+            ValueError: shapes do not match, or tolerance is not positive.
+        """
+        if not tolerance > 0.0:
+            raise ValueError(f"tolerance must be positive, got {tolerance}")
+        path, poses = self._check_path(trajectory, object_poses)
+        best, where, checks = _nothing(), 0.0, 0
+        for sample in np.unique(
+            np.linspace(0, len(path) - 1, 16).astype(int)
+        ):  # a good first guess of the minimum
+            found = self.distance(path[sample], poses[sample])
+            checks += len(self._links) * len(self._objects)
+            if found.distance < best.distance:
+                best, where = found, float(sample)
+
+        for (i, j), so_far in self._travel_along(path, poses).items():
+            s = 0.0
+            while True:
+                q, pose = _interpolate(path, s), _interpolate_pose(poses[:, j], s)
+                found = self._pair(i, j, self.robot.pose(q, self._links[i].name), pose)
+                checks += 1
+                if found.distance < best.distance:
+                    best, where = found, s
+                following = _advance(so_far, s, found.distance - best.distance + tolerance)
+                if following is None:
+                    break
+                s = following
+        return PathClearance(best, where, best.distance - tolerance, checks)
+
+    def series(self, trajectory: Array, object_poses: Array | None = None) -> Array:
+        """The clearance (T,) [m] at each sample of a trajectory, for plots; arguments as in `minimum_over`.
+
+        The same bound spares most distance computations: a pair is measured only where it could be the
+        closest.
+        """
+        path, poses = self._check_path(trajectory, object_poses)
+        travel = self._travel_along(path, poses)
+        pairs = list(travel)
+        so_far = np.array(list(travel.values())).reshape(len(pairs), len(path))
+        at_least = np.full(len(pairs), -np.inf)  # of each pair, at sample k
+        closest = np.full(len(path), np.inf)
+        for k, q in enumerate(path):
+            if k > 0:
+                at_least -= so_far[:, k] - so_far[:, k - 1]
+            for index in np.argsort(at_least):
+                if at_least[index] >= closest[k]:
+                    break
+                i, j = pairs[index]
+                found = self._pair(i, j, self.robot.pose(q, self._links[i].name), poses[k, j]).distance
+                at_least[index] = found if found > 0.0 else -np.inf  # an overlap of meshes has no such bound
+                closest[k] = min(closest[k], found)
+        return closest
+
+    def _check_path(self, trajectory: Array, object_poses: Array | None) -> tuple[Array, Array]:
+        path = np.asarray(trajectory, dtype=float)
+        if path.ndim != 2 or path.shape[1] != self.robot.num_coordinates or len(path) == 0:
+            raise ValueError(
+                f"trajectory has shape {path.shape}, expected (T, {self.robot.num_coordinates}), T > 0"
+            )
+        expected = (len(path), len(self._objects), 7)
+        if object_poses is None:
+            poses: Array = np.broadcast_to(self._start_poses(), expected)
+        else:
+            poses = np.asarray(object_poses, dtype=float)
+        if poses.shape != expected:
+            raise ValueError(f"object_poses has shape {poses.shape}, expected {expected}")
+        if not (np.all(np.isfinite(path)) and np.all(np.isfinite(poses))):
+            raise ValueError("trajectory and object_poses must be finite")
+        return path, poses
+
+    def _travel_along(self, path: Array, poses: Array) -> dict[tuple[int, int], Array]:
+        """Of each pair (link, object): how far its points can have come towards each other, (T,) from 0."""
+        steps = np.abs(np.diff(path, axis=0))
+        link_travel = [steps @ travel for travel in self._travel]
+        object_travel = [
+            _object_travel(poses[:, j], item.bounding_radius) for j, item in enumerate(self._objects)
+        ]
+        return {
+            (i, j): np.concatenate([[0.0], np.cumsum(of_link + of_object)])
+            for i, of_link in enumerate(link_travel)
+            for j, of_object in enumerate(object_travel)
+        }
+
+    def _start_poses(self) -> Array:
+        return np.array([pose_vector(item.pose) for item in self.objects]).reshape(-1, 7)
+
+    def _pair(self, i: int, j: int, X_WL: Array, pose: Array) -> Clearance:
+        """One link, with its frame at X_WL (4, 4), and one object at `pose` (7,)."""
+        link, item = self._links[i], self._objects[j]
+        R, p = rotation_matrix(pose[3:]), pose[:3]
+        X_link = coal.Transform3s(X_WL[:3, :3], X_WL[:3, 3])
+        X_item = coal.Transform3s(R, p)
+        result = coal.DistanceResult()
+        request = coal.DistanceRequest()
+        request.enable_signed_distance = True
+        value = coal.distance(link.shape, X_link, item.shape, X_item, request, result)
+        on_link, on_item = np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
+        reference_L = X_WL[:3, :3].T @ (R @ item.reference + p - X_WL[:3, 3])
+        inside = link.surface is not None and _contains(link.surface, reference_L)
+        if item.radius > 0.0:  # a ball, measured from its centre
+            depth = value + POINT_RADIUS
+            value = (-depth if inside else depth) - item.radius
+            outward = on_link - p
+            length = float(np.linalg.norm(outward))
+            if length > 0.0:
+                on_item = p + (-1.0 if inside else 1.0) * outward / length * item.radius
+        elif value <= 0.0:
+            value = min(value, -_penetration(link.shape, X_link, item.shape, X_item))
+        elif inside or (
+            item.surface is not None and _contains(item.surface, R.T @ (_world(X_WL, link.reference) - p))
+        ):
+            value = -value
+        return Clearance(float(value), link.name, item.name, on_link, on_item)
+
+
+def travel_per_joint(robot: Robot, link: str, mesh: trimesh.Trimesh) -> Array:
+    """Bound (nv,) on how far any point of a link moves per unit of each joint coordinate, at any
+    configuration.
+
+    For a revolute joint it is the longest lever arm, at most the stretched length of the chain from the joint
+    to the link plus the radius of the link; for a prismatic joint 1. [m/rad] or [m/m].
+
+    Raises:
+        ValueError: a prismatic joint between a revolute one and the link has no position limits.
+    """
+    frame = next(f for f in robot.frames if f.name == link)
+    bound = np.zeros(robot.num_coordinates)
+    limits = robot.limits
+    vertices = mesh.vertices @ frame.placement[:3, :3].T + frame.placement[:3, 3]
+    reach = float(np.linalg.norm(vertices, axis=1).max())
+    index, first = frame.joint, True
+    while index >= 0:
+        joint = robot.joints[index]
+        if joint.type == JointType.revolute:
+            arm = float(np.linalg.norm(np.cross(vertices, joint.axis), axis=1).max()) if first else reach
+            bound[joint.coordinate] += abs(joint.multiplier) * arm
+        else:
+            bound[joint.coordinate] += abs(joint.multiplier)
+            ends = (limits.lower[joint.coordinate], limits.upper[joint.coordinate])
+            stroke = max(abs(joint.multiplier * e + joint.offset) for e in ends)
+            if not np.isfinite(stroke) and joint.parent >= 0:
+                raise ValueError(
+                    f"prismatic joint {joint.name!r} needs finite position limits to bound its motion"
+                )
+            reach += stroke if np.isfinite(stroke) else 0.0
+        reach += float(np.linalg.norm(joint.placement[:3, 3]))
+        index, first = joint.parent, False
+    return bound
+
+
+def _nothing() -> Clearance:
+    return Clearance(float("inf"), "", "", np.zeros(3), np.zeros(3))
+
+
+def _world(X: Array, point: Array) -> Array:
+    moved: Array = X[:3, :3] @ point + X[:3, 3]
+    return moved
+
+
+def _bvh(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
+    model = coal.BVHModelOBBRSS()
+    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for vertex in np.asarray(mesh.vertices, dtype=float):
+        vertices.append(vertex)
+    for a, b, c in np.asarray(mesh.faces).tolist():
+        triangles.append(coal.Triangle(a, b, c))
+    model.beginModel(len(triangles), len(vertices))
+    model.addSubModel(vertices, triangles)
+    model.endModel()
+    return model
+
+
+def _mesh_solid(name: str, mesh: trimesh.Trimesh) -> _Solid:
+    radius = float(np.linalg.norm(mesh.vertices, axis=1).max())
+    triangles = np.array(mesh.triangles, dtype=float)
+    return _Solid(name, _bvh(mesh), 0.0, triangles, triangles[0, 0], radius)
+
+
+def _object_solid(item: SceneObject) -> _Solid:
+    if item.mesh is not None:
+        return _mesh_solid(item.name, item.mesh)
+    origin, bound = np.zeros(3), item.bounding_radius
+    if item.kind == "sphere":
+        return _Solid(item.name, coal.Sphere(POINT_RADIUS), item.size[0], None, origin, bound)
+    shape = coal.Box(*item.size) if item.kind == "box" else coal.Cylinder(*item.size)
+    return _Solid(item.name, shape, 0.0, None, origin, bound)
+
+
+def _penetration(
+    a: coal.CollisionGeometry, X_a: coal.Transform3s, b: coal.CollisionGeometry, X_b: coal.Transform3s
+) -> float:
+    request, result = coal.CollisionRequest(coal.CONTACT, MAX_CONTACTS), coal.CollisionResult()
+    coal.collide(a, X_a, b, X_b, request, result)
+    depths = [abs(result.getContact(k).penetration_depth) for k in range(result.numContacts())]
+    return float(max(depths, default=0.0))
+
+
+def _contains(surface: Array, point: Array) -> bool:
+    """Whether a point is inside a surface: its winding number (van Oosterom, Strackee 1983) exceeds one
+    half."""
+    if np.any(point < surface.min(axis=(0, 1))) or np.any(point > surface.max(axis=(0, 1))):
+        return False
+    a, b, c = (surface[:, k] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = [np.einsum("ij,ij->i", u, w) for u, w in ((a, b), (b, c), (c, a))]
+    solid_angles = 2.0 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
+    return bool(abs(solid_angles.sum()) > 2.0 * np.pi)
+
+
+def _object_travel(poses: Array, radius: float) -> Array:
+    """Bound (T - 1,) on the travel of any point of an object between samples: shift plus angle times
+    radius."""
+    shift = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+    overlap = np.abs(np.einsum("ij,ij->i", poses[1:, 3:], poses[:-1, 3:]))
+    turned: Array = shift + radius * 2.0 * np.arccos(np.clip(overlap, 0.0, 1.0))
+    return turned
+
+
+def _interpolate(samples: Array, s: float) -> Array:
+    k = min(int(s), len(samples) - 1)
+    f = s - k
+    value: Array = samples[k] if f == 0.0 else (1.0 - f) * samples[k] + f * samples[k + 1]
+    return value
+
+
+def _interpolate_pose(poses: Array, s: float) -> Array:
+    pose = _interpolate(poses, s)
+    k = min(int(s), len(poses) - 1)
+    if s == k or np.array_equal(poses[k, 3:], poses[k + 1, 3:]):
+        return pose
+    start, end, f = poses[k, 3:], poses[k + 1, 3:], s - k
+    overlap = float(start @ end)
+    end = end if overlap >= 0.0 else -end
+    angle = float(np.arccos(min(abs(overlap), 1.0)))
+    if angle < 1e-9:  # [rad] no turn worth dividing by
+        return np.concatenate([pose[:3], start])
+    turned = (np.sin((1.0 - f) * angle) * start + np.sin(f * angle) * end) / np.sin(angle)
+    return np.concatenate([pose[:3], turned])
+
+
+def _advance(so_far: Array, s: float, budget: float) -> float | None:
+    """The position along the path at which the travel has grown by `budget`; None past the end."""
+    target = float(_interpolate(so_far[:, None], s)[0]) + budget
+    if target >= so_far[-1]:
+        return None
+    k = int(np.searchsorted(so_far, target, side="right")) - 1
+    return float(k + (target - so_far[k]) / (so_far[k + 1] - so_far[k]))

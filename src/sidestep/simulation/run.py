@@ -1,0 +1,125 @@
+"""The record of a motion, with physics or without: what evaluation, plots and animations read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.robot import Robot
+from sidestep.simulation.scene import SceneObject
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """When a run counts as arrived and may stop.
+
+    Attributes:
+        position: largest joint error [rad | m].
+        speed: largest joint speed [rad/s | m/s].
+        hold: for how long both must hold [s].
+    """
+
+    position: float = 0.02
+    speed: float = 0.02
+    hold: float = 0.2
+
+    def __post_init__(self) -> None:
+        if not (self.position > 0.0 and self.speed > 0.0 and self.hold >= 0.0):
+            raise ValueError(f"arrival tolerances must be positive and hold not negative, got {self}")
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One contact point between the arm and the scene that MuJoCo found in one step.
+
+    Attributes:
+        time: [s]; link and obstacle: names; depth: overlap [m]; force: normal force [N].
+    """
+
+    time: float
+    link: str
+    obstacle: str
+    depth: float
+    force: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run:
+    """Time series of a motion, one row per control step, T rows.
+
+    Attributes:
+        robot, objects: what moved, among what.
+        start, goal: (nv,).
+        timestep: control period [s]; time: (T,) [s].
+        q, v: (T, nv) state at the beginning of each step.
+        wanted: (T, nv) acceleration that the dynamical system asked for.
+        achieved: (T, nv) change of v over the step divided by the period.
+        switch: (T, num_switches); values: (T, m) embedding values psi.
+        system_status: T names.
+        object_poses: (T, num_objects, 7) position and quaternion (w, x, y, z) in the world.
+        arrived: the run stopped because it arrived; time_to_goal: when it had, [s], or None.
+    """
+
+    robot: Robot
+    objects: tuple[SceneObject, ...]
+    start: Array
+    goal: Array
+    timestep: float
+    time: Array
+    q: Array
+    v: Array
+    wanted: Array
+    achieved: Array
+    switch: Array
+    values: Array
+    system_status: tuple[str, ...]
+    object_poses: Array
+    arrived: bool
+    time_to_goal: float | None
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SimulationRun(Run):
+    """A run under torque control in MuJoCo.
+
+    Attributes:
+        solved: (T, nv) acceleration that the torque controller's quadratic program chose.
+        torque: (T, nv) [Nm | N] applied.
+        controller_status: T names.
+        contacts: every arm-scene contact point of every physics step, in time order.
+    """
+
+    solved: Array
+    torque: Array
+    controller_status: tuple[str, ...]
+    contacts: tuple[Contact, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class KinematicRun(Run):
+    """A run without physics: the dynamical system's own integration."""
+
+
+@dataclass
+class ArrivalWatch:
+    """Follows a motion and says when it has arrived."""
+
+    goal: Array
+    rule: Arrival
+    since: float | None = field(default=None, init=False)
+
+    def update(self, time: float, q: Array, v: Array) -> bool:
+        """True once error and speed have been small for the rule's hold time; `since` is when that began."""
+        near = np.abs(q - self.goal).max() < self.rule.position and np.abs(v).max() < self.rule.speed
+        if not near:
+            self.since = None
+        elif self.since is None:
+            self.since = time
+        return self.since is not None and time - self.since >= self.rule.hold

@@ -1,0 +1,211 @@
+"""The solid things around the arm: what the simulator moves and what clearance is measured to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from sidestep._core import Obstacles
+
+Array = npt.NDArray[np.float64]
+Kind = Literal["sphere", "box", "cylinder", "mesh"]
+Motion = Literal["fixed", "free", "moving"]
+
+_SIZE_MEANING: dict[str, tuple[int, str]] = {
+    "sphere": (1, "(radius,)"),
+    "box": (3, "the three side lengths"),
+    "cylinder": (2, "(radius, length)"),
+    "mesh": (0, "(), the mesh has its own size"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SceneObject:
+    """One solid object of the scene, at a pose in the world.
+
+    Args:
+        name: unique in a scene; contacts and clearances are reported under it.
+        kind: "sphere", "box", "cylinder" (axis: z) or "mesh".
+        size: sphere (radius,), box three side lengths, cylinder (radius, length), mesh () [m].
+        pose: (4, 4) pose of the object frame in the world at time 0.
+        motion: "fixed"; "free" (a rigid body of `mass` that floats until something touches it); or
+            "moving" (driven with `velocity` whatever it meets).
+        mass: [kg], used when free.
+        velocity: (3,) [m/s], used when moving.
+        moves_during: (from, until) [s] in which a moving object moves; it rests before and after.
+        mesh: the surface in the object frame, for kind "mesh".
+
+    Raises:
+        ValueError: a value is not finite, not positive or has the wrong shape.
+    """
+
+    name: str
+    kind: Kind
+    size: tuple[float, ...] = ()
+    pose: Array = field(default_factory=lambda: np.eye(4))
+    motion: Motion = "fixed"
+    mass: float = 0.1
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
+    moves_during: tuple[float, float] = (0.0, float("inf"))
+    mesh: trimesh.Trimesh | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(Kind):
+            raise ValueError(
+                f"object {self.name!r}: kind is {self.kind!r}, allowed: {', '.join(get_args(Kind))}"
+            )
+        if self.motion not in get_args(Motion):
+            allowed = ", ".join(get_args(Motion))
+            raise ValueError(f"object {self.name!r}: motion is {self.motion!r}, allowed: {allowed}")
+        size = tuple(float(s) for s in self.size)
+        count, meaning = _SIZE_MEANING[self.kind]
+        if len(size) != count or not all(np.isfinite(s) and s > 0.0 for s in size):
+            raise ValueError(
+                f"object {self.name!r}: size of a {self.kind} is {meaning}, positive, got {self.size}"
+            )
+        pose = np.array(self.pose, dtype=float)
+        if pose.shape != (4, 4) or not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-6):
+            raise ValueError(f"object {self.name!r}: pose must be a (4, 4) rigid transform")
+        velocity = np.array(self.velocity, dtype=float)
+        if velocity.shape != (3,) or not np.all(np.isfinite(velocity)) or not np.all(np.isfinite(pose)):
+            raise ValueError(f"object {self.name!r}: velocity must be (3,), pose and velocity finite")
+        if not (np.isfinite(self.mass) and self.mass > 0.0):
+            raise ValueError(f"object {self.name!r}: mass must be positive, got {self.mass}")
+        if not 0.0 <= self.moves_during[0] <= self.moves_during[1]:
+            raise ValueError(
+                f"object {self.name!r}: moves_during must be 0 <= from <= until, got {self.moves_during}"
+            )
+        if (self.kind == "mesh") != (self.mesh is not None):
+            raise ValueError(f"object {self.name!r}: a mesh object needs `mesh`, and only it")
+        for name, value in (("size", size), ("pose", pose), ("velocity", velocity)):
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def ball(
+        cls,
+        name: str,
+        center: Sequence[float] | Array,
+        *,
+        radius: float,
+        motion: Motion = "fixed",
+        mass: float = 0.1,
+        velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        moves_during: tuple[float, float] = (0.0, float("inf")),
+    ) -> SceneObject:
+        """A sphere at `center` (3,) [m] in the world."""
+        pose = np.eye(4)
+        pose[:3, 3] = center
+        return cls(
+            name,
+            "sphere",
+            size=(radius,),
+            pose=pose,
+            motion=motion,
+            mass=mass,
+            velocity=np.asarray(velocity, dtype=float),
+            moves_during=moves_during,
+        )
+
+    @classmethod
+    def balls(
+        cls,
+        obstacles: Obstacles,
+        *,
+        radius: float | None = None,
+        motion: Motion | None = None,
+        mass: float = 0.1,
+    ) -> tuple[SceneObject, ...]:
+        """One ball per obstacle point, named obstacle_0, obstacle_1, …
+
+        Args:
+            obstacles: the points the controller sees.
+            radius: [m] of every ball; None takes each point's own, which must then be positive.
+            motion: None: "moving" where the point has a velocity, else "fixed".
+            mass: [kg].
+        """
+        radii = obstacles.radii if radius is None else np.full(len(obstacles), radius)
+        return tuple(
+            cls.ball(
+                f"obstacle_{i}",
+                point,
+                radius=float(r),
+                motion=motion or ("moving" if np.any(s != 0.0) else "fixed"),
+                mass=mass,
+                velocity=s,
+            )
+            for i, (point, r, s) in enumerate(zip(obstacles.points, radii, obstacles.velocities, strict=True))
+        )
+
+    def pose_at(self, time: float) -> Array:
+        """Pose (4, 4) in the world at `time` [s] of an object that nothing has touched."""
+        pose = self.pose.copy()
+        if self.motion == "moving":
+            start, end = self.moves_during
+            pose[:3, 3] += self.velocity * max(0.0, min(time, end) - start)
+        return pose
+
+    def surface(self, *, subdivisions: int = 2) -> trimesh.Trimesh:
+        """The surface as triangles in the object frame; spheres as an icosphere of `subdivisions`."""
+        surface: trimesh.Trimesh
+        if self.mesh is not None:
+            surface = self.mesh
+        elif self.kind == "sphere":
+            surface = trimesh.creation.icosphere(subdivisions=subdivisions, radius=self.size[0])
+        elif self.kind == "box":
+            surface = trimesh.creation.box(extents=self.size)
+        else:
+            surface = trimesh.creation.cylinder(radius=self.size[0], height=self.size[1], sections=24)
+        return surface
+
+    @property
+    def bounding_radius(self) -> float:
+        """Largest distance [m] of a point of the object from the origin of its frame."""
+        if self.kind == "sphere":
+            return self.size[0]
+        if self.kind == "box":
+            return 0.5 * float(np.linalg.norm(self.size))
+        if self.kind == "cylinder":
+            return float(np.hypot(self.size[0], 0.5 * self.size[1]))
+        return float(np.linalg.norm(self.surface().vertices, axis=1).max())
+
+
+def check_scene(objects: Iterable[SceneObject]) -> tuple[SceneObject, ...]:
+    """The objects as a tuple; raises ValueError when two share a name."""
+    scene = tuple(objects)
+    seen: set[str] = set()
+    for item in scene:
+        if item.name in seen:
+            raise ValueError(f"two objects of the scene are named {item.name!r}; names must differ")
+        seen.add(item.name)
+    return scene
+
+
+def seen_obstacles(
+    objects: Iterable[SceneObject], time: float, *, point_radius: float | None = None
+) -> Obstacles:
+    """What a perfect camera reports of the balls of a scene at a time: centres, radii and velocities.
+
+    Only scripted motion is followed: a free ball is reported where it started.
+
+    Args:
+        objects: balls only.
+        time: [s].
+        point_radius: [m] given to every point; None: each ball's own radius.
+
+    Raises:
+        ValueError: an object is not a sphere.
+    """
+    points, radii, velocities = [], [], []
+    for item in objects:
+        if item.kind != "sphere":
+            raise ValueError(f"object {item.name!r} is a {item.kind}; only spheres are reported as points")
+        moves = item.motion == "moving" and item.moves_during[0] <= time < item.moves_during[1]
+        points.append(item.pose_at(time)[:3, 3])
+        radii.append(item.size[0] if point_radius is None else point_radius)
+        velocities.append(item.velocity if moves else np.zeros(3))
+    return Obstacles(np.array(points), np.array(radii), np.array(velocities)) if points else Obstacles.none()

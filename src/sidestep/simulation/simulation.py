@@ -1,0 +1,291 @@
+"""Torque control of the arm in MuJoCo's rigid-body physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, TypeAlias
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import Obstacles
+from sidestep.robot import Robot
+from sidestep.simulation.model import build_model
+from sidestep.simulation.pose import pose_vector
+from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, KinematicRun, SimulationRun
+from sidestep.simulation.scene import SceneObject, check_scene
+
+Array = npt.NDArray[np.float64]
+ObstacleSource: TypeAlias = Obstacles | Callable[[float], Obstacles]
+
+
+class MotionSystem(Protocol):
+    """What wants an acceleration: `GeometricSystem`, or anything with its `acceleration`."""
+
+    def acceleration(self, q: Array, v: Array, goal: Array, obstacles: Obstacles) -> Any:
+        """A step with `acceleration` (nv,), `status`, and where they exist `switch` and `values`."""
+
+
+class AccelerationController(Protocol):
+    """What turns an acceleration into torque: `TorqueController`, or anything with its `solve`."""
+
+    def solve(self, q: Array, v: Array, acceleration: Array, mass_matrix: Array, bias: Array) -> Any:
+        """A solution with `torque` (nv,), `acceleration` (nv,) and `status`."""
+
+
+class Simulation:
+    """One robot among objects in MuJoCo, driven by torque at a fixed rate.
+
+    Args:
+        robot: with inertias and collision meshes.
+        objects: the scene: fixed, free and moving solids. See `build_model` for what touches what.
+        timestep: control period [s].
+        substeps: physics steps per control period; the torque is held over them.
+        floor_height, joint_damping, joint_friction: see `build_model`.
+
+    Raises:
+        ValueError: see `build_model`; or substeps < 1.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        objects: Sequence[SceneObject] = (),
+        *,
+        timestep: float = 1e-3,
+        substeps: int = 1,
+        floor_height: float | None = None,
+        joint_damping: float = 0.0,
+        joint_friction: float = 0.0,
+    ) -> None:
+        if substeps < 1:
+            raise ValueError(f"substeps must be at least 1, got {substeps}")
+        self.robot = robot
+        self.objects = check_scene(objects)
+        self.timestep = timestep
+        self.substeps = substeps
+        self.built = build_model(
+            robot,
+            self.objects,
+            timestep=timestep / substeps,
+            floor_height=floor_height,
+            joint_damping=joint_damping,
+            joint_friction=joint_friction,
+        )
+
+    def run(
+        self,
+        system: MotionSystem,
+        controller: AccelerationController,
+        start: Array,
+        goal: Array,
+        duration: float,
+        obstacles: ObstacleSource,
+        *,
+        start_velocity: Array | None = None,
+        arrival: Arrival | None = Arrival(),
+        on_step: Callable[[float, Array], None] | None = None,
+    ) -> SimulationRun:
+        """Runs the loop: state, wanted acceleration, torque, physics, record.
+
+        Args:
+            system, controller: the dynamical system and the torque controller.
+            start, goal: (nv,) configurations inside the limits.
+            duration: at most this long [s].
+            obstacles: what the controller sees: points, moved along their velocities as time passes, or a
+                function of time [s]. It never sees `objects`.
+            start_velocity: (nv,), at rest by default.
+            arrival: when to stop early; None: run the whole duration.
+            on_step: called with time [s] and q after every step.
+
+        Raises:
+            ValueError: start or goal outside the limits, or a duration that is not positive.
+            RuntimeError: the physics diverged (MuJoCo's own check).
+        """
+        if not (np.isfinite(duration) and duration > 0.0):
+            raise ValueError(f"duration must be positive, got {duration}")
+        start = self.robot.check_configuration(start, "start")
+        goal = self.robot.check_configuration(goal, "goal")
+        built, data = self.built, mujoco.MjData(self.built.model)
+        built.set_state(
+            data, start, np.zeros_like(start) if start_velocity is None else np.asarray(start_velocity)
+        )
+        see = _observer(obstacles)
+        watch = None if arrival is None else ArrivalWatch(goal, arrival)
+        steps = max(1, round(duration / self.timestep))
+        rows: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
+        contacts: list[Contact] = []
+        arrived = False
+        for k in range(steps):
+            time = k * self.timestep
+            self._drive(data, time)
+            mujoco.mj_step1(built.model, data)
+            q, v = built.state(data)
+            step = system.acceleration(q, v, goal, see(time))
+            solution = controller.solve(q, v, step.acceleration, built.mass_matrix(data), built.bias(data))
+            torque = np.asarray(solution.torque)
+            poses = self._object_poses(data)
+            data.ctrl[built.actuators] = torque
+            for substep in range(self.substeps):
+                if substep > 0:
+                    self._drive(data, time + substep * self.timestep / self.substeps)
+                    mujoco.mj_step1(built.model, data)
+                mujoco.mj_step2(built.model, data)
+                contacts.extend(self._contacts(data, time))
+            _, v_next = built.state(data)
+            if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.all(np.isfinite(v_next)):
+                raise RuntimeError(
+                    f"the physics diverged at {time:.3f} s; shorten the timestep or add substeps"
+                )
+            row = (
+                time,
+                q,
+                v,
+                step.acceleration,
+                (v_next - v) / self.timestep,
+                np.atleast_1d(getattr(step, "switch", ())),
+                np.atleast_1d(getattr(step, "values", ())),
+                status_name(step.status),
+                poses,
+                solution.acceleration,
+                torque,
+                status_name(solution.status),
+            )
+            for name, value in zip(_COLUMNS, row, strict=True):
+                rows[name].append(value)
+            if on_step is not None:
+                on_step(time, q)
+            if watch is not None and watch.update(time, q, v):
+                arrived = True
+                break
+        return SimulationRun(
+            robot=self.robot,
+            objects=self.objects,
+            start=start,
+            goal=goal,
+            timestep=self.timestep,
+            arrived=arrived,
+            time_to_goal=watch.since if watch is not None and arrived else None,
+            contacts=tuple(contacts),
+            system_status=tuple(rows.pop("system_status")),
+            controller_status=tuple(rows.pop("controller_status")),
+            **{name: np.array(column, dtype=float) for name, column in rows.items()},
+        )
+
+    def _drive(self, data: mujoco.MjData, time: float) -> None:
+        """Puts the moving objects where their script says."""
+        for item, body in zip(self.objects, self.built.object_bodies, strict=True):
+            if item.motion == "moving":
+                data.mocap_pos[self.built.model.body_mocapid[body]] = item.pose_at(time)[:3, 3]
+
+    def _object_poses(self, data: mujoco.MjData) -> Array:
+        bodies = list(self.built.object_bodies)
+        return np.hstack([data.xpos[bodies], data.xquat[bodies]]) if bodies else np.zeros((0, 7))
+
+    def _contacts(self, data: mujoco.MjData, time: float) -> list[Contact]:
+        found = []
+        wrench = np.zeros(6)
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            owners = [self.built.geom_owner[int(g)] for g in contact.geom]
+            links = [name for role, name in owners if role == "link"]
+            if not links or contact.dist > 0.0:
+                continue
+            obstacle = next(name for role, name in owners if role != "link")
+            mujoco.mj_contactForce(self.built.model, data, index, wrench)
+            found.append(Contact(time, links[0], obstacle, float(-contact.dist), float(wrench[0])))
+        return found
+
+
+_COLUMNS = (
+    "time",
+    "q",
+    "v",
+    "wanted",
+    "achieved",
+    "switch",
+    "values",
+    "system_status",
+    "object_poses",
+    "solved",
+    "torque",
+    "controller_status",
+)
+
+
+def run_kinematically(
+    robot: Robot,
+    system: MotionSystem,
+    start: Array,
+    goal: Array,
+    duration: float,
+    obstacles: ObstacleSource,
+    *,
+    objects: Sequence[SceneObject] = (),
+    timestep: float = 1e-3,
+    arrival: Arrival | None = Arrival(),
+    on_step: Callable[[float, Array], None] | None = None,
+) -> KinematicRun:
+    """Integrates the wanted acceleration itself by semi-implicit Euler: no masses, no torques, no contacts.
+
+        v_{k+1} = v_k + dt a(q_k, v_k),   q_{k+1} = q_k + dt v_{k+1}
+
+    Arguments, stopping and record as in `Simulation.run`; free objects stay where they are.
+    """
+    if not (np.isfinite(duration) and duration > 0.0 and np.isfinite(timestep) and timestep > 0.0):
+        raise ValueError(f"duration and timestep must be positive, got {duration} and {timestep}")
+    scene = check_scene(objects)
+    start = robot.check_configuration(start, "start")
+    goal = robot.check_configuration(goal, "goal")
+    see = _observer(obstacles)
+    watch = None if arrival is None else ArrivalWatch(goal, arrival)
+    names = [name for name in _COLUMNS if name not in ("solved", "torque", "controller_status")]
+    rows: dict[str, list[Any]] = {name: [] for name in names}
+    q, v, arrived = start.copy(), np.zeros_like(start), False
+    for k in range(max(1, round(duration / timestep))):
+        time = k * timestep
+        step = system.acceleration(q, v, goal, see(time))
+        wanted = np.asarray(step.acceleration, dtype=float)
+        poses = np.array([pose_vector(item.pose_at(time)) for item in scene]).reshape(-1, 7)
+        switch, values = (
+            np.atleast_1d(getattr(step, "switch", ())),
+            np.atleast_1d(getattr(step, "values", ())),
+        )
+        row = (time, q, v, wanted, wanted, switch, values, status_name(step.status), poses)
+        for name, value in zip(names, row, strict=True):
+            rows[name].append(value)
+        if on_step is not None:
+            on_step(time, q)
+        if watch is not None and watch.update(time, q, v):
+            arrived = True
+            break
+        v = v + timestep * wanted
+        q = q + timestep * v
+        if not np.all(np.isfinite(q)):
+            raise RuntimeError(f"the integration diverged at {time:.3f} s; shorten the timestep")
+    return KinematicRun(
+        robot=robot,
+        objects=scene,
+        start=start,
+        goal=goal,
+        timestep=timestep,
+        arrived=arrived,
+        time_to_goal=watch.since if watch is not None and arrived else None,
+        system_status=tuple(rows.pop("system_status")),
+        **{name: np.array(column, dtype=float) for name, column in rows.items()},
+    )
+
+
+def status_name(status: object) -> str:
+    """The name of a status, enumerated or plain."""
+    return str(getattr(status, "name", status))
+
+
+def _observer(obstacles: ObstacleSource) -> Callable[[float], Obstacles]:
+    if not isinstance(obstacles, Obstacles):
+        return obstacles
+    if len(obstacles) == 0 or not np.any(obstacles.velocities):
+        return lambda time: obstacles
+    points, radii, velocities = obstacles.points, obstacles.radii, obstacles.velocities
+    return lambda time: Obstacles(points + time * velocities, radii, velocities)
