@@ -6,5 +6,8 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_kinematics(m);
   sidestep::python::bind_body(m);
   sidestep::python::bind_obstacles(m);
+  sidestep::python::bind_embedding(m);
+  sidestep::python::bind_geometry(m);
+  sidestep::python::bind_dynamical_system(m);
   sidestep::python::bind_control(m);
 }

@@ -8,6 +8,9 @@ namespace sidestep::python {
 void bind_kinematics(nanobind::module_& m);
 void bind_body(nanobind::module_& m);
 void bind_obstacles(nanobind::module_& m);
+void bind_embedding(nanobind::module_& m);
+void bind_geometry(nanobind::module_& m);
+void bind_dynamical_system(nanobind::module_& m);
 void bind_control(nanobind::module_& m);
 
 }  // namespace sidestep::python

@@ -4,14 +4,21 @@
 
 namespace sidestep {
 
-KinematicState::KinematicState(const Robot& robot) : links_(robot.joints().size()) {
+KinematicState::KinematicState(const Robot& robot)
+    : q_(robot.num_coordinates()), v_(robot.num_coordinates()), links_(robot.joints().size()) {
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    links_[i].parent = robot.joints()[i].parent;
+    links_[i].coordinate = robot.joints()[i].coordinate;
+  }
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.num_coordinates());
   update(robot, zero, zero);
 }
 
 void KinematicState::update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd> q,
                             Eigen::Ref<const Eigen::VectorXd> v) noexcept {
-  static const Link base{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), {}, {}, {}};
+  static const Link base{-1, -1, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), {}, {}, {}};
+  q_ = q;
+  v_ = v;
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const Joint& joint = robot.joints()[i];
     const Link& parent = joint.parent < 0 ? base : links_[static_cast<std::size_t>(joint.parent)];
@@ -91,13 +98,12 @@ Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state
   return acceleration;
 }
 
-void accumulate_generalised_force(const Robot& robot, const KinematicState& state, int joint,
-                                  const SpatialForce& wrench,
+void accumulate_generalised_force(const KinematicState& state, int joint, const SpatialForce& wrench,
                                   Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept {
-  for (int j = joint; j >= 0; j = robot.joints()[static_cast<std::size_t>(j)].parent) {
-    const SpatialMotion& screw = state.link(j).screw;
-    generalised_force[robot.joints()[static_cast<std::size_t>(j)].coordinate] +=
-        screw.angular.dot(wrench.angular) + screw.linear.dot(wrench.linear);
+  for (int j = joint; j >= 0; j = state.link(j).parent) {
+    const KinematicState::Link& link = state.link(j);
+    generalised_force[link.coordinate] +=
+        link.screw.angular.dot(wrench.angular) + link.screw.linear.dot(wrench.linear);
   }
 }
 

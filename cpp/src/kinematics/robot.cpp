@@ -1,5 +1,6 @@
 #include "sidestep/kinematics/robot.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -97,6 +98,16 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
                                   std::to_string(limits_.upper[i]));
     }
   }
+}
+
+bool Robot::same_joints(const Robot& other) const noexcept {
+  return coordinate_names_ == other.coordinate_names_ &&
+         std::equal(joints_.begin(), joints_.end(), other.joints_.begin(), other.joints_.end(),
+                    [](const Joint& a, const Joint& b) {
+                      return a.name == b.name && a.type == b.type && a.parent == b.parent && a.axis == b.axis &&
+                             a.coordinate == b.coordinate && a.multiplier == b.multiplier && a.offset == b.offset &&
+                             a.X_PJ.matrix() == b.X_PJ.matrix();
+                    });
 }
 
 int Robot::frame_index(const std::string& frame) const {

@@ -36,16 +36,21 @@ class KinematicState {
   void update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v) noexcept;
 
   struct Link {
+    int parent;                 ///< index of the parent joint, -1 for the base
+    int coordinate;             ///< which entry of q drives the joint
     Eigen::Matrix3d R_WL;       ///< orientation in the world
     Eigen::Vector3d p_WL;       ///< origin in the world [m]
     SpatialMotion screw;        ///< column of the Jacobian of this joint's own coordinate (multiplier included)
     SpatialMotion velocity;
     SpatialMotion bias;
   };
+  const Eigen::VectorXd& q() const noexcept { return q_; }
+  const Eigen::VectorXd& v() const noexcept { return v_; }
   const Link& link(int joint) const noexcept { return links_[static_cast<std::size_t>(joint)]; }
   int num_links() const noexcept { return static_cast<int>(links_.size()); }
 
  private:
+  Eigen::VectorXd q_, v_;
   std::vector<Link> links_;
 };
 
@@ -60,7 +65,6 @@ Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, 
 Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state, int frame);
 
 /// Projects a wrench on link `joint` to the joint coordinates: generalised_force += J_jointᵀ wrench.
-void accumulate_generalised_force(const Robot& robot, const KinematicState& state, int joint,
-                                  const SpatialForce& wrench, Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept;
+void accumulate_generalised_force(const KinematicState& state, int joint, const SpatialForce& wrench, Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept;
 
 }  // namespace sidestep

@@ -57,6 +57,9 @@ class Robot {
   const std::vector<std::string>& coordinate_names() const noexcept { return coordinate_names_; }
   const JointLimits& limits() const noexcept { return limits_; }
 
+  /// Whether the other robot has the same joints in the same places, so that their states mean the same.
+  bool same_joints(const Robot& other) const noexcept;
+
   /// Index of a frame; throws std::invalid_argument that lists the known names.
   int frame_index(const std::string& frame) const;
 

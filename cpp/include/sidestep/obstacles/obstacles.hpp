@@ -14,6 +14,13 @@ class Obstacles {
   /// A workspace that is known to be free.
   static Obstacles none() { return Obstacles(); }
 
+  /// The same points at rest.
+  Obstacles frozen() const {
+    Obstacles copy = *this;
+    copy.velocities_.setZero();
+    return copy;
+  }
+
   Eigen::Index size() const noexcept { return points_.cols(); }
   const Eigen::Matrix3Xd& points() const noexcept { return points_; }
   const Eigen::VectorXd& radii() const noexcept { return radii_; }

@@ -1,0 +1,68 @@
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include "arguments.hpp"
+#include "module.hpp"
+#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/embedding/joint_limit_potential.hpp"
+#include "sidestep/embedding/sum.hpp"
+
+namespace sidestep::python {
+
+void bind_embedding(nb::module_& m) {
+  nb::class_<EmbeddingEvaluation>(m, "EmbeddingEvaluation", "Values, Jacobian and curvatures of an embedding.")
+      .def_prop_ro("values", [](const EmbeddingEvaluation& e) { return to_numpy(e.values); }, "psi (m,).")
+      .def_prop_ro("jacobian", [](const EmbeddingEvaluation& e) { return to_numpy_matrix(e.jacobian); },
+                   "dpsi/dq (m, nv).")
+      .def_prop_ro("curvatures", [](const EmbeddingEvaluation& e) { return to_numpy(e.curvatures); },
+                   "d2psi/dt2 (m,) along the motion with constant joint velocity.");
+
+  nb::class_<Embedding>(m, "Embedding",
+                        "Extra coordinates psi(q, t) that embed the joint space as the graph q -> (q, psi(q, t)).")
+      .def_prop_ro("num_coordinates", &Embedding::num_coordinates, "Number of coordinates m.")
+      .def(
+          "evaluate",
+          [](const Embedding& e, nb::handle q, nb::handle v, const Obstacles& obstacles) {
+            const int nv = e.robot().num_coordinates();
+            return evaluate(e, as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles);
+          },
+          nb::arg("q"), nb::arg("v"), nb::arg("obstacles"),
+          "psi, dpsi/dq and d2psi/dt2 at q (nv,) [rad] and v (nv,) [rad/s], obstacle velocities included.")
+      .def(
+          "hessian",
+          [](const Embedding& e, nb::handle q, const Obstacles& obstacles) -> nb::object {
+            const auto all = hessians(e, as_vector(q, "q", e.robot().num_coordinates()), obstacles);
+            if (all.size() == 1) {
+              return to_numpy_matrix(all.front());
+            }
+            nb::list arrays;
+            for (const Eigen::MatrixXd& hessian : all) {
+              arrays.append(to_numpy_matrix(hessian));
+            }
+            return nb::module_::import_("numpy").attr("stack")(arrays);
+          },
+          nb::arg("q"), nb::arg("obstacles"),
+          "d2psi/dq2, (nv, nv) where m = 1, else (m, nv, nv); exact. For tests and plots, not for the loop.");
+
+  nb::class_<CollisionDensity, Embedding>(
+      m, "CollisionDensity",
+      "The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),\n"
+      "    psi(q) = sum_points sum_links sum_k pi_k N(x | o_l + R_l mu_k, R_l Sigma_k R_l^T + r^2 I)  [1/m^3].\n"
+      "`average` divides by the number of points. Links that no joint moves are left out.")
+      .def(nb::init<const Robot&, const Body&, bool>(), nb::arg("robot"), nb::arg("body"), nb::kw_only(),
+           nb::arg("average") = false);
+
+  nb::class_<JointLimitPotential, Embedding>(
+      m, "JointLimitPotential",
+      "Smooth steps at the joint limits (Bosc 2024, T5.7, corrected to a sum over the joints),\n"
+      "    zeta(q) = height sum_j [s(slope (q_j - upper_j)) + s(slope (lower_j - q_j))],  s(u) = 1/(1 + exp(-u)).\n"
+      "slope [1/rad]; height in the unit of the coordinate it is added to.")
+      .def(nb::init<const Robot&, double, double>(), nb::arg("robot"), nb::kw_only(), nb::arg("slope") = 30.0,
+           nb::arg("height") = 1.0);
+
+  nb::class_<Sum, Embedding>(m, "Sum",
+                             "Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).")
+      .def(nb::init<std::vector<std::shared_ptr<const Embedding>>>(), nb::arg("terms"));
+}
+
+}  // namespace sidestep::python

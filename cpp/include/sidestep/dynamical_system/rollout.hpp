@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sidestep/dynamical_system/geometric_system.hpp"
+
+namespace sidestep {
+
+/// How a step of length dt is taken.
+enum class Integrator {
+  semi_implicit_euler,  ///< v ← v + a dt, q ← q + v dt
+  second_order,         ///< q ← q + v dt + ½ a dt², v ← v + a dt (the thesis's update, 6.2.1)
+  runge_kutta_4,        ///< the classical scheme on (q, v), with the obstacles moved along
+};
+
+struct RolloutSettings {
+  double period = 0.001;  ///< dt [s]
+  int steps = 1000;
+  Integrator integrator = Integrator::semi_implicit_euler;
+};
+
+/// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.
+struct Rollout {
+  Eigen::VectorXd time;                ///< [s]
+  Eigen::MatrixXd q, v, acceleration;  ///< (steps + 1, nv)
+  Eigen::MatrixXd values;              ///< ψ (steps + 1, m)
+  Eigen::MatrixXd switch_weights;      ///< (steps + 1, nv)
+  std::vector<StepStatus> statuses;    ///< one per row
+};
+
+/// Integrates the system from (q, v), obstacles moving at their velocities.
+/// Throws std::invalid_argument on sizes, or a period or number of steps that is not positive.
+Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                const Eigen::VectorXd& goal, Obstacles obstacles, const RolloutSettings& settings);
+
+}  // namespace sidestep

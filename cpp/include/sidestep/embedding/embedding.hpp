@@ -1,0 +1,64 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <utility>
+#include <vector>
+
+#include "sidestep/kinematics/kinematic_state.hpp"
+#include "sidestep/obstacles/obstacles.hpp"
+
+namespace sidestep {
+
+/// Where an embedding adds its m coordinates ψ, their gradients and their curvatures.
+struct EmbeddingView {
+  Eigen::Ref<Eigen::VectorXd> values;               ///< ψ (m)
+  Eigen::Ref<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m)
+  Eigen::Ref<Eigen::VectorXd> curvatures;           ///< d²ψ/dt² along q̇ = v, q̈ = 0 (m)
+};
+
+/// Extra coordinates ψ(q, t) that embed the joint space in R^(nv + m) as the graph q ↦ (q, ψ(q, t)).
+///
+/// Only ψ, ∂ψ/∂q and the m scalars d²ψ/dt² along the motion are needed by the dynamics: the geodesic term follows
+/// from them in closed form, without third-order tensors. Where obstacles move, their velocities enter d²ψ/dt².
+class Embedding {
+ public:
+  explicit Embedding(Robot robot) : robot_(std::move(robot)) {}
+  virtual ~Embedding() = default;
+  Embedding(const Embedding&) = default;
+  Embedding& operator=(const Embedding&) = default;
+
+  virtual int num_coordinates() const noexcept = 0;
+
+  /// Adds to `out`, which the caller has zeroed. No allocation.
+  virtual void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept = 0;
+
+  /// Lowers `distances` (nv) to the distance [m] between the obstacles and what each joint carries directly
+  /// (thesis T6.1). Embeddings without a body leave it as it is. No allocation.
+  virtual void lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,
+                               const Obstacles& obstacles) const noexcept;
+
+  /// Whether `lower_distances` does anything.
+  virtual bool measures_distances() const noexcept { return false; }
+
+  /// The robot the embedding was made for.
+  const Robot& robot() const noexcept { return robot_; }
+
+ private:
+  Robot robot_;
+};
+
+/// Values (m), Jacobian (m × nv) and curvatures (m) of an embedding at (q, v).
+struct EmbeddingEvaluation {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd jacobian;
+  Eigen::VectorXd curvatures;
+};
+EmbeddingEvaluation evaluate(const Embedding& embedding, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                             const Obstacles& obstacles);
+
+/// Hessians ∂²ψ_i/∂q² (m of nv × nv), exact: the curvature at zero obstacle velocity is the quadratic form vᵀ H v,
+/// read off by polarisation. For tests and plots; nv(nv+1)/2 evaluations.
+std::vector<Eigen::MatrixXd> hessians(const Embedding& embedding, const Eigen::VectorXd& q,
+                                      const Obstacles& obstacles);
+
+}  // namespace sidestep

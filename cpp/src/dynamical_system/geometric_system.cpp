@@ -1,0 +1,204 @@
+#include "sidestep/dynamical_system/geometric_system.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace sidestep {
+namespace {
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+
+double sigmoid(double u) noexcept { return 1.0 / (1.0 + std::exp(-u)); }
+
+void check_gain(const Eigen::MatrixXd& gain, const char* name, int nv) {
+  if (gain.rows() != nv || gain.cols() != nv) {
+    throw std::invalid_argument(std::string(name) + " is " + std::to_string(gain.rows()) + " × " +
+                                std::to_string(gain.cols()) + ", expected " + std::to_string(nv) + " × " +
+                                std::to_string(nv));
+  }
+  constexpr double tolerance = 1e-12;  // rounding of a symmetric gain, relative to its largest entry
+  const double margin = tolerance * gain.cwiseAbs().maxCoeff() + std::numeric_limits<double>::min();
+  const Eigen::MatrixXd shifted = gain + margin * Eigen::MatrixXd::Identity(nv, nv);
+  if (!gain.allFinite() || !((gain - gain.transpose()).cwiseAbs().maxCoeff() <= margin) ||
+      shifted.llt().info() != Eigen::Success) {
+    throw std::invalid_argument(std::string(name) + " must be finite, symmetric and positive semi-definite");
+  }
+}
+
+void check_positive(double value, const char* name) {
+  if (!(value > 0.0) || !std::isfinite(value)) {
+    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) + ", must be positive and finite");
+  }
+}
+
+void check_finite(double value, const char* name) {
+  if (!std::isfinite(value)) {
+    throw std::invalid_argument(std::string(name) + " must be finite");
+  }
+}
+
+bool outside(Eigen::Ref<const Eigen::VectorXd> q, const JointLimits& limits) noexcept {
+  return (q.array() < limits.lower.array()).any() || (q.array() > limits.upper.array()).any();
+}
+
+}  // namespace
+
+GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const Embedding>> embeddings,
+                                 GeometricSystemSettings settings)
+    : robot_(std::move(robot)), embeddings_(std::move(embeddings)), settings_(std::move(settings)) {
+  const int nv = robot_.num_coordinates();
+  bool measures_distances = false;
+  for (const auto& embedding : embeddings_) {
+    if (!embedding->robot().same_joints(robot_)) {
+      throw std::invalid_argument("an embedding was made for robot '" + embedding->robot().name() + "', not for '" +
+                                  robot_.name() + "'");
+    }
+    num_embedding_coordinates_ += embedding->num_coordinates();
+    measures_distances = measures_distances || embedding->measures_distances();
+  }
+  check_gain(settings_.stiffness, "stiffness", nv);
+  check_gain(settings_.damping, "damping", nv);
+  check_positive(settings_.fallback_rate, "fallback rate");
+  std::visit(Overloaded{
+                 [](const Unswitched&) {}, [](const HarmonicOnly&) {}, [](const GeodesicOnly&) {},
+                 [](const BinarySwitch& s) { check_finite(s.threshold, "switch threshold"); },
+                 [](const SigmoidSwitch& s) {
+                   check_finite(s.threshold, "switch threshold");
+                   check_positive(s.slope, "switch slope");
+                 },
+                 [&](const DistanceSwitch& s) {
+                   check_positive(s.slope, "switch slope");
+                   if (s.thresholds.size() != nv || !s.thresholds.allFinite()) {
+                     throw std::invalid_argument("switch thresholds: expected " + std::to_string(nv) +
+                                                 " finite values, got " + std::to_string(s.thresholds.size()));
+                   }
+                   if (!measures_distances) {
+                     throw std::invalid_argument(
+                         "a distance switch needs an embedding with a body, such as CollisionDensity");
+                   }
+                 },
+             },
+             settings_.combination);
+}
+
+GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
+    : acceleration(Eigen::VectorXd::Zero(system.robot().num_coordinates())),
+      harmonic(acceleration),
+      geodesic(acceleration),
+      switch_weights(acceleration),
+      values(Eigen::VectorXd::Zero(system.num_embedding_coordinates())),
+      curvatures(values),
+      jacobian_transposed(Eigen::MatrixXd::Zero(acceleration.size(), values.size())),
+      metric(system.robot().num_coordinates()),
+      state_(system.robot()),
+      displacement_(acceleration),
+      distances_(acceleration) {}
+
+StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+                                         Eigen::Ref<const Eigen::VectorXd> goal, const Obstacles& obstacles,
+                                         Workspace& w) const noexcept {
+  if (!q.allFinite() || !v.allFinite()) {
+    return fall_back(StepStatus::invalid_state, v, w);
+  }
+  if (!goal.allFinite()) {
+    return fall_back(StepStatus::invalid_goal, v, w);
+  }
+  if (outside(goal, robot_.limits())) {
+    return fall_back(StepStatus::goal_outside_limits, v, w);
+  }
+
+  w.state_.update(robot_, q, v);
+  embed(obstacles, w);
+  w.metric.update(w.jacobian_transposed);
+
+  // h = −G⁻¹ K (q − q*) − D v, or with D v inside the bracket.
+  w.displacement_ = q - goal;
+  w.harmonic = -settings_.stiffness.lazyProduct(w.displacement_);
+  if (settings_.damping_form == DampingForm::metric) {
+    w.harmonic -= settings_.damping.lazyProduct(v);
+    w.metric.solve_in_place(w.harmonic);
+  } else {
+    w.metric.solve_in_place(w.harmonic);
+    w.harmonic -= settings_.damping.lazyProduct(v);
+  }
+  // g = −G⁻¹ Jᵀ d²ψ/dt².
+  w.geodesic = -w.jacobian_transposed.lazyProduct(w.curvatures);
+  w.metric.solve_in_place(w.geodesic);
+
+  combine(obstacles, w);
+  if (!w.acceleration.allFinite()) {
+    return fall_back(StepStatus::not_finite, v, w);
+  }
+  return outside(q, robot_.limits()) ? StepStatus::outside_limits : StepStatus::ok;
+}
+
+void GeometricSystem::embed(const Obstacles& obstacles, Workspace& w) const noexcept {
+  w.values.setZero();
+  w.curvatures.setZero();
+  w.jacobian_transposed.setZero();
+  Eigen::Index start = 0;
+  for (const auto& embedding : embeddings_) {
+    const Eigen::Index m = embedding->num_coordinates();
+    embedding->add_to(
+        {w.values.segment(start, m), w.jacobian_transposed.middleCols(start, m), w.curvatures.segment(start, m)},
+        w.state_, obstacles);
+    start += m;
+  }
+}
+
+void GeometricSystem::combine(const Obstacles& obstacles, Workspace& w) const noexcept {
+  const auto blend = [&w] {
+    w.acceleration = w.switch_weights.cwiseProduct(w.harmonic - w.geodesic) + w.geodesic;
+  };
+  std::visit(Overloaded{
+                 [&](const Unswitched&) {
+                   w.switch_weights.setOnes();
+                   w.acceleration = w.harmonic + w.geodesic;
+                 },
+                 [&](const HarmonicOnly&) {
+                   w.switch_weights.setOnes();
+                   w.acceleration = w.harmonic;
+                 },
+                 [&](const GeodesicOnly&) {
+                   w.switch_weights.setZero();
+                   w.acceleration = w.geodesic;
+                 },
+                 [&](const BinarySwitch& s) {
+                   w.switch_weights.setConstant(w.values.sum() <= s.threshold ? 1.0 : 0.0);
+                   blend();
+                 },
+                 [&](const SigmoidSwitch& s) {
+                   w.switch_weights.setConstant(1.0 - sigmoid(s.slope * (w.values.sum() - s.threshold)));
+                   blend();
+                 },
+                 [&](const DistanceSwitch& s) {
+                   w.distances_.setConstant(std::numeric_limits<double>::infinity());
+                   for (const auto& embedding : embeddings_) {
+                     embedding->lower_distances(w.distances_, w.state_, obstacles);
+                   }
+                   for (Eigen::Index i = 0; i < w.distances_.size(); ++i) {
+                     w.switch_weights[i] = sigmoid(s.slope * (w.distances_[i] - s.thresholds[i]));
+                   }
+                   blend();
+                 },
+             },
+             settings_.combination);
+}
+
+StepStatus GeometricSystem::fall_back(StepStatus status, Eigen::Ref<const Eigen::VectorXd> v,
+                                      Workspace& w) const noexcept {
+  for (Eigen::Index i = 0; i < v.size(); ++i) {
+    const double limit = robot_.limits().acceleration[i];
+    w.acceleration[i] = std::isfinite(v[i]) ? std::clamp(-settings_.fallback_rate * v[i], -limit, limit) : 0.0;
+  }
+  return status;
+}
+
+}  // namespace sidestep

@@ -1,0 +1,95 @@
+#include "sidestep/dynamical_system/rollout.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace sidestep {
+namespace {
+
+void check_size(const Eigen::VectorXd& vector, const char* name, int nv) {
+  if (vector.size() != nv) {
+    throw std::invalid_argument(std::string(name) + " has " + std::to_string(vector.size()) + " entries, expected " +
+                                std::to_string(nv));
+  }
+}
+
+/// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles at t + dt.
+/// A stage that falls back brakes; the status that is recorded is that of the step's own state.
+void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, const Eigen::VectorXd& goal,
+                   Obstacles& obstacles, double dt, const Eigen::VectorXd& a1, Eigen::VectorXd& q,
+                   Eigen::VectorXd& v) {
+  const double half = 0.5 * dt;
+  const auto stage = [&](const Eigen::VectorXd& stage_q, const Eigen::VectorXd& stage_v) -> Eigen::VectorXd {
+    static_cast<void>(system.acceleration(stage_q, stage_v, goal, obstacles, w));
+    return w.acceleration;
+  };
+  obstacles.advance(half);
+  const Eigen::VectorXd v2 = v + half * a1;
+  const Eigen::VectorXd a2 = stage(q + half * v, v2);
+  const Eigen::VectorXd v3 = v + half * a2;
+  const Eigen::VectorXd a3 = stage(q + half * v2, v3);
+  obstacles.advance(half);
+  const Eigen::VectorXd v4 = v + dt * a3;
+  const Eigen::VectorXd a4 = stage(q + dt * v3, v4);
+  q += dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
+  v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+}
+
+}  // namespace
+
+Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, const Eigen::VectorXd& start_velocity,
+                const Eigen::VectorXd& goal, Obstacles obstacles, const RolloutSettings& settings) {
+  const int nv = system.robot().num_coordinates();
+  check_size(start, "q", nv);
+  check_size(start_velocity, "v", nv);
+  check_size(goal, "goal", nv);
+  if (!(settings.period > 0.0) || !std::isfinite(settings.period)) {
+    throw std::invalid_argument("period is " + std::to_string(settings.period) + " s, must be positive and finite");
+  }
+  if (settings.steps < 1) {
+    throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at least 1");
+  }
+  const double dt = settings.period;
+  const Eigen::Index rows = settings.steps + 1;
+  const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, nv);
+  Rollout result{Eigen::VectorXd::LinSpaced(rows, 0.0, dt * settings.steps),
+                 of_joints,
+                 of_joints,
+                 of_joints,
+                 Eigen::MatrixXd::Zero(rows, system.num_embedding_coordinates()),
+                 of_joints,
+                 {}};
+  result.statuses.reserve(static_cast<std::size_t>(rows));
+  GeometricSystem::Workspace w(system);
+  Eigen::VectorXd q = start;
+  Eigen::VectorXd v = start_velocity;
+  for (Eigen::Index k = 0; k < rows; ++k) {
+    const StepStatus status = system.acceleration(q, v, goal, obstacles, w);
+    const Eigen::VectorXd a = w.acceleration;
+    result.q.row(k) = q;
+    result.v.row(k) = v;
+    result.acceleration.row(k) = a;
+    result.values.row(k) = w.values;
+    result.switch_weights.row(k) = w.switch_weights;
+    result.statuses.push_back(status);
+    switch (settings.integrator) {
+      case Integrator::semi_implicit_euler:
+        v += dt * a;
+        q += dt * v;
+        obstacles.advance(dt);
+        break;
+      case Integrator::second_order:
+        q += dt * v + 0.5 * dt * dt * a;
+        v += dt * a;
+        obstacles.advance(dt);
+        break;
+      case Integrator::runge_kutta_4:
+        runge_kutta_4(system, w, goal, obstacles, dt, a, q, v);
+        break;
+    }
+  }
+  return result;
+}
+
+}  // namespace sidestep
