@@ -25,7 +25,7 @@ BASE_POSE = np.array(pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.3, 1.1), np.array([0.5,
 class Oracle:
     """Pinocchio's model of a URDF text, driven by the coordinates of a Robot.
 
-    `follow` gives joints without a coordinate of their name: joint -> (coordinate or None, multiplier, offset).
+    `follow` has joints without a coordinate of that name: joint -> (coordinate or None, multiplier, offset).
     """
 
     model: pin.Model

@@ -70,8 +70,8 @@ _FR3_REASON = (
     "acceleration (no place in URDF): 10 rad/s^2 on every joint, Franka Control Interface, limits of FR3"
 )
 
-# Every correction of a robot's file stands in this table. Known and left as it is: the UR5's file gives its wrist
-# links 0.11 kg m^2 at 1.2 kg, more than links of their size can have.
+# Every correction of a robot's file stands in this table. Known and left as it is: the UR5's file gives its
+# wrist links 0.11 kg m^2 at 1.2 kg, more than links of their size can have.
 RECIPES: tuple[Recipe, ...] = (
     Recipe(
         "fr3",

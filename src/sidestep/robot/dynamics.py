@@ -14,8 +14,8 @@ from sidestep.robot.link import Array, Link
 class Dynamics:
     """Mass matrix and bias force of a tree whose mimic joints follow other coordinates.
 
-    Pinocchio's model has one coordinate per moving joint, q' = S q + c, where S holds the mimic multipliers (it
-    is the identity without mimic joints). By virtual work M = S^T M' S and, S being constant,
+    Pinocchio's model has one coordinate per moving joint, q' = S q + c, where S holds the mimic multipliers
+    (the identity without mimic joints). By virtual work M = S^T M' S and, S being constant,
     h = S^T h'(q', S v).
     Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 and 6.
 
@@ -47,7 +47,7 @@ class Dynamics:
 
 
 def _model(robot: _core.Robot, links: Sequence[Link]) -> pin.Model:
-    """The tree as a Pinocchio model; coordinate i belongs to `robot.joints[i]`, frames are called as links."""
+    """The tree as a Pinocchio model; coordinate i belongs to `robot.joints[i]`, frames carry link names."""
     model = pin.Model()
     model.name = robot.name
     indices: list[int] = []

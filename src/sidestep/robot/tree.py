@@ -32,7 +32,7 @@ class KinematicTree:
 
 @dataclass(frozen=True)
 class _Drive:
-    """What a moving joint follows: multiplier * position of `source` + offset; `offset` alone without source."""
+    """What a moving joint follows: multiplier * position of `source` + offset; `offset` alone without one."""
 
     source: str | None
     multiplier: float

@@ -1,0 +1,103 @@
+"""Files, packages and xacro."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from sidestep.robot import Robot, planar_arm
+
+MESH_URDF = re.sub(r"<box [^>]*/>", '<mesh filename="{}" scale="2 1 -1"/>', planar_arm(1), count=1)
+
+
+@pytest.fixture
+def packages(tmp_path: Path) -> Path:
+    """packages/arm/{urdf,meshes}, the mesh a box 1 x 2 x 3 m with its corner at the origin."""
+    (tmp_path / "arm" / "meshes").mkdir(parents=True)
+    (tmp_path / "arm" / "urdf").mkdir()
+    box = trimesh.creation.box(bounds=[[0, 0, 0], [1, 2, 3]])
+    box.export(tmp_path / "arm" / "meshes" / "box.stl")
+    return tmp_path
+
+
+def check_mesh(robot: Robot) -> None:
+    mesh = robot.collision_mesh("link1")
+    assert mesh is not None
+    # the file's box, scaled by (2, 1, -1), then moved by the origin 0.25 0 0; STL holds float32
+    np.testing.assert_allclose(mesh.bounds, [[0.25, 0, -3], [2.25, 2, 0]], atol=1e-6)
+    assert mesh.volume == pytest.approx(
+        12.0, rel=1e-6
+    )  # positive: the mirror did not turn the mesh inside out
+
+
+@pytest.mark.parametrize("uri", ["package://arm/meshes/box.stl", "../meshes/box.stl"])
+def test_references_from_a_file(packages: Path, uri: str) -> None:
+    path = packages / "arm" / "urdf" / "arm.urdf"
+    path.write_text(MESH_URDF.format(uri))
+    check_mesh(Robot.from_urdf(path))
+
+
+def test_references_from_a_string(packages: Path) -> None:
+    check_mesh(Robot.from_urdf(MESH_URDF.format("package://arm/meshes/box.stl"), package_dirs=[packages]))
+    check_mesh(
+        Robot.from_urdf(MESH_URDF.format("package://arm/meshes/box.stl"), package_dirs=[packages / "arm"])
+    )
+    check_mesh(Robot.from_urdf(MESH_URDF.format((packages / "arm/meshes/box.stl").as_uri())))
+    check_mesh(Robot.from_urdf(MESH_URDF.format(packages / "arm/meshes/box.stl")))
+    with pytest.raises(ValueError, match="'http://x/box.stl'; allowed: package://, file:// and plain paths"):
+        Robot.from_urdf(MESH_URDF.format("http://x/box.stl"))
+
+
+def test_collada_unit_is_applied(packages: Path) -> None:
+    box = trimesh.creation.box(bounds=[[0, 0, 0], [1000, 2000, 3000]])
+    path = packages / "arm" / "meshes" / "box.dae"
+    box.export(path)
+    text, count = re.subn(
+        r"<asset>", '<asset><unit name="millimeter" meter="0.001"/>', path.read_text(), count=1
+    )
+    assert count == 1
+    path.write_text(re.sub(r'<unit[^>]*meter="1(\.0)?"[^>]*/>', "", text))
+    check_mesh(Robot.from_urdf(MESH_URDF.format(path)))
+
+
+def test_unreadable_mesh(packages: Path) -> None:
+    path = packages / "broken.obj"
+    path.write_text("not a mesh")
+    robot = Robot.from_urdf(MESH_URDF.format(path))
+    with pytest.raises(ValueError, match=r"mesh file .*broken.obj"):
+        robot.collision_mesh("link1")
+
+
+XACRO = """<robot name="made" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:arg name="reach" default="0.3"/>
+  <xacro:include filename="$(find arm)/urdf/part.xacro"/>
+  <xacro:part length="$(arg reach)"/>
+</robot>"""
+PART = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:macro name="part" params="length">
+    <link name="base"/><link name="arm"/><link name="tip"/>
+    <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/></joint>
+    <joint name="end" type="fixed">
+      <parent link="arm"/><child link="tip"/><origin xyz="${2 * length} 0 0"/>
+    </joint>
+  </xacro:macro>
+</robot>"""
+
+
+def test_xacro(packages: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (packages / "arm" / "urdf" / "part.xacro").write_text(PART)
+    path = packages / "arm" / "urdf" / "arm.xacro"
+    path.write_text(XACRO)
+    assert Robot.from_urdf(path).pose([0.0], "tip")[0, 3] == pytest.approx(0.6)
+    longer = Robot.from_urdf(XACRO, package_dirs=[packages], xacro_arguments={"reach": "0.5"})
+    assert longer.name == "made"
+    assert longer.pose([0.0], "tip")[0, 3] == pytest.approx(1.0)
+    assert capfd.readouterr() == ("", "")
+    with pytest.raises(
+        ValueError, match=r"xacro expansion failed: .*\$\(find arm\): no such package; searched in"
+    ):
+        Robot.from_urdf(XACRO)
+    with pytest.raises(ValueError, match=r"uses no xacro, but xacro_arguments are given: \['reach'\]"):
+        Robot.from_urdf(planar_arm(2), xacro_arguments={"reach": "1"})

@@ -1,0 +1,142 @@
+"""Every way a description can be wrong gives one error that names what is wrong and what is allowed."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sidestep.robot import Robot, planar_arm
+
+GOOD = planar_arm(2)
+Edit = Callable[[str], str]
+
+
+def swap(old: str, new: str) -> Edit:
+    assert old in GOOD
+    return lambda text: text.replace(old, new, 1)
+
+
+def add(element: str) -> Edit:
+    return lambda text: text.replace("</robot>", element + "</robot>")
+
+
+def without_limit(text: str) -> str:
+    return re.sub(r"<limit[^>]*/>", "", text, count=1)
+
+
+FIXED = '<joint name="{}" type="fixed"><parent link="{}"/><child link="{}"/></joint>'
+LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+REVOLUTE = '<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/>' + LIMIT + "{}</joint>"
+
+BAD: dict[str, tuple[Edit, str]] = {
+    "unknown joint type": (
+        swap('type="revolute"', 'type="floating"'),
+        "joint 'joint1' has type 'floating'; allowed: revolute, continuous, prismatic, fixed",
+    ),
+    "misspelt joint type": (
+        swap('type="fixed"', 'type="fix"'),
+        "joint 'tip_joint' has type 'fix'; allowed: revo",
+    ),
+    "no parent link": (
+        swap('<parent link="link1"/>', '<parent link="arm"/>'),
+        "'joint2': parent link 'arm' does not",
+    ),
+    "no child link": (
+        swap('<child link="tip"/>', '<child link="hand"/>'),
+        "'tip_joint': child link 'hand' does not",
+    ),
+    "no parent element": (swap('<parent link="link1"/>', ""), "joint 'joint2' has no <parent>"),
+    "no limit": (
+        without_limit,
+        "joint 'joint1' is revolute and has no <limit>; give lower, upper, velocity and eff",
+    ),
+    "no effort": (lambda text: re.sub(r' effort="[^"]*"', "", text, count=1), "has no attribute 'effort'"),
+    "limit is no number": (
+        swap('velocity="5.0"', 'velocity="fast"'),
+        "'joint1': <limit>: velocity is 'fast', must",
+    ),
+    "zero velocity": (
+        swap('velocity="5.0"', 'velocity="0"'),
+        "'joint1': velocity limit is 0.0, must be positive",
+    ),
+    "empty interval": (swap('upper="3.14', 'upper="-4.14'), "must be below upper -4.14"),
+    "zero axis": (swap('xyz="0 0 1"', 'xyz="0 0 0"'), "joint 'joint1': axis is zero"),
+    "axis of two": (
+        swap('xyz="0 0 1"', 'xyz="0 1"'),
+        "joint 'joint1': xyz is '0 1', must be 3 finite numbers",
+    ),
+    "origin not finite": (
+        swap('xyz="0.5 0 0"', 'xyz="nan 0 0"'),
+        "xyz is 'nan 0 0', must be 3 finite numbers",
+    ),
+    "negative mass": (
+        lambda text: text.replace('mass value="', 'mass value="-', 1),
+        "link 'link1': <inertial>: mass",
+    ),
+    "no inertia": (lambda text: re.sub(r"<inertia .*/>", "", text, count=1), "needs <mass> and <inertia>"),
+    "unknown shape": (
+        swap("<box size=", "<torus size="),
+        "holds <torus>; allowed: one of mesh, box, cylinder, sph",
+    ),
+    "flat box": (swap('0.08 0.08"/>', '0.08 0"/>'), "box dimensions (0.5, 0.08, 0.0) must be positive"),
+    "link twice": (add('<link name="link1"/>'), "link 'link1' is defined twice"),
+    "joint twice": (
+        add('<link name="x"/>' + FIXED.format("joint1", "tip", "x")),
+        "joint 'joint1' is defined twice",
+    ),
+    "two parents": (
+        add(FIXED.format("again", "base", "tip")),
+        "link 'tip' is the child of joints 'tip_joint' and 'a",
+    ),
+    "several roots": (add('<link name="island"/>'), "several root links ['base', 'island']"),
+    "loop through the root": (add(FIXED.format("back", "tip", "base")), "hang on a loop of joints"),
+    "loop beside the tree": (
+        add('<link name="a"/><link name="b"/>' + FIXED.format("ab", "a", "b") + FIXED.format("ba", "b", "a")),
+        "links ['a', 'b'] hang on a loop",
+    ),
+    "unknown mimic source": (
+        add('<link name="x"/>' + REVOLUTE.format("jx", "tip", "x", '<mimic joint="nobody"/>')),
+        "joint 'jx' mimics 'nobody', which does not exist; the joints are: joint1, joint2",
+    ),
+    "mimic loop": (
+        add('<link name="x"/>' + REVOLUTE.format("jx", "tip", "x", '<mimic joint="jx"/>')),
+        "mimic joints form a loop: jx -> jx",
+    ),
+    "mimic of a fixed joint": (
+        add('<link name="x"/>' + REVOLUTE.format("jx", "tip", "x", '<mimic joint="tip_joint"/>')),
+        "joint 'jx' mimics 'tip_joint', which is fixed",
+    ),
+    "malformed XML": (swap("</robot>", ""), "URDF string is not well-formed XML"),
+    "another format": (lambda text: "<sdf/>", "the root element is <sdf>, must be <robot>"),
+    "no link": (lambda text: "<robot/>", "has no link"),
+    "nothing moves": (lambda text: '<robot><link name="a"/></robot>', "has no movable joint left"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_error_names_what_is_wrong(case: str) -> None:
+    edit, message = BAD[case]
+    text = edit(GOOD)
+    assert text != GOOD
+    with pytest.raises(ValueError, match=re.escape(message)):
+        Robot.from_urdf(text)
+
+
+def test_missing_mesh_names_link_reference_and_folders(tmp_path: Path) -> None:
+    text = re.sub(r"<box [^>]*/>", '<mesh filename="package://arm/meshes/link.stl"/>', GOOD, count=1)
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    with pytest.raises(FileNotFoundError) as caught:
+        Robot.from_urdf(path)
+    assert "link 'link1' refers to 'package://arm/meshes/link.stl'" in str(caught.value)
+    assert str(tmp_path.resolve()) in str(caught.value)
+    with pytest.raises(FileNotFoundError, match=r"no folder \(pass package_dirs\)"):
+        Robot.from_urdf(text)
+
+
+def test_missing_description_and_folder(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=re.escape("nothing.urdf does not exist")):
+        Robot.from_urdf(tmp_path / "nothing.urdf")
+    with pytest.raises(FileNotFoundError, match=r"package_dirs: .*nowhere is not a folder"):
+        Robot.from_urdf(GOOD, package_dirs=[tmp_path / "nowhere"])
