@@ -1,0 +1,19 @@
+"""Obstacles: points with radii and velocities, from arrays, shapes, meshes and point-cloud files."""
+
+from sidestep._core import Obstacles
+from sidestep.obstacles.cloud import load_point_cloud, merge_in_voxels
+from sidestep.obstacles.scene import obstacles_from_shapes
+from sidestep.obstacles.shapes import Box, Cylinder, MeshShape, Shape, Sphere, pose_at
+
+__all__ = [
+    "Box",
+    "Cylinder",
+    "MeshShape",
+    "Obstacles",
+    "Shape",
+    "Sphere",
+    "load_point_cloud",
+    "merge_in_voxels",
+    "obstacles_from_shapes",
+    "pose_at",
+]

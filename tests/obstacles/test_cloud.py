@@ -1,0 +1,175 @@
+"""Point-cloud files of every encoding, bad files, and thinning that loses nothing."""
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from pypcd4.pypcd4 import Encoding, PointCloud
+
+from sidestep.obstacles import load_point_cloud, merge_in_voxels
+
+POINTS = np.random.default_rng(7).uniform(-1.0, 1.0, (50, 3)).astype(np.float32)
+
+
+def write_ply_ascii(path: Path, points: np.ndarray) -> None:
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n"
+    head += "".join(f"property float {c}\n" for c in "xyz") + "end_header\n"
+    path.write_text(head + "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in points.astype(float).tolist()))
+
+
+def ply_binary_writer(order: str) -> Callable[[Path, np.ndarray], None]:
+    def write(path: Path, points: np.ndarray) -> None:
+        name = {"<": "little", ">": "big"}[order]
+        head = f"ply\nformat binary_{name}_endian 1.0\ncomment a depth camera\nelement vertex {len(points)}\n"
+        # a colour between the coordinates and the next point, as cameras write it
+        head += "".join(f"property float {c}\n" for c in "xyz") + "property uchar red\nend_header\n"
+        body = b"".join(struct.pack(f"{order}fffB", *point, 200) for point in points)
+        path.write_bytes(head.encode() + body)
+
+    return write
+
+
+def pcd_writer(encoding: Encoding) -> Callable[[Path, np.ndarray], None]:
+    def write(path: Path, points: np.ndarray) -> None:
+        intensity = np.linspace(0.0, 1.0, len(points), dtype=np.float32)
+        PointCloud.from_xyzi_points(np.column_stack([points, intensity])).save(path, encoding=encoding)
+
+    return write
+
+
+WRITERS: dict[str, tuple[str, Callable[[Path, np.ndarray], None]]] = {
+    "ply ascii": ("cloud.ply", write_ply_ascii),
+    "ply little endian": ("cloud.ply", ply_binary_writer("<")),
+    "ply big endian": ("cloud.ply", ply_binary_writer(">")),
+    "pcd ascii": ("cloud.pcd", pcd_writer(Encoding.ASCII)),
+    "pcd binary": ("cloud.pcd", pcd_writer(Encoding.BINARY)),
+    "pcd compressed": ("cloud.pcd", pcd_writer(Encoding.BINARY_COMPRESSED)),
+    "npy": ("cloud.NPY", lambda path, points: np.save(path.open("wb"), points)),
+}
+
+
+@pytest.fixture(params=WRITERS)
+def written(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[np.ndarray], Path]:
+    name, writer = WRITERS[request.param]
+
+    def write(points: np.ndarray) -> Path:
+        writer(tmp_path / name, points)
+        return tmp_path / name
+
+    return write
+
+
+def test_points_come_back_as_written(written: Callable[[np.ndarray], Path]) -> None:
+    obstacles = load_point_cloud(written(POINTS), radius=0.01)
+    # single precision goes through binary files unchanged; ASCII PCD is written with fewer digits
+    np.testing.assert_allclose(obstacles.points, POINTS, rtol=0.0, atol=1e-6)
+    np.testing.assert_array_equal(obstacles.radii, np.full(50, 0.01))
+    np.testing.assert_array_equal(obstacles.velocities, np.zeros((50, 3)))
+
+
+def test_points_that_are_not_finite_are_never_dropped_in_silence(
+    written: Callable[[np.ndarray], Path],
+) -> None:
+    holes = POINTS.copy()
+    holes[[3, 17]] = np.nan
+    path = written(holes)
+    with pytest.raises(
+        ValueError, match=r"2 of 50 points are not finite, the first is point 3; invalid='drop'"
+    ):
+        load_point_cloud(path)
+    with pytest.warns(RuntimeWarning, match="2 of 50 points are not finite and were dropped"):
+        obstacles = load_point_cloud(path, invalid="drop")
+    np.testing.assert_allclose(obstacles.points, np.delete(POINTS, [3, 17], axis=0), rtol=0.0, atol=1e-6)
+
+
+def test_a_cloud_of_invalid_points_only_is_empty(tmp_path: Path) -> None:
+    np.save(tmp_path / "blind.npy", np.full((4, 3), np.nan))
+    with pytest.warns(RuntimeWarning, match="4 of 4"), pytest.raises(ValueError, match="holds no point"):
+        load_point_cloud(tmp_path / "blind.npy", invalid="drop")
+
+
+def test_truncated_files_are_refused(written: Callable[[np.ndarray], Path]) -> None:
+    path = written(POINTS)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) - 60])
+    with pytest.raises(ValueError, match=rf"point cloud '.*{path.name}' cannot be read: ."):
+        load_point_cloud(path)
+
+
+def test_a_pcd_file_with_rows_left_out_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cloud.pcd"
+    pcd_writer(Encoding.ASCII)(path, POINTS)
+    path.write_text("\n".join(path.read_text().splitlines()[:-5]) + "\n")
+    with pytest.raises(ValueError, match="announces 50 points and holds 45"):
+        load_point_cloud(path)
+
+
+def test_files_that_are_no_cloud_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"absent\.ply' does not exist"):
+        load_point_cloud(tmp_path / "absent.ply")
+    (tmp_path / "cloud.xyz").write_text("0 0 0\n")
+    with pytest.raises(ValueError, match=r"suffix '\.xyz', must be one of \.ply, \.pcd, \.npy"):
+        load_point_cloud(tmp_path / "cloud.xyz")
+    trimesh.creation.box().export(tmp_path / "mesh.ply")
+    with pytest.raises(ValueError, match="it is a mesh of 12 faces"):
+        load_point_cloud(tmp_path / "mesh.ply")
+    for name in ("cloud.ply", "cloud.pcd", "cloud.npy"):
+        (tmp_path / name).write_bytes(b"nonsense\n")
+        with pytest.raises(ValueError, match=f"{name}' cannot be read"):
+            load_point_cloud(tmp_path / name)
+    np.save(tmp_path / "wide.npy", np.zeros((5, 4)))
+    with pytest.raises(ValueError, match=r"shape \(5, 4\), expected \(N, 3\)"):
+        load_point_cloud(tmp_path / "wide.npy")
+    np.save(tmp_path / "text.npy", np.array([["a", "b", "c"]]))
+    with pytest.raises(ValueError, match="does not hold an array of real numbers"):
+        load_point_cloud(tmp_path / "text.npy")
+    np.save(tmp_path / "objects.npy", np.array([[object()] * 3]), allow_pickle=True)
+    with pytest.raises(ValueError, match=r"objects\.npy' cannot be read"):
+        load_point_cloud(tmp_path / "objects.npy")
+    np.save(tmp_path / "empty.npy", np.zeros((0, 3)))
+    with pytest.raises(ValueError, match="holds no point"):
+        load_point_cloud(tmp_path / "empty.npy")
+    np.save(tmp_path / "good.npy", POINTS)
+    with pytest.raises(ValueError, match="invalid is 'ignore', must be 'raise' or 'drop'"):
+        load_point_cloud(tmp_path / "good.npy", invalid="ignore")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"radius -0\.5"):
+        load_point_cloud(tmp_path / "good.npy", radius=-0.5)
+
+
+def test_a_pcd_file_without_coordinates_names_its_fields(tmp_path: Path) -> None:
+    cloud = PointCloud.from_points(POINTS[:, :2], ("x", "intensity"), (np.float32, np.float32))
+    cloud.save(tmp_path / "flat.pcd")
+    with pytest.raises(ValueError, match="it has no field y, z; its fields are x, intensity"):
+        load_point_cloud(tmp_path / "flat.pcd")
+
+
+@pytest.mark.parametrize("voxel", [0.05, 0.3, 5.0])
+def test_merged_balls_contain_every_ball(voxel: float) -> None:
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-0.5, 0.5, (2000, 3))
+    radii = rng.uniform(0.0, 0.02, 2000)
+    centres, reach = merge_in_voxels(points, radii, voxel=voxel)
+    assert len(centres) < len(points)
+    # ball i is inside ball j where |x_i - c_j| + r_i <= R_j; rounding at the scale of a metre
+    slack = reach - np.linalg.norm(points[:, None] - centres[None], axis=2) - radii[:, None]
+    assert slack.max(axis=1).min() >= -1e-12
+    assert reach.max() <= radii.max() + np.sqrt(3.0) / 2.0 * voxel + 1e-12
+
+
+def test_merging_leaves_a_lone_point_as_it_is() -> None:
+    centres, reach = merge_in_voxels([[0.1, 0.1, 0.1], [0.9, 0.9, 0.9]], [0.01, 0.02], voxel=0.2)
+    np.testing.assert_array_equal(centres, [[0.1, 0.1, 0.1], [0.9, 0.9, 0.9]])
+    np.testing.assert_array_equal(reach, [0.01, 0.02])
+
+
+def test_a_file_can_be_merged_as_it_is_read(tmp_path: Path) -> None:
+    np.save(tmp_path / "cloud.npy", POINTS)
+    obstacles = load_point_cloud(tmp_path / "cloud.npy", radius=0.01, voxel=0.5)
+    centres, reach = merge_in_voxels(POINTS, 0.01, voxel=0.5)
+    np.testing.assert_array_equal(obstacles.points, centres)
+    np.testing.assert_array_equal(obstacles.radii, reach)
+    with pytest.raises(ValueError, match="voxel is 0"):
+        load_point_cloud(tmp_path / "cloud.npy", voxel=0.0)
