@@ -114,13 +114,13 @@ def test_limits_can_be_given() -> None:
         ValueError, match=r"acceleration_limits has shape \(3,\), expected a number or \(2,\)"
     ):
         Robot.from_urdf(planar_arm(2), acceleration_limits=[1, 2, 3])
-    with pytest.raises(ValueError, match="acceleration_limits: -1.0 for 'joint2', must be positive"):
+    with pytest.raises(ValueError, match=r"acceleration_limits: -1.0 for 'joint2', must be positive"):
         Robot.from_urdf(planar_arm(2), acceleration_limits=[1, -1])
 
 
 def test_unusable_limits_of_the_file_can_be_replaced() -> None:
     with pytest.raises(
-        ValueError, match="'held': velocity limit is 0.0, must be positive.*pass velocity_limits or"
+        ValueError, match=r"'held': velocity limit is 0.0, must be positive.*pass velocity_limits or"
     ):
         Robot.from_urdf(EVERY_JOINT)
     assert Robot.from_urdf(EVERY_JOINT, velocity_limits=1, effort_limits=1).num_coordinates == 5
