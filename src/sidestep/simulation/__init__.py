@@ -1,6 +1,7 @@
 """Physics, exact clearance, and what a run achieved."""
 
 from sidestep.simulation.clearance import Clearance, ExactClearance, PathClearance
+from sidestep.simulation.drawing import draw_arm, render_frames
 from sidestep.simulation.evaluation import Evaluation, LimitViolations, evaluate
 from sidestep.simulation.model import SimulationModel, build_model
 from sidestep.simulation.run import Arrival, Contact, KinematicRun, Run, SimulationRun
@@ -22,7 +23,9 @@ __all__ = [
     "SimulationModel",
     "SimulationRun",
     "build_model",
+    "draw_arm",
     "evaluate",
+    "render_frames",
     "run_kinematically",
     "seen_obstacles",
 ]

@@ -65,7 +65,7 @@ class Evaluation:
         max_qp_error, rms_qp_error: the same for |QP's - wanted|; max_model_error for |achieved - QP's|.
         max_torque_ratio: largest |torque| / limit.
         limits: violations at samples.
-        system_faults, controller_faults: status name to number of samples, all but "ok".
+        system_status, controller_status: status name to the number of samples that had it.
         duration_s: simulated time.
     """
 
@@ -89,8 +89,8 @@ class Evaluation:
     max_model_error: float | None
     max_torque_ratio: float | None
     limits: LimitViolations
-    system_faults: dict[str, int]
-    controller_faults: dict[str, int] | None
+    system_status: dict[str, int]
+    controller_status: dict[str, int] | None
     duration_s: float
 
     @property
@@ -158,8 +158,8 @@ def evaluate(
         max_model_error=_largest(physics, "achieved", "solved"),
         max_torque_ratio=None if physics is None else float((np.abs(physics.torque) / effort).max()),
         limits=_violations(run),
-        system_faults=_faults(run.system_status),
-        controller_faults=None if physics is None else _faults(physics.controller_status),
+        system_status=_counts(run.system_status),
+        controller_status=None if physics is None else _counts(physics.controller_status),
         duration_s=float(run.time[-1] + run.timestep),
     )
 
@@ -192,17 +192,24 @@ def _moved(run: Run) -> dict[str, float]:
     return moved
 
 
-def _difference(run: SimulationRun, a: str, b: str) -> Array:
-    difference: Array = np.abs(getattr(run, a) - getattr(run, b))
-    return difference
+def _differences(run: SimulationRun | None, a: str, b: str) -> Array:
+    """|a - b| of two recorded accelerations, all joints and samples; a fallback's unknown ones are left
+    out."""
+    if run is None:
+        return np.zeros(0)
+    differences = np.abs(getattr(run, a) - getattr(run, b)).ravel()
+    known: Array = differences[np.isfinite(differences)]
+    return known
 
 
 def _largest(run: SimulationRun | None, a: str, b: str) -> float | None:
-    return None if run is None else float(_difference(run, a, b).max())
+    differences = _differences(run, a, b)
+    return float(differences.max()) if differences.size else None
 
 
 def _rms(run: SimulationRun | None, a: str, b: str) -> float | None:
-    return None if run is None else float(np.sqrt((_difference(run, a, b) ** 2).mean()))
+    differences = _differences(run, a, b)
+    return float(np.sqrt((differences**2).mean())) if differences.size else None
 
 
 def _violations(run: Run) -> LimitViolations:
@@ -230,9 +237,9 @@ def _excess(values: Array, limit: Array) -> tuple[int, float]:
     return int(beyond.any(axis=1).sum()), float(np.max(excess, where=beyond, initial=0.0))
 
 
-def _faults(statuses: tuple[str, ...]) -> dict[str, int]:
+def _counts(statuses: tuple[str, ...]) -> dict[str, int]:
     names, counts = np.unique(np.array(statuses, dtype=str), return_counts=True)
-    return {str(name): int(count) for name, count in zip(names, counts, strict=True) if name != "ok"}
+    return {str(name): int(count) for name, count in zip(names, counts, strict=True)}
 
 
 def _finite(value: object) -> object:
