@@ -120,7 +120,7 @@ def _read_ply(path: Path) -> Points:
     faces = contents.get("faces")
     if faces is not None and len(faces):
         raise ValueError(
-            f"it is a mesh of {len(faces)} faces, its corners are no cloud; MeshShape(path) samples its surface"
+            f"it is a mesh of {len(faces)} faces, not a cloud; MeshShape(path) samples its surface"
         )
     points = _points(contents.get("vertices"))
     announced = re.search(rb"element\s+vertex\s+(\d+)", path.read_bytes())
