@@ -17,10 +17,10 @@ std::string shape_text(const Array& array) {
   throw nb::value_error((std::string(name) + " has shape " + shape_text(array) + ", expected " + expected).c_str());
 }
 
-nb::object make_numpy(std::unique_ptr<double[]> data, std::initializer_list<std::size_t> shape) {
+NumpyArray make_numpy(std::unique_ptr<double[]> data, std::initializer_list<std::size_t> shape) {
   double* raw = data.release();
   nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, double>(raw, shape, owner));
+  return nb::steal<NumpyArray>(nb::cast(nb::ndarray<nb::numpy, double>(raw, shape, owner)).release());
 }
 
 }  // namespace
@@ -84,20 +84,20 @@ Eigen::Matrix3Xd as_points(nb::handle value, const char* name) {
   return Eigen::Map<const Eigen::Matrix3Xd>(array.data(), 3, static_cast<Eigen::Index>(array.shape(0)));
 }
 
-nb::object to_numpy(const Eigen::Ref<const Eigen::VectorXd>& vector) {
+NumpyArray to_numpy(const Eigen::Ref<const Eigen::VectorXd>& vector) {
   auto data = std::make_unique<double[]>(static_cast<std::size_t>(vector.size()));
   Eigen::Map<Eigen::VectorXd>(data.get(), vector.size()) = vector;
   return make_numpy(std::move(data), {static_cast<std::size_t>(vector.size())});
 }
 
-nb::object to_numpy_matrix(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+NumpyArray to_numpy_matrix(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   auto data = std::make_unique<double[]>(static_cast<std::size_t>(matrix.size()));
   Eigen::Map<RowMajor>(data.get(), matrix.rows(), matrix.cols()) = matrix;
   return make_numpy(std::move(data), {static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols())});
 }
 
-nb::object to_numpy_points(const Eigen::Ref<const Eigen::Matrix3Xd>& points) {
+NumpyArray to_numpy_points(const Eigen::Ref<const Eigen::Matrix3Xd>& points) {
   return to_numpy_matrix(points.transpose());
 }
 

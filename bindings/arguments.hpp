@@ -30,10 +30,17 @@ Eigen::Matrix3Xd as_points(nb::handle value, const char* name);
 /// A matrix argument of exactly this shape.
 Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols);
 
+inline bool is_object(nb::handle) { return true; }
+
+/// A numpy array of float64; the name is what the type stubs say about functions that return one.
+class NumpyArray : public nb::object {
+  NB_OBJECT_DEFAULT(NumpyArray, nb::object, "numpy.typing.NDArray[numpy.float64]", is_object)
+};
+
 /// A numpy array that owns a copy of the data.
-nb::object to_numpy(const Eigen::Ref<const Eigen::VectorXd>& vector);
-nb::object to_numpy_matrix(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
+NumpyArray to_numpy(const Eigen::Ref<const Eigen::VectorXd>& vector);
+NumpyArray to_numpy_matrix(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
 /// 3 × N points as an (N, 3) array.
-nb::object to_numpy_points(const Eigen::Ref<const Eigen::Matrix3Xd>& points);
+NumpyArray to_numpy_points(const Eigen::Ref<const Eigen::Matrix3Xd>& points);
 
 }  // namespace sidestep::python

@@ -45,7 +45,7 @@ void bind_body(nb::module_& m) {
           const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> row_major = b.covariances[static_cast<std::size_t>(k)];
           flat.row(k) = Eigen::Map<const Eigen::RowVectorXd>(row_major.data(), 9);
         }
-        return to_numpy_matrix(flat).attr("reshape")(nb::make_tuple(b.num_components(), 3, 3));
+        return nb::cast<NumpyArray>(to_numpy_matrix(flat).attr("reshape")(nb::make_tuple(b.num_components(), 3, 3)));
       });
 }
 
