@@ -3,10 +3,11 @@
 from sidestep.simulation.clearance import Clearance, ExactClearance, PathClearance
 from sidestep.simulation.drawing import draw_arm, render_frames
 from sidestep.simulation.evaluation import Evaluation, LimitViolations, evaluate
+from sidestep.simulation.kinematic import run_kinematically
 from sidestep.simulation.model import SimulationModel, build_model
 from sidestep.simulation.run import Arrival, Contact, KinematicRun, Run, SimulationRun
 from sidestep.simulation.scene import SceneObject, seen_obstacles
-from sidestep.simulation.simulation import Simulation, run_kinematically
+from sidestep.simulation.simulation import Simulation
 
 __all__ = [
     "Arrival",

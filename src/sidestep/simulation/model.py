@@ -192,13 +192,13 @@ def _add_robot(
         for follower in leaders:
             if follower is not leader:
                 ratio = follower.multiplier / leader.multiplier
-                spec.add_equality(
+                gear = spec.add_equality(
                     type=mujoco.mjtEq.mjEQ_JOINT,
                     objtype=mujoco.mjtObj.mjOBJ_JOINT,
                     name1=follower.name,
                     name2=leader.name,
-                    data=[follower.offset - ratio * leader.offset, ratio] + [0.0] * 9,
                 )
+                gear.data[0], gear.data[1] = follower.offset - ratio * leader.offset, ratio
 
 
 def _joint_coefficient(value: float) -> float | list[float]:

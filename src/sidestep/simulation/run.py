@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from sidestep._core import Obstacles
 from sidestep.robot import Robot
 from sidestep.simulation.scene import SceneObject
 
 Array = npt.NDArray[np.float64]
+ObstacleSource: TypeAlias = Obstacles | Callable[[float], Obstacles]
 
 
 @dataclass(frozen=True)
@@ -123,3 +127,18 @@ class ArrivalWatch:
         elif self.since is None:
             self.since = time
         return self.since is not None and time - self.since >= self.rule.hold
+
+
+def obstacles_over_time(obstacles: ObstacleSource) -> Callable[[float], Obstacles]:
+    """What the controller sees as a function of time [s]; points move along their velocities from time 0."""
+    if not isinstance(obstacles, Obstacles):
+        return obstacles
+    points, radii, velocities = obstacles.points, obstacles.radii, obstacles.velocities
+    if not np.any(velocities):
+        return lambda time: obstacles
+    return lambda time: Obstacles(points + time * velocities, radii, velocities)
+
+
+def status_name(status: object) -> str:
+    """The name of a status, enumerated or plain."""
+    return str(getattr(status, "name", status))

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import Obstacles
+from sidestep.obstacles import Box, Cylinder, Shape, Sphere
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["sphere", "box", "cylinder", "mesh"]
@@ -109,6 +110,42 @@ class SceneObject:
             mass=mass,
             velocity=np.asarray(velocity, dtype=float),
             moves_during=moves_during,
+        )
+
+    @classmethod
+    def from_shape(
+        cls,
+        name: str,
+        shape: Shape,
+        *,
+        motion: Motion = "fixed",
+        mass: float = 0.1,
+        velocity: Sequence[float] | Array = (0.0, 0.0, 0.0),
+        moves_during: tuple[float, float] = (0.0, float("inf")),
+    ) -> SceneObject:
+        """The solid of an obstacle shape; spheres, boxes and cylinders stay exact, others become their mesh."""
+        kind: Kind = "mesh"
+        size: tuple[float, ...] = ()
+        mesh: trimesh.Trimesh | None = None
+        if isinstance(shape, Sphere):
+            kind, size = "sphere", (shape.radius,)
+        elif isinstance(shape, Box):
+            kind, size = "box", tuple(shape.size)
+        elif isinstance(shape, Cylinder):
+            kind, size = "cylinder", (shape.radius, shape.length)
+        else:
+            mesh = shape.mesh().copy()
+            mesh.apply_transform(np.linalg.inv(shape.pose))
+        return cls(
+            name,
+            kind,
+            size=size,
+            pose=shape.pose,
+            motion=motion,
+            mass=mass,
+            velocity=np.asarray(velocity, dtype=float),
+            moves_during=moves_during,
+            mesh=mesh,
         )
 
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -12,12 +12,18 @@ import numpy.typing as npt
 from sidestep._core import Obstacles
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
-from sidestep.simulation.pose import pose_vector
-from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, KinematicRun, SimulationRun
+from sidestep.simulation.run import (
+    Arrival,
+    ArrivalWatch,
+    Contact,
+    ObstacleSource,
+    SimulationRun,
+    obstacles_over_time,
+    status_name,
+)
 from sidestep.simulation.scene import SceneObject, check_scene
 
 Array = npt.NDArray[np.float64]
-ObstacleSource: TypeAlias = Obstacles | Callable[[float], Obstacles]
 
 
 class MotionSystem(Protocol):
@@ -111,7 +117,7 @@ class Simulation:
         built.set_state(
             data, start, np.zeros_like(start) if start_velocity is None else np.asarray(start_velocity)
         )
-        see = _observer(obstacles)
+        see = obstacles_over_time(obstacles)
         watch = None if arrival is None else ArrivalWatch(goal, arrival)
         steps = max(1, round(duration / self.timestep))
         rows: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
@@ -212,80 +218,3 @@ _COLUMNS = (
     "torque",
     "controller_status",
 )
-
-
-def run_kinematically(
-    robot: Robot,
-    system: MotionSystem,
-    start: Array,
-    goal: Array,
-    duration: float,
-    obstacles: ObstacleSource,
-    *,
-    objects: Sequence[SceneObject] = (),
-    timestep: float = 1e-3,
-    arrival: Arrival | None = Arrival(),
-    on_step: Callable[[float, Array], None] | None = None,
-) -> KinematicRun:
-    """Integrates the wanted acceleration itself by semi-implicit Euler: no masses, no torques, no contacts.
-
-        v_{k+1} = v_k + dt a(q_k, v_k),   q_{k+1} = q_k + dt v_{k+1}
-
-    Arguments, stopping and record as in `Simulation.run`; free objects stay where they are.
-    """
-    if not (np.isfinite(duration) and duration > 0.0 and np.isfinite(timestep) and timestep > 0.0):
-        raise ValueError(f"duration and timestep must be positive, got {duration} and {timestep}")
-    scene = check_scene(objects)
-    start = robot.check_configuration(start, "start")
-    goal = robot.check_configuration(goal, "goal")
-    see = _observer(obstacles)
-    watch = None if arrival is None else ArrivalWatch(goal, arrival)
-    names = [name for name in _COLUMNS if name not in ("solved", "torque", "controller_status")]
-    rows: dict[str, list[Any]] = {name: [] for name in names}
-    q, v, arrived = start.copy(), np.zeros_like(start), False
-    for k in range(max(1, round(duration / timestep))):
-        time = k * timestep
-        step = system.acceleration(q, v, goal, see(time))
-        wanted = np.asarray(step.acceleration, dtype=float)
-        poses = np.array([pose_vector(item.pose_at(time)) for item in scene]).reshape(-1, 7)
-        switch, values = (
-            np.atleast_1d(getattr(step, "switch", ())),
-            np.atleast_1d(getattr(step, "values", ())),
-        )
-        row = (time, q, v, wanted, wanted, switch, values, status_name(step.status), poses)
-        for name, value in zip(names, row, strict=True):
-            rows[name].append(value)
-        if on_step is not None:
-            on_step(time, q)
-        if watch is not None and watch.update(time, q, v):
-            arrived = True
-            break
-        v = v + timestep * wanted
-        q = q + timestep * v
-        if not np.all(np.isfinite(q)):
-            raise RuntimeError(f"the integration diverged at {time:.3f} s; shorten the timestep")
-    return KinematicRun(
-        robot=robot,
-        objects=scene,
-        start=start,
-        goal=goal,
-        timestep=timestep,
-        arrived=arrived,
-        time_to_goal=watch.since if watch is not None and arrived else None,
-        system_status=tuple(rows.pop("system_status")),
-        **{name: np.array(column, dtype=float) for name, column in rows.items()},
-    )
-
-
-def status_name(status: object) -> str:
-    """The name of a status, enumerated or plain."""
-    return str(getattr(status, "name", status))
-
-
-def _observer(obstacles: ObstacleSource) -> Callable[[float], Obstacles]:
-    if not isinstance(obstacles, Obstacles):
-        return obstacles
-    if len(obstacles) == 0 or not np.any(obstacles.velocities):
-        return lambda time: obstacles
-    points, radii, velocities = obstacles.points, obstacles.radii, obstacles.velocities
-    return lambda time: Obstacles(points + time * velocities, radii, velocities)
