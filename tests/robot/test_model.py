@@ -128,6 +128,20 @@ def test_several_shapes_are_merged_in_the_link_frame() -> None:
         robot.collision_mesh("nose")
 
 
+def test_curved_primitives_are_close_to_their_surface() -> None:
+    for shape in ('<sphere radius="1"/>', '<cylinder radius="1" length="2"/>'):
+        text = re.sub(r"<box [^>]*/>", shape, planar_arm(1)).replace(
+            '<collision>\n      <origin xyz="0.25 0 0"/>', "<collision>"
+        )
+        mesh = Robot.from_urdf(text).collision_mesh("link1")
+        assert mesh is not None
+        side = (
+            np.abs(mesh.face_normals[:, 2]) < 0.999 if "cylinder" in shape else np.ones(len(mesh.faces), bool)
+        )
+        distance = np.einsum("ij,ij->i", mesh.triangles_center, mesh.face_normals)[side]
+        assert 1.0 - 0.0015 < distance.min() < distance.max() < 1.0  # what Geometry.mesh promises
+
+
 def test_robot_without_geometry_moves_but_has_no_mesh() -> None:
     robot = Robot.from_urdf(re.sub(r"<collision>.*?</collision>", "", planar_arm(2), flags=re.DOTALL))
     np.testing.assert_allclose(robot.pose([0, 0], "tip")[:3, 3], [1, 0, 0])

@@ -6,20 +6,23 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
-import trimesh
 from numpy.typing import ArrayLike
 
 from sidestep import _core
 from sidestep.robot import catalogue
-from sidestep.robot.dynamics import Dynamics
 from sidestep.robot.link import Array, Link
 from sidestep.robot.source import read_description
 from sidestep.robot.tree import KinematicTree, build_tree
 from sidestep.robot.urdf import parse_urdf
+
+if TYPE_CHECKING:  # imported where they are used: each takes longer to import than a robot to load
+    import pinocchio as pin
+    import trimesh
+
+    from sidestep.robot.dynamics import Dynamics
 
 _HASH_DECIMALS = 9  # lengths [m] and angles are hashed to 1e-9: below any mesh's accuracy, above rounding
 
@@ -112,6 +115,9 @@ class Robot(_core.Robot):
             name=name,
         )
 
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, {self.num_coordinates} coordinates, {len(self._links)} links)"
+
     @property
     def links(self) -> tuple[Link, ...]:
         """Every link, in the order of `frames`."""
@@ -139,6 +145,8 @@ class Robot(_core.Robot):
                 f"robot {self.name!r} has no geometry: no link of its URDF has a <collision> or <visual>"
             )
         if link not in self._meshes:
+            import trimesh
+
             meshes = [geometry.mesh() for geometry in geometries]
             merged: Any = trimesh.util.concatenate(meshes) if meshes else None
             self._meshes[link] = merged
@@ -225,6 +233,8 @@ class Robot(_core.Robot):
 
     @cached_property
     def _dynamics(self) -> Dynamics:
+        from sidestep.robot.dynamics import Dynamics
+
         return Dynamics(self, self._links)
 
     def _vector(self, value: ArrayLike, name: str) -> Array:

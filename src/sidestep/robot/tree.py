@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from sidestep._core import Frame, Joint, JointLimits, JointType
 from sidestep.robot.link import Array, Link
+from sidestep.robot.rotation import about_axis
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
 DEFAULT_ACCELERATION_LIMIT = 10.0
@@ -184,7 +184,7 @@ def _motion(joint: UrdfJoint, value: float) -> Array:
     if joint.type == "prismatic":
         motion[:3, 3] = value * joint.axis
     else:
-        motion[:3, :3] = Rotation.from_rotvec(value * joint.axis).as_matrix()
+        motion[:3, :3] = about_axis(joint.axis, value)
     return motion
 
 

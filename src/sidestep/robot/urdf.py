@@ -7,9 +7,9 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from sidestep.robot.link import Array, Geometry, Inertial, Link
+from sidestep.robot.rotation import from_roll_pitch_yaw
 from sidestep.robot.source import Description
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed")
@@ -244,7 +244,7 @@ def _placement(element: ElementTree.Element, owner: str) -> Array:
     if origin is not None:
         where = f"{owner}: <origin>"
         rpy = _numbers(origin, "rpy", where, count=3, default="0 0 0")
-        placement[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
+        placement[:3, :3] = from_roll_pitch_yaw(rpy)
         placement[:3, 3] = _numbers(origin, "xyz", where, count=3, default="0 0 0")
     return placement
 
