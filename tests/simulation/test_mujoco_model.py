@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.special import ellipk
+from sidestep._core import Obstacles
+from stand_ins import PENDULUM, Holding, InverseDynamics, Spring
 
 from sidestep import Arrival, Robot, SceneObject, Simulation
-from sidestep._core import Obstacles
 from sidestep.simulation import build_model
-from stand_ins import PENDULUM, Holding, InverseDynamics, Spring
 
 MIMIC = """
 <robot name="mimic">
@@ -36,7 +36,7 @@ def _robot(name: str) -> Robot:
     return Robot.from_urdf(MIMIC) if name == "mimic" else Robot.named(name)
 
 
-@pytest.mark.parametrize("name", ["fr3_arm", "fr3", "ur5", "z1", "planar3", "mimic"])
+@pytest.mark.parametrize("name", ["fr3_arm", "fr3", "ur5", "planar3", "mimic"])
 def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
     robot = _robot(name)
     built = build_model(robot)
@@ -114,7 +114,7 @@ def test_substeps_hold_the_torque() -> None:
 
 def test_robot_without_mass_is_refused() -> None:
     urdf = PENDULUM.replace('<mass value="1.5"/>', '<mass value="0"/>')
-    with pytest.raises(ValueError, match="pivot.*without mass|mass"):
+    with pytest.raises(ValueError, match=r"pivot.*without mass"):
         build_model(Robot.from_urdf(urdf))
 
 

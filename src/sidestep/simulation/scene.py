@@ -123,7 +123,7 @@ class SceneObject:
         velocity: Sequence[float] | Array = (0.0, 0.0, 0.0),
         moves_during: tuple[float, float] = (0.0, float("inf")),
     ) -> SceneObject:
-        """The solid of an obstacle shape; spheres, boxes and cylinders stay exact, others become their mesh."""
+        """The solid of an obstacle shape; spheres, boxes and cylinders stay exact, others become a mesh."""
         kind: Kind = "mesh"
         size: tuple[float, ...] = ()
         mesh: trimesh.Trimesh | None = None
