@@ -75,6 +75,10 @@ BAD: dict[str, tuple[Edit, str]] = {
         "link 'link1': <inertial>: mass",
     ),
     "no inertia": (lambda text: re.sub(r"<inertia .*/>", "", text, count=1), "needs <mass> and <inertia>"),
+    "negative inertia": (
+        lambda text: text.replace(' ixx="', ' ixx="-', 1),
+        "link 'link1': <inertial>: ixx, iyy, izz are -0.",
+    ),
     "unknown shape": (
         swap("<box size=", "<torus size="),
         "holds <torus>; allowed: one of mesh, box, cylinder, sph",

@@ -220,6 +220,7 @@ def _limits(
         if not limit.lower < limit.upper:
             raise ValueError(
                 f"{label}: joint {joint.name!r}: lower limit {limit.lower} must be below upper {limit.upper}"
+                "; a joint without end is continuous"
             )
         for what, value, given in (("velocity", limit.velocity, velocity), ("effort", limit.effort, effort)):
             if given is None and not value > 0.0:

@@ -13,6 +13,7 @@ from sidestep.robot.rotation import from_roll_pitch_yaw
 from sidestep.robot.source import Description
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed")
+_INERTIA_ROUNDING = 1e-12  # [kg m^2] a CAD export's zero; the lightest finger has 1e-7
 GEOMETRY_TYPES = ("mesh", "box", "cylinder", "sphere")
 
 
@@ -89,7 +90,9 @@ def parse_urdf(description: Description) -> Urdf:
 def _root(links: dict[str, Link], joints: dict[str, UrdfJoint], label: str) -> str:
     """The only link that is no joint's child, after checking that the joints form one tree over all links."""
     if not links:
-        raise ValueError(f"{label} has no link")
+        raise ValueError(
+            f"{label} has no link (of xacro macros only, the file that calls them makes a robot)"
+        )
     parent_joint: dict[str, str] = {}
     children: dict[str, list[str]] = {name: [] for name in links}
     for joint in joints.values():
@@ -202,7 +205,7 @@ def _inertial(element: ElementTree.Element, owner: str) -> Inertial:
         raise ValueError(f"{where}: mass is {mass}, must not be negative")
     xx, yy, zz = (_number(inertia_element, key, where) for key in ("ixx", "iyy", "izz"))
     xy, xz, yz = (_number(inertia_element, key, where, default=0.0) for key in ("ixy", "ixz", "iyz"))
-    if min(xx, yy, zz) < 0.0:
+    if min(xx, yy, zz) < -_INERTIA_ROUNDING:
         raise ValueError(f"{where}: ixx, iyy, izz are {xx}, {yy}, {zz}, must not be negative")
     placement = _placement(element, where)
     rotation = placement[:3, :3]
