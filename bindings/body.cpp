@@ -28,17 +28,22 @@ void bind_body(nb::module_& m) {
       .def(
           "__init__",
           [](Body* self, std::vector<std::string> links, nb::handle weights, nb::handle means,
-             nb::handle covariances) {
+             nb::handle covariances, nb::handle levels) {
             new (self) Body(std::move(links), as_vector(weights, "weights"), as_points(means, "means"),
-                            as_covariances(covariances));
+                            as_covariances(covariances),
+                            levels.is_none() ? Eigen::VectorXd() : as_vector(levels, "levels"));
           },
           nb::kw_only(), nb::arg("links"), nb::arg("weights"), nb::arg("means"), nb::arg("covariances"),
+          nb::arg("levels") = nb::none(),
           "links (K,): frame of each component; weights (K,), sum 1 per link; means (K, 3) [m];\n"
-          "covariances (K, 3, 3) [m^2]. Raises ValueError that names the component at fault.")
+          "covariances (K, 3, 3) [m^2]; levels (K,) of a calibrated body. Raises ValueError that names the component at fault.")
       .def_prop_ro("num_components", &Body::num_components)
       .def_prop_ro("links", [](const Body& b) { return b.links; })
       .def_prop_ro("weights", [](const Body& b) { return to_numpy(b.weights); })
       .def_prop_ro("means", [](const Body& b) { return to_numpy_points(b.means); })
+      .def_prop_ro(
+          "levels", [](const Body& b) { return b.levels.size() ? to_numpy(b.levels) : nb::none(); },
+          "Levels (K,) of the covering ellipsoids, or None if the body is not calibrated.")
       .def_prop_ro("covariances", [](const Body& b) {
         Eigen::MatrixXd flat(b.num_components(), 9);
         for (int k = 0; k < b.num_components(); ++k) {

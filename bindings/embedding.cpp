@@ -3,6 +3,7 @@
 
 #include "arguments.hpp"
 #include "module.hpp"
+#include "sidestep/embedding/clearance_barrier.hpp"
 #include "sidestep/embedding/collision_density.hpp"
 #include "sidestep/embedding/joint_limit_potential.hpp"
 #include "sidestep/embedding/sum.hpp"
@@ -15,7 +16,17 @@ void bind_embedding(nb::module_& m) {
       .def_prop_ro("jacobian", [](const EmbeddingEvaluation& e) { return to_numpy_matrix(e.jacobian); },
                    "dpsi/dq (m, nv).")
       .def_prop_ro("curvatures", [](const EmbeddingEvaluation& e) { return to_numpy(e.curvatures); },
-                   "d2psi/dt2 (m,) along the motion with constant joint velocity.");
+                   "d2psi/dt2 (m,) along the motion with constant joint velocity.")
+      .def_prop_ro("clearances", [](const EmbeddingEvaluation& e) { return to_numpy(e.clearances.values); },
+                   "h (m,) [m] where the coordinates are barriers of clearances; inf beyond their reach.")
+      .def_prop_ro("clearance_rates", [](const EmbeddingEvaluation& e) { return to_numpy(e.clearances.rates); },
+                   "dh/dt (m,) [m/s].")
+      .def_prop_ro("clearance_curvatures",
+                   [](const EmbeddingEvaluation& e) { return to_numpy(e.clearances.curvatures); },
+                   "d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity.")
+      .def_prop_ro("clearance_gradients",
+                   [](const EmbeddingEvaluation& e) { return to_numpy_matrix(e.clearances.gradients.transpose()); },
+                   "dh/dq (m, nv) [m/rad].");
 
   nb::class_<Embedding>(m, "Embedding",
                         "Extra coordinates psi(q, t) that embed the joint space as the graph q -> (q, psi(q, t)).")
@@ -59,6 +70,33 @@ void bind_embedding(nb::module_& m) {
       "slope [1/rad]; height in the unit of the coordinate it is added to.")
       .def(nb::init<const Robot&, double, double>(), nb::arg("robot"), nb::kw_only(), nb::arg("slope") = 30.0,
            nb::arg("height") = 1.0);
+
+  nb::class_<ClearanceBarrier, Embedding>(
+      m, "ClearanceBarrier",
+      "One coordinate per covering ellipsoid of the body, a barrier of its clearance h_k to the obstacles,\n"
+      "    psi_k = strength (activation / h_k - 1)^power  for h_k < activation, else 0.\n"
+      "activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.\n"
+      "strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer\n"
+      "and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between\n"
+      "neighbouring points. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
+      .def(
+          "__init__",
+          [](ClearanceBarrier* self, const Robot& robot, const Body& body, double activation, double strength,
+             double power, double floor, double temperature) {
+            new (self) ClearanceBarrier(robot, body, {activation, strength, power, floor}, temperature);
+          },
+          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("activation") = 0.10, nb::arg("strength") = 0.1,
+          nb::arg("power") = 2.0, nb::arg("floor") = 0.002, nb::arg("temperature") = 0.002)
+      .def_prop_ro("activation", [](const ClearanceBarrier& b) { return b.barrier().activation; })
+      .def_prop_ro("components",
+                   [](const ClearanceBarrier& b) {
+                     std::vector<int> components;
+                     for (int k = 0; k < b.field().size(); ++k) {
+                       components.push_back(b.field().component(k));
+                     }
+                     return components;
+                   },
+                   "Which component of the body each coordinate belongs to.");
 
   nb::class_<Sum, Embedding>(m, "Sum",
                              "Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).")

@@ -13,11 +13,12 @@ constexpr double symmetry_tolerance = 1e-9;    // relative; rounding of a symmet
 }  // namespace
 
 Body::Body(std::vector<std::string> links_, Eigen::VectorXd weights_, Eigen::Matrix3Xd means_,
-           std::vector<Eigen::Matrix3d> covariances_)
+           std::vector<Eigen::Matrix3d> covariances_, Eigen::VectorXd levels_)
     : links(std::move(links_)),
       weights(std::move(weights_)),
       means(std::move(means_)),
-      covariances(std::move(covariances_)) {
+      covariances(std::move(covariances_)),
+      levels(std::move(levels_)) {
   const auto num = static_cast<Eigen::Index>(links.size());
   if (num == 0) {
     throw std::invalid_argument("body has no Gaussian component");
@@ -26,6 +27,10 @@ Body::Body(std::vector<std::string> links_, Eigen::VectorXd weights_, Eigen::Mat
     throw std::invalid_argument("body has " + std::to_string(num) + " links, " + std::to_string(weights.size()) +
                                 " weights, " + std::to_string(means.cols()) + " means and " +
                                 std::to_string(covariances.size()) + " covariances; the numbers must be equal");
+  }
+  if (levels.size() != 0 && levels.size() != num) {
+    throw std::invalid_argument("body has " + std::to_string(num) + " components and " +
+                                std::to_string(levels.size()) + " levels; give one each, or none");
   }
   std::map<std::string, double> weight_of_link;
   for (Eigen::Index k = 0; k < num; ++k) {
@@ -41,6 +46,9 @@ Body::Body(std::vector<std::string> links_, Eigen::VectorXd weights_, Eigen::Mat
     if (!covariance.allFinite() || !covariance.isApprox(covariance.transpose(), symmetry_tolerance) ||
         covariance.llt().info() != Eigen::Success) {
       throw std::invalid_argument(owner + "covariance must be symmetric positive definite");
+    }
+    if (levels.size() != 0 && (!(levels[k] > 0.0) || !std::isfinite(levels[k]))) {
+      throw std::invalid_argument(owner + "level " + std::to_string(levels[k]) + " must be positive and finite");
     }
     weight_of_link[links[i]] += weights[k];
   }

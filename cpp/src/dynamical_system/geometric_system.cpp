@@ -96,6 +96,7 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
       values(Eigen::VectorXd::Zero(system.num_embedding_coordinates())),
       curvatures(values),
       jacobian_transposed(Eigen::MatrixXd::Zero(acceleration.size(), values.size())),
+      clearances(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       metric(system.robot().num_coordinates()),
       state_(system.robot()),
       displacement_(acceleration),
@@ -143,11 +144,13 @@ void GeometricSystem::embed(const Obstacles& obstacles, Workspace& w) const noex
   w.values.setZero();
   w.curvatures.setZero();
   w.jacobian_transposed.setZero();
+  w.clearances.clear();
   Eigen::Index start = 0;
   for (const auto& embedding : embeddings_) {
     const Eigen::Index m = embedding->num_coordinates();
     embedding->add_to(
-        {w.values.segment(start, m), w.jacobian_transposed.middleCols(start, m), w.curvatures.segment(start, m)},
+        {w.values.segment(start, m), w.jacobian_transposed.middleCols(start, m), w.curvatures.segment(start, m),
+         w.clearances.view(start, m)},
         w.state_, obstacles);
     start += m;
   }

@@ -11,9 +11,10 @@ EmbeddingEvaluation evaluate(const Embedding& embedding, const Eigen::VectorXd& 
   KinematicState state(robot);
   state.update(robot, q, v);
   const int m = embedding.num_coordinates();
-  EmbeddingEvaluation result{Eigen::VectorXd::Zero(m), {}, Eigen::VectorXd::Zero(m)};
+  EmbeddingEvaluation result{Eigen::VectorXd::Zero(m), {}, Eigen::VectorXd::Zero(m),
+                             Clearances(robot.num_coordinates(), m)};
   Eigen::MatrixXd jacobian_transposed = Eigen::MatrixXd::Zero(robot.num_coordinates(), m);
-  embedding.add_to({result.values, jacobian_transposed, result.curvatures}, state, obstacles);
+  embedding.add_to({result.values, jacobian_transposed, result.curvatures, result.clearances.view(0, m)}, state, obstacles);
   result.jacobian = jacobian_transposed.transpose();
   return result;
 }

@@ -11,7 +11,12 @@ void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_trans
   rank_one_ = jacobian_transposed.cols() <= 1;
   matrix_.setIdentity();
   if (!rank_one_) {
-    matrix_ += jacobian_transposed.lazyProduct(jacobian_transposed.transpose());
+    for (Eigen::Index a = 0; a < jacobian_transposed.cols(); ++a) {
+      const auto gradient = jacobian_transposed.col(a);
+      if (!gradient.isZero(0.0)) {  // most barriers are out of reach most of the time
+        matrix_ += gradient.lazyProduct(gradient.transpose());
+      }
+    }
     factor_.compute(matrix_);
   } else if (jacobian_transposed.cols() == 1) {
     gradient_ = jacobian_transposed.col(0);

@@ -60,6 +60,7 @@ class GeometricSystem {
     Eigen::VectorXd switch_weights;       ///< s (nv): 1 is harmonic
     Eigen::VectorXd values, curvatures;   ///< ψ and d²ψ/dt² (m)
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
+    Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
     GraphMetric metric;
 
    private:

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "sidestep/embedding/clearances.hpp"
 #include "sidestep/kinematics/kinematic_state.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
@@ -14,6 +15,7 @@ struct EmbeddingView {
   Eigen::Ref<Eigen::VectorXd> values;               ///< ψ (m)
   Eigen::Ref<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m)
   Eigen::Ref<Eigen::VectorXd> curvatures;           ///< d²ψ/dt² along q̇ = v, q̈ = 0 (m)
+  ClearanceView clearances;                         ///< for barriers of clearances; others leave it as it is
 };
 
 /// Extra coordinates ψ(q, t) that embed the joint space in R^(nv + m) as the graph q ↦ (q, ψ(q, t)).
@@ -52,6 +54,7 @@ struct EmbeddingEvaluation {
   Eigen::VectorXd values;
   Eigen::MatrixXd jacobian;
   Eigen::VectorXd curvatures;
+  Clearances clearances;
 };
 EmbeddingEvaluation evaluate(const Embedding& embedding, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                              const Obstacles& obstacles);

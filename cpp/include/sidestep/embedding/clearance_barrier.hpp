@@ -1,0 +1,34 @@
+#pragma once
+
+#include "sidestep/embedding/barrier_function.hpp"
+#include "sidestep/embedding/clearance_field.hpp"
+#include "sidestep/embedding/embedding.hpp"
+
+namespace sidestep {
+
+/// One coordinate per body ellipsoid, a barrier of its clearance to the obstacles:
+///
+///     ψ_k = strength (activation / h_k − 1)^power for h_k < activation, else 0.
+///
+/// The metric I + JᵀJ is then complete on the free set: kinetic energy bounds dψ/dt, so in continuous time ψ cannot
+/// become infinite and the ellipsoids cannot touch. Moving obstacles enter dψ/dt and d²ψ/dt² exactly.
+class ClearanceBarrier final : public Embedding {
+ public:
+  /// The body must be calibrated. Throws std::invalid_argument that names what is wrong.
+  ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature = 0.002);
+
+  int num_coordinates() const noexcept override { return field_.size(); }
+  void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
+
+  const ClearanceField& field() const noexcept { return field_; }
+  const BarrierFunction& barrier() const noexcept { return barrier_; }
+
+ private:
+  ClearanceField field_;
+  BarrierFunction barrier_;
+};
+
+/// Adds ψ_k = f(h_k) with its derivatives, for every clearance within reach that `out.clearances` holds.
+void add_barriers(const BarrierFunction& barrier, EmbeddingView out) noexcept;
+
+}  // namespace sidestep
