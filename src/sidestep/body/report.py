@@ -105,18 +105,18 @@ def draw_links(body: Body, robot: Robot) -> Figure:
         points = _drawn_points(body, robot, name)
         axes.scatter(*points.T, s=3.0, color=CLOUD_COLOUR, alpha=0.8, linewidths=0, depthshade=False)
         reached = [points, *draw_ellipsoids(axes, body, name)]
-        _frame(axes, np.concatenate(reached), unit="mm")
+        _frame(axes, np.concatenate(reached), unit="mm", zoom=0.8)  # room for the labels
         axes.set_title(f"{name}: {body.links.count(name)} components", fontsize=10)
     figure.suptitle(f"{body.robot_name}: surface samples and {ELLIPSOID_STD:g}-sigma ellipsoids, link frames")
     return figure
 
 
 def draw_arm(body: Body, robot: Robot, q: ArrayLike | None = None) -> Figure:
-    """The arm at q (nv,), neutral by default, in the world frame: from the front-left and from the side."""
+    """The arm at q (nv,), neutral by default, in the world frame: at an angle, and from the side."""
     configuration = robot.neutral if q is None else np.asarray(q, dtype=np.float64)
     figure = _figure(11.0, 5.8)
-    for index, (elevation, azimuth) in enumerate(((20.0, -55.0), (5.0, -90.0))):
-        axes: Axes3D = figure.add_subplot(1, 2, index + 1, projection="3d")
+    for index, (elevation, azimuth, projection) in enumerate(((20.0, -55.0, "persp"), (0.0, -90.0, "ortho"))):
+        axes: Axes3D = figure.add_subplot(1, 2, index + 1, projection="3d", proj_type=projection)
         reached = []
         for number, name in enumerate(fit.link for fit in body.link_fits):
             pose = robot.pose(configuration, name)
@@ -124,8 +124,11 @@ def draw_arm(body: Body, robot: Robot, q: ArrayLike | None = None) -> Figure:
             points = _drawn_points(body, robot, name) @ pose[:3, :3].T + pose[:3, 3]
             axes.scatter(*points.T, s=1.5, color=CLOUD_COLOUR, alpha=0.6, linewidths=0, depthshade=False)
             reached += [points, *draw_ellipsoids(axes, body, name, pose=pose, colours=(colour,))]
-        _frame(axes, np.concatenate(reached), unit="m")
+        _frame(axes, np.concatenate(reached), unit="m", zoom=1.1 if projection == "ortho" else 0.95)
         axes.view_init(elev=elevation, azim=azimuth)
+        if projection == "ortho":  # seen along y, whose ticks would all fall on one spot
+            axes.set_yticks([])
+            axes.set_ylabel("")
     figure.suptitle(
         f"{body.robot_name}: {body.num_components} Gaussians at {ELLIPSOID_STD:g} sigma, one colour per link"
     )
@@ -206,7 +209,7 @@ def _figure(width: float, height: float) -> Figure:
     return figure
 
 
-def _frame(axes: Axes3D, points: NDArray[np.float64], *, unit: str) -> None:
+def _frame(axes: Axes3D, points: NDArray[np.float64], *, unit: str, zoom: float) -> None:
     """Equal scale on all axes, few ticks, labels with the unit; the data stay in metres."""
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.02 * float((high - low).max())
@@ -215,7 +218,7 @@ def _frame(axes: Axes3D, points: NDArray[np.float64], *, unit: str) -> None:
         ylim=(low[1] - margin, high[1] + margin),
         zlim=(low[2] - margin, high[2] + margin),
     )
-    axes.set_box_aspect(high - low + 2.0 * margin, zoom=0.82)  # room for the labels of the axes
+    axes.set_box_aspect(high - low + 2.0 * margin, zoom=zoom)
     for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y"), (axes.zaxis, "z")):
         axis.set_major_locator(_few_ticks())
         if unit == "mm":
