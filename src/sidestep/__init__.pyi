@@ -44,6 +44,8 @@ from .robot import planar_arm as planar_arm
 from .robot import robots as robots
 from .scenario import Scenario as Scenario
 from .scenario import ScenarioError as ScenarioError
+from .scenario import ScenarioResult as ScenarioResult
+from .scenario import run_scenario as run_scenario
 from .scenario import shipped_scenarios as shipped_scenarios
 from .simulation import Arrival as Arrival
 from .simulation import Evaluation as Evaluation

@@ -1,6 +1,6 @@
 """Scenarios: one run of one arm as a YAML file with a published schema, and the runner."""
 
-from sidestep.scenario.scenario import Scenario, shipped_scenarios
-from sidestep.scenario.validation import ScenarioError, schema_text
+import lazy_loader
 
-__all__ = ["Scenario", "ScenarioError", "schema_text", "shipped_scenarios"]
+# The public names stand once, in __init__.pyi; `run_scenario` imports the physics, reading a file does not.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

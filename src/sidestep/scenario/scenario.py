@@ -57,7 +57,7 @@ class JointState:
 class BodyChoice:
     """How the Gaussian mixtures of the links are fitted."""
 
-    components: int | str | dict[str, int] = 4
+    components: int | Literal["aic", "bic"] | dict[str, int] = 4
     covariance: Literal["spherical", "diagonal", "full"] = "full"
     seed: int = 0
 
@@ -219,7 +219,7 @@ class Scenario:
                 )
             if item.motion is not None and any(item.velocity):
                 raise ScenarioError(f"{file}: obstacles[{index}]: give either velocity or motion, not both")
-            if item.points == "ball" and item.shape.type != "sphere":
+            if item.points == "ball" and item.shape.type not in ("sphere", "points"):
                 raise ScenarioError(
                     f"{file}: obstacles[{index}].points is 'ball'; a {item.shape.type} allows centre, surface"
                 )

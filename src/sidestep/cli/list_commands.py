@@ -1,0 +1,65 @@
+"""`sidestep robots`, `sidestep scenarios` and `sidestep schema`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from sidestep.cli.output import console, write_json
+
+JsonOption = Annotated[
+    str | None, typer.Option("--json", metavar="FILE|-", help="Write the list as JSON; '-' for stdout.")
+]
+
+
+def robots(json: JsonOption = None) -> None:
+    """List the robots that go by a name; any other is loaded by the path of its URDF."""
+    from sidestep.robot import robots as known_robots
+
+    entries = known_robots()
+    if json is not None:
+        write_json([asdict(entry) for entry in entries], json)
+        return
+    from rich import box
+    from rich.table import Table
+
+    table = Table("robot", "joints", "what it is", "from the package", "here", box=box.SIMPLE, pad_edge=False)
+    for entry in entries:
+        here = "[green]yes[/green]" if entry.available else "[yellow]no[/yellow]"
+        table.add_row(
+            f"[bold]{entry.name}[/bold]", str(entry.num_coordinates), entry.description, entry.package, here
+        )
+    terminal = console()
+    terminal.print(table)
+    for entry in entries:
+        if not entry.available:
+            terminal.print(f"{entry.name}: {entry.reason}", highlight=False, markup=False)
+
+
+def scenarios(json: JsonOption = None) -> None:
+    """List the scenarios that come with the package."""
+    from sidestep.scenario import Scenario, shipped_scenarios
+
+    loaded = [Scenario.load(name) for name in shipped_scenarios()]
+    if json is not None:
+        write_json([scenario.to_document() for scenario in loaded], json)
+        return
+    from rich import box
+    from rich.table import Table
+
+    table = Table(
+        "scenario", "robot", "mode", "what happens", box=box.SIMPLE, pad_edge=False, show_lines=True
+    )
+    for scenario in loaded:
+        robot = scenario.robot.name or str(scenario.robot.urdf)
+        table.add_row(f"[bold]{scenario.name}[/bold]", robot, scenario.simulation.mode, scenario.description)
+    console().print(table)
+
+
+def schema() -> None:
+    """Print the JSON schema of scenario files."""
+    from sidestep.scenario import schema_text
+
+    print(schema_text(), end="")

@@ -1,0 +1,27 @@
+"""Where the commands write: a rich console for people, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def console(*, quiet: bool = False, to_stderr: bool = False) -> Console:
+    """The console of a command; on stderr where stdout carries JSON."""
+    from rich.console import Console
+
+    return Console(quiet=quiet, stderr=to_stderr)
+
+
+def write_json(document: dict[str, Any] | list[Any], target: str) -> None:
+    """Writes a document as JSON to a file, or to stdout for "-"."""
+    text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+    else:
+        Path(target).write_text(text, encoding="utf-8")

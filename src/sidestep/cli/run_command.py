@@ -1,0 +1,150 @@
+"""`sidestep run` and `sidestep demo`."""
+
+from __future__ import annotations
+
+import dataclasses
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sidestep.cli.output import console, write_json
+
+if TYPE_CHECKING:
+    from sidestep.scenario import Scenario
+    from sidestep.scenario.result import ScenarioResult
+
+DEMO_SCENARIO = "thesis-6.2.3"
+
+
+class ModeChoice(StrEnum):
+    """How a run is simulated."""
+
+    torque = "torque"
+    kinematic = "kinematic"
+
+
+class PlainSwitch(StrEnum):
+    """The switches that need no further number."""
+
+    none = "none"
+    harmonic_only = "harmonic_only"
+    geodesic_only = "geodesic_only"
+
+
+def run(
+    scenario: Annotated[
+        str, typer.Argument(help="A scenario file (YAML), or a name from `sidestep scenarios`.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Report folder [default: sidestep-report-NAME].")
+    ] = None,
+    mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the scenario's mode.")] = None,
+    switch: Annotated[
+        PlainSwitch | None, typer.Option(help="Instead of the scenario's switch (others: in the file).")
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(min=1e-3, max=600.0, help="Longest simulated time [s], instead of the scenario's."),
+    ] = None,
+    json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
+    ] = None,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the report folder.")] = True,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Run a scenario, judge it, and write a report folder.
+
+    Exit code: 0 when the goal was reached without contact and within every limit, 1 when not, 2 on bad input.
+    """
+    from sidestep.scenario import Scenario
+
+    chosen = Scenario.load(scenario)
+    simulation = chosen.simulation
+    if mode is not None:
+        simulation = dataclasses.replace(simulation, mode=mode.value)
+    if duration is not None:
+        simulation = dataclasses.replace(simulation, duration=duration)
+    system = chosen.system
+    if switch is not None:
+        from sidestep.scenario.scenario import SwitchChoice
+
+        system = dataclasses.replace(system, switch=SwitchChoice(switch.value))
+    chosen = dataclasses.replace(chosen, simulation=simulation, system=system)
+    folder = (out or Path(f"sidestep-report-{chosen.name}")) if report or out is not None else None
+    result = run_and_show(chosen, folder=folder, json=json, quiet=quiet)
+    raise typer.Exit(0 if result.success else 1)
+
+
+def demo(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Report folder.")] = Path("sidestep-report-demo"),
+    json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Show what Sidestep does: a Franka Research 3 under torque control passes a cluster of balls.
+
+    Exit code: 0 when the goal was reached without contact and within every limit, 1 when not.
+    """
+    from sidestep.scenario import Scenario
+
+    result = run_and_show(Scenario.load(DEMO_SCENARIO), folder=out, json=json, quiet=quiet)
+    raise typer.Exit(0 if result.success else 1)
+
+
+def run_and_show(scenario: Scenario, *, folder: Path | None, json: str | None, quiet: bool) -> ScenarioResult:
+    """Runs a scenario with live progress, then prints a table and a sentence.
+
+    Args:
+        scenario: what to run.
+        folder: of the report, or None for none.
+        json: file for the figures, "-" for stdout, None for none.
+        quiet: print nothing.
+    """
+    terminal = console(quiet=quiet, to_stderr=json == "-")
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)  # found out now, not after the run
+    terminal.print(f"[bold]{scenario.name}[/bold]  {_facts(scenario)}", highlight=False)
+    from sidestep.cli.progress import run_with_progress
+
+    result = run_with_progress(scenario, terminal)
+    if folder is not None:
+        with terminal.status("writing the report"):
+            from sidestep.report import write_report
+
+            page = write_report(result, folder)[0]
+    terminal.print(_table(result))
+    mark = "[green]✓[/green]" if result.success else "[red]✗[/red]"
+    terminal.print(f"{mark} {result.sentence()}", highlight=False)
+    if folder is not None:
+        terminal.print(f"Report: {page}", highlight=False, soft_wrap=True)
+    if json is not None:
+        write_json(result.to_document(), json)
+    return result
+
+
+def _facts(scenario: Scenario) -> str:
+    robot = scenario.robot.name or scenario.robot.urdf
+    count = len(scenario.obstacles)
+    obstacles = "no obstacle" if count == 0 else f"{count} obstacle{'s' if count > 1 else ''}"
+    switch = scenario.system.switch.type.replace("_", " ")
+    return f"{robot}, {obstacles}, switch: {switch}, {scenario.simulation.mode} mode"
+
+
+def _table(result: ScenarioResult) -> object:
+    from rich import box
+    from rich.table import Table
+
+    from sidestep.scenario.summary import summary_rows
+
+    table = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
+    table.add_column(style="dim")
+    table.add_column(justify="right")
+    table.add_column(style="dim", overflow="fold")
+    for row in summary_rows(result):
+        table.add_row(*row)
+    return table

@@ -1,0 +1,322 @@
+"""From a scenario's words to the parts of a run: robot, body, system, solids, and what is seen of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from sidestep import (
+    BinarySwitch,
+    Body,
+    CollisionDensity,
+    DistanceSwitch,
+    GeodesicOnly,
+    GeometricSystem,
+    HarmonicOnly,
+    JointLimitPotential,
+    Robot,
+    SigmoidSwitch,
+    Sum,
+)
+from sidestep._core import JointType, Obstacles
+from sidestep.obstacles import load_point_cloud
+from sidestep.scenario.scenario import (
+    BasePose,
+    EmbeddingChoice,
+    JointState,
+    Obstacle,
+    RobotChoice,
+    Scenario,
+    Shape,
+    SwitchChoice,
+    rotation_matrix,
+)
+from sidestep.scenario.validation import ScenarioError
+from sidestep.simulation import SceneObject
+from sidestep.simulation.scene import Kind, check_scene
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+_T = TypeVar("_T")
+
+MAX_CLOUD_POINTS = 2000  # more balls than this make the physics and the exact distances too slow to be of use
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """The parts of a run.
+
+    Attributes:
+        robot, body, system: as the scenario asks.
+        objects: the solid obstacles, for physics and exact clearance.
+        start, start_velocity, goal: (nv,) [rad | m].
+        seen: what the controller sees; a function of time [s] where an obstacle starts or stops.
+    """
+
+    robot: Robot
+    body: Body
+    system: GeometricSystem
+    objects: tuple[SceneObject, ...]
+    start: Array
+    start_velocity: Array
+    goal: Array
+    seen: Obstacles | Callable[[float], Obstacles]
+
+
+def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembly:
+    """Builds the parts of a scenario and checks what its schema cannot.
+
+    Args:
+        scenario: what to build.
+        progress: told of the fit of the body, see `Body.fit`.
+
+    Raises:
+        ScenarioError: a number of values that does not fit the robot, a start or goal outside the limits, an
+            unknown robot, a file that is missing or malformed; names the key and what is allowed.
+    """
+    robot = _at("robot", scenario, partial(load_robot, scenario))
+    start = _at("start.position", scenario, partial(coordinates, scenario.start, robot, "start.position"))
+    velocity = _at("start.velocity", scenario, partial(start_velocity, scenario.start, robot))
+    goal = _at("goal.position", scenario, partial(coordinates, scenario.goal, robot, "goal.position"))
+    objects: list[SceneObject] = []
+    views: list[_View] = []
+    for index, item in enumerate(scenario.obstacles):
+        name = item.name or f"obstacle{index}"
+        things = _at(f"obstacles[{index}]", scenario, partial(solids, scenario, item, name))
+        objects += things
+        views += [_view(item, thing) for thing in things]
+    _at("obstacles", scenario, partial(check_scene, objects))
+    scripted = any(item.motion is not None for item in scenario.obstacles)
+    body = _at("body", scenario, partial(_fit, scenario, robot, progress))
+    system = _at("system", scenario, partial(_system, scenario, robot, body))
+    return Assembly(
+        robot=robot,
+        body=body,
+        system=system,
+        objects=tuple(objects),
+        start=start,
+        start_velocity=velocity,
+        goal=goal,
+        seen=partial(_seen, tuple(views)) if scripted else _seen(tuple(views), 0.0),
+    )
+
+
+def load_robot(scenario: Scenario) -> Robot:
+    """The robot that a scenario asks for; raises ValueError or FileNotFoundError that says what is wrong."""
+    choice: RobotChoice = scenario.robot
+    if choice.name is not None:
+        extras = [key for key in ("package_dirs", "tip", "locked", "base") if getattr(choice, key)]
+        if extras:
+            raise ValueError(f"{', '.join(extras)} go with 'urdf', not with a named robot")
+        return Robot.named(choice.name)
+    assert choice.urdf is not None  # the schema asks for one of the two
+    return Robot.from_urdf(
+        scenario.file(choice.urdf),
+        package_dirs=[scenario.file(folder) for folder in choice.package_dirs],
+        tip=choice.tip,
+        locked=choice.locked,
+        base_pose=None if choice.base is None else _pose(choice.base),
+    )
+
+
+def coordinates(state: JointState, robot: Robot, name: str) -> Array:
+    """The position (nv,) of a state in radians and metres, inside the limits of the robot."""
+    return robot.check_configuration(_si(state.position, state.unit, robot, name), name)
+
+
+def start_velocity(state: JointState, robot: Robot) -> Array:
+    """The velocity (nv,) of a state, zero where none is given, within the limits of the robot."""
+    if state.velocity is None:
+        return np.zeros(robot.num_coordinates)
+    velocity = _si(state.velocity, state.unit, robot, "start.velocity")
+    limit = robot.limits.velocity
+    for joint, value, most in zip(robot.coordinate_names, velocity, limit, strict=True):
+        if abs(value) > most:
+            raise ValueError(f"start.velocity: joint {joint!r} is {value}, allowed: [{-most}, {most}]")
+    return velocity
+
+
+def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, ...]:
+    """The solid of an obstacle; a point cloud gives one ball per point, called NAME.0, NAME.1, …"""
+    shape, pose = item.shape, np.eye(4)
+    pose[:3, :3] = rotation_matrix(item.rotation_deg)
+    pose[:3, 3] = item.position
+    velocity, interval = np.array(item.velocity), (0.0, float("inf"))
+    if item.motion is not None:
+        interval = (item.motion.begin, item.motion.end)
+        velocity = (np.array(item.motion.to) - np.array(item.position)) / (interval[1] - interval[0])
+    driven: Literal["moving", "fixed"] = "moving" if np.any(velocity != 0.0) else "fixed"
+    motion: Literal["free", "moving", "fixed"] = "free" if item.free else driven
+
+    def solid(kind: Kind, size: tuple[float, ...] = (), mesh: trimesh.Trimesh | None = None) -> SceneObject:
+        return SceneObject(
+            name,
+            kind,
+            size=size,
+            pose=pose,
+            motion=motion,
+            velocity=velocity,
+            moves_during=interval,
+            mesh=mesh,
+        )
+
+    match shape:
+        case Shape(type="sphere", radius=float(radius)):
+            return (solid("sphere", (radius,)),)
+        case Shape(type="cylinder", radius=float(radius), length=float(length)):
+            return (solid("cylinder", (radius, length)),)
+        case Shape(type="box", size=(x, y, z)):
+            return (solid("box", (x, y, z)),)
+        case Shape(type="mesh", file=str(file)):
+            return (solid("mesh", mesh=_mesh(scenario.file(file), shape.scale or 1.0)),)
+        case Shape(type="points", file=str(file), radius=float(radius)):
+            cloud = load_point_cloud(scenario.file(file)).points
+            if len(cloud) > MAX_CLOUD_POINTS:
+                raise ValueError(
+                    f"shape.file: {file} has {len(cloud)} points; at most {MAX_CLOUD_POINTS} are simulated"
+                )
+            ball = solid("sphere", (radius,))
+            return tuple(
+                replace(ball, name=f"{name}.{index}", pose=_translated(pose, point))
+                for index, point in enumerate(cloud)
+            )
+    raise AssertionError(f"the schema lets no other shape through, got {shape}")
+
+
+def _mesh(path: Path, scale: float) -> trimesh.Trimesh:
+    if not path.is_file():
+        raise FileNotFoundError(f"shape.file: there is no file {path}")
+    vertices = trimesh.load_mesh(path)
+    return trimesh.Trimesh(vertices=scale * vertices.vertices, faces=vertices.faces)
+
+
+def _translated(pose: Array, point: Array) -> Array:
+    moved = pose.copy()
+    moved[:3, 3] += pose[:3, :3] @ point
+    return moved
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """What is seen of one solid: points (N, 3) in its frame, and the radius of each [m]."""
+
+    thing: SceneObject
+    points: Array
+    radius: float
+
+
+def _view(item: Obstacle, thing: SceneObject) -> _View:
+    if item.points == "surface":
+        surface = thing.surface(subdivisions=3)
+        count = max(12, round(surface.area / item.spacing**2))
+        points, _ = trimesh.sample.sample_surface_even(surface, count, seed=0)
+        return _View(thing, np.asarray(points), 0.0)
+    centre = np.zeros((1, 3)) if thing.mesh is None else thing.mesh.bounds.mean(axis=0, keepdims=True)
+    return _View(thing, centre, float(item.shape.radius or 0.0) if item.points == "ball" else 0.0)
+
+
+def _seen(views: tuple[_View, ...], time: float) -> Obstacles:
+    if not views:
+        return Obstacles.none()
+    points, radii, velocities = [], [], []
+    for view in views:
+        pose = view.thing.pose_at(time)
+        begin, end = view.thing.moves_during
+        moves = view.thing.motion == "moving" and begin <= time < end
+        points.append(view.points @ pose[:3, :3].T + pose[:3, 3])
+        radii.append(np.full(len(view.points), view.radius))
+        velocities.append(np.tile(view.thing.velocity if moves else np.zeros(3), (len(view.points), 1)))
+    return Obstacles(np.concatenate(points), np.concatenate(radii), np.concatenate(velocities))
+
+
+def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
+    choice = scenario.body
+    return Body.fit(
+        robot,
+        components=choice.components,
+        covariance=choice.covariance,
+        seed=choice.seed,
+        progress=progress,
+    )
+
+
+def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
+    choice = scenario.system
+    return GeometricSystem(
+        _embeddings(scenario.embedding, robot, body),
+        stiffness=choice.stiffness,
+        damping=choice.damping,
+        damping_form=choice.damping_form,
+        switch=_switch(choice.switch, robot, body),
+    )
+
+
+def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[object]:
+    parts: list[object] = [CollisionDensity(robot, body, average=choice.density == "average")]
+    if choice.joint_limits is not None:
+        parts.append(
+            JointLimitPotential(robot, slope=choice.joint_limits.slope, height=choice.joint_limits.height)
+        )
+    return [Sum(parts)] if choice.combine == "sum" and len(parts) > 1 else parts
+
+
+def _switch(choice: SwitchChoice, robot: Robot, body: Body) -> object:
+    match choice.type:
+        case "none":
+            return None
+        case "harmonic_only":
+            return HarmonicOnly()
+        case "geodesic_only":
+            return GeodesicOnly()
+        case "binary":
+            return BinarySwitch(threshold=choice.threshold)
+        case "sigmoid":
+            return SigmoidSwitch(threshold=choice.threshold, slope=choice.slope)
+    thresholds = choice.thresholds or ()
+    if len(thresholds) != robot.num_coordinates:
+        raise ValueError(
+            f"switch.thresholds has {len(thresholds)} values; robot {robot.name!r} has "
+            f"{robot.num_coordinates} coordinates ({', '.join(robot.coordinate_names)})"
+        )
+    return DistanceSwitch(thresholds=thresholds, slope=choice.slope)
+
+
+def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:
+    """Values (nv,) of a file in radians and metres; only revolute coordinates are ever in degrees."""
+    if len(values) != robot.num_coordinates:
+        raise ValueError(
+            f"{name} has {len(values)} values; robot {robot.name!r} has {robot.num_coordinates} coordinates "
+            f"({', '.join(robot.coordinate_names)})"
+        )
+    array = np.array(values, dtype=float)
+    if unit == "deg":
+        revolute = {joint.coordinate for joint in robot.joints if joint.type == JointType.revolute}
+        for index in revolute:
+            array[index] = np.deg2rad(array[index])
+    return array
+
+
+def _pose(base: BasePose) -> Array:
+    pose = np.eye(4)
+    pose[:3, :3] = rotation_matrix(base.rotation_deg)
+    pose[:3, 3] = base.position
+    return pose
+
+
+def _at(place: str, scenario: Scenario, make: Callable[[], _T]) -> _T:
+    """The value that `make` gives; an error of it names the scenario and the place in it."""
+    try:
+        return make()
+    except ScenarioError:
+        raise
+    except (ValueError, OSError) as error:
+        text = str(error)
+        text = text if text.startswith(place) else f"{place}: {text}"
+        raise ScenarioError(f"{scenario.name}: {text}") from error

@@ -1,0 +1,79 @@
+"""What a run of a scenario leaves behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import __version__
+from sidestep.body import Body
+from sidestep.scenario.scenario import Scenario
+from sidestep.simulation import Evaluation, Run
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ScenarioResult:
+    """A scenario that was run.
+
+    Attributes:
+        scenario, body: what was run.
+        run: the record, one row per control step.
+        evaluation: the figures it is judged by.
+        clearance_time, clearance: (C,) [s] and [m] exact distance between arm and obstacles at some samples;
+            empty without obstacles. `evaluation.min_clearance_m` looks between the samples too.
+        wall_time: what the run took on the clock, without the fit of the body [s].
+    """
+
+    scenario: Scenario
+    body: Body
+    run: Run
+    evaluation: Evaluation
+    clearance_time: Array
+    clearance: Array
+    wall_time: float
+
+    @property
+    def success(self) -> bool:
+        """Reached the goal, touched nothing and exceeded no limit."""
+        evaluation = self.evaluation
+        return evaluation.reached and evaluation.collision_free and not evaluation.limits.any
+
+    def to_document(self) -> dict[str, Any]:
+        """The figures as JSON values, with units in the keys (accelerations [rad/s^2], ratios without)."""
+        choice = self.scenario.simulation
+        return {
+            "scenario": self.scenario.name,
+            "robot": self.run.robot.name,
+            "mode": choice.mode,
+            "switch": self.scenario.system.switch.type,
+            "success": self.success,
+            **self.evaluation.to_dict(),
+            "tolerance_rad": choice.tolerance,
+            "period_s": choice.period,
+            "wall_time_s": self.wall_time,
+            "body_components": self.body.num_components,
+            "sidestep_version": __version__,
+        }
+
+    def sentence(self) -> str:
+        """What happened, in one sentence."""
+        evaluation = self.evaluation
+        arrival = f"ends {evaluation.position_error_rad:.3f} rad from the goal, which it does not reach"
+        if evaluation.reached and evaluation.time_to_goal_s is not None:
+            arrival = f"reaches the goal after {evaluation.time_to_goal_s:.1f} s"
+        encounter = ""
+        if evaluation.min_clearance_m is not None:
+            millimetres = 1000.0 * evaluation.min_clearance_m
+            encounter = f", stays at least {millimetres:.1f} mm away from the obstacles"
+            if not evaluation.collision_free:
+                pair = evaluation.clearance_pair or "arm - obstacle"
+                pushed = ", ".join(evaluation.moved_objects)
+                encounter = f", touches on the way ({pair})"
+                encounter += f" and pushes {pushed} away" if pushed else ""
+        limits = "exceeds a limit" if evaluation.limits.any else "respects every limit"
+        return f"The arm {arrival}{encounter}, and {limits}."

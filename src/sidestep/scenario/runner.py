@@ -1,0 +1,102 @@
+"""Runs a scenario: physics under torque control, or the integrated dynamical system alone."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.scenario.assembly import Assembly, Progress, assemble
+from sidestep.scenario.result import ScenarioResult
+from sidestep.scenario.scenario import Scenario
+from sidestep.simulation import Arrival, ExactClearance, Run, Simulation, evaluate, run_kinematically
+
+Array = npt.NDArray[np.float64]
+OnStep = Callable[[float, Array], None]
+
+MAX_CLEARANCE_SAMPLES = 400  # of the curve of the clearance; the minimum is searched between them as well
+ARRIVAL_SHARE = 0.4  # of the tolerance: a run ends when the error is well inside it
+
+
+def run_scenario(
+    scenario: Scenario,
+    *,
+    on_step: OnStep | None = None,
+    on_start: Callable[[Assembly], None] | None = None,
+    fit_progress: Progress | None = None,
+) -> ScenarioResult:
+    """Runs a scenario and judges the run.
+
+    Args:
+        scenario: what to run.
+        on_step: called with time [s] and q (nv,) after every control step.
+        on_start: called with the parts of the run before the first step.
+        fit_progress: told of the fit of the body, see `Body.fit`.
+
+    Raises:
+        ScenarioError: the scenario asks for something impossible, see `assemble`.
+        RuntimeError: the physics or the integration diverged.
+    """
+    parts = assemble(scenario, progress=fit_progress)
+    if on_start is not None:
+        on_start(parts)
+    begin = clock.perf_counter()
+    run = _run_torque(scenario, parts, on_step) if scenario.simulation.mode == "torque" else _run_kinematic(
+        scenario, parts, on_step
+    )  # fmt: skip
+    evaluation = evaluate(run, goal_tolerance=scenario.simulation.tolerance)
+    samples = np.unique(np.linspace(0, len(run) - 1, MAX_CLEARANCE_SAMPLES).astype(int))
+    clearance = np.zeros(0)
+    if run.objects:
+        clearance = ExactClearance(run.robot, run.objects).series(run.q[samples], run.object_poses[samples])
+    return ScenarioResult(
+        scenario=scenario,
+        body=parts.body,
+        run=run,
+        evaluation=evaluation,
+        clearance_time=run.time[samples] if run.objects else np.zeros(0),
+        clearance=clearance,
+        wall_time=clock.perf_counter() - begin,
+    )
+
+
+def _arrival(scenario: Scenario) -> Arrival:
+    return Arrival(position=ARRIVAL_SHARE * scenario.simulation.tolerance)
+
+
+def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
+    from sidestep import TorqueController
+
+    choice = scenario.simulation
+    simulation = Simulation(parts.robot, parts.objects, timestep=choice.period)
+    return simulation.run(
+        parts.system,
+        TorqueController(parts.robot, period=choice.period),
+        parts.start,
+        parts.goal,
+        choice.duration,
+        parts.seen,
+        start_velocity=parts.start_velocity,
+        arrival=_arrival(scenario),
+        on_step=on_step,
+    )
+
+
+def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
+    choice = scenario.simulation
+    return run_kinematically(
+        parts.robot,
+        parts.system,
+        parts.start,
+        parts.goal,
+        choice.duration,
+        parts.seen,
+        objects=parts.objects,
+        timestep=choice.period,
+        start_velocity=parts.start_velocity,
+        integrator=choice.integrator,
+        arrival=_arrival(scenario),
+        on_step=on_step,
+    )
