@@ -40,6 +40,7 @@ class SimulationModel:
             included.
         coordinate: (nj, nv) motion of each joint per coordinate; `offset` (nj,): joints = coordinate @ q +
             offset.
+        leaders: (nv,) index of the joint that each coordinate is read from; what mimics it follows.
         actuators: (nv,) index of each coordinate's torque actuator.
         geom_owner: geom index to ("link" | "object" | "floor", name).
         object_bodies: body index of each scene object.
@@ -50,15 +51,16 @@ class SimulationModel:
     joint_velocities: npt.NDArray[np.intp]
     coordinate: Array
     offset: Array
+    leaders: npt.NDArray[np.intp]
     actuators: npt.NDArray[np.intp]
     geom_owner: dict[int, tuple[str, str]]
     object_bodies: tuple[int, ...]
 
     def state(self, data: mujoco.MjData) -> tuple[Array, Array]:
         """Coordinates q and v (nv,) of the robot."""
-        inverse = np.linalg.pinv(self.coordinate)
-        q = inverse @ (data.qpos[self.joint_positions] - self.offset)
-        return q, inverse @ data.qvel[self.joint_velocities]
+        own = self.coordinate[self.leaders, np.arange(len(self.leaders))]
+        q = (data.qpos[self.joint_positions[self.leaders]] - self.offset[self.leaders]) / own
+        return q, data.qvel[self.joint_velocities[self.leaders]] / own
 
     def set_state(self, data: mujoco.MjData, q: Array, v: Array) -> None:
         """Puts the robot, mimic joints included, at (q, v)."""
@@ -179,8 +181,7 @@ def _add_robot(
         body = bodies[frame.joint] if frame.joint >= 0 else base
         _add_geoms(spec, body, robot, link.name, frame.placement, owners)
     for coordinate, name in enumerate(robot.coordinate_names):
-        leaders = [j for j in robot.joints if j.coordinate == coordinate]
-        leader = next((j for j in leaders if j.multiplier == 1.0 and j.offset == 0.0), leaders[0])
+        leader = robot.joints[_leader(robot, coordinate)]
         effort = float(limits.effort[coordinate])
         spec.add_actuator(
             name=name,
@@ -189,8 +190,8 @@ def _add_robot(
             ctrlrange=[-effort, effort] if np.isfinite(effort) else [0.0, 0.0],
             ctrllimited=bool(np.isfinite(effort)),
         )
-        for follower in leaders:
-            if follower is not leader:
+        for follower in robot.joints:
+            if follower.coordinate == coordinate and follower.name != leader.name:
                 ratio = follower.multiplier / leader.multiplier
                 gear = spec.add_equality(
                     type=mujoco.mjtEq.mjEQ_JOINT,
@@ -199,6 +200,13 @@ def _add_robot(
                     name2=leader.name,
                 )
                 gear.data[0], gear.data[1] = follower.offset - ratio * leader.offset, ratio
+
+
+def _leader(robot: Robot, coordinate: int) -> int:
+    """Index of the joint that carries a coordinate's motor: the one that mimics nothing."""
+    carried = [i for i, joint in enumerate(robot.joints) if joint.coordinate == coordinate]
+    plain = [i for i in carried if robot.joints[i].multiplier == 1.0 and robot.joints[i].offset == 0.0]
+    return (plain or carried)[0]
 
 
 def _joint_coefficient(value: float) -> float | list[float]:
@@ -342,6 +350,7 @@ def _locate(
         joint_velocities=np.array([int(j.dofadr[0]) for j in joints], dtype=np.intp),
         coordinate=coordinate,
         offset=np.array([joint.offset for joint in robot.joints]),
+        leaders=np.array([_leader(robot, c) for c in range(robot.num_coordinates)], dtype=np.intp),
         actuators=np.array([model.actuator(name).id for name in robot.coordinate_names], dtype=np.intp),
         geom_owner={model.geom(name).id: owner for name, owner in owners.items()},
         object_bodies=tuple(int(model.body(f"object:{item.name}").id) for item in scene),
