@@ -32,6 +32,11 @@ Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows,
 
 inline bool is_object(nb::handle) { return true; }
 
+/// Anything that numpy makes an array of; the name is what the type stubs say about arguments that accept it.
+class ArrayLike : public nb::object {
+  NB_OBJECT_DEFAULT(ArrayLike, nb::object, "numpy.typing.ArrayLike", is_object)
+};
+
 /// A numpy array of float64; the name is what the type stubs say about functions that return one.
 class NumpyArray : public nb::object {
   NB_OBJECT_DEFAULT(NumpyArray, nb::object, "numpy.typing.NDArray[numpy.float64]", is_object)

@@ -1,5 +1,6 @@
 #include "sidestep/body/body.hpp"
 
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -27,8 +28,8 @@ void bind_body(nb::module_& m) {
   nb::class_<Body>(m, "Body", "A Gaussian mixture per link, in the core.")
       .def(
           "__init__",
-          [](Body* self, std::vector<std::string> links, nb::handle weights, nb::handle means,
-             nb::handle covariances, nb::handle levels) {
+          [](Body* self, std::vector<std::string> links, const ArrayLike& weights, const ArrayLike& means,
+             const ArrayLike& covariances, const ArrayLike& levels) {
             new (self) Body(std::move(links), as_vector(weights, "weights"), as_points(means, "means"),
                             as_covariances(covariances),
                             levels.is_none() ? Eigen::VectorXd() : as_vector(levels, "levels"));
@@ -42,7 +43,10 @@ void bind_body(nb::module_& m) {
       .def_prop_ro("weights", [](const Body& b) { return to_numpy(b.weights); })
       .def_prop_ro("means", [](const Body& b) { return to_numpy_points(b.means); })
       .def_prop_ro(
-          "levels", [](const Body& b) { return b.levels.size() ? to_numpy(b.levels) : nb::none(); },
+          "levels",
+          [](const Body& b) -> std::optional<NumpyArray> {
+            return b.levels.size() ? std::optional(to_numpy(b.levels)) : std::nullopt;
+          },
           "Levels (K,) of the covering ellipsoids, or None if the body is not calibrated.")
       .def_prop_ro("covariances", [](const Body& b) {
         Eigen::MatrixXd flat(b.num_components(), 9);

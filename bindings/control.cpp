@@ -45,8 +45,8 @@ void bind_quadratic_program(nb::module_& m) {
       .def_prop_ro("num_rows", &QuadraticProgram::num_rows)
       .def(
           "solve",
-          [](QuadraticProgram& qp, nb::handle H, nb::handle g, nb::handle lower, nb::handle upper, nb::handle A,
-             nb::handle row_lower, nb::handle row_upper) {
+          [](QuadraticProgram& qp, const ArrayLike& H, const ArrayLike& g, const ArrayLike& lower, const ArrayLike& upper, const ArrayLike& A,
+             const ArrayLike& row_lower, const ArrayLike& row_upper) {
             const int n = qp.num_variables(), rows = qp.num_rows();
             QuadraticProgramData data(n, rows);
             data.H = as_matrix(H, "H", n, n);
@@ -82,7 +82,7 @@ void bind_acceleration_bounds(nb::module_& m) {
 
   m.def(
       "acceleration_bounds",
-      [](nb::handle robot_or_limits, nb::handle q, nb::handle v, double period, double position_margin) {
+      [](nb::handle robot_or_limits, const ArrayLike& q, const ArrayLike& v, double period, double position_margin) {
         const JointLimits& limits = nb::isinstance<Robot>(robot_or_limits)
                                         ? nb::cast<const Robot&>(robot_or_limits).limits()
                                         : nb::cast<const JointLimits&>(robot_or_limits);
@@ -149,8 +149,8 @@ void bind_torque_controller(nb::module_& m) {
                                "Source: Bosc, equation T6.3, corrected. One object per thread.")
       .def(
           "__init__",
-          [](TorqueController* self, const Robot& robot, double period, nb::handle tracking_weight,
-             nb::handle torque_weight, double slack_weight, double position_margin, double stop_time,
+          [](TorqueController* self, const Robot& robot, double period, const ArrayLike& tracking_weight,
+             const ArrayLike& torque_weight, double slack_weight, double position_margin, double stop_time,
              double stop_damping) {
             const int nv = robot.num_coordinates();
             TorqueControllerSettings settings;
@@ -177,8 +177,8 @@ void bind_torque_controller(nb::module_& m) {
           "effort limit / velocity limit. Raises ValueError that names the setting.")
       .def(
           "solve",
-          [](TorqueController& controller, nb::handle q, nb::handle v, nb::handle acceleration, nb::handle mass_matrix,
-             nb::handle bias) {
+          [](TorqueController& controller, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration, const ArrayLike& mass_matrix,
+             const ArrayLike& bias) {
             const int nv = controller.num_coordinates();
             TorqueSolution solution(nv);
             static_cast<void>(controller.solve(as_vector(q, "q", nv), as_vector(v, "v", nv),

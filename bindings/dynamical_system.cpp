@@ -57,7 +57,7 @@ void bind_switches(nb::module_& m) {
       "smallest distance between the obstacles and the Gaussian means on the link that joint i carries.")
       .def(
           "__init__",
-          [](DistanceSwitch* self, nb::handle thresholds, double slope) {
+          [](DistanceSwitch* self, const ArrayLike& thresholds, double slope) {
             new (self) DistanceSwitch{as_vector(thresholds, "thresholds"), slope};
           },
           nb::arg("thresholds"), nb::arg("slope"))
@@ -109,7 +109,7 @@ void bind_rollout(nb::module_& m) {
 
   m.def(
       "rollout",
-      [](const GeometricSystem& system, nb::handle q, nb::handle v, nb::handle goal, const Obstacles& obstacles,
+      [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goal, const Obstacles& obstacles,
          double period, int steps, nb::handle integrator) {
         const int nv = system.robot().num_coordinates();
         const Eigen::VectorXd start = as_vector(q, "q", nv);
@@ -121,6 +121,9 @@ void bind_rollout(nb::module_& m) {
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
+      nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
+              "goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, "
+              "integrator: Integrator | str = 'semi_implicit_euler') -> Rollout"),
       "Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.\n"
       "period dt [s]; integrator: an Integrator or its name.");
 }
@@ -145,8 +148,8 @@ void bind_dynamical_system(nb::module_& m) {
       "Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
-          [](GeometricSystem* self, std::vector<std::shared_ptr<const Embedding>> embeddings, nb::handle stiffness,
-             nb::handle damping, nb::handle damping_form, nb::handle combination, nb::handle flat) {
+          [](GeometricSystem* self, std::vector<std::shared_ptr<const Embedding>> embeddings, const ArrayLike& stiffness,
+             const ArrayLike& damping, nb::handle damping_form, nb::handle combination, nb::handle flat) {
             if (embeddings.empty() == flat.is_none()) {
               throw nb::value_error(
                   "give either embeddings, which know their robot, or an empty list and robot=... for flat space");
@@ -160,7 +163,11 @@ void bind_dynamical_system(nb::module_& m) {
             new (self) GeometricSystem(robot, std::move(embeddings), std::move(settings));
           },
           nb::arg("embeddings"), nb::kw_only(), nb::arg("stiffness") = 0.5, nb::arg("damping") = 1.5,
-          nb::arg("damping_form") = "plain", nb::arg("switch") = nb::none(), nb::arg("robot") = nb::none())
+          nb::arg("damping_form") = "plain", nb::arg("switch") = nb::none(), nb::arg("robot") = nb::none(),
+          nb::sig("def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, "
+                  "damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', "
+                  "switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch "
+                  "| None = None, robot: Robot | None = None) -> None"))
       .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
       .def_prop_ro("stiffness", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().stiffness); })
       .def_prop_ro("damping", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().damping); })
@@ -168,7 +175,7 @@ void bind_dynamical_system(nb::module_& m) {
       .def_prop_ro("switch", [](const GeometricSystem& s) { return s.settings().combination; })
       .def(
           "acceleration",
-          [](const GeometricSystem& system, nb::handle q, nb::handle v, nb::handle goal,
+          [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goal,
              const Obstacles& obstacles) {
             const int nv = system.robot().num_coordinates();
             Step step{StepStatus::ok, GeometricSystem::Workspace(system)};

@@ -33,7 +33,7 @@ void bind_embedding(nb::module_& m) {
       .def_prop_ro("num_coordinates", &Embedding::num_coordinates, "Number of coordinates m.")
       .def(
           "evaluate",
-          [](const Embedding& e, nb::handle q, nb::handle v, const Obstacles& obstacles) {
+          [](const Embedding& e, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles) {
             const int nv = e.robot().num_coordinates();
             return evaluate(e, as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles);
           },
@@ -41,7 +41,7 @@ void bind_embedding(nb::module_& m) {
           "psi, dpsi/dq and d2psi/dt2 at q (nv,) [rad] and v (nv,) [rad/s], obstacle velocities included.")
       .def(
           "hessian",
-          [](const Embedding& e, nb::handle q, const Obstacles& obstacles) -> nb::object {
+          [](const Embedding& e, const ArrayLike& q, const Obstacles& obstacles) -> NumpyArray {
             const auto all = hessians(e, as_vector(q, "q", e.robot().num_coordinates()), obstacles);
             if (all.size() == 1) {
               return to_numpy_matrix(all.front());
@@ -50,7 +50,7 @@ void bind_embedding(nb::module_& m) {
             for (const Eigen::MatrixXd& hessian : all) {
               arrays.append(to_numpy_matrix(hessian));
             }
-            return nb::module_::import_("numpy").attr("stack")(arrays);
+            return nb::cast<NumpyArray>(nb::module_::import_("numpy").attr("stack")(arrays));
           },
           nb::arg("q"), nb::arg("obstacles"),
           "d2psi/dq2, (nv, nv) where m = 1, else (m, nv, nv); exact. For tests and plots, not for the loop.");

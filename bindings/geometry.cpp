@@ -20,7 +20,7 @@ Eigen::MatrixXd as_jacobian(nb::handle value) {
 void bind_geometry(nb::module_& m) {
   m.def(
       "metric_matrix",
-      [](nb::handle jacobian) {
+      [](const ArrayLike& jacobian) {
         const Eigen::MatrixXd J = as_jacobian(jacobian);
         GraphMetric metric(static_cast<int>(J.cols()));
         metric.update(J.transpose());
@@ -29,7 +29,7 @@ void bind_geometry(nb::module_& m) {
       nb::arg("jacobian"), "Metric G = I + J^T J (nv, nv) of the graph, from J (m, nv) (T2.9).");
   m.def(
       "geodesic_acceleration",
-      [](nb::handle jacobian, nb::handle curvatures) {
+      [](const ArrayLike& jacobian, const ArrayLike& curvatures) {
         const Eigen::MatrixXd J = as_jacobian(jacobian);
         return to_numpy(geodesic_acceleration(J, as_vector(curvatures, "curvatures", J.rows())));
       },
@@ -37,7 +37,7 @@ void bind_geometry(nb::module_& m) {
       "Geodesic acceleration -G^-1 J^T c (nv,), from J (m, nv) and c = d2psi/dt2 (m,): T5.3 in closed form.");
   m.def(
       "christoffel_symbols",
-      [](nb::handle jacobian, nb::handle hessians) {
+      [](const ArrayLike& jacobian, const ArrayLike& hessians) {
         const Eigen::MatrixXd J = as_jacobian(jacobian);
         const Eigen::Index nv = J.cols();
         const Array array = as_array(hessians, "hessians");
@@ -52,7 +52,7 @@ void bind_geometry(nb::module_& m) {
         for (const Eigen::MatrixXd& symbol : christoffel_symbols(J, of_coordinate)) {
           symbols.append(to_numpy_matrix(symbol));
         }
-        return nb::module_::import_("numpy").attr("stack")(symbols);
+        return nb::cast<NumpyArray>(nb::module_::import_("numpy").attr("stack")(symbols));
       },
       nb::arg("jacobian"), nb::arg("hessians"),
       "Christoffel symbols of the second kind (nv, nv, nv), indexed [k, i, j] for Gamma^k_ij, from dense tensors.\n"

@@ -36,7 +36,7 @@ void bind_kinematics(nb::module_& m) {
   nb::class_<Joint>(m, "Joint", "One moving joint; fixed and locked joints are folded into placements.")
       .def(
           "__init__",
-          [](Joint* self, std::string name, JointType type, int parent, nb::handle placement, nb::handle axis,
+          [](Joint* self, std::string name, JointType type, int parent, const ArrayLike& placement, const ArrayLike& axis,
              int coordinate, double multiplier, double offset) {
             new (self) Joint{std::move(name), type,       parent,     as_pose(placement, "placement"),
                              as_vector(axis, "axis", 3), coordinate, multiplier, offset};
@@ -57,7 +57,7 @@ void bind_kinematics(nb::module_& m) {
   nb::class_<Frame>(m, "Frame", "A named link frame, rigidly attached to the child of a joint (-1: to the world).")
       .def(
           "__init__",
-          [](Frame* self, std::string name, int joint, nb::handle placement) {
+          [](Frame* self, std::string name, int joint, const ArrayLike& placement) {
             new (self) Frame{std::move(name), joint, as_pose(placement, "placement")};
           },
           nb::arg("name"), nb::kw_only(), nb::arg("joint"), nb::arg("placement"))
@@ -70,8 +70,8 @@ void bind_kinematics(nb::module_& m) {
                           "effort [Nm | N]. Each (nv,); position bounds may be infinite, the others are positive.")
       .def(
           "__init__",
-          [](JointLimits* self, nb::handle lower, nb::handle upper, nb::handle velocity, nb::handle acceleration,
-             nb::handle effort) {
+          [](JointLimits* self, const ArrayLike& lower, const ArrayLike& upper, const ArrayLike& velocity, const ArrayLike& acceleration,
+             const ArrayLike& effort) {
             new (self) JointLimits{as_vector(lower, "lower"), as_vector(upper, "upper"),
                                    as_vector(velocity, "velocity"), as_vector(acceleration, "acceleration"),
                                    as_vector(effort, "effort")};
@@ -96,14 +96,14 @@ void bind_kinematics(nb::module_& m) {
       .def_prop_ro("limits", [](const Robot& r) { return r.limits(); })
       .def(
           "pose",
-          [](const Robot& robot, nb::handle q, const std::string& link) {
+          [](const Robot& robot, const ArrayLike& q, const std::string& link) {
             const int frame = robot.frame_index(link);
             return to_numpy_matrix(frame_pose(robot, state_at(robot, q), frame).matrix());
           },
           nb::arg("q"), nb::arg("link"), "Pose (4, 4) of a link frame in the world at q (nv,).")
       .def(
           "jacobian",
-          [](const Robot& robot, nb::handle q, const std::string& link) {
+          [](const Robot& robot, const ArrayLike& q, const std::string& link) {
             const int frame = robot.frame_index(link);
             return to_numpy_matrix(frame_jacobian(robot, state_at(robot, q), frame));
           },
@@ -112,7 +112,7 @@ void bind_kinematics(nb::module_& m) {
           "the world (Pinocchio's LOCAL_WORLD_ALIGNED).")
       .def(
           "bias_acceleration",
-          [](const Robot& robot, nb::handle q, nb::handle v, const std::string& link) {
+          [](const Robot& robot, const ArrayLike& q, const ArrayLike& v, const std::string& link) {
             const int frame = robot.frame_index(link);
             return to_numpy(frame_bias_acceleration(robot, state_at(robot, q, v), frame));
           },

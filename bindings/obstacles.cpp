@@ -10,7 +10,7 @@ void bind_obstacles(nb::module_& m) {
                         "Obstacle points in the world, each a ball with a radius, moving with a constant velocity.")
       .def(
           "__init__",
-          [](Obstacles* self, nb::handle points, nb::handle radii, nb::handle velocities) {
+          [](Obstacles* self, const ArrayLike& points, const ArrayLike& radii, const ArrayLike& velocities) {
             Eigen::Matrix3Xd p = as_points(points, "points");
             Eigen::VectorXd r = as_filled_vector(radii, "radii", p.cols());
             Eigen::Matrix3Xd s = velocities.is_none() ? Eigen::Matrix3Xd(Eigen::Matrix3Xd::Zero(3, p.cols()))

@@ -1,0 +1,702 @@
+"""
+C++ core of sidestep. Use the names re-exported by the sidestep package.
+"""
+
+from collections.abc import Sequence
+import enum
+
+import numpy
+import numpy.typing
+
+
+class JointType(enum.Enum):
+    """
+    How a joint moves its child. A continuous joint is revolute without limits.
+    """
+
+    revolute = 0
+
+    prismatic = 1
+
+class Joint:
+    """One moving joint; fixed and locked joints are folded into placements."""
+
+    def __init__(self, name: str, type: JointType, *, parent: int, placement: numpy.typing.ArrayLike, axis: numpy.typing.ArrayLike, coordinate: int, multiplier: float = 1.0, offset: float = 0.0) -> None:
+        """
+        placement (4, 4): pose of the joint at zero motion in the parent joint's frame (-1: the world);
+        axis (3,): unit vector in the joint frame; the motion is multiplier * q[coordinate] + offset.
+        """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def type(self) -> JointType: ...
+
+    @property
+    def parent(self) -> int: ...
+
+    @property
+    def placement(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def axis(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def coordinate(self) -> int: ...
+
+    @property
+    def multiplier(self) -> float: ...
+
+    @property
+    def offset(self) -> float: ...
+
+class Frame:
+    """
+    A named link frame, rigidly attached to the child of a joint (-1: to the world).
+    """
+
+    def __init__(self, name: str, *, joint: int, placement: numpy.typing.ArrayLike) -> None: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def joint(self) -> int: ...
+
+    @property
+    def placement(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+class JointLimits:
+    """
+    Per-coordinate limits: position [rad | m], velocity [/s], acceleration [/s^2], effort [Nm | N]. Each (nv,); position bounds may be infinite, the others are positive.
+    """
+
+    def __init__(self, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, effort: numpy.typing.ArrayLike) -> None: ...
+
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def upper(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def effort(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+class Robot:
+    """The immutable kinematic model of an arm, in the core."""
+
+    def __init__(self, name: str, *, joints: Sequence[Joint], frames: Sequence[Frame], coordinate_names: Sequence[str], limits: JointLimits) -> None: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def num_coordinates(self) -> int:
+        """Number of joint coordinates nv (= nq)."""
+
+    @property
+    def joints(self) -> list[Joint]: ...
+
+    @property
+    def frames(self) -> list[Frame]: ...
+
+    @property
+    def coordinate_names(self) -> list[str]: ...
+
+    @property
+    def limits(self) -> JointLimits: ...
+
+    def pose(self, q: numpy.typing.ArrayLike, link: str) -> numpy.typing.NDArray[numpy.float64]:
+        """Pose (4, 4) of a link frame in the world at q (nv,)."""
+
+    def jacobian(self, q: numpy.typing.ArrayLike, link: str) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Jacobian (6, nv) of a link frame: rows 0-2 velocity of its origin, rows 3-5 angular velocity, both in
+        the world (Pinocchio's LOCAL_WORLD_ALIGNED).
+        """
+
+    def bias_acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, link: str) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Classical acceleration (6,) of a link frame when the joint acceleration is zero, rows as in jacobian.
+        """
+
+class Body:
+    """A Gaussian mixture per link, in the core."""
+
+    def __init__(self, *, links: Sequence[str], weights: numpy.typing.ArrayLike, means: numpy.typing.ArrayLike, covariances: numpy.typing.ArrayLike, levels: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        links (K,): frame of each component; weights (K,), sum 1 per link; means (K, 3) [m];
+        covariances (K, 3, 3) [m^2]; levels (K,) of a calibrated body. Raises ValueError that names the component at fault.
+        """
+
+    @property
+    def num_components(self) -> int: ...
+
+    @property
+    def links(self) -> list[str]: ...
+
+    @property
+    def weights(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def means(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def levels(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        Levels (K,) of the covering ellipsoids, or None if the body is not calibrated.
+        """
+
+    @property
+    def covariances(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+class Obstacles:
+    """
+    Obstacle points in the world, each a ball with a radius, moving with a constant velocity.
+    """
+
+    def __init__(self, points: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike = 0.0, velocities: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        points (N, 3) [m]; radii scalar or (N,) [m], >= 0; velocities (N, 3) [m/s] or None for rest.
+        Raises ValueError that names the first bad point; an empty cloud is refused (see none()).
+        """
+
+    @staticmethod
+    def none() -> Obstacles:
+        """A workspace that is known to be free."""
+
+    def __len__(self) -> int: ...
+
+    @property
+    def points(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def radii(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def velocities(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    def advance(self, duration: float) -> None:
+        """Moves every point along its velocity for `duration` [s]."""
+
+class EmbeddingEvaluation:
+    """Values, Jacobian and curvatures of an embedding."""
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """psi (m,)."""
+
+    @property
+    def jacobian(self) -> numpy.typing.NDArray[numpy.float64]:
+        """dpsi/dq (m, nv)."""
+
+    @property
+    def curvatures(self) -> numpy.typing.NDArray[numpy.float64]:
+        """d2psi/dt2 (m,) along the motion with constant joint velocity."""
+
+    @property
+    def clearances(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        h (m,) [m] where the coordinates are barriers of clearances; inf beyond their reach.
+        """
+
+    @property
+    def clearance_rates(self) -> numpy.typing.NDArray[numpy.float64]:
+        """dh/dt (m,) [m/s]."""
+
+    @property
+    def clearance_curvatures(self) -> numpy.typing.NDArray[numpy.float64]:
+        """d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity."""
+
+    @property
+    def clearance_gradients(self) -> numpy.typing.NDArray[numpy.float64]:
+        """dh/dq (m, nv) [m/rad]."""
+
+class Embedding:
+    """
+    Extra coordinates psi(q, t) that embed the joint space as the graph q -> (q, psi(q, t)).
+    """
+
+    @property
+    def num_coordinates(self) -> int:
+        """Number of coordinates m."""
+
+    def evaluate(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles) -> EmbeddingEvaluation:
+        """
+        psi, dpsi/dq and d2psi/dt2 at q (nv,) [rad] and v (nv,) [rad/s], obstacle velocities included.
+        """
+
+    def hessian(self, q: numpy.typing.ArrayLike, obstacles: Obstacles) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        d2psi/dq2, (nv, nv) where m = 1, else (m, nv, nv); exact. For tests and plots, not for the loop.
+        """
+
+class CollisionDensity(Embedding):
+    """
+    The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),
+        psi(q) = sum_points sum_links sum_k pi_k N(x | o_l + R_l mu_k, R_l Sigma_k R_l^T + r^2 I)  [1/m^3].
+    `average` divides by the number of points. Links that no joint moves are left out.
+    """
+
+    def __init__(self, robot: Robot, body: Body, *, average: bool = False) -> None: ...
+
+class JointLimitPotential(Embedding):
+    """
+    Smooth steps at the joint limits (Bosc 2024, T5.7, corrected to a sum over the joints),
+        zeta(q) = height sum_j [s(slope (q_j - upper_j)) + s(slope (lower_j - q_j))],  s(u) = 1/(1 + exp(-u)).
+    slope [1/rad]; height in the unit of the coordinate it is added to.
+    """
+
+    def __init__(self, robot: Robot, *, slope: float = 30.0, height: float = 1.0) -> None: ...
+
+class ClearanceBarrier(Embedding):
+    """
+    One coordinate per covering ellipsoid of the body, a barrier of its clearance h_k to the obstacles,
+        psi_k = strength (activation / h_k - 1)^power  for h_k < activation, else 0.
+    activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.
+    strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer
+    and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between
+    neighbouring points. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
+    """
+
+    def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002) -> None: ...
+
+    @property
+    def activation(self) -> float: ...
+
+    @property
+    def components(self) -> list[int]:
+        """Which component of the body each coordinate belongs to."""
+
+class Sum(Embedding):
+    """
+    Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).
+    """
+
+    def __init__(self, terms: Sequence[Embedding]) -> None: ...
+
+def metric_matrix(jacobian: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """Metric G = I + J^T J (nv, nv) of the graph, from J (m, nv) (T2.9)."""
+
+def geodesic_acceleration(jacobian: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Geodesic acceleration -G^-1 J^T c (nv,), from J (m, nv) and c = d2psi/dt2 (m,): T5.3 in closed form.
+    """
+
+def christoffel_symbols(jacobian: numpy.typing.ArrayLike, hessians: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Christoffel symbols of the second kind (nv, nv, nv), indexed [k, i, j] for Gamma^k_ij, from dense tensors.
+    The slow second implementation of the geodesic term: g^k = -Gamma^k_ij v^i v^j.
+    """
+
+class DampingForm(enum.Enum):
+    """Where damping acts."""
+
+    plain = 0
+    """h = -G^-1 K (q - q*) - D v (T5.4)."""
+
+    metric = 1
+    """h = -G^-1 (K (q - q*) + D v) (T2.12)."""
+
+class Unswitched:
+    """a = h + g (T2.12)."""
+
+    def __init__(self) -> None: ...
+
+class HarmonicOnly:
+    """a = h, the damped spring alone."""
+
+    def __init__(self) -> None: ...
+
+class GeodesicOnly:
+    """a = g, free fall along a geodesic (T5.3); it knows no goal."""
+
+    def __init__(self) -> None: ...
+
+class BinarySwitch:
+    """a = s h + (1 - s) g with s = [psi <= threshold] (T5.5, T5.6)."""
+
+    def __init__(self, threshold: float) -> None: ...
+
+    @property
+    def threshold(self) -> float: ...
+
+class SigmoidSwitch:
+    """
+    The same with s = 1 - 1/(1 + exp(-slope (psi - threshold))) (thesis 6.1.1).
+    """
+
+    def __init__(self, threshold: float, slope: float) -> None: ...
+
+    @property
+    def threshold(self) -> float: ...
+
+    @property
+    def slope(self) -> float: ...
+
+class DistanceSwitch:
+    """
+    The same joint by joint, s_i = 1/(1 + exp(-slope (d_i - threshold_i))) (T6.1, T6.2), where d_i [m] is the
+    smallest distance between the obstacles and the Gaussian means on the link that joint i carries.
+    """
+
+    def __init__(self, thresholds: numpy.typing.ArrayLike, slope: float) -> None: ...
+
+    @property
+    def thresholds(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def slope(self) -> float: ...
+
+class StepStatus(enum.Enum):
+    """What a step of the system says about its result."""
+
+    ok = 0
+    """The equations hold."""
+
+    outside_limits = 1
+    """They hold, but a joint is outside its position limits."""
+
+    goal_outside_limits = 2
+    """Fallback: the goal is outside the limits."""
+
+    invalid_state = 3
+    """Fallback: q or v is not finite."""
+
+    invalid_goal = 4
+    """Fallback: the goal is not finite."""
+
+    not_finite = 5
+    """Fallback: the equations gave a value that is not finite."""
+
+def is_fallback(status: StepStatus) -> bool:
+    """
+    Whether the acceleration is the fallback: a damped stop within the acceleration limits.
+    """
+
+class Step:
+    """The result of one step; arrays are copies."""
+
+    @property
+    def status(self) -> StepStatus: ...
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """a (nv,) [rad/s^2]."""
+
+    @property
+    def harmonic(self) -> numpy.typing.NDArray[numpy.float64]:
+        """h (nv,) [rad/s^2]."""
+
+    @property
+    def geodesic(self) -> numpy.typing.NDArray[numpy.float64]:
+        """g (nv,) [rad/s^2]."""
+
+    @property
+    def switch(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Weights s (nv,) of the harmonic part."""
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """psi (m,)."""
+
+    @property
+    def curvatures(self) -> numpy.typing.NDArray[numpy.float64]:
+        """d2psi/dt2 (m,)."""
+
+    @property
+    def jacobian(self) -> numpy.typing.NDArray[numpy.float64]:
+        """dpsi/dq (m, nv)."""
+
+    @property
+    def metric(self) -> numpy.typing.NDArray[numpy.float64]:
+        """G = I + J^T J (nv, nv)."""
+
+class GeometricSystem:
+    """
+    A damped spring that moves on the graph of psi: obstacles bend its path (Bosc 2024, chapter 5),
+        h = -G^-1 K (q - q*) - D v,   g = -G^-1 J^T d2psi/dt2,   a = h + g or as the switch weighs them.
+    Embeddings in the list are stacked, each with its own coordinates; an empty list and robot=... give flat
+    space.
+    stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive
+    semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.
+    Raises ValueError that names the setting at fault.
+    """
+
+    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None) -> None: ...
+
+    @property
+    def num_embedding_coordinates(self) -> int: ...
+
+    @property
+    def stiffness(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def damping(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def damping_form(self) -> DampingForm: ...
+
+    @property
+    def switch(self) -> Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch: ...
+
+    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles) -> Step:
+        """
+        One step at q, v (nv,) [rad, rad/s] towards goal (nv,). Values that are not finite and goals outside
+        the limits give a status and a damped stop, not an exception; wrong shapes raise ValueError.
+        """
+
+class Integrator(enum.Enum):
+    """How a step of length dt is taken."""
+
+    semi_implicit_euler = 0
+    """v += a dt; q += v dt."""
+
+    second_order = 1
+    """q += v dt + a dt^2/2; v += a dt (thesis 6.2.1)."""
+
+    runge_kutta_4 = 2
+    """The classical scheme, with the obstacles moved along."""
+
+class Rollout:
+    """A kinematic motion: row k is at time k dt, steps + 1 rows."""
+
+    @property
+    def time(self) -> numpy.typing.NDArray[numpy.float64]:
+        """[s]"""
+
+    @property
+    def statuses(self) -> list[StepStatus]:
+        """One StepStatus per row."""
+
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps + 1, nv) [rad]"""
+
+    @property
+    def v(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps + 1, nv) [rad/s]"""
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps + 1, nv) [rad/s^2]"""
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """psi (steps + 1, m)"""
+
+    @property
+    def switch(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Weights of the harmonic part (steps + 1, nv)"""
+
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler') -> Rollout:
+    """
+    Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.
+    period dt [s]; integrator: an Integrator or its name.
+    """
+
+class QuadraticProgramStatus(enum.Enum):
+    """How a quadratic program ended."""
+
+    def __str__(self) -> str: ...
+
+    solved = 0
+
+    infeasible = 1
+
+    max_iterations = 2
+
+    not_positive_definite = 3
+
+    not_finite = 4
+
+    wrong_size = 5
+
+class QuadraticSolution:
+    """What one solve of a QuadraticProgram gives."""
+
+    @property
+    def status(self) -> QuadraticProgramStatus: ...
+
+    @property
+    def x(self) -> numpy.typing.NDArray[numpy.float64]:
+        """The minimiser (n,)."""
+
+    @property
+    def multipliers(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n + m,): of the bounds, then of the rows; positive at an upper, negative at a lower limit.
+        """
+
+    @property
+    def iterations(self) -> int: ...
+
+    @property
+    def residual(self) -> float:
+        """
+        Largest relative violation of the optimality conditions; NaN unless solved.
+        """
+
+class QuadraticProgram:
+    """
+    A dense strictly convex quadratic program of fixed size, solved by the dual active-set
+    method: minimise 1/2 x'Hx + g'x subject to lower <= x <= upper and
+    row_lower <= A x <= row_upper. Source: Goldfarb and Idnani (1983).
+    """
+
+    def __init__(self, num_variables: int, num_rows: int = 0) -> None: ...
+
+    @property
+    def num_variables(self) -> int: ...
+
+    @property
+    def num_rows(self) -> int: ...
+
+    def solve(self, H: numpy.typing.ArrayLike, g: numpy.typing.ArrayLike, *, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, A: numpy.typing.ArrayLike | None = None, row_lower: numpy.typing.ArrayLike | None = None, row_upper: numpy.typing.ArrayLike | None = None) -> QuadraticSolution:
+        """
+        H (n, n) symmetric positive definite; g (n,); bounds scalar or (n,), rows A (m, n), scalar or (m,);
+        None or infinite means no bound, equal bounds an equality. Returns a QuadraticSolution; data that cannot
+        be solved give a status. Raises ValueError on wrong shapes.
+        """
+
+class Limit(enum.Flag):
+    """Limits of one joint; a flag, so a set of them is one value."""
+
+    position_lower = 1
+
+    position_upper = 2
+
+    velocity_lower = 4
+
+    velocity_upper = 8
+
+    acceleration_lower = 16
+
+    acceleration_upper = 32
+
+    torque_lower = 64
+
+    torque_upper = 128
+
+def acceleration_bounds(limits: Robot | JointLimits, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, period: float, *, position_margin: float = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Accelerations (lower, upper), each (nv,) [/s^2], that keep every joint inside its limits for ever.
+
+    limits: a Robot or its JointLimits; q (nv,) [rad | m]; v (nv,) [/s]; period [s]: how long an acceleration is
+    held. Outside the limits they steer back. Never empty. Raises ValueError on wrong shapes or values that are
+    not finite. Source: Del Prete (2018), made exact for held accelerations.
+    """
+
+class TorqueStatus(enum.Enum):
+    """How a control step ended, from best to worst."""
+
+    def __str__(self) -> str: ...
+
+    ok = 0
+    """tracked, no limit in the way"""
+
+    limited = 1
+    """optimal, with a limit in the way"""
+
+    relaxed = 2
+    """the torque limits do not allow the acceleration bounds"""
+
+    fallback_invalid_input = 3
+    """unusable input, damped stop"""
+
+    fallback_solver = 4
+    """program not solved, damped stop"""
+
+    @property
+    def is_fallback(self) -> bool: ...
+
+class TorqueFault(enum.Enum):
+    """Which input of a control step is unusable."""
+
+    def __str__(self) -> str: ...
+
+    none = 0
+
+    position = 1
+
+    velocity = 2
+
+    acceleration = 3
+
+    mass_matrix = 4
+
+    bias = 5
+
+class TorqueSolution:
+    """What one control step gives."""
+
+    @property
+    def status(self) -> TorqueStatus: ...
+
+    @property
+    def fault(self) -> TorqueFault: ...
+
+    @property
+    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [Nm | N], within the effort limits, always finite."""
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (nv,) [/s^2] that the torque gives; NaN where M or the bias is unusable.
+        """
+
+    @property
+    def slack(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [/s^2] signed acceleration beyond its bounds; 0 unless relaxed."""
+
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [/s^2] lower acceleration bounds."""
+
+    @property
+    def upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [/s^2] upper acceleration bounds."""
+
+    @property
+    def active(self) -> tuple[Limit, ...]:
+        """The limits in the way of each joint."""
+
+class TorqueController:
+    """
+    Torque that tracks a wanted acceleration within every limit of the arm:
+    minimise 1/2 (x - a)'Q(x - a) + 1/2 t'Rt with t = torque / effort limit, subject to
+    M x + h = torque, |torque| <= effort limit, lower(q, v) <= x <= upper(q, v).
+    Source: Bosc, equation T6.3, corrected. One object per thread.
+    """
+
+    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25) -> None:
+        """
+        period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];
+        torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the
+        steepest tracking cost; position_margin [rad | m]: position limits are moved inwards by it;
+        stop_time [s]: time constant of the damped stop; stop_damping [-]: its damping without a mass matrix, over
+        effort limit / velocity limit. Raises ValueError that names the setting.
+        """
+
+    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike) -> TorqueSolution:
+        """
+        One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),
+        bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity). Returns a TorqueSolution; values that are not
+        finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
+        """
+
+    @property
+    def num_coordinates(self) -> int: ...
+
+    def count(self, status: TorqueStatus) -> int:
+        """Number of solves that ended with this status."""
+
+__version__: str
