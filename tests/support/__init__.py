@@ -1,0 +1,1 @@
+"""Second implementations and random scenes that several test folders share."""
