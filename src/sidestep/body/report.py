@@ -124,7 +124,7 @@ def draw_arm(body: Body, robot: Robot, q: ArrayLike | None = None) -> Figure:
             points = _drawn_points(body, robot, name) @ pose[:3, :3].T + pose[:3, 3]
             axes.scatter(*points.T, s=1.5, color=CLOUD_COLOUR, alpha=0.6, linewidths=0, depthshade=False)
             reached += [points, *draw_ellipsoids(axes, body, name, pose=pose, colours=(colour,))]
-        _frame(axes, np.concatenate(reached), unit="m", zoom=1.1 if projection == "ortho" else 0.95)
+        _frame(axes, np.concatenate(reached), unit="m", zoom=0.88)  # beyond it wide arms are cut off
         axes.view_init(elev=elevation, azim=azimuth)
         if projection == "ortho":  # seen along y, whose ticks would all fall on one spot
             axes.set_yticks([])
