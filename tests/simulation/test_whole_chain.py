@@ -94,3 +94,16 @@ def test_goal_outside_the_limits(fr3: tuple[Robot, CollisionDensity]) -> None:
     system = GeometricSystem([psi])
     with pytest.raises(ValueError, match="goal: joint 'fr3_joint4' is 0"):
         run_kinematically(robot, system, START, np.zeros(7), 1.0, Obstacles.none())
+
+
+def test_kinematic_objects_follow_their_scripts(fr3: tuple[Robot, CollisionDensity]) -> None:
+    robot, psi = fr3
+    still = SceneObject("still", "box", size=(0.1, 0.1, 0.1))
+    ball = SceneObject.ball(
+        "ball", [0, 1, 1], radius=0.1, motion="moving", velocity=(0, 0, -1), moves_during=(0.1, 0.3)
+    )
+    run = run_kinematically(
+        robot, GeometricSystem([psi]), START, GOAL, 0.5, Obstacles.none(), objects=[still, ball]
+    )
+    np.testing.assert_allclose(run.object_poses[:, 0], np.tile([0, 0, 0, 1, 0, 0, 0], (len(run), 1)))
+    np.testing.assert_allclose(run.object_poses[:, 1, 2], 1 - np.clip(run.time - 0.1, 0, 0.2), atol=1e-12)

@@ -88,7 +88,10 @@ def run_kinematically(
             on_step((done + keep - 1) * timestep, part.q[keep - 1])
         done += keep
     time = np.arange(done, dtype=np.float64) * timestep
-    poses = np.array([[pose_vector(item.pose_at(t)) for item in scene] for t in time]).reshape(done, -1, 7)
+    poses = np.tile(np.array([pose_vector(item.pose) for item in scene]).reshape(-1, 7), (done, 1, 1))
+    for j, item in enumerate(scene):
+        if item.motion == "moving":
+            poses[:, j, :3] = [item.pose_at(t)[:3, 3] for t in time]
     return KinematicRun(
         robot=robot,
         objects=scene,
