@@ -22,7 +22,7 @@ void bind_geometry(nb::module_& m) {
       "metric_matrix",
       [](const ArrayLike& jacobian) {
         const Eigen::MatrixXd J = as_jacobian(jacobian);
-        GraphMetric metric(static_cast<int>(J.cols()));
+        GraphMetric metric(static_cast<int>(J.cols()), static_cast<int>(J.rows()));
         metric.update(J.transpose());
         return to_numpy_matrix(metric.matrix());
       },

@@ -97,7 +97,7 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
       curvatures(values),
       jacobian_transposed(Eigen::MatrixXd::Zero(acceleration.size(), values.size())),
       clearances(system.robot().num_coordinates(), system.num_embedding_coordinates()),
-      metric(system.robot().num_coordinates()),
+      metric(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       state_(system.robot()),
       displacement_(acceleration),
       distances_(acceleration) {}
@@ -130,8 +130,8 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
     w.harmonic -= settings_.damping.lazyProduct(v);
   }
   // g = −G⁻¹ Jᵀ d²ψ/dt².
-  w.geodesic = -w.jacobian_transposed.lazyProduct(w.curvatures);
-  w.metric.solve_in_place(w.geodesic);
+  w.metric.solve_pullback(w.curvatures, w.geodesic);
+  w.geodesic = -w.geodesic;
 
   combine(obstacles, w);
   if (!w.acceleration.allFinite()) {

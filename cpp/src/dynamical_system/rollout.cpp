@@ -1,6 +1,7 @@
 #include "sidestep/dynamical_system/rollout.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -70,8 +71,13 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
     result.q.row(k) = q;
     result.v.row(k) = v;
     result.acceleration.row(k) = a;
-    result.values.row(k) = w.values;
-    result.switch_weights.row(k) = w.switch_weights;
+    if (is_fallback(status)) {
+      result.values.row(k).setConstant(std::numeric_limits<double>::quiet_NaN());
+      result.switch_weights.row(k).setConstant(std::numeric_limits<double>::quiet_NaN());
+    } else {
+      result.values.row(k) = w.values;
+      result.switch_weights.row(k) = w.switch_weights;
+    }
     result.statuses.push_back(status);
     switch (settings.integrator) {
       case Integrator::semi_implicit_euler:

@@ -1,44 +1,72 @@
 #include "sidestep/geometry/graph_metric.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 
 namespace sidestep {
 
-GraphMetric::GraphMetric(int nv)
-    : matrix_(Eigen::MatrixXd::Identity(nv, nv)), factor_(nv), gradient_(Eigen::VectorXd::Zero(nv)) {}
+GraphMetric::GraphMetric(int nv, int m)
+    : matrix_(Eigen::MatrixXd::Identity(nv, nv)),
+      jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m)),
+      small_matrix_(Eigen::MatrixXd::Identity(std::min(m, nv), std::min(m, nv))),
+      factor_(small_matrix_),
+      along_(Eigen::VectorXd::Zero(m)) {}
 
 void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed) noexcept {
-  rank_one_ = jacobian_transposed.cols() <= 1;
+  jacobian_transposed_ = jacobian_transposed;
+  const auto& J_T = jacobian_transposed_;
   matrix_.setIdentity();
-  if (!rank_one_) {
-    for (Eigen::Index a = 0; a < jacobian_transposed.cols(); ++a) {
-      const auto gradient = jacobian_transposed.col(a);
-      if (!gradient.isZero(0.0)) {  // most barriers are out of reach most of the time
-        matrix_ += gradient.lazyProduct(gradient.transpose());
-      }
-    }
+  matrix_ += J_T.lazyProduct(J_T.transpose());
+  if (J_T.cols() > J_T.rows()) {
     factor_.compute(matrix_);
-  } else if (jacobian_transposed.cols() == 1) {
-    gradient_ = jacobian_transposed.col(0);
-    inverse_scale_ = 1.0 / (1.0 + gradient_.squaredNorm());
-    matrix_ += gradient_.lazyProduct(gradient_.transpose());
+  } else {
+    small_matrix_.setIdentity();
+    small_matrix_ += J_T.transpose().lazyProduct(J_T);
+    if (J_T.cols() > 1) {
+      factor_.compute(small_matrix_);
+    }
   }
 }
 
-void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) const noexcept {
-  if (rank_one_) {
-    x -= (gradient_.dot(x) * inverse_scale_) * gradient_;
+void GraphMetric::solve_small(Eigen::Ref<Eigen::VectorXd> c) const noexcept {
+  if (c.size() == 1) {
+    c[0] /= small_matrix_(0, 0);
   } else {
+    factor_.solveInPlace(c);
+  }
+}
+
+void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept {
+  const auto& J_T = jacobian_transposed_;
+  if (J_T.cols() > J_T.rows()) {
     factor_.solveInPlace(x);
+  } else if (J_T.cols() > 0) {
+    along_ = J_T.transpose().lazyProduct(x);
+    solve_small(along_);
+    x -= J_T.lazyProduct(along_);
+  }
+}
+
+void GraphMetric::solve_pullback(const Eigen::Ref<const Eigen::VectorXd>& c, Eigen::Ref<Eigen::VectorXd> x) noexcept {
+  const auto& J_T = jacobian_transposed_;
+  if (J_T.cols() > J_T.rows()) {
+    x = J_T.lazyProduct(c);
+    factor_.solveInPlace(x);
+  } else if (J_T.cols() > 0) {
+    along_ = c;
+    solve_small(along_);
+    x = J_T.lazyProduct(along_);
+  } else {
+    x.setZero();
   }
 }
 
 Eigen::VectorXd geodesic_acceleration(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& curvatures) {
-  GraphMetric metric(static_cast<int>(jacobian.cols()));
+  GraphMetric metric(static_cast<int>(jacobian.cols()), static_cast<int>(jacobian.rows()));
   metric.update(jacobian.transpose());
-  Eigen::VectorXd acceleration = -(jacobian.transpose() * curvatures);
-  metric.solve_in_place(acceleration);
-  return acceleration;
+  Eigen::VectorXd acceleration(jacobian.cols());
+  metric.solve_pullback(curvatures, acceleration);
+  return -acceleration;
 }
 
 std::vector<Eigen::MatrixXd> christoffel_symbols(const Eigen::MatrixXd& jacobian,

@@ -10,7 +10,7 @@ namespace sidestep {
 /// How a step of length dt is taken.
 enum class Integrator {
   semi_implicit_euler,  ///< v ← v + a dt, q ← q + v dt
-  second_order,         ///< q ← q + v dt + ½ a dt², v ← v + a dt (the thesis's update, 6.2.1)
+  second_order,         ///< q ← q + v dt + ½ a dt², v ← v + a dt (the thesis's update, 6.2.1); of first order, as v is
   runge_kutta_4,        ///< the classical scheme on (q, v), with the obstacles moved along
 };
 
@@ -24,8 +24,8 @@ struct RolloutSettings {
 struct Rollout {
   Eigen::VectorXd time;                ///< [s]
   Eigen::MatrixXd q, v, acceleration;  ///< (steps + 1, nv)
-  Eigen::MatrixXd values;              ///< ψ (steps + 1, m)
-  Eigen::MatrixXd switch_weights;      ///< (steps + 1, nv)
+  Eigen::MatrixXd values;              ///< ψ (steps + 1, m), NaN where the step fell back
+  Eigen::MatrixXd switch_weights;      ///< (steps + 1, nv), the same
   std::vector<StepStatus> statuses;    ///< one per row
 };
 

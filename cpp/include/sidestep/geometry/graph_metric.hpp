@@ -10,26 +10,36 @@ namespace sidestep {
 ///
 ///     G = I + Jᵀ J                                              (T2.9, T4.1 for m = 1)
 ///
-/// For one coordinate G⁻¹ follows from Sherman–Morrison; otherwise G is factorised by Cholesky.
+/// Next to an obstacle J is large, and G alone loses the digits of all other directions: |J|² is 1e12 beside a thin
+/// Gaussian. While m <= nv the small matrix S = I + J Jᵀ is factorised instead (Woodbury; Sherman–Morrison for m = 1):
+///
+///     G⁻¹ x = x − Jᵀ S⁻¹ J x,     G⁻¹ Jᵀ c = Jᵀ S⁻¹ c.
+///
+/// Beyond that G itself is, by Cholesky, with errors of |J|² times rounding.
 class GraphMetric {
  public:
-  /// For `nv` joint coordinates; starts flat, G = I.
-  explicit GraphMetric(int nv);
+  /// For `nv` joint coordinates and `m` embedding coordinates; starts flat, G = I.
+  GraphMetric(int nv, int m);
 
   /// Takes J as its transpose (nv × m). No allocation.
   void update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed) noexcept;
 
   /// x ← G⁻¹ x. No allocation.
-  void solve_in_place(Eigen::Ref<Eigen::VectorXd> x) const noexcept;
+  void solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept;
+
+  /// x ← G⁻¹ Jᵀ c for c (m). No allocation.
+  void solve_pullback(const Eigen::Ref<const Eigen::VectorXd>& c, Eigen::Ref<Eigen::VectorXd> x) noexcept;
 
   const Eigen::MatrixXd& matrix() const noexcept { return matrix_; }
 
  private:
-  Eigen::MatrixXd matrix_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd gradient_;      // of the single coordinate, where there is one
-  double inverse_scale_ = 1.0;    // 1 / (1 + |gradient|²)
-  bool rank_one_ = true;
+  void solve_small(Eigen::Ref<Eigen::VectorXd> c) const noexcept;
+
+  Eigen::MatrixXd matrix_;               // G
+  Eigen::MatrixXd jacobian_transposed_;  // Jᵀ (nv × m)
+  Eigen::MatrixXd small_matrix_;         // S, where m <= nv
+  Eigen::LLT<Eigen::MatrixXd> factor_;   // of S where m <= nv, else of G
+  Eigen::VectorXd along_;                // J x, then S⁻¹ J x (m)
 };
 
 /// The geodesic acceleration g = −Ξ v = −G⁻¹ Jᵀ c (T5.3 in closed form), from J (m × nv) and c = d²ψ/dt² (m).
