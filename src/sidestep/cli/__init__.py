@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from sidestep._core import __version__
-from sidestep.cli import fit_command, list_commands, run_command
+from sidestep.cli import fit_command, list_commands, reproduce_command, run_command
 
 app = typer.Typer(
     name="sidestep",
@@ -26,6 +26,7 @@ app.command("scenarios")(list_commands.scenarios)
 app.command("schema")(list_commands.schema)
 app.command("robots")(list_commands.robots)
 app.command("fit")(fit_command.fit)
+app.command("reproduce")(reproduce_command.reproduce)
 
 
 def main() -> None:

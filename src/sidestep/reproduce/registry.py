@@ -1,0 +1,82 @@
+"""The parts of the report, and how one is chosen by the number of its figure, table or section."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+
+from sidestep.reproduce.item import Item, Notify
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How thorough a run is.
+
+    Attributes:
+        quick: fewer samples and repetitions, and no physics: for tests and a first look.
+        seed: of everything that is drawn.
+        notify: told in a few words what is being done.
+    """
+
+    quick: bool = False
+    seed: int = 0
+    notify: Notify = lambda _: None
+
+
+@dataclass(frozen=True)
+class Part:
+    """One experiment: a function in a module of this package.
+
+    Attributes:
+        key: for `--only`.
+        title: heading in the report.
+        chapter: heading above it.
+        module, function: `function(settings)` yields the items; imported when it runs.
+        items: keys of the items that it yields, also allowed for `--only`.
+    """
+
+    key: str
+    title: str
+    chapter: str
+    module: str
+    function: str
+    items: tuple[str, ...]
+
+    def run(self, settings: Settings) -> Iterator[Item]:
+        """Runs the experiment; yields its figures and tables."""
+        make: Callable[[Settings], Iterator[Item]] = getattr(
+            import_module(f"sidestep.reproduce.{self.module}"), self.function
+        )
+        yield from make(settings)
+
+
+_TWO_THREE = "Chapters 2 and 3: curved spaces, the body, the embedding"
+_FIVE = "Chapter 5: the geometric dynamical system"
+_SIX = "Chapter 6: the seven-joint arm"
+_APPENDIX = "Appendix"
+
+PARTS: tuple[Part, ...] = (Part("5.1", "Flat space", _FIVE, "flat_space", "flat_space", ("5.1",)),)
+
+
+def select(only: Sequence[str]) -> tuple[Part, ...]:
+    """The parts that hold any of the keys: of a part, of an item ("6.4", "B.1"), or of a chapter ("5").
+
+    Args:
+        only: keys; empty for all parts.
+
+    Raises:
+        ValueError: a key that no part has, with those allowed.
+    """
+    if not only:
+        return PARTS
+    chosen: list[Part] = []
+    for key in only:
+        found = [part for part in PARTS if key == part.key or key in part.items]
+        if not found:
+            found = [part for part in PARTS if any(item.split(".")[0] == key for item in part.items)]
+        if not found:
+            allowed = ", ".join(dict.fromkeys(k for part in PARTS for k in (part.key, *part.items)))
+            raise ValueError(f"there is no part {key!r}; allowed: {allowed}, or a chapter")
+        chosen += found
+    return tuple(part for part in PARTS if part in chosen)
