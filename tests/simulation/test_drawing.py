@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from sidestep._core import Obstacles
 from stand_ins import InverseDynamics, Spring
 
 from sidestep import Robot, SceneObject, Simulation
+from sidestep._core import Obstacles
 from sidestep.simulation import render_frames
 from sidestep.simulation.drawing import simplified
 

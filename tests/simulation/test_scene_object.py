@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from sidestep._core import Obstacles
 
 from sidestep import SceneObject
+from sidestep._core import Obstacles
 from sidestep.obstacles import Box, Cylinder, MeshShape, Sphere, pose_at
 from sidestep.simulation import seen_obstacles
 

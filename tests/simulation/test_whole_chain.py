@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sidestep._core import Obstacles
 
 from sidestep import (
     Body,
@@ -17,6 +16,7 @@ from sidestep import (
     evaluate,
     run_kinematically,
 )
+from sidestep._core import Obstacles
 
 START, GOAL = np.deg2rad([0, 45, 0, -66, 0, 66, 45]), np.deg2rad([90, 45, 0, -66, 0, 66, 45])
 

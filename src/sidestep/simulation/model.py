@@ -12,6 +12,7 @@ import trimesh
 
 from sidestep._core import JointType
 from sidestep.robot import Robot
+from sidestep.simulation.convex_parts import convex_parts
 from sidestep.simulation.pose import pose_vector
 from sidestep.simulation.scene import SceneObject, check_scene
 
@@ -97,9 +98,11 @@ def build_model(
     no joint damping or friction unless asked for. The integrator is "implicitfast": without damping it is
     exactly semi-implicit Euler, and with damping it stays stable where Euler does not.
 
-    MuJoCo collides the CONVEX HULL of each collision mesh. Its contacts are therefore on the safe side of the
-    truth: a concave link can report a contact that `ExactClearance` shows was none. The arm does not collide
-    with itself nor with the floor; objects do not collide with each other.
+    MuJoCo collides convex shapes only. Each collision mesh is therefore covered by convex parts
+    (`convex_parts`), and a mesh object by its one hull. Both hold the true solid, so no contact is missed,
+    but a contact in a hollow can be reported where `ExactClearance` shows that there was none: the FR3's
+    parts stand out by 1 to 2 mm on average, 16 mm at worst. The arm does not collide with itself nor with the
+    floor; objects not with each other.
 
     Args:
         robot: with inertias on every moving link.
@@ -264,30 +267,32 @@ def _add_geoms(
     placement: Array,
     owners: dict[str, tuple[str, str]],
 ) -> None:
-    pose = pose_vector(placement)
-    for role, geometries in (
-        ("collision", robot.link(link).geometries),
-        ("visual", robot.link(link).visuals),
-    ):
-        for i, geometry in enumerate(geometries):
-            name = f"{role}:{link}:{i}"
-            mesh = geometry.mesh()
-            if not _add_mesh(spec, name, mesh):
-                continue
-            touches = role == "collision"
-            body.add_geom(
-                name=name,
-                type=mujoco.mjtGeom.mjGEOM_MESH,
-                meshname=name,
-                pos=pose[:3],
-                quat=pose[3:],
-                rgba=ARM_COLOUR,
-                contype=ARM_BIT if touches else 0,
-                conaffinity=0,
-                group=COLLISION_GROUP if touches else VISUAL_GROUP,
-                mass=0.0,
-            )
+    for i, geometry in enumerate(robot.link(link).geometries):
+        for k, corners in enumerate(convex_parts(np.array(geometry.mesh().triangles, dtype=float))):
+            name = f"collision:{link}:{i}:{k}"
+            spec.add_mesh(name=name, uservert=corners.ravel())
+            _add_geom(body, name, placement, touches=True)
             owners[name] = ("link", link)
+    for i, geometry in enumerate(robot.link(link).visuals):
+        name = f"visual:{link}:{i}"
+        if _add_mesh(spec, name, geometry.mesh()):
+            _add_geom(body, name, placement, touches=False)
+
+
+def _add_geom(body: mujoco.MjsBody, name: str, placement: Array, *, touches: bool) -> None:
+    pose = pose_vector(placement)
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        pos=pose[:3],
+        quat=pose[3:],
+        rgba=ARM_COLOUR,
+        contype=ARM_BIT if touches else 0,
+        conaffinity=0,
+        group=COLLISION_GROUP if touches else VISUAL_GROUP,
+        mass=0.0,
+    )
 
 
 def _add_mesh(spec: mujoco.MjSpec, name: str, mesh: trimesh.Trimesh) -> bool:
