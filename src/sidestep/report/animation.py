@@ -19,6 +19,7 @@ VIEW_SIZE = (400, 360)  # [pixel]
 NUM_INSTANTS = 6
 FRAMES_PER_SECOND = 12
 MAX_FRAMES = 120  # keeps the file below 3 MB; a longer run is shown faster
+PATH_STRIDE = 20  # samples from one corner of the drawn path to the next
 CROSS = 0.03  # [m] half the width of the cross at the goal of the tip
 
 
@@ -40,10 +41,9 @@ class ArmPictures:
         for sample in samples[[0, len(samples) // 2, -1]]:
             clouds += [t.reshape(-1, 3) for t in self._solids(sample)]
         points = np.concatenate(clouds)
-        low, high = points.min(axis=0), points.max(axis=0)
         axes = [frame_axis(robot, joint) for joint in range(len(robot.joints))]
         flat = all(abs(abs(axis[2]) - 1.0) < 1e-9 for axis in axes)
-        self.cameras = look_at(low, high, flat=flat, size=VIEW_SIZE)
+        self.cameras = look_at(points, flat=flat, size=VIEW_SIZE)
 
     def picture(self, sample: int) -> Image.Image:
         """All views of one sample side by side, with the time and the path of the tip so far."""
@@ -57,17 +57,16 @@ class ArmPictures:
 
     def _caption(self, sample: int) -> str:
         run = self._result.run
-        error = float(np.linalg.norm(run.q[sample] - self._result.run.goal))
-        return f"t = {run.time[sample]:5.2f} s    error {error:.2f} rad"
+        error = float(np.abs(run.q[sample] - run.goal).max())
+        return f"t = {run.time[sample]:5.2f} s    largest joint error {error:.2f} rad"
 
     def _view(self, camera: Camera, sample: int) -> Image.Image:
         q = self._result.run.q[sample]
         surfaces = [(t, ARM) for t in self._arm(q)] + [(t, OBSTACLE) for t in self._solids(sample)]
         tip = self._tip_position(self._result.run.goal)
-        cross = [(tip + np.array([[-CROSS], [CROSS]]) * axis, GOAL) for axis in camera.axes()[:2]]
-        path = self._path[: sample + 1 : 20] if sample >= 20 else self._path[: sample + 1]
-        lines = [*cross] + ([(path, PATH)] if len(path) > 1 else [])
-        return paint(camera, surfaces, lines=lines)
+        cross = [(tip + np.array([[-CROSS], [CROSS]]) * axis, GOAL) for axis in camera.axes[:2]]
+        path = np.vstack([self._path[: sample + 1 : PATH_STRIDE], self._path[sample]])
+        return paint(camera, surfaces, lines=[*cross, (path, PATH)])
 
     def _arm(self, q: Array) -> list[Array]:
         return [moved(t, self._result.run.robot.pose(q, name)) for name, t in self._links.items()]

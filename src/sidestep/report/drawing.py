@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ ARM: Colour = (150, 165, 185)
 OBSTACLE: Colour = (213, 94, 0)  # Okabe and Ito's vermillion: told apart from grey and blue by everyone
 PATH: Colour = (0, 114, 178)
 GOAL: Colour = (0, 158, 115)
+FILLED = 0.94  # share of the picture that the visible points fill
 SUPERSAMPLING = 2  # drawn this many times larger, then averaged down
 
 
@@ -26,16 +28,16 @@ class Camera:
 
     Args:
         azimuth, elevation: side the camera stands on [deg]; azimuth 0 is +x, 90 is +y; elevation 90 is above.
-        low, high: (3,) corners of the box that must be visible, world [m].
+        visible: (N, 3) points that must be in the picture, world [m].
         size: width and height of the picture [pixel].
     """
 
     azimuth: float
     elevation: float
-    low: Array
-    high: Array
+    visible: Array
     size: tuple[int, int]
 
+    @cached_property
     def axes(self) -> Array:
         """(3, 3) rows: right, up, towards the viewer; world."""
         a, e = np.deg2rad(self.azimuth), np.deg2rad(self.elevation)
@@ -43,21 +45,21 @@ class Camera:
         right = np.array([-np.sin(a), np.cos(a), 0.0])
         return np.stack([right, np.cross(towards, right), towards])
 
+    @cached_property
+    def _window(self) -> tuple[float, Array]:
+        """Pixels per metre, and the middle (2,) of what is visible along right and up [m]."""
+        seen = self.visible @ self.axes[:2].T
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        scale = FILLED * float(np.min(np.array(self.size) / np.maximum(high - low, 1e-6)))
+        return scale, 0.5 * (low + high)
+
     def project(self, points: Array) -> Array:
         """World points (..., 3) to pixel x, pixel y (down) and depth towards the viewer [m] (..., 3)."""
-        axes = self.axes()
-        ends = np.array([self.low, self.high])
-        corners = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, 3)
-        seen = corners @ axes.T
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        scale, middle = self._window
         width, height = self.size
-        scale = 0.94 * min(width / max(high[0] - low[0], 1e-6), height / max(high[1] - low[1], 1e-6))
-        middle = 0.5 * (low + high)
-        view = points @ axes.T
-        pixels = np.empty_like(view)
-        pixels[..., 0] = 0.5 * width + scale * (view[..., 0] - middle[0])
-        pixels[..., 1] = 0.5 * height - scale * (view[..., 1] - middle[1])
-        pixels[..., 2] = view[..., 2]
+        pixels = points @ self.axes.T
+        pixels[..., 0] = 0.5 * width + scale * (pixels[..., 0] - middle[0])
+        pixels[..., 1] = 0.5 * height - scale * (pixels[..., 1] - middle[1])
         return pixels
 
 
@@ -77,7 +79,7 @@ def paint(
         colours = np.concatenate([np.tile(np.array(c, dtype=float), (len(t), 1)) for t, c in filled])
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        axes = camera.axes()
+        axes = camera.axes
         light = axes.T @ np.array([-0.35, 0.55, 0.76])  # from above, left of the viewer
         shade = 0.45 + 0.55 * np.abs(normals @ light)
         pixels = SUPERSAMPLING * camera.project(triangles)
@@ -91,11 +93,7 @@ def paint(
     return image.resize(camera.size, Image.Resampling.LANCZOS)
 
 
-def look_at(low: Array, high: Array, *, flat: bool, size: tuple[int, int]) -> tuple[Camera, ...]:
-    """Views that suit a box: from above for a flat arm, else from the side and from above."""
-    if flat:
-        return (Camera(azimuth=-90.0, elevation=90.0, low=low, high=high, size=size),)
-    return (
-        Camera(azimuth=-35.0, elevation=22.0, low=low, high=high, size=size),
-        Camera(azimuth=-90.0, elevation=90.0, low=low, high=high, size=size),
-    )
+def look_at(visible: Array, *, flat: bool, size: tuple[int, int]) -> tuple[Camera, ...]:
+    """Views of points (N, 3) [m]: from above for a flat arm, else from the side and from above."""
+    above = Camera(azimuth=-90.0, elevation=90.0, visible=visible, size=size)
+    return (above,) if flat else (Camera(azimuth=-35.0, elevation=22.0, visible=visible, size=size), above)

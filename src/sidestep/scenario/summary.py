@@ -8,59 +8,58 @@ from sidestep.scenario.result import ScenarioResult
 def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
     """Rows (quantity, value with unit, what is allowed or what it means)."""
     evaluation, choice = result.evaluation, result.scenario.simulation
-    limits = evaluation.limits
     rows = [
-        ("goal reached", _yes(evaluation.reached), f"joint error under {choice.tolerance:g} rad at the end"),
-        ("largest joint error at the end", f"{evaluation.position_error_rad:.4f} rad", ""),
+        ("goal reached", _yes(evaluation.reached), f"error under {choice.tolerance:g} rad at the end"),
+        ("largest joint error", f"{evaluation.position_error_rad:.4f} rad", "at the end"),
         (
             "time to goal",
             _number(evaluation.time_to_goal_s, "{:.2f} s"),
             f"of {evaluation.duration_s:.2f} s simulated",
         ),
         (
-            "largest detour from the straight path",
+            "largest detour",
             f"{evaluation.path_deviation_rad:.3f} rad",
-            evaluation.path_deviation_joint,
+            f"by {evaluation.path_deviation_joint}",
         ),
     ]
-    if result.run.objects:
-        pairs = ", ".join(evaluation.contact_pairs or ())
-        clearance, pushed = evaluation.min_clearance_m, evaluation.moved_objects
-        rows += [
-            ("contact points counted", _number(evaluation.contacts, "{}"), pairs or "0 allowed"),
+    if evaluation.min_clearance_m is not None:
+        where = f"exact meshes, {evaluation.clearance_pair} at {evaluation.clearance_time_s:.2f} s"
+        rows.append(("smallest clearance", f"{1000.0 * evaluation.min_clearance_m:.1f} mm", where))
+    if evaluation.contacts is not None and result.run.objects:
+        pushed = ", ".join(evaluation.moved_objects) or "no obstacle"
+        rows.append(("contact points", str(evaluation.contacts), f"pushed away: {pushed}"))
+    if evaluation.max_tracking_error is not None:
+        rows.append(
             (
-                "smallest clearance, exact meshes",
-                _number(None if clearance is None else 1000.0 * clearance, "{:.1f} mm"),
-                f"{evaluation.clearance_pair} at {evaluation.clearance_time_s:.2f} s",
-            ),
-            (
-                "obstacles pushed away",
-                str(len(pushed)),
-                ", ".join(pushed),
-            ),
-        ]
+                "tracking error",
+                f"{evaluation.max_tracking_error:.2g} rad/s²",
+                "largest, achieved against wanted acceleration",
+            )
+        )
+    if evaluation.max_torque_ratio is not None:
+        rows.append(("torque over limit", f"{evaluation.max_torque_ratio:.0%}", "largest"))
     rows += [
-        (
-            "acceleration tracking error, largest",
-            _number(evaluation.max_tracking_error, "{:.2g} rad/s²"),
-            f"root mean square {_number(evaluation.rms_tracking_error, '{:.2g} rad/s²')}",
-        ),
-        ("torque over limit, largest", _number(evaluation.max_torque_ratio, "{:.0%}"), "100 % allowed"),
-        (
-            "samples beyond a limit",
-            str(limits.position + limits.velocity + limits.acceleration + (limits.torque or 0)),
-            f"position {limits.position}, velocity {limits.velocity}, acceleration {limits.acceleration}, "
-            f"torque {limits.torque if limits.torque is not None else '-'}",
-        ),
-        ("status of the system", _counts(evaluation.system_status), ""),
-        ("status of the controller", _counts(evaluation.controller_status), ""),
+        ("limits exceeded", _limits(result), "at samples"),
+        ("system", _counts(evaluation.system_status), "steps by status"),
+        ("controller", _counts(evaluation.controller_status), "steps by status"),
         (
             "computing time",
             f"{result.wall_time:.1f} s",
-            f"{len(result.run)} steps of {1000.0 * choice.period:g} ms, {choice.mode} mode",
+            f"{1000.0 * choice.period:g} ms steps, {choice.mode} mode",
         ),
     ]
-    return rows
+    return [row for row in rows if row[1] != "-" or row[0] == "time to goal"]
+
+
+def _limits(result: ScenarioResult) -> str:
+    limits = result.evaluation.limits
+    counts = {
+        "position": limits.position,
+        "velocity": limits.velocity,
+        "acceleration": limits.acceleration,
+        "torque": limits.torque or 0,
+    }
+    return ", ".join(f"{name} {count}" for name, count in counts.items() if count) or "none"
 
 
 def _yes(value: bool) -> str:

@@ -1,0 +1,144 @@
+"""From a scenario to the parts of a run."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sidestep._core import DistanceSwitch, Obstacles
+
+from sidestep.scenario import Scenario, ScenarioError
+from sidestep.scenario.assembly import assemble
+
+BASE = """\
+format: 1
+name: small
+robot: {name: planar2}
+start: {unit: deg, position: [0, 90], velocity: [10, 0]}
+goal: {unit: rad, position: [0.5, 0.25]}
+body: {components: 1}
+obstacles:
+  - {shape: {type: sphere, radius: 0.05}, position: [0.9, 0.1, 0.2]}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path_factory.getbasetemp() / "bodies"))
+
+
+def parse(text: str, folder: Path | None = None) -> Scenario:
+    return Scenario.from_text(text, file="file.yaml", folder=folder)
+
+
+def with_obstacle(text: str) -> Scenario:
+    return parse(BASE[: BASE.index("  - {shape")] + f"  - {text}\n")
+
+
+def test_degrees_become_radians() -> None:
+    parts = assemble(parse(BASE))
+    np.testing.assert_allclose(parts.start, [0.0, math.pi / 2], rtol=1e-15)  # one rounding of the conversion
+    np.testing.assert_allclose(parts.start_velocity, [math.pi / 18, 0.0], rtol=1e-15)
+    assert parts.goal.tolist() == [0.5, 0.25]
+
+
+def test_the_controller_sees_the_bare_centre_and_physics_the_ball() -> None:
+    parts = assemble(parse(BASE))
+    assert isinstance(parts.seen, Obstacles)
+    assert parts.seen.points.tolist() == [[0.9, 0.1, 0.2]]
+    assert parts.seen.radii.tolist() == [0.0]
+    (ball,) = parts.objects
+    assert (ball.name, ball.kind, ball.size, ball.motion) == ("obstacle0", "sphere", (0.05,), "fixed")
+
+
+def test_a_ball_is_seen_with_its_radius_where_asked() -> None:
+    parts = assemble(parse(BASE.replace("0.2]}", "0.2], points: ball}")))
+    assert isinstance(parts.seen, Obstacles)
+    assert parts.seen.radii.tolist() == [0.05]
+
+
+def test_a_turned_box_is_seen_by_its_surface() -> None:
+    scenario = with_obstacle(
+        "{shape: {type: box, size: [0.4, 0.2, 0.1]}, position: [1, 0, 0], rotation_deg: [0, 0, 90], "
+        "points: surface}"
+    )
+    parts = assemble(scenario)
+    assert isinstance(parts.seen, Obstacles)
+    points = parts.seen.points - [1.0, 0.0, 0.0]
+    half = np.array([0.1, 0.2, 0.05])  # turned by 90 degrees, x and y change places
+    assert np.all(np.abs(points) <= half + 1e-9)
+    assert np.all(np.isclose(np.abs(points), half, atol=1e-9).any(axis=1))  # on a face, to rounding
+    assert len(points) > 50
+
+
+def test_a_dropped_ball_moves_between_its_times_only() -> None:
+    scenario = with_obstacle(
+        "{shape: {type: sphere, radius: 0.05}, position: [1, 1, 0], "
+        "motion: {to: [1, 0, 0], begin: 1, end: 3}}"
+    )
+    parts = assemble(scenario)
+    assert callable(parts.seen)
+    seen = [parts.seen(time) for time in (0.5, 2.0, 4.0)]
+    # positions by linear interpolation; one rounding
+    np.testing.assert_allclose([o.points[0] for o in seen], [[1, 1, 0], [1, 0.5, 0], [1, 0, 0]], atol=1e-15)
+    np.testing.assert_allclose(
+        [o.velocities[0] for o in seen], [[0, 0, 0], [0, -0.5, 0], [0, 0, 0]], atol=1e-15
+    )
+    assert [item.pose_at(2.0)[1, 3] for item in parts.objects] == [0.5]
+
+
+def test_a_point_cloud_becomes_one_ball_per_point(tmp_path: Path) -> None:
+    np.save(tmp_path / "cloud.npy", np.array([[0.1, 0.0, 0.0], [0.0, 0.2, 0.0]]))
+    text = BASE.replace("{type: sphere, radius: 0.05}", "{type: points, file: cloud.npy, radius: 0.01}")
+    parts = assemble(parse(text, folder=tmp_path))
+    assert [item.name for item in parts.objects] == ["obstacle0.0", "obstacle0.1"]
+    assert isinstance(parts.seen, Obstacles)
+    np.testing.assert_allclose(
+        parts.seen.points, [[1.0, 0.1, 0.2], [0.9, 0.3, 0.2]], rtol=1e-15
+    )  # one addition
+
+
+def test_the_switch_and_embedding_are_those_asked_for() -> None:
+    text = BASE + "embedding: {joint_limits: {slope: 10}, combine: stack}\n"
+    text += "system: {stiffness: 2, switch: {type: distance, thresholds: [0.1, 0.2], slope: 30}}\n"
+    system = assemble(parse(text)).system
+    assert isinstance(system.switch, DistanceSwitch)
+    assert system.switch.thresholds.tolist() == [0.1, 0.2]
+    assert system.num_embedding_coordinates == 2
+    assert assemble(parse(text.replace("stack", "sum"))).system.num_embedding_coordinates == 1
+    np.testing.assert_array_equal(system.stiffness, 2.0 * np.eye(2))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("planar2", "planr2", "small: robot: no robot is named 'planr2'"),
+        ("[0.5, 0.25]", "[0.5, 4.0]", "small: goal.position: joint 'joint2' is 4.0, allowed: [-3.14"),
+        ("[0, 90]", "[0, 90, 0]", "small: start.position has 3 values; robot 'planar2' has 2 coordinates"),
+        ("[10, 0]", "[1000, 0]", "small: start.velocity: joint 'joint1' is 17.4"),
+        ("[10, 0]", "[1]", "small: start.velocity has 1 values"),
+        ("components: 1", "components: {link1: 1}", "small: body: components has no number for links link2"),
+        (
+            "{type: sphere, radius: 0.05}",
+            "{type: mesh, file: no.stl}",
+            "small: obstacles[0]: shape.file: there is no file",
+        ),
+        ("{name: planar2}", "{name: planar2, tip: link1}", "small: robot: tip go with 'urdf'"),
+        ("{name: planar2}", "{urdf: no.urdf}", "small: robot"),
+        (
+            "components: 1}",
+            "components: 1}\nsystem: {switch: {type: distance, thresholds: [1], slope: 1}}",
+            "small: system: switch.thresholds has 1 values; robot 'planar2' has 2 coordinates (joint1,",
+        ),
+        (
+            "obstacles:\n",
+            "obstacles:\n  - {name: obstacle1, shape: {type: sphere, radius: 1}, position: [9, 9, 9]}\n",
+            "small: obstacles: two objects of the scene are named 'obstacle1'",
+        ),
+    ],
+)
+def test_impossible_wishes_name_the_place(old: str, new: str, message: str) -> None:
+    assert old in BASE
+    with pytest.raises(ScenarioError) as caught:
+        assemble(parse(BASE.replace(old, new, 1)))
+    assert message in str(caught.value).replace("['link2']", "link2")

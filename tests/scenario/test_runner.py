@@ -1,0 +1,105 @@
+"""Running a scenario, end to end."""
+
+import math
+
+import pytest
+
+from sidestep.scenario import Scenario, run_scenario
+
+# Without obstacles the system is e'' = -0.5 e - 1.5 e', so e(t) = e0 (2 exp(-t/2) - exp(-t)). With e0 = 1 it
+# passes 0.05 where exp(-t/2) = 1 - sqrt(0.95).
+FREE = """\
+format: 1
+name: free
+robot: {{name: planar2}}
+start: {{unit: rad, position: [0, 0.5]}}
+goal: {{unit: rad, position: [1, 0.5]}}
+body: {{components: 1}}
+simulation: {{mode: {mode}, period: {period}, duration: 12.0}}
+"""
+TIME_TO_GOAL = -2.0 * math.log(1.0 - math.sqrt(0.95))
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path_factory.getbasetemp() / "bodies"))
+
+
+@pytest.mark.parametrize("mode", ["kinematic", "torque"])
+def test_the_free_motion_arrives_when_the_solution_in_closed_form_does(mode: str) -> None:
+    period = 0.005
+    result = run_scenario(Scenario.from_text(FREE.format(mode=mode, period=period)))
+    document = result.to_document()
+    assert document["success"] is document["reached"] is True
+    # semi-implicit Euler is of first order: its time is off by less than two periods here
+    assert document["time_to_goal_s"] == pytest.approx(TIME_TO_GOAL, abs=2 * period)
+    assert document["position_error_rad"] < 0.05
+    assert document["min_clearance_m"] is None
+    assert (
+        document["path_deviation_rad"] < 1e-6
+    )  # straight: rounding, and the tolerance of the torque program
+    if mode == "torque":
+        assert document["contacts"] == 0
+        assert (
+            document["max_tracking_error"] < 1e-6
+        )  # tolerance of the program; the physics has the same model
+        assert 0.0 < document["max_torque_ratio"] < 1.0
+    else:
+        assert document["contacts"] is document["max_torque_ratio"] is document["max_tracking_error"] is None
+
+
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "second_order", "runge_kutta_4"])
+def test_every_integrator_can_be_chosen(integrator: str) -> None:
+    text = FREE.format(mode="kinematic", period=0.01).replace(
+        "duration", f"integrator: {integrator}, duration"
+    )
+    document = run_scenario(Scenario.from_text(text)).to_document()
+    # two periods for the schemes of first order, one (the grid) for the fourth
+    bound = 0.01 if integrator == "runge_kutta_4" else 0.02
+    assert document["time_to_goal_s"] == pytest.approx(TIME_TO_GOAL, abs=bound)
+
+
+def test_a_start_velocity_is_used() -> None:
+    # e0 = 1 and e'(0) = -0.5 leave the slow mode alone: e = exp(-t/2), which passes 0.05 at 2 log 20
+    text = FREE.format(mode="kinematic", period=0.005).replace(
+        "[0, 0.5]}", "[0, 0.5], velocity: [0.5, 0]}", 1
+    )
+    document = run_scenario(Scenario.from_text(text)).to_document()
+    assert document["time_to_goal_s"] == pytest.approx(2.0 * math.log(20.0), abs=0.02)  # first order
+
+
+def test_a_run_that_ends_too_early_fails_and_says_so() -> None:
+    text = FREE.format(mode="kinematic", period=0.005).replace("12.0", "1.0")
+    result = run_scenario(Scenario.from_text(text))
+    assert not result.success
+    assert not result.to_document()["reached"]
+    assert result.evaluation.position_error_rad == pytest.approx(
+        2.0 * math.exp(-0.5) - math.exp(-1.0), abs=0.01
+    )  # first order in the period of 0.005 s
+    assert "does not reach" in result.sentence()
+
+
+def test_hitting_a_free_ball_is_seen_by_physics_and_by_exact_clearance() -> None:
+    text = (
+        FREE.format(mode="torque", period=0.002).replace("[0, 0.5]", "[0, 0]").replace("[1, 0.5]", "[1, 0]")
+    )
+    text += "system: {switch: {type: harmonic_only}}\n"
+    ball = "{name: ball, free: true, shape: {type: sphere, radius: 0.03}, position: [0.8, 0.4, 0.0]}"
+    text += f"obstacles: [{ball}]\n"
+    result = run_scenario(Scenario.from_text(text))
+    document = result.to_document()
+    assert not result.success
+    assert document["contacts"] > 0
+    assert document["contact_pairs"] == ["link2 - ball"]
+    assert document["moved_objects"]["ball"] > 0.01
+    assert "touches on the way" in result.sentence()
+    assert "pushes ball away" in result.sentence()
+
+
+@pytest.mark.parametrize("name", ["planar-one-obstacle", "planar-several", "planar-drop"])
+def test_planar_scenarios_go_around(name: str) -> None:
+    result = run_scenario(Scenario.load(name))
+    assert result.success, result.sentence()
+    assert result.evaluation.min_clearance_m is not None
+    assert result.evaluation.min_clearance_m > 0.003  # [m] as measured when they were made, less a safe part
+    assert result.evaluation.path_deviation_rad > 0.1  # the straight path would have hit

@@ -1,0 +1,181 @@
+"""Reading, checking and writing scenario files."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
+from sidestep.scenario import scenario as module
+
+BASE = """\
+format: 1
+name: small
+robot: {name: planar2}
+start: {unit: deg, position: [0, 10]}
+goal: {unit: rad, position: [0.5, 0.25]}
+body: {components: 3, covariance: diagonal, seed: 7}
+obstacles:
+  - name: ball
+    shape: {type: sphere, radius: 0.05}
+    position: [0.9, 0.1, 0.0]
+    motion: {to: [0.9, 0.2, 0.0], begin: 1.0, end: 2.0}
+    points: surface
+system: {stiffness: 2, switch: {type: distance, thresholds: [0.1, 0.2], slope: 30}}
+simulation: {mode: kinematic, period: 0.002}
+"""
+
+
+def parse(text: str) -> Scenario:
+    return Scenario.from_text(text, file="file.yaml")
+
+
+def test_every_value_of_a_file_arrives() -> None:
+    scenario = parse(BASE)
+    assert scenario.name == "small"
+    assert scenario.robot.name == "planar2"
+    assert (scenario.start.unit, scenario.start.position, scenario.start.velocity) == (
+        "deg",
+        (0.0, 10.0),
+        None,
+    )
+    assert (scenario.goal.unit, scenario.goal.position) == ("rad", (0.5, 0.25))
+    assert scenario.body == module.BodyChoice(components=3, covariance="diagonal", seed=7)
+    (ball,) = scenario.obstacles
+    assert ball.shape == module.Shape("sphere", radius=0.05)
+    assert ball.motion == module.StraightMove(to=(0.9, 0.2, 0.0), begin=1.0, end=2.0)
+    assert (ball.points, ball.free, ball.spacing) == ("surface", False, 0.03)
+    assert scenario.system.stiffness == 2.0
+    assert scenario.system.damping == 1.5
+    assert scenario.system.switch == module.SwitchChoice("distance", thresholds=(0.1, 0.2), slope=30.0)
+    assert scenario.simulation == module.SimulationChoice(mode="kinematic", period=0.002)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("format: 1", "format: 2", "format is 2; allowed: 1"),
+        ("goal:", "gaol:", "the key 'goal' is missing"),
+        (
+            "name: small",
+            "name: small\ncolour: red",
+            "unknown key 'colour' (value 'red'); allowed: format, name",
+        ),
+        ("name: small", "name: a b", "name is 'a b'; it must match"),
+        ("{name: planar2}", "{}", "robot is {}; it needs either 'name' or 'urdf'"),
+        ("{name: planar2}", "{name: a, urdf: b}", "it needs either 'name' or 'urdf'"),
+        ("unit: deg", "unit: grad", "start.unit is 'grad'; allowed: deg, rad"),
+        ("unit: deg, ", "", "start: the key 'unit' is missing"),
+        ("radius: 0.05", "radius: -1", "obstacles[0].shape.radius is -1; it must be greater than 0"),
+        ("radius: 0.05", "radius: .nan", "obstacles[0].shape.radius is nan; it must be a finite number"),
+        ("radius: 0.05", "radius: 5e-2", "is '5e-2'; it must be of type number (YAML reads it as text"),
+        ("radius: 0.05", "radius: 1, size: 2", "unknown key 'size' (value 2); allowed: type, radius"),
+        ("type: sphere", "type: ball", "shape.type is 'ball'; allowed: sphere, box, cylinder, mesh, points"),
+        ("[0.9, 0.1, 0.0]", "[0.9, 0.1]", "position is [0.9, 0.1] with 2 values; it must have at least 3"),
+        ("components: 3", "components: cic", "allowed: an integer from 1, one per link name, 'aic', 'bic'"),
+        ("components: 3", "components: 0", "body.components is 0; it must be at least 1"),
+        ("slope: 30", "slope: 0", "system.switch.slope is 0; it must be greater than 0"),
+        (", slope: 30", "", "system.switch: the key 'slope' is missing"),
+        ("mode: kinematic", "mode: fast", "simulation.mode is 'fast'; allowed: torque, kinematic"),
+        ("period: 0.002", "period: 1", "simulation.period is 1; it must be at most 0.1"),
+        ("end: 2.0", "end: 0.5", "obstacles[0].motion: end is 0.5; it must be after begin (1.0)"),
+        ("points: surface", "free: true", "obstacles[0].free is true; a free obstacle starts at rest"),
+        ("points: surface", "velocity: [1, 0, 0]", "give either velocity or motion, not both"),
+        ("seed: 7", "seed: 7, seed: 8", "line 6, column 54: not valid YAML: the key 'seed' is given twice"),
+        ("robot: {", "robot: {{", "not valid YAML"),
+        (BASE, "- 1", "a scenario is a mapping of keys to values, got list"),
+        (BASE, "", "a scenario is a mapping of keys to values, got NoneType"),
+    ],
+)
+def test_one_error_names_file_place_value_and_what_is_allowed(old: str, new: str, message: str) -> None:
+    assert old in BASE
+    with pytest.raises(ScenarioError) as caught:
+        parse(BASE.replace(old, new, 1))
+    assert str(caught.value).startswith("file.yaml")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_ball_of_points_is_refused_for_a_box() -> None:
+    text = BASE.replace("{type: sphere, radius: 0.05}", "{type: box, size: [1, 1, 1]}")
+    with pytest.raises(ScenarioError, match="points is 'ball'; a box allows centre, surface"):
+        parse(text.replace("points: surface", "points: ball"))
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_shipped_scenarios_survive_saving_and_loading(name: str, tmp_path: Path) -> None:
+    scenario = Scenario.load(name)
+    assert scenario.name == name
+    assert scenario.description
+    scenario.save(tmp_path / "copy.yaml")
+    assert Scenario.load(tmp_path / "copy.yaml") == scenario
+
+
+def test_files_stay_reachable_from_where_a_scenario_is_saved(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b" / "c").mkdir(parents=True)
+    text = BASE.replace("{name: planar2}", "{urdf: arm.urdf, package_dirs: [parts]}")
+    text = text.replace("{type: sphere, radius: 0.05}", "{type: mesh, file: rock.stl}")
+    (tmp_path / "a" / "s.yaml").write_text(text)
+    Scenario.load(tmp_path / "a" / "s.yaml").save(tmp_path / "b" / "c" / "s.yaml")
+    copy = Scenario.load(tmp_path / "b" / "c" / "s.yaml")
+    assert copy.robot.urdf == "../../a/arm.urdf"
+    assert copy.file(copy.robot.package_dirs[0]) == tmp_path / "a" / "parts"
+    assert copy.file(str(copy.obstacles[0].shape.file)) == tmp_path / "a" / "rock.stl"
+
+
+def test_an_unknown_scenario_lists_the_shipped_ones() -> None:
+    with pytest.raises(
+        FileNotFoundError, match=r"no scenario 'nothing'.*planar-one-obstacle.*thesis-6\.2\.4"
+    ):
+        Scenario.load("nothing")
+
+
+def test_a_file_that_is_not_text_is_named(tmp_path: Path) -> None:
+    (tmp_path / "s.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioError, match=r"s\.yaml: cannot be read as UTF-8"):
+        Scenario.load(tmp_path / "s.yaml")
+
+
+def test_thesis_scenarios_have_the_figures_of_the_thesis() -> None:
+    free, cluster, diagonal = (Scenario.load(f"thesis-6.2.{n}") for n in (2, 3, 4))
+    for scenario in (free, cluster, diagonal):
+        assert (scenario.system.stiffness, scenario.system.damping) == (0.5, 1.5)
+        assert scenario.system.switch.thresholds == (0.1, 0.1, 0.2, 0.2, 0.2, 0.2, 0.1)
+    assert free.start.position == cluster.start.position == (0, 45, 0, -66, 0, 66, 45)
+    assert free.goal.position == cluster.goal.position == (90, 45, 0, -66, 0, 66, 45)
+    assert diagonal.start.position == (0, 80, 0, -30, 0, 66, 45)
+    assert diagonal.goal.position == (100, 10, 0, -66, 0, 66, 45)
+    assert free.obstacles == ()
+    assert [o.position for o in cluster.obstacles] == [
+        (0.4, 0.53, 0.52),
+        (0.4, 0.51, 0.52),
+        (0.3, 0.45, 0.52),
+    ]
+    assert [o.position for o in diagonal.obstacles] == [
+        (0.3, 0.23, 0.42),
+        (0.2, 0.51, 0.75),
+        (0.2, 0.51, 0.55),
+    ]
+
+
+def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
+    schema = json.loads(schema_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    parts = {
+        "body": module.BodyChoice(),
+        "embedding": module.EmbeddingChoice(),
+        "system": module.SystemChoice(),
+        "simulation": module.SimulationChoice(),
+    }
+    for key, value in parts.items():
+        for field in dataclasses.fields(value):
+            if field.name != "switch":
+                stated = schema["properties"][key]["properties"][field.name]["default"]
+                assert stated == getattr(value, field.name), f"{key}.{field.name}"
+    assert schema["properties"]["system"]["properties"]["switch"]["default"] == {"type": "none"}
+    defaults = {f.name: f.default for f in dataclasses.fields(module.Obstacle)}
+    for name in ("free", "points", "spacing"):
+        assert schema["$defs"]["obstacle"]["properties"][name]["default"] == defaults[name]
