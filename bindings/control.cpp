@@ -1,6 +1,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
+#include <limits>
+
 #include "arguments.hpp"
 #include "module.hpp"
 #include "sidestep/control/acceleration_bounds.hpp"
@@ -83,6 +86,9 @@ void bind_acceleration_bounds(nb::module_& m) {
   m.def(
       "acceleration_bounds",
       [](nb::handle robot_or_limits, const ArrayLike& q, const ArrayLike& v, double period, double position_margin) {
+        if (!nb::isinstance<Robot>(robot_or_limits) && !nb::isinstance<JointLimits>(robot_or_limits)) {
+          throw nb::type_error("limits must be a Robot or JointLimits");
+        }
         const JointLimits& limits = nb::isinstance<Robot>(robot_or_limits)
                                         ? nb::cast<const Robot&>(robot_or_limits).limits()
                                         : nb::cast<const JointLimits&>(robot_or_limits);
@@ -93,6 +99,9 @@ void bind_acceleration_bounds(nb::module_& m) {
         }
         if (!(period > 0.0) || !std::isfinite(period)) {
           throw nb::value_error(("period is " + std::to_string(period) + ", must be finite and positive").c_str());
+        }
+        if (limits.lower.size() != nv || limits.upper.size() != nv || limits.acceleration.size() != nv) {
+          throw nb::value_error("limits must have the same number of entries each");
         }
         AccelerationBounds bounds(nv);
         bounds.update(limits, position, velocity, period, position_margin);

@@ -56,6 +56,7 @@ QuadraticProgram::QuadraticProgram(int num_variables, int num_rows) : n_(num_var
   R_.setZero(n_, n_);
   x_.setZero(n_);
   multipliers_.setZero(n_ + m_);
+  row_norms_.setZero(m_);
   u_.setZero(n_);
   d_.setZero(n_);
   r_.setZero(n_);
@@ -104,7 +105,7 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
       const auto row = data.A.row(i - n_);
       value = row.dot(x_);
       terms = row.cwiseAbs().dot(x_.cwiseAbs().transpose());
-      norm = row.norm();
+      norm = row_norms_[i - n_];
       low = data.row_lower[i - n_];
       high = data.row_upper[i - n_];
     }
@@ -219,6 +220,7 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
   if (!factorise(data.H)) {
     return QuadraticProgramStatus::not_positive_definite;
   }
+  row_norms_ = data.A.rowwise().norm();
   recompute(data);
 
   const int max_iterations = iterations_per_constraint * (n_ + m_) + n_;

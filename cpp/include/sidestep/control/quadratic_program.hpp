@@ -26,7 +26,7 @@ struct QuadraticProgramData {
   Eigen::MatrixXd H;                     ///< (n, n), symmetric positive definite; the lower triangle is read
   Eigen::VectorXd g;                     ///< (n)
   Eigen::VectorXd lower, upper;          ///< (n)
-  Eigen::MatrixXd A;                     ///< (m, n)
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;  ///< (m, n)
   Eigen::VectorXd row_lower, row_upper;  ///< (m)
 };
 
@@ -83,6 +83,7 @@ class QuadraticProgram {
   Eigen::MatrixXd J_;              // L^-T times an orthogonal matrix, so J' H J = I; J' N = [R; 0]
   Eigen::MatrixXd R_;              // upper triangular, (num_active_, num_active_) in use; N: active normals
   Eigen::VectorXd x_, multipliers_;
+  Eigen::VectorXd row_norms_;      // |row| of A
   Eigen::VectorXd u_;              // multipliers of the active constraints, >= 0 for inequalities
   Eigen::VectorXd d_, r_, z_, y_;  // J' n, R^-1 d_1, step direction J_2 d_2, coordinates of x in J
 };
