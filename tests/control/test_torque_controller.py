@@ -57,7 +57,7 @@ def test_limits_in_the_way_are_named():
     robot = ss.Robot.named("planar2")
     q, v = robot.neutral, np.zeros(2)
     mass, bias = robot.mass_matrix(q), robot.bias(q, v)
-    # Carrying joint 2 along while joint 1 accelerates takes all its torque, and for more all its deceleration.
+    # Carrying joint 2 along while joint 1 accelerates takes all its torque; for more, all its deceleration.
     for demand, expected in [
         (20.0, ss.Limit.torque_upper),
         (1e6, ss.Limit.torque_upper | ss.Limit.acceleration_lower),
