@@ -185,3 +185,14 @@ def test_help_imports_nothing_heavy() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.endswith("heavy: []\n")
     assert time.perf_counter() - begin < 5.0  # [s] takes 0.2 s; ten times that when the machine is busy
+
+
+def test_a_diverging_run_is_one_line_and_exit_code_1(
+    invoke: Invoke, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverge(*_: object, **__: object) -> None:
+        raise RuntimeError("the integration diverged near 1.0 s")
+
+    monkeypatch.setattr("sidestep.cli.run_command.run_and_show", diverge)
+    assert invoke("run", "small.yaml", "-q", "--no-report") == 1
+    assert capsys.readouterr().err == "failed: the integration diverged near 1.0 s\n"

@@ -36,6 +36,9 @@ def main() -> None:
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
+    except RuntimeError as error:  # the physics or the integration diverged
+        print(f"failed: {error}", file=sys.stderr)
+        sys.exit(1)
 
 
 def cmake_dir() -> Path:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from sidestep import (
     Body,
     CollisionDensity,
     DistanceSwitch,
+    Embedding,
     GeodesicOnly,
     GeometricSystem,
     HarmonicOnly,
@@ -24,6 +25,7 @@ from sidestep import (
     Robot,
     SigmoidSwitch,
     Sum,
+    Unswitched,
 )
 from sidestep._core import JointType, Obstacles
 from sidestep.obstacles import load_point_cloud
@@ -45,6 +47,7 @@ from sidestep.simulation.scene import Kind, check_scene
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 _T = TypeVar("_T")
+Switch: TypeAlias = Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch
 
 MAX_CLOUD_POINTS = 2000  # more balls than this make the physics and the exact distances too slow to be of use
 
@@ -254,12 +257,12 @@ def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
         stiffness=choice.stiffness,
         damping=choice.damping,
         damping_form=choice.damping_form,
-        switch=_switch(choice.switch, robot, body),
+        switch=_switch(choice.switch, robot),
     )
 
 
-def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[object]:
-    parts: list[object] = [CollisionDensity(robot, body, average=choice.density == "average")]
+def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[Embedding]:
+    parts: list[Embedding] = [CollisionDensity(robot, body, average=choice.density == "average")]
     if choice.joint_limits is not None:
         parts.append(
             JointLimitPotential(robot, slope=choice.joint_limits.slope, height=choice.joint_limits.height)
@@ -267,25 +270,26 @@ def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[objec
     return [Sum(parts)] if choice.combine == "sum" and len(parts) > 1 else parts
 
 
-def _switch(choice: SwitchChoice, robot: Robot, body: Body) -> object:
-    match choice.type:
-        case "none":
-            return None
-        case "harmonic_only":
+def _switch(choice: SwitchChoice, robot: Robot) -> Switch:
+    match choice:
+        case SwitchChoice(type="none"):
+            return Unswitched()
+        case SwitchChoice(type="harmonic_only"):
             return HarmonicOnly()
-        case "geodesic_only":
+        case SwitchChoice(type="geodesic_only"):
             return GeodesicOnly()
-        case "binary":
-            return BinarySwitch(threshold=choice.threshold)
-        case "sigmoid":
-            return SigmoidSwitch(threshold=choice.threshold, slope=choice.slope)
-    thresholds = choice.thresholds or ()
-    if len(thresholds) != robot.num_coordinates:
-        raise ValueError(
-            f"switch.thresholds has {len(thresholds)} values; robot {robot.name!r} has "
-            f"{robot.num_coordinates} coordinates ({', '.join(robot.coordinate_names)})"
-        )
-    return DistanceSwitch(thresholds=thresholds, slope=choice.slope)
+        case SwitchChoice(type="binary", threshold=float(threshold)):
+            return BinarySwitch(threshold=threshold)
+        case SwitchChoice(type="sigmoid", threshold=float(threshold), slope=float(slope)):
+            return SigmoidSwitch(threshold=threshold, slope=slope)
+        case SwitchChoice(type="distance", thresholds=tuple(thresholds), slope=float(slope)):
+            if len(thresholds) != robot.num_coordinates:
+                raise ValueError(
+                    f"switch.thresholds has {len(thresholds)} values; robot {robot.name!r} has "
+                    f"{robot.num_coordinates} coordinates ({', '.join(robot.coordinate_names)})"
+                )
+            return DistanceSwitch(thresholds=thresholds, slope=slope)
+    raise ValueError(f"switch of type {choice.type!r} lacks a number it needs, got {choice}")
 
 
 def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:
