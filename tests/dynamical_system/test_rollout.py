@@ -22,7 +22,8 @@ def wide_scene(name: str) -> tuple[ss.Robot, ss.CollisionDensity, ss.Obstacles, 
     )
     q = robot.neutral
     tip = robot.pose(q, links[-1])[:3, 3]
-    obstacles = ss.Obstacles(np.array([[0.2, 0.1, 0.1], [0.1, -0.2, 0.0]]) + [tip, 0.5 * tip], [0.05, 0.0])
+    beside = np.array([[0.2, 0.1, 0.1], [0.1, -0.2, 0.0]])
+    obstacles = ss.Obstacles(beside + np.outer([1.0, 0.5], tip), [0.05, 0.0])
     v = rng.normal(size=robot.num_coordinates)
     return robot, ss.CollisionDensity(robot, body), obstacles, q, 0.7 * v / np.linalg.norm(v)
 

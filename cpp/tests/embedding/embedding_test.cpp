@@ -1,0 +1,78 @@
+// Embeddings of random trees against finite differences of their own values.
+#include "sidestep/embedding/embedding.hpp"
+
+#include <boost/test/unit_test.hpp>
+#include <memory>
+
+#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/embedding/joint_limit_potential.hpp"
+#include "sidestep/embedding/sum.hpp"
+#include "support/random_scene.hpp"
+
+using namespace sidestep;
+using test::Random;
+
+namespace {
+
+void check_derivatives(const Embedding& embedding, Random& random) {
+  const int nv = embedding.robot().num_coordinates();
+  const Eigen::VectorXd q = random.vector(nv), v = random.vector(nv);
+  const Obstacles obstacles = test::random_obstacles(random, 3);
+  const EmbeddingEvaluation result = evaluate(embedding, q, v, obstacles);
+  const Eigen::MatrixXd hessian = hessians(embedding, q, obstacles).front();
+
+  // Central differences over 1e-5 rad, deviations above 5 cm: truncation 1e-7 of the largest entry at most.
+  constexpr double h = 1e-5;
+  constexpr double tolerance = 1e-6;
+  Eigen::RowVectorXd gradient(nv);
+  Eigen::MatrixXd second(nv, nv);
+  for (int i = 0; i < nv; ++i) {
+    const Eigen::VectorXd shift = h * Eigen::VectorXd::Unit(nv, i);
+    const EmbeddingEvaluation after = evaluate(embedding, q + shift, v, obstacles);
+    const EmbeddingEvaluation before = evaluate(embedding, q - shift, v, obstacles);
+    gradient[i] = (after.values[0] - before.values[0]) / (2.0 * h);
+    second.row(i) = (after.jacobian.row(0) - before.jacobian.row(0)) / (2.0 * h);
+  }
+  BOOST_TEST((result.jacobian - gradient).norm() <= tolerance * gradient.norm());
+  BOOST_TEST((hessian - second).norm() <= tolerance * second.norm());
+  BOOST_TEST((hessian - hessian.transpose()).norm() == 0.0);
+
+  // d²ψ/dt² with the obstacles moving along; 1 ms: truncation 1e-6, rounding 1e-10 of the size of its terms.
+  constexpr double dt = 1e-3;
+  const auto value_at = [&](double time) {
+    Obstacles moved = obstacles;
+    moved.advance(time);
+    return evaluate(embedding, q + time * v, v, moved).values[0];
+  };
+  const double curvature = (16.0 * (value_at(dt) + value_at(-dt)) - value_at(2.0 * dt) - value_at(-2.0 * dt) -
+                            30.0 * value_at(0.0)) / (12.0 * dt * dt);
+  const double scale = second.norm() * v.squaredNorm() + std::abs(curvature);
+  BOOST_TEST(std::abs(result.curvatures[0] - curvature) <= tolerance * scale);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(derivatives_of_random_trees) {
+  Random random(1);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Robot robot = test::random_tree(random, 7);
+    const Body body = test::random_body(random, robot);
+    const auto density = std::make_shared<CollisionDensity>(robot, body, random.chance(0.5));
+    const auto limits = std::make_shared<JointLimitPotential>(robot, 2.0, 3.0);
+    check_derivatives(*density, random);
+    check_derivatives(*limits, random);
+    check_derivatives(Sum({density, limits}), random);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(wrong_arguments_are_named) {
+  Random random(2);
+  const Robot robot = test::random_tree(random, 3);
+  Body body = test::random_body(random, robot);
+  body.links[0] = "tail";
+  BOOST_CHECK_EXCEPTION(CollisionDensity(robot, body), std::invalid_argument, [](const std::exception& e) {
+    return std::string(e.what()).find("no link 'tail'; its links are: link0, link1") != std::string::npos;
+  });
+  BOOST_CHECK_THROW(JointLimitPotential(robot, 0.0), std::invalid_argument);
+  BOOST_CHECK_THROW(Sum({}), std::invalid_argument);
+}
