@@ -21,8 +21,10 @@ std::size_t num_allocations() noexcept { return allocations; }
 
 #if defined(SIDESTEP_ADDRESS_SANITIZER)
 
-// The sanitizer owns malloc, and offers a hook that sees every allocation.
-#include <sanitizer/allocator_interface.h>
+// The sanitizer owns malloc, and offers a hook that sees every allocation. Declared here because not every compiler
+// package ships <sanitizer/allocator_interface.h>.
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*, std::size_t),
+                                                         void (*on_free)(const volatile void*));
 namespace {
 void on_malloc(const volatile void*, std::size_t) { ++allocations; }
 void on_free(const volatile void*) {}
