@@ -8,7 +8,9 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 COMMITTED = ROOT / "src" / "sidestep" / "_core.pyi"
-REGENERATE = "python -m nanobind.stubgen -m sidestep._core -p bindings/stubs.pattern -o src/sidestep/_core.pyi"
+REGENERATE = (
+    "python -m nanobind.stubgen -m sidestep._core -p bindings/stubs.pattern -o src/sidestep/_core.pyi"
+)
 
 
 @pytest.fixture(scope="module")

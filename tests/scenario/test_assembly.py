@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sidestep._core import DistanceSwitch, Obstacles
 
+from sidestep._core import DistanceSwitch, Obstacles
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import assemble
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sidestep._core import Obstacles
 from stand_ins import InverseDynamics, Spring
 
 from sidestep import Robot, SceneObject, Simulation, evaluate
+from sidestep._core import Obstacles
 from sidestep.simulation import seen_obstacles
 
 START, GOAL = np.zeros(2), np.array([1.2, 0.0])

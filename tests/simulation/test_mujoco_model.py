@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.special import ellipk
-from sidestep._core import Obstacles
 from stand_ins import PENDULUM, Holding, InverseDynamics, Spring
 
 from sidestep import Arrival, Robot, SceneObject, Simulation
+from sidestep._core import Obstacles
 from sidestep.simulation import build_model
 
 MIMIC = """

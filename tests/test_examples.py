@@ -1,0 +1,78 @@
+"""Every example runs, and what it prints is right."""
+
+import contextlib
+import io
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def run(number: str) -> str:
+    (path,) = EXAMPLES.glob(f"{number}_*.py")
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        runpy.run_path(str(path), run_name="__main__")
+    return output.getvalue()
+
+
+def number_after(text: str, output: str) -> float:
+    found = re.search(re.escape(text) + r"\s*(-?[\d.]+(?:e[+-]?\d+)?)", output)
+    assert found is not None, f"no number after {text!r} in:\n{output}"
+    return float(found[1])
+
+
+def test_01_every_link_has_its_gaussians() -> None:
+    output = run("01")
+    assert "fr3_arm: 7 joints" in output
+    assert number_after("in all:", output) == 32  # 8 links with meshes, 4 each
+
+
+def test_02_derivatives_agree() -> None:
+    output = run("02")
+    # Rounding of the differences (1e-16 / h^2 = 1e-10, relative to a curvature of 10) leaves this much.
+    assert number_after("error of dpsi/dt:", output) < 1e-8
+    assert number_after("error of d2psi/dt2:", output) < 1e-6
+    assert number_after("dense Christoffel symbols:", output) < 1e-6
+
+
+def test_03_arm_goes_around() -> None:
+    output = run("03")
+    assert "joint error 0.000095 rad" in output  # the C++ twin prints the same
+    assert number_after("straight line: smallest clearance", output) < 0.0
+    assert number_after("around: smallest clearance", output) > 0.1
+
+
+def test_04_torque_control_arrives_within_limits() -> None:
+    output = run("04")
+    assert "reached: True" in output
+    assert "contacts: 0" in output
+    assert "limits kept: True" in output
+    assert number_after("smallest clearance", output) > 0.0
+    # The QP's price on torque costs about 1e-8 rad/s^2 of tracking (see TorqueControllerSettings).
+    assert number_after("largest tracking error:", output) < 1e-6
+
+
+def test_05_velocities_enter_the_curvature() -> None:
+    output = run("05")
+    exact, difference = number_after("at rest:", output), number_after("by finite differences", output)
+    assert exact == pytest.approx(difference, rel=1e-5)  # printed to six digits
+    assert number_after("joint error", output) < 0.01
+    assert number_after("smallest clearance", output) > 0.1
+
+
+def test_06_merged_points_cover_the_cloud() -> None:
+    output = run("06")
+    assert output.startswith("5000 points in the file")
+    assert number_after("in the file,", output) < 500
+    assert "every point is covered: True" in output
+
+
+def test_examples_are_short_and_say_what_they_show() -> None:
+    for path in sorted(EXAMPLES.glob("0*.py")):
+        text = path.read_text(encoding="utf-8")
+        assert text.startswith('"""'), path.name
+        assert len(text.splitlines()) < 80, path.name

@@ -1,0 +1,36 @@
+"""The README's Python example runs, and it has exactly two set-up commands."""
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_python_example_arrives() -> None:
+    (example,) = blocks("python")
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        exec(compile(example, "README.md", "exec"), {})
+    error = re.fullmatch(r"joint error (\d\.\d+) rad\n", output.getvalue())
+    assert error is not None
+    assert (
+        float(error[1]) < 0.01
+    )  # the spring's slow pole is 1/s: about e^-8 of 2.4 rad is left, plus the detour
+
+
+def test_two_set_up_commands() -> None:
+    commands = [line for line in README.splitlines() if re.match(r"python3? -m venv ", line)]
+    assert [line.split(" && ")[-1] for line in commands] == ["sidestep demo", "pytest"]
+
+
+def test_links_lead_somewhere() -> None:
+    root = Path(__file__).parents[1]
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link]
+    assert links
+    assert [link for link in links if not (root / link).exists()] == []
