@@ -1,11 +1,15 @@
 #include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "arguments.hpp"
 #include "module.hpp"
 #include "sidestep/embedding/clearance_barrier.hpp"
 #include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/embedding/joint_limit_barrier.hpp"
 #include "sidestep/embedding/joint_limit_potential.hpp"
+#include "sidestep/embedding/self_collision_barrier.hpp"
 #include "sidestep/embedding/sum.hpp"
 
 namespace sidestep::python {
@@ -97,6 +101,51 @@ void bind_embedding(nb::module_& m) {
                      return components;
                    },
                    "Which component of the body each coordinate belongs to.");
+
+  nb::class_<JointLimitBarrier, Embedding>(
+      m, "JointLimitBarrier",
+      "One coordinate per finite position limit, a barrier of the way h [rad] left to it, as in ClearanceBarrier.")
+      .def(
+          "__init__",
+          [](JointLimitBarrier* self, const Robot& robot, double activation, double strength, double power,
+             double floor) {
+            new (self) JointLimitBarrier(robot, {activation, strength, power, floor});
+          },
+          nb::arg("robot"), nb::kw_only(), nb::arg("activation") = 0.1, nb::arg("strength") = 0.02,
+          nb::arg("power") = 2.0, nb::arg("floor") = 0.002);
+
+  nb::class_<SelfCollisionBarrier, Embedding>(
+      m, "SelfCollisionBarrier",
+      "One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: the gap\n"
+      "between their extents along the line of centres, a lower bound of the distance. Parameters as in\n"
+      "ClearanceBarrier; pairs: names of links.")
+      .def(
+          "__init__",
+          [](SelfCollisionBarrier* self, const Robot& robot, const Body& body,
+             const std::vector<std::pair<std::string, std::string>>& pairs, double activation, double strength,
+             double power, double floor, double temperature) {
+            new (self)
+                SelfCollisionBarrier(robot, body, pairs, {activation, strength, power, floor}, temperature);
+          },
+          nb::arg("robot"), nb::arg("body"), nb::arg("pairs"), nb::kw_only(), nb::arg("activation") = 0.05,
+          nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
+          nb::arg("temperature") = 0.002);
+
+  nb::class_<PlaneBarrier, Embedding>(
+      m, "PlaneBarrier",
+      "One coordinate per link, a barrier of its clearance to a plane (a floor, a table, a wall). point (3,) [m] on\n"
+      "the plane, normal (3,) to the free side, in the world; other parameters as in ClearanceBarrier.")
+      .def(
+          "__init__",
+          [](PlaneBarrier* self, const Robot& robot, const Body& body, nb::handle point, nb::handle normal,
+             const std::vector<std::string>& links, double activation, double strength, double power, double floor,
+             double temperature) {
+            new (self) PlaneBarrier(robot, body, as_vector(point, "point", 3), as_vector(normal, "normal", 3), links,
+                                    {activation, strength, power, floor}, temperature);
+          },
+          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("point"), nb::arg("normal"), nb::arg("links"),
+          nb::arg("activation") = 0.05, nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
+          nb::arg("temperature") = 0.002);
 
   nb::class_<Sum, Embedding>(m, "Sum",
                              "Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).")

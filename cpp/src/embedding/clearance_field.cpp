@@ -7,12 +7,12 @@
 #include <stdexcept>
 #include <string>
 
+#include "sidestep/embedding/boltzmann_mean.hpp"
+
 namespace sidestep {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Points farther than this many temperatures beyond the nearest weigh less than exp(-30) = 1e-13: rounding.
-constexpr double window = 30.0;
 
 // Stands for the centre of an ellipsoid, where h has no gradient [m]; far below any size that matters.
 constexpr double centre_offset = 1e-9;
@@ -96,8 +96,7 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
 
 void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
                               ClearanceView out) const noexcept {
-  const double inverse_T = 1.0 / temperature_;
-  const double horizon = window * temperature_;
+  const double horizon = BoltzmannMean::window * temperature_;
   for (int k = 0; k < size(); ++k) {
     const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(k)];
     const KinematicState::Link& link = state.link(ellipsoid.joint);
@@ -106,12 +105,8 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
     // h >= slimness (|e| − extent) − r: farther than this, a point is out of reach.
     const double far = ellipsoid.extent + (reach + horizon) / ellipsoid.slimness;
 
-    // Sums over points of w, w h and their time derivatives and gradients, with h measured from `reference` and w
-    // relative to it; both are moved when a nearer point turns up.
-    double reference = infinity;
-    double s0 = 0.0, s0_dot = 0.0, s0_ddot = 0.0, s1 = 0.0, s1_dot = 0.0, s1_ddot = 0.0;
-    SpatialForce g0, g1;
-    Eigen::Index nearest = -1;
+    BoltzmannMean mean(temperature_);
+    int nearest = -1;
     for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
       const Eigen::Vector3d x = obstacles.points().col(n);
       const Eigen::Vector3d offset = x - centre;
@@ -122,25 +117,8 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       }
       const PointClearance point = point_clearance(to_axes * offset, ellipsoid.precisions, ellipsoid.root_level);
       const double h = point.value - radius;
-      if (!(h < std::min(reach, reference) + horizon)) {
+      if (!(h < reach + horizon) || !mean.matters(h)) {
         continue;
-      }
-      if (h < reference) {
-        if (nearest >= 0) {
-          const double shift = reference - h;  // old values are larger by this, measured from the new reference
-          const double decay = std::exp(-shift * inverse_T);
-          s1 += shift * s0;
-          s1_dot += shift * s0_dot;
-          s1_ddot += shift * s0_ddot;
-          g1.angular += shift * g0.angular;
-          g1.linear += shift * g0.linear;
-          s0 *= decay, s0_dot *= decay, s0_ddot *= decay;
-          s1 *= decay, s1_dot *= decay, s1_ddot *= decay;
-          g0.angular *= decay, g0.linear *= decay;
-          g1.angular *= decay, g1.linear *= decay;
-        }
-        reference = h;
-        nearest = n;
       }
       const Eigen::Vector3d x_dot = obstacles.velocities().col(n);
       const Eigen::Vector3d slip = x_dot - link.velocity.linear - link.velocity.angular.cross(x);
@@ -150,41 +128,23 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       const double rate = point.gradient.dot(e_dot);
       const double curvature =
           point.gradient.dot(to_axes * slip_dot) + point.quadratic(e_dot, rate, ellipsoid.precisions);
-
-      const double above = h - reference;
-      const double w = std::exp(-above * inverse_T);
-      const double w_dot = -w * rate * inverse_T;
-      const double w_ddot = w * (rate * rate * inverse_T - curvature) * inverse_T;
-      s0 += w;
-      s0_dot += w_dot;
-      s0_ddot += w_ddot;
-      s1 += w * above;
-      s1_dot += w_dot * above + w * rate;
-      s1_ddot += w_ddot * above + 2.0 * w_dot * rate + w * curvature;
       const Eigen::Vector3d f = to_axes.transpose() * point.gradient;
-      const Eigen::Vector3d moment = x.cross(f);
-      const double of_w = -w * inverse_T;
-      const double of_wh = of_w * above + w;
-      g0.angular -= of_w * moment;
-      g0.linear -= of_w * f;
-      g1.angular -= of_wh * moment;
-      g1.linear -= of_wh * f;
+      if (mean.add({h, rate, curvature, {{-x.cross(f), -f}, {}}})) {
+        nearest = static_cast<int>(n);
+      }
     }
-
-    const double above = nearest >= 0 ? s1 / s0 : infinity;
-    if (!(reference + above < reach)) {
-      out.values[k] = infinity;
-      out.nearest[k] = -1;
+    if (mean.empty()) {
       continue;
     }
-    const double rate = (s1_dot - above * s0_dot) / s0;
-    out.values[k] = reference + above;
-    out.rates[k] = rate;
-    out.curvatures[k] = (s1_ddot - 2.0 * rate * s0_dot - above * s0_ddot) / s0;
-    out.nearest[k] = static_cast<int>(nearest);
-    const SpatialForce wrench{(g1.angular - above * g0.angular) / s0, (g1.linear - above * g0.linear) / s0};
-    out.gradients.col(k).setZero();
-    accumulate_generalised_force(state, ellipsoid.joint, wrench, out.gradients.col(k));
+    const ClearanceSample result = mean.result();
+    if (result.value < reach) {
+      out.values[k] = result.value;
+      out.rates[k] = result.rate;
+      out.curvatures[k] = result.curvature;
+      out.nearest[k] = nearest;
+      out.gradients.col(k).setZero();
+      accumulate_generalised_force(state, ellipsoid.joint, result.gradient.first, out.gradients.col(k));
+    }
   }
 }
 

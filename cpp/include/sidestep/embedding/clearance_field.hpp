@@ -19,12 +19,8 @@ namespace sidestep {
 /// the first-order distance of √m, less the point's radius. Because √m is convex it never exceeds the distance to the
 /// ellipsoid; it has the right zero set, is exact along the axes and exact everywhere for spheres.
 ///
-/// The points are reduced to one clearance by the Boltzmann mean, with temperature T [m],
-///
-///     h_k = Σ_n w_n h_n / Σ_n w_n,     w_n = exp(−h_n / T),
-///
-/// which is smooth, does not depend on how densely a surface is sampled (unlike a soft minimum, which is low by up
-/// to T log N), and exceeds the smallest clearance by about T at most where many points are about equally near.
+/// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
+/// depend on how densely a surface is sampled.
 class ClearanceField {
  public:
   /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, or the
@@ -33,7 +29,7 @@ class ClearanceField {
 
   int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
 
-  /// Clearances of all ellipsoids below `reach` [m] at a state. No allocation.
+  /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared. No allocation.
   void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
                 ClearanceView out) const noexcept;
 

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "sidestep/kinematics/kinematic_state.hpp"
+
+namespace sidestep {
+
+/// Wrenches about the world origin on up to two links, as the gradient of a clearance.
+struct WrenchPair {
+  SpatialForce first, second;
+
+  void add(double factor, const WrenchPair& other) noexcept {
+    first.angular += factor * other.first.angular;
+    first.linear += factor * other.first.linear;
+    second.angular += factor * other.second.angular;
+    second.linear += factor * other.second.linear;
+  }
+  void scale(double factor) noexcept {
+    first.angular *= factor, first.linear *= factor;
+    second.angular *= factor, second.linear *= factor;
+  }
+};
+
+/// A clearance with its first and second time derivative and its gradient.
+struct ClearanceSample {
+  double value, rate, curvature;
+  WrenchPair gradient;
+};
+
+/// Reduces clearances h_n to one by the Boltzmann mean with temperature T, and carries its derivatives:
+///
+///     h = Σ_n w_n h_n / Σ_n w_n,    w_n = exp(−h_n / T).
+///
+/// It is smooth, does not depend on how densely a surface is sampled (unlike a soft minimum, which is low by up to
+/// T log N), and exceeds the smallest clearance by about T at most where many are about equally small. Samples may come
+/// in any order: the sums are kept relative to the smallest clearance so far.
+class BoltzmannMean {
+ public:
+  explicit BoltzmannMean(double temperature) noexcept : inverse_T_(1.0 / temperature) {}
+
+  /// Samples this far beyond the smallest weigh less than exp(−30) = 1e-13: rounding.
+  static constexpr double window = 30.0;
+  /// Whether a sample of this value would change the mean.
+  bool matters(double value) const noexcept { return (value - reference_) * inverse_T_ < window; }
+  bool empty() const noexcept { return !(reference_ < std::numeric_limits<double>::infinity()); }
+
+  /// Returns whether the sample is the smallest so far.
+  bool add(const ClearanceSample& sample) noexcept;
+
+  /// The mean of what was added; not to be called when empty.
+  ClearanceSample result() const noexcept;
+
+ private:
+  double inverse_T_;
+  double reference_ = std::numeric_limits<double>::infinity();
+  // Sums of w and w (h − reference), with their time derivatives and gradients.
+  double s0_ = 0.0, s0_dot_ = 0.0, s0_ddot_ = 0.0, s1_ = 0.0, s1_dot_ = 0.0, s1_ddot_ = 0.0;
+  WrenchPair g0_, g1_;
+};
+
+}  // namespace sidestep
