@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from sidestep import Body, CollisionDensity, Obstacles, Robot, planar_arm
 from sidestep._core import Embedding
@@ -18,7 +19,9 @@ from sidestep.reproduce.item import Array
 LINK_LENGTH = 1.0  # [m]
 LINK_WIDTH = 0.08  # [m] of the boxes that planar_arm makes
 OBSTACLE_RADIUS = 0.05  # [m] of the ball that stands for a point, for judging contact
-STANDARD_DEVIATIONS = (0.29, 0.15, 0.15)  # [m] along and across a link: ψ peaks at 9.7 / m³, as in figure 3.7
+LENGTH_DEVIATION, WIDTH_DEVIATION = 0.29, 0.15  # [m] of the Gaussian, as wide as the ridge in figure 3.7
+LOW = 0.15  # [m] deviation out of the plane: ψ peaks at 9.75 / m³, the end of the scale of figure 3.7
+HIGH = 0.01  # [m] the same as thin as the thesis's toy links: ψ peaks at 146 / m³
 OBSTACLE = np.array([-0.5, 1.4, 0.0])  # [m]
 START = np.array([-0.5, -1.2])  # [rad]
 GOAL = np.array([1.0, 0.15])  # [rad]
@@ -36,21 +39,23 @@ def arm(num_joints: int = 2) -> Robot:
         return Robot.from_urdf(path, base_pose=base)
 
 
-@lru_cache(maxsize=4)
-def body(num_joints: int = 2) -> Body:
-    """One Gaussian in the middle of each link."""
+@lru_cache(maxsize=8)
+def body(num_joints: int = 2, *, thickness: float = LOW) -> Body:
+    """One Gaussian in the middle of each link, with a standard deviation out of the plane [m]."""
     names = [f"link{i}" for i in range(1, num_joints + 1)]
     return Body(
         links=names,
         weights=np.ones(num_joints),
         means=np.tile([LINK_LENGTH / 2.0, 0.0, 0.0], (num_joints, 1)),
-        covariances=np.tile(np.diag(np.square(STANDARD_DEVIATIONS)), (num_joints, 1, 1)),
+        covariances=np.tile(
+            np.diag(np.square([LENGTH_DEVIATION, WIDTH_DEVIATION, thickness])), (num_joints, 1, 1)
+        ),
     )
 
 
-def density() -> CollisionDensity:
+def density(*, thickness: float = LOW) -> CollisionDensity:
     """ψ of the two-joint arm."""
-    return CollisionDensity(arm(), body())
+    return CollisionDensity(arm(), body(thickness=thickness))
 
 
 def point(position: Array = OBSTACLE) -> Obstacles:
@@ -101,3 +106,18 @@ def least_clearance(q: Array, positions: Array = OBSTACLE, *, count: int = 2000)
     """The least clearance [m] along a motion (T, nv), at up to `count` of its rows, to any of the balls."""
     rows = np.unique(np.linspace(0, len(q) - 1, count).round().astype(int))
     return min(clearance(q[k], position) for k in rows for position in np.atleast_2d(positions))
+
+
+def draw_arm(ax: Axes, q: Array, *, color: str = "0.25", alpha: float = 1.0, width: float = 2.5) -> None:
+    """The arm in the plane of the task: base, links, joints and tip."""
+    chain = joints(q)
+    ax.plot(*chain.T, color=color, alpha=alpha, linewidth=width, solid_capstyle="round", zorder=3)
+    ax.plot(*chain[1:-1].T, "o", color="white", markeredgecolor=color, markersize=4, alpha=alpha, zorder=4)
+    ax.plot(*chain[0], "s", color="0.25", markersize=6, zorder=4)
+
+
+def task_axes(ax: Axes, *, title: str | None = None) -> None:
+    """Labels and equal scales for the plane of the task."""
+    ax.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    if title is not None:
+        ax.set_title(title)

@@ -56,7 +56,17 @@ _FIVE = "Chapter 5: the geometric dynamical system"
 _SIX = "Chapter 6: the seven-joint arm"
 _APPENDIX = "Appendix"
 
-PARTS: tuple[Part, ...] = (Part("5.1", "Flat space", _FIVE, "flat_space", "flat_space", ("5.1",)),)
+PARTS: tuple[Part, ...] = (
+    Part("5.1", "Flat space", _FIVE, "flat_space", "flat_space", ("5.1",)),
+    Part("5.3", "Pure geodesic", _FIVE, "avoidance", "geodesic", ("5.3", "5.3-height")),
+    Part("5.4", "Without and with a switch", _FIVE, "avoidance", "switching", ("5.4",)),
+    Part("5.5", "Effect of the threshold", _FIVE, "avoidance", "kappa", ("5.5",)),
+    Part("5.6", "Joint limits", _FIVE, "limits", "joint_limits", ("5.6",)),
+    Part("5.4-kernels", "Kernels along the limits", _FIVE, "limits", "kernels", ("5.4-kernels",)),
+    Part("5.7", "An obstacle drops in", _FIVE, "moving", "dropping", ("5.7",)),
+    Part("5.8", "Several obstacles", _FIVE, "moving", "several", ("5.8",)),
+    Part("5.9", "Merging curvatures", _FIVE, "moving", "merging", ("5.9",)),
+)
 
 
 def select(only: Sequence[str]) -> tuple[Part, ...]:
