@@ -137,7 +137,7 @@ void bind_embedding(nb::module_& m) {
       "the plane, normal (3,) to the free side, in the world; other parameters as in ClearanceBarrier.")
       .def(
           "__init__",
-          [](PlaneBarrier* self, const Robot& robot, const Body& body, nb::handle point, nb::handle normal,
+          [](PlaneBarrier* self, const Robot& robot, const Body& body, const ArrayLike& point, const ArrayLike& normal,
              const std::vector<std::string>& links, double activation, double strength, double power, double floor,
              double temperature) {
             new (self) PlaneBarrier(robot, body, as_vector(point, "point", 3), as_vector(normal, "normal", 3), links,

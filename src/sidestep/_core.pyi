@@ -275,6 +275,30 @@ class ClearanceBarrier(Embedding):
     def components(self) -> list[int]:
         """Which component of the body each coordinate belongs to."""
 
+class JointLimitBarrier(Embedding):
+    """
+    One coordinate per finite position limit, a barrier of the way h [rad] left to it, as in ClearanceBarrier.
+    """
+
+    def __init__(self, robot: Robot, *, activation: float = 0.1, strength: float = 0.02, power: float = 2.0, floor: float = 0.002) -> None: ...
+
+class SelfCollisionBarrier(Embedding):
+    """
+    One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: the gap
+    between their extents along the line of centres, a lower bound of the distance. Parameters as in
+    ClearanceBarrier; pairs: names of links.
+    """
+
+    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002) -> None: ...
+
+class PlaneBarrier(Embedding):
+    """
+    One coordinate per link, a barrier of its clearance to a plane (a floor, a table, a wall). point (3,) [m] on
+    the plane, normal (3,) to the free side, in the world; other parameters as in ClearanceBarrier.
+    """
+
+    def __init__(self, robot: Robot, body: Body, *, point: numpy.typing.ArrayLike, normal: numpy.typing.ArrayLike, links: Sequence[str], activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002) -> None: ...
+
 class Sum(Embedding):
     """
     Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).
