@@ -66,6 +66,15 @@ PARTS: tuple[Part, ...] = (
     Part("5.7", "An obstacle drops in", _FIVE, "moving", "dropping", ("5.7",)),
     Part("5.8", "Several obstacles", _FIVE, "moving", "several", ("5.8",)),
     Part("5.9", "Merging curvatures", _FIVE, "moving", "merging", ("5.9",)),
+    Part(
+        "6.1",
+        "Three switches on seven joints",
+        _SIX,
+        "seven_joints",
+        "switches",
+        ("6.1", "6.2", "6.3", "6.4", "6.5", "6.6", "6.7", "6.8", "B.1", "B.2", "6.1-switches"),
+    ),
+    Part("table-6.1", "Computation frequency", _SIX, "performance", "computation_frequency", ("table-6.1",)),
 )
 
 
