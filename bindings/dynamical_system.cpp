@@ -100,7 +100,9 @@ void bind_rollout(nb::module_& m) {
 
   nb::class_<Rollout> result(m, "Rollout", "A kinematic motion: row k is at time k dt, steps + 1 rows.");
   result.def_prop_ro("time", [](const Rollout& r) { return to_numpy(r.time); }, "[s]")
-      .def_ro("statuses", &Rollout::statuses, "One StepStatus per row.");
+      .def_ro("statuses", &Rollout::statuses, "One StepStatus per row.")
+      .def_prop_ro("step_seconds", [](const Rollout& r) { return to_numpy(r.step_seconds); },
+                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.");
   matrix_property(result, "q", &Rollout::q, "(steps + 1, nv) [rad]");
   matrix_property(result, "v", &Rollout::v, "(steps + 1, nv) [rad/s]");
   matrix_property(result, "acceleration", &Rollout::acceleration, "(steps + 1, nv) [rad/s^2]");
@@ -110,22 +112,24 @@ void bind_rollout(nb::module_& m) {
   m.def(
       "rollout",
       [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goal, const Obstacles& obstacles,
-         double period, int steps, nb::handle integrator) {
+         double period, int steps, nb::handle integrator, bool time_steps) {
         const int nv = system.robot().num_coordinates();
         const Eigen::VectorXd start = as_vector(q, "q", nv);
         const Eigen::VectorXd velocity = as_vector(v, "v", nv);
         const Eigen::VectorXd target = as_vector(goal, "goal", nv);
-        const RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator")};
+        const RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"),
+                                       time_steps};
         nb::gil_scoped_release release;
         return rollout(system, start, velocity, target, obstacles, settings);
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
+      nb::arg("time_steps") = false,
       nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
               "goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, "
-              "integrator: Integrator | str = 'semi_implicit_euler') -> Rollout"),
+              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout"),
       "Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.\n"
-      "period dt [s]; integrator: an Integrator or its name.");
+      "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.");
 }
 
 }  // namespace

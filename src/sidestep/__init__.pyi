@@ -52,6 +52,8 @@ from .simulation import Evaluation as Evaluation
 from .simulation import ExactClearance as ExactClearance
 from .simulation import KinematicRun as KinematicRun
 from .simulation import SceneObject as SceneObject
+from .simulation import SelfClearance as SelfClearance
+from .simulation import SelfCollision as SelfCollision
 from .simulation import Simulation as Simulation
 from .simulation import SimulationRun as SimulationRun
 from .simulation import evaluate as evaluate

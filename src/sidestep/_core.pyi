@@ -501,6 +501,12 @@ class Rollout:
         """One StepStatus per row."""
 
     @property
+    def step_seconds(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.
+        """
+
+    @property
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """(steps + 1, nv) [rad]"""
 
@@ -520,10 +526,10 @@ class Rollout:
     def switch(self) -> numpy.typing.NDArray[numpy.float64]:
         """Weights of the harmonic part (steps + 1, nv)"""
 
-def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler') -> Rollout:
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout:
     """
     Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.
-    period dt [s]; integrator: an Integrator or its name.
+    period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.
     """
 
 class QuadraticProgramStatus(enum.Enum):

@@ -1,5 +1,6 @@
 #include "sidestep/dynamical_system/rollout.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -7,6 +8,8 @@
 
 namespace sidestep {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 void check_size(const Eigen::VectorXd& vector, const char* name, int nv) {
   if (vector.size() != nv) {
@@ -60,13 +63,18 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
                  of_joints,
                  Eigen::MatrixXd::Zero(rows, system.num_embedding_coordinates()),
                  of_joints,
-                 {}};
+                 {},
+                 Eigen::VectorXd(settings.time_steps ? rows : 0)};
   result.statuses.reserve(static_cast<std::size_t>(rows));
   GeometricSystem::Workspace w(system);
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
   for (Eigen::Index k = 0; k < rows; ++k) {
+    const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
     const StepStatus status = system.acceleration(q, v, goal, obstacles, w);
+    if (settings.time_steps) {
+      result.step_seconds[k] = std::chrono::duration<double>(Clock::now() - begin).count();
+    }
     const Eigen::VectorXd a = w.acceleration;
     result.q.row(k) = q;
     result.v.row(k) = v;

@@ -7,6 +7,7 @@ from sidestep.simulation.kinematic import run_kinematically
 from sidestep.simulation.model import SimulationModel, build_model
 from sidestep.simulation.run import Arrival, Contact, KinematicRun, Run, SimulationRun
 from sidestep.simulation.scene import SceneObject, seen_obstacles
+from sidestep.simulation.self_collision import SelfClearance, SelfCollision
 from sidestep.simulation.simulation import Simulation
 
 __all__ = [
@@ -20,6 +21,8 @@ __all__ = [
     "PathClearance",
     "Run",
     "SceneObject",
+    "SelfClearance",
+    "SelfCollision",
     "Simulation",
     "SimulationModel",
     "SimulationRun",

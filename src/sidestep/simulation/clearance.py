@@ -7,7 +7,7 @@ the triangles of the collision meshes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import coal
@@ -264,12 +264,15 @@ class ExactClearance:
         return Clearance(float(value), link.name, item.name, on_link, on_item)
 
 
-def travel_per_joint(robot: Robot, link: str, mesh: trimesh.Trimesh) -> Array:
+def travel_per_joint(
+    robot: Robot, link: str, mesh: trimesh.Trimesh, *, beyond: Collection[int] = ()
+) -> Array:
     """Bound (nv,) on how far any point of a link moves per unit of each joint coordinate, at any
     configuration.
 
     For a revolute joint it is the longest lever arm, at most the stretched length of the chain from the joint
     to the link plus the radius of the link; for a prismatic joint 1. [m/rad] or [m/m].
+    Only the joints beyond the ones in `beyond` (indices of `robot.joints`) count: motion relative to them.
 
     Raises:
         ValueError: a prismatic joint between a revolute one and the link has no position limits.
@@ -280,7 +283,7 @@ def travel_per_joint(robot: Robot, link: str, mesh: trimesh.Trimesh) -> Array:
     vertices = mesh.vertices @ frame.placement[:3, :3].T + frame.placement[:3, 3]
     reach = float(np.linalg.norm(vertices, axis=1).max())
     index, first = frame.joint, True
-    while index >= 0:
+    while index >= 0 and index not in beyond:
         joint = robot.joints[index]
         if joint.type == JointType.revolute:
             arm = float(np.linalg.norm(np.cross(vertices, joint.axis), axis=1).max()) if first else reach
@@ -308,7 +311,8 @@ def _world(X: Array, point: Array) -> Array:
     return moved
 
 
-def _bvh(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
+def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
+    """The triangles of a mesh for Coal: hollow, exact."""
     model = coal.BVHModelOBBRSS()
     vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for vertex in np.asarray(mesh.vertices, dtype=float):
@@ -324,7 +328,7 @@ def _bvh(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
 def _mesh_solid(name: str, mesh: trimesh.Trimesh) -> _Solid:
     radius = float(np.linalg.norm(mesh.vertices, axis=1).max())
     triangles = np.array(mesh.triangles, dtype=float)
-    return _Solid(name, _bvh(mesh), 0.0, triangles, triangles[0, 0], radius)
+    return _Solid(name, mesh_model(mesh), 0.0, triangles, triangles[0, 0], radius)
 
 
 def _object_solid(item: SceneObject) -> _Solid:

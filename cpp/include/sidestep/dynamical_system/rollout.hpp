@@ -18,6 +18,7 @@ struct RolloutSettings {
   double period = 0.001;  ///< dt [s]
   int steps = 1000;
   Integrator integrator = Integrator::semi_implicit_euler;
+  bool time_steps = false;  ///< measure each call of GeometricSystem::acceleration
 };
 
 /// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.
@@ -27,6 +28,7 @@ struct Rollout {
   Eigen::MatrixXd values;              ///< ψ (steps + 1, m), NaN where the step fell back
   Eigen::MatrixXd switch_weights;      ///< (steps + 1, nv), the same
   std::vector<StepStatus> statuses;    ///< one per row
+  Eigen::VectorXd step_seconds;        ///< [s] that the acceleration of each row took; empty if not asked for
 };
 
 /// Integrates the system from (q, v), obstacles moving at their velocities.

@@ -1,0 +1,217 @@
+"""Exact self-collision of the arm's own meshes, and which pairs of links count."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import coal
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.robot import Robot
+from sidestep.simulation.clearance import mesh_model, travel_per_joint
+
+Array = npt.NDArray[np.float64]
+Pair = tuple[str, str]
+Reason = Literal["rigid", "adjacent", "always", "allowed"]
+
+SAMPLES = 200  # configurations by which a pair that always touches is found
+ALWAYS = 0.95  # share of them: SRDF tools take the same, since a rare pose may part what is meant to touch
+FIRST_LOOKS = 16  # samples of a motion at which every pair is measured, for a good first guess of the minimum
+
+
+@dataclass(frozen=True)
+class SelfClearance:
+    """The closest pair of links of an arm.
+
+    Attributes:
+        distance: [m]; 0 when they touch or overlap; infinite when no pair is checked.
+        pair: their names; empty when no pair is checked.
+        sample: where along a motion, in samples; 0 for one configuration.
+    """
+
+    distance: float
+    pair: tuple[str, ...]
+    sample: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _PairOfLinks:
+    first: int
+    second: int
+    travel: Array  # (nv,) how far points of the two can come towards each other per unit of each joint
+
+
+class SelfCollision:
+    """Distance between the links of an arm on their exact meshes, by Coal.
+
+    Left out, as tools for SRDF do, are pairs that cannot or need not part: "rigid" (no joint between them),
+    "adjacent" (one joint between them), "always" (touch in 95 % of random configurations) and "allowed" (asked
+    for). Pairs that never touched in those samples are kept: sampling cannot prove it.
+
+    Args:
+        robot: with collision meshes.
+        allowed: further pairs of link names that may touch.
+        samples: configurations, uniform within the limits, by which "always" is judged.
+        seed: of these.
+
+    Raises:
+        ValueError: `allowed` names a link that the robot does not have.
+    """
+
+    def __init__(
+        self, robot: Robot, *, allowed: Iterable[Pair] = (), samples: int = SAMPLES, seed: int = 0
+    ) -> None:
+        self.robot = robot
+        asked = {frozenset((robot.link(a).name, robot.link(b).name)) for a, b in allowed}
+        joint_of = {frame.name: frame.joint for frame in robot.frames}
+        meshes = {link.name: robot.collision_mesh(link.name) for link in robot.links}
+        self._names = [name for name, mesh in meshes.items() if mesh is not None]
+        self._models, self._centers, self._radii = [], [], []
+        for name in self._names:
+            mesh = meshes[name]
+            assert mesh is not None
+            center = np.asarray(mesh.bounds.mean(axis=0))
+            self._models.append(mesh_model(mesh))
+            self._centers.append(center)
+            self._radii.append(float(np.linalg.norm(mesh.vertices - center, axis=1).max()))
+        self.left_out: dict[Pair, Reason] = {}
+        self._pairs: list[_PairOfLinks] = []
+        for i, j in itertools.combinations(range(len(self._names)), 2):
+            a, b = self._names[i], self._names[j]
+            above_a, above_b = (_joints_above(robot, joint_of[name]) for name in (a, b))
+            apart = above_a ^ above_b
+            if frozenset((a, b)) in asked:
+                self.left_out[a, b] = "allowed"
+            elif not apart:
+                self.left_out[a, b] = "rigid"
+            elif len(apart) == 1:
+                self.left_out[a, b] = "adjacent"
+            else:
+                shared = above_a & above_b
+                travel = np.zeros(robot.num_coordinates)
+                for name in (a, b):
+                    mesh = meshes[name]
+                    assert mesh is not None
+                    travel += travel_per_joint(robot, name, mesh, beyond=shared)
+                self._pairs.append(_PairOfLinks(i, j, travel))
+        self._leave_out_what_always_touches(samples, np.random.default_rng(seed))
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The pairs of links that are checked."""
+        return tuple(self._name(pair) for pair in self._pairs)
+
+    def touching(self, q: Array) -> tuple[Pair, ...]:
+        """The pairs that touch at q (nv,)."""
+        poses = self._poses(q)
+        return tuple(self._name(pair) for pair in self._pairs if self._touch(pair, poses))
+
+    def distance(self, q: Array) -> SelfClearance:
+        """The closest pair at q (nv,)."""
+        return self._closest(q, SelfClearance(float("inf"), ()), 0.0)
+
+    def minimum_over(self, trajectory: Array, *, tolerance: float = 1e-3) -> SelfClearance:
+        """The smallest distance of a motion (T, nv) that is linear in the joints between samples.
+
+        A pair comes closer by at most sum_j L_j |dq_j|, with L_j the lever arms of the joints between the two
+        links, so after a distance d it is skipped until that sum has grown to d - (smallest so far) +
+        tolerance [m]: the true minimum lies in [reported - tolerance, reported]. Ends at the first touch.
+
+        Raises:
+            ValueError: wrong shape, values that are not finite, or a tolerance that is not positive.
+        """
+        path = np.asarray(trajectory, dtype=float)
+        if path.ndim != 2 or path.shape[1] != self.robot.num_coordinates or len(path) == 0:
+            raise ValueError(
+                f"trajectory has shape {path.shape}, expected (T, {self.robot.num_coordinates}), T > 0"
+            )
+        if not np.all(np.isfinite(path)):
+            raise ValueError("trajectory must be finite")
+        if not tolerance > 0.0:
+            raise ValueError(f"tolerance must be positive, got {tolerance}")
+        best = SelfClearance(float("inf"), ())
+        for sample in np.unique(np.linspace(0, len(path) - 1, FIRST_LOOKS).astype(int)):
+            best = self._closest(path[sample], best, float(sample))
+        moved = np.abs(np.diff(path, axis=0))
+        for pair in self._pairs:
+            so_far = np.concatenate([[0.0], np.cumsum(moved @ pair.travel)])
+            here = 0.0  # of so_far
+            while here < so_far[-1]:
+                if best.distance == 0.0:
+                    return best
+                k = min(int(np.searchsorted(so_far, here, side="right")) - 1, len(path) - 2)
+                share = (here - so_far[k]) / (so_far[k + 1] - so_far[k])
+                poses = self._poses(path[k] + share * (path[k + 1] - path[k]), pair)
+                at_least = self._balls_apart(pair, poses)
+                if at_least <= best.distance:
+                    at_least = self._measure(pair, poses)
+                    if at_least < best.distance:
+                        best = SelfClearance(at_least, self._name(pair), k + share)
+                here += at_least - best.distance + tolerance
+        return best
+
+    def _leave_out_what_always_touches(self, samples: int, rng: np.random.Generator) -> None:
+        touches = np.zeros(len(self._pairs))
+        for _ in range(samples):
+            poses = self._poses(self.robot.random_configuration(rng))
+            touches += [self._touch(pair, poses) for pair in self._pairs]
+        for pair, count in zip(self._pairs, touches, strict=True):
+            if count >= ALWAYS * samples:
+                self.left_out[self._name(pair)] = "always"
+        self._pairs = [pair for pair in self._pairs if self._name(pair) not in self.left_out]
+
+    def _name(self, pair: _PairOfLinks) -> Pair:
+        return self._names[pair.first], self._names[pair.second]
+
+    def _poses(self, q: Array, pair: _PairOfLinks | None = None) -> dict[int, Array]:
+        wanted = range(len(self._names)) if pair is None else (pair.first, pair.second)
+        return {index: self.robot.pose(q, self._names[index]) for index in wanted}
+
+    def _closest(self, q: Array, best: SelfClearance, sample: float) -> SelfClearance:
+        """The closest pair at q, or `best` if none is closer."""
+        poses = self._poses(q)
+        for pair in self._pairs:
+            if self._balls_apart(pair, poses) < best.distance:
+                distance = self._measure(pair, poses)
+                if distance < best.distance:
+                    best = SelfClearance(distance, self._name(pair), sample)
+        return best
+
+    def _balls_apart(self, pair: _PairOfLinks, poses: dict[int, Array]) -> float:
+        """The gap between the bounding balls of two links: no more than their distance."""
+        a, b = (
+            poses[index][:3, :3] @ self._centers[index] + poses[index][:3, 3]
+            for index in (pair.first, pair.second)
+        )
+        return float(np.linalg.norm(a - b)) - self._radii[pair.first] - self._radii[pair.second]
+
+    def _measure(self, pair: _PairOfLinks, poses: dict[int, Array]) -> float:
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        request.enable_signed_distance = False
+        return max(0.0, float(coal.distance(*self._placed(pair, poses), request, result)))
+
+    def _touch(self, pair: _PairOfLinks, poses: dict[int, Array]) -> bool:
+        if self._balls_apart(pair, poses) > 0.0:
+            return False
+        result = coal.CollisionResult()
+        return bool(coal.collide(*self._placed(pair, poses), coal.CollisionRequest(), result))
+
+    def _placed(self, pair: _PairOfLinks, poses: dict[int, Array]) -> tuple[object, ...]:
+        placed: list[object] = []
+        for index in (pair.first, pair.second):
+            X = poses[index]
+            placed += [self._models[index], coal.Transform3s(X[:3, :3], X[:3, 3])]
+        return tuple(placed)
+
+
+def _joints_above(robot: Robot, joint: int) -> frozenset[int]:
+    """The joints from the world to a joint, that joint included."""
+    found = set()
+    while joint >= 0:
+        found.add(joint)
+        joint = robot.joints[joint].parent
+    return frozenset(found)
