@@ -172,7 +172,7 @@ def in_link(name: str, value: object) -> Callable[[dict[str, Any]], object]:
     ("change", "message"),
     [
         (remove("format"), 'its "format" is not'),
-        (lambda d: d.update(format_version=2), "has format version 2, this sidestep reads version 1"),
+        (lambda d: d.update(format_version=3), "has format version 3, this sidestep reads versions 1, 2"),
         (remove("links"), "'links' is a required property"),
         (lambda d: d.update(links=[]), r"at \$\.links"),
         (lambda d: d["settings"].update(covariance="tied"), r"at \$\.settings\.covariance: 'tied'"),

@@ -1,6 +1,7 @@
 """Bodies: a Gaussian mixture per link, fitted to the robot's meshes."""
 
 from sidestep.body.body import Body
+from sidestep.body.cover import CoverSettings, LinkCover, TradeOff
 from sidestep.body.fitting import FitSettings, LinkFit
 from sidestep.body.mixture import Mixture, fit_mixture
 from sidestep.body.report import FitRow, fit_table, plot_fit
@@ -9,11 +10,14 @@ from sidestep.body.selection import CriterionCurve, criterion_curve
 
 __all__ = [
     "Body",
+    "CoverSettings",
     "CriterionCurve",
     "FitRow",
     "FitSettings",
+    "LinkCover",
     "LinkFit",
     "Mixture",
+    "TradeOff",
     "criterion_curve",
     "fit_mixture",
     "fit_table",

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 from sidestep import _core
 from sidestep.body import cache as fit_cache
 from sidestep.body import file as body_file
+from sidestep.body.cover import MAX_COMPONENTS as MAX_COVER_COMPONENTS
+from sidestep.body.cover import CoverProgress, CoverSettings, LinkCover, cover_mixtures
 from sidestep.body.fitting import Components, FitSettings, LinkFit, Progress, fit_links
 from sidestep.body.mixture import CovarianceType
 from sidestep.body.selection import MAX_COMPONENTS
@@ -29,17 +31,21 @@ class Body(_core.Body):
         means: mu (K, 3) [m], link frame.
         covariances: Sigma (K, 3, 3) [m^2], link frame.
         num_components: K, over all links.
+        levels: (K,) or None; of a calibrated body: each link lies inside the union of the ellipsoids
+            (y - mu)^T Sigma^-1 (y - mu) <= level.
         robot_name, fingerprint: the robot it was fitted to; empty for a body made by hand.
         settings: what the fit was asked for, or None for a body made by hand.
         link_fits: how well each link is described, in the order of the links; empty for a body made by hand.
+        link_covers: how the ellipsoids cover each link; empty unless made by `cover`.
 
     Source: Bosc, section 3.1; T3.1 to T3.3.
     """
 
     robot_name: str
     fingerprint: str
-    settings: FitSettings | None
+    settings: FitSettings | CoverSettings | None
     link_fits: tuple[LinkFit, ...]
+    link_covers: tuple[LinkCover, ...]
 
     def __init__(
         self,
@@ -48,21 +54,25 @@ class Body(_core.Body):
         weights: ArrayLike,
         means: ArrayLike,
         covariances: ArrayLike,
+        levels: ArrayLike | None = None,
         robot_name: str = "",
         fingerprint: str = "",
-        settings: FitSettings | None = None,
+        settings: FitSettings | CoverSettings | None = None,
         link_fits: Sequence[LinkFit] = (),
+        link_covers: Sequence[LinkCover] = (),
     ) -> None:
         super().__init__(
             links=list(links),
             weights=np.asarray(weights, dtype=np.float64),
             means=np.asarray(means, dtype=np.float64),
             covariances=np.asarray(covariances, dtype=np.float64),
+            levels=None if levels is None else np.asarray(levels, dtype=np.float64),
         )
         self.robot_name = robot_name
         self.fingerprint = fingerprint
         self.settings = settings
         self.link_fits = tuple(link_fits)
+        self.link_covers = tuple(link_covers)
 
     @classmethod
     def fit(
@@ -122,6 +132,61 @@ class Body(_core.Body):
             fit_cache.write(robot, settings, contents)
         return cls._from_contents(contents)
 
+    @classmethod
+    def cover(
+        cls,
+        robot: Robot,
+        *,
+        components: int | Mapping[str, int] | None = None,
+        max_components: int = MAX_COVER_COMPONENTS,
+        seed: int = 0,
+        progress: CoverProgress | None = None,
+        cache: bool = True,
+    ) -> Body:
+        """Covers every link with ellipsoids that overshoot it as little as possible.
+
+        The surface of each link lies inside the union of its ellipsoids {y : m_k(y) <= level_k},
+        m_k(y) = (y - mu_k)^T Sigma_k^-1 (y - mu_k). This is proven on the triangles of the mesh: each is in one
+        ellipsoid or cut until its parts are. Nothing outside can reach the inside of a link without crossing
+        its surface, so gaps inside do no harm; `LinkCover.interior_coverage` tells them.
+
+        Sigma_k is the covariance of the solid ellipsoid and pi_k its share of the volume, so that the same body
+        has a density.
+
+        Args:
+            robot: the robot, with geometry.
+            components: ellipsoids per link: a number or {link: number} for every link with geometry; None shares
+                max_components so that overshoot, relative to the size of the link, is even.
+            max_components: ellipsoids in all; fewer are used if every link overshoots little enough.
+            seed: seed of the starts.
+            progress: called as progress(link, done, in_all); not called when the cache answers.
+            cache: whether to read and write the user's cache (SIDESTEP_CACHE_DIR overrides its place).
+
+        Raises:
+            ValueError: that names the argument at fault and what is allowed.
+        """
+        if isinstance(components, Mapping):
+            components = dict(components)
+        settings = CoverSettings(components=components, max_components=max_components, seed=seed)
+        settings.validate(robot)
+        stored = fit_cache.read(robot, settings) if cache else None
+        if stored is not None:
+            return cls._from_contents(stored)
+        contents = body_file.BodyContents(
+            robot_name=robot.name,
+            fingerprint=robot.fingerprint,
+            settings=settings,
+            links=tuple(
+                body_file.LinkContents(
+                    fit, mixture.weights, mixture.means, mixture.covariances, levels, cover
+                )
+                for fit, mixture, levels, cover in cover_mixtures(robot, settings, progress)
+            ),
+        )
+        if cache:
+            fit_cache.write(robot, settings, contents)
+        return cls._from_contents(contents)
+
     def save(self, path: str | Path) -> None:
         """Writes the body to a versioned JSON file.
 
@@ -149,6 +214,7 @@ class Body(_core.Body):
             fingerprint=contents.fingerprint,
             settings=contents.settings,
             link_fits=[link.fit for link in contents.links],
+            link_covers=[link.cover for link in contents.links if link.cover is not None],
         )
 
     def _contents(self) -> body_file.BodyContents:
@@ -168,6 +234,8 @@ class Body(_core.Body):
                     weights=self.weights[owner == fit.link],
                     means=self.means[owner == fit.link],
                     covariances=self.covariances[owner == fit.link],
+                    levels=None if self.levels is None else self.levels[owner == fit.link],
+                    cover=next((cover for cover in self.link_covers if cover.link == fit.link), None),
                 )
                 for fit in self.link_fits
             ),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import platformdirs
 
 from sidestep.body import file as body_file
+from sidestep.body.cover import CoverSettings
 from sidestep.body.fitting import FitSettings
 
 if TYPE_CHECKING:
@@ -28,11 +29,12 @@ def cache_directory() -> Path:
     return root / "bodies"
 
 
-def cache_path(robot: Robot, settings: FitSettings) -> Path:
+def cache_path(robot: Robot, settings: FitSettings | CoverSettings) -> Path:
     """The file of one fit; its name is a hash of the robot's content, the settings and the file format."""
     content = {
         "fingerprint": robot.fingerprint,
         "name": robot.name,
+        "method": type(settings).__name__,
         "settings": asdict(settings),
         "format_version": body_file.FORMAT_VERSION,
     }
@@ -40,7 +42,7 @@ def cache_path(robot: Robot, settings: FitSettings) -> Path:
     return cache_directory() / f"{key}.json"
 
 
-def read(robot: Robot, settings: FitSettings) -> body_file.BodyContents | None:
+def read(robot: Robot, settings: FitSettings | CoverSettings) -> body_file.BodyContents | None:
     """The stored fit, or None if there is none; warns about an entry that cannot be read."""
     path = cache_path(robot, settings)
     try:
@@ -52,7 +54,7 @@ def read(robot: Robot, settings: FitSettings) -> body_file.BodyContents | None:
         return None
 
 
-def write(robot: Robot, settings: FitSettings, contents: body_file.BodyContents) -> None:
+def write(robot: Robot, settings: FitSettings | CoverSettings, contents: body_file.BodyContents) -> None:
     """Stores a fit; warns if the cache cannot be written, because a fit without a cache is still a fit."""
     path = cache_path(robot, settings)
     try:

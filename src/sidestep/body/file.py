@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sidestep import _core
+from sidestep.body.cover import CoverSettings, LinkCover, TradeOff
 from sidestep.body.fitting import FitSettings, LinkFit
 from sidestep.body.mixture import Mixture
 from sidestep.body.selection import CriterionCurve
@@ -23,17 +24,20 @@ if TYPE_CHECKING:
     from sidestep.robot import Robot
 
 FORMAT = "sidestep-body"
-FORMAT_VERSION = 1  # raise it when a reader of the old files would misread a new one, or when fits change
+FORMAT_VERSION = 2  # 2 added covers and levels; raise it when a reader of the old files would misread a new one, or when fits change
+READABLE_VERSIONS = (1, FORMAT_VERSION)  # version 1 has no levels: good for the density, not for a barrier
 
 
 @dataclass(frozen=True, eq=False)
 class LinkContents:
-    """The mixture of one link and the quality of its fit; arrays as in `Mixture`."""
+    """The mixture of one link and the quality of its fit; arrays as in `Mixture`, levels (K,) if calibrated."""
 
     fit: LinkFit
     weights: NDArray[np.float64]
     means: NDArray[np.float64]
     covariances: NDArray[np.float64]
+    levels: NDArray[np.float64] | None = None
+    cover: LinkCover | None = None
 
     @classmethod
     def of(cls, fit: LinkFit, mixture: Mixture) -> LinkContents:
@@ -46,7 +50,7 @@ class BodyContents:
 
     robot_name: str
     fingerprint: str
-    settings: FitSettings
+    settings: FitSettings | CoverSettings
     links: tuple[LinkContents, ...]
 
     def arrays(self) -> dict[str, Any]:
@@ -56,6 +60,9 @@ class BodyContents:
             "weights": np.concatenate([link.weights for link in self.links]),
             "means": np.concatenate([link.means for link in self.links]),
             "covariances": np.concatenate([link.covariances for link in self.links]),
+            "levels": None
+            if any(link.levels is None for link in self.links)
+            else np.concatenate([link.levels for link in self.links if link.levels is not None]),
         }
 
 
@@ -111,7 +118,7 @@ def read(path: str | Path, robot: Robot) -> BodyContents:
     contents = BodyContents(
         robot_name=name,
         fingerprint=fingerprint,
-        settings=FitSettings(**document["settings"]),
+        settings=_settings(document["settings"]),
         links=tuple(_link_contents(link) for link in document["links"]),
     )
     _check_links(path, contents, robot)
@@ -126,10 +133,10 @@ def _check_version(path: Path, document: Any) -> None:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f"'{path}' is not a body file: its \"format\" is not {FORMAT!r}")
     version = document.get("format_version")
-    if version != FORMAT_VERSION:
+    if version not in READABLE_VERSIONS:
         raise ValueError(
-            f"body file '{path}' has format version {version}, this sidestep reads version {FORMAT_VERSION}; "
-            "fit the body again"
+            f"body file '{path}' has format version {version}, this sidestep reads versions "
+            f"{', '.join(map(str, READABLE_VERSIONS))}; fit the body again"
         )
 
 
@@ -145,6 +152,10 @@ def _check_links(path: Path, contents: BodyContents, robot: Robot) -> None:
                 f"{place}: {len(link.weights)} weights, {len(link.means)} means and "
                 f"{len(link.covariances)} covariances; the numbers must be equal"
             )
+        if link.levels is not None and len(link.levels) != len(link.weights):
+            raise ValueError(f"{place}: {len(link.levels)} levels for {len(link.weights)} components")
+    if len({link.levels is None for link in contents.links}) != 1:
+        raise ValueError(f"body file '{path}' is malformed at $.links: only some links have levels")
     names = [link.fit.link for link in contents.links]
     if len(set(names)) != len(names):
         raise ValueError(f"body file '{path}' is malformed at $.links: a link appears twice")
@@ -169,7 +180,26 @@ def _link_document(link: LinkContents) -> dict[str, Any]:
         "weights": link.weights.tolist(),
         "means": link.means.tolist(),
         "covariances": link.covariances.tolist(),
+        "levels": None if link.levels is None else link.levels.tolist(),
+        "cover": None if link.cover is None else _cover_document(link.cover),
     }
+
+
+def _cover_document(cover: LinkCover) -> dict[str, Any]:
+    document = asdict(cover)
+    del document["link"], document["num_components"]
+    return document
+
+
+def _cover_contents(document: dict[str, Any] | None, link: str, number: int) -> LinkCover | None:
+    if document is None:
+        return None
+    trade_off = tuple(TradeOff(**point) for point in document["trade_off"])
+    return LinkCover(**{**document, "trade_off": trade_off}, link=link, num_components=number)
+
+
+def _settings(document: dict[str, Any]) -> FitSettings | CoverSettings:
+    return FitSettings(**document) if "covariance" in document else CoverSettings(**document)
 
 
 def _link_contents(document: dict[str, Any]) -> LinkContents:
@@ -195,4 +225,6 @@ def _link_contents(document: dict[str, Any]) -> LinkContents:
         weights=np.asarray(document["weights"], dtype=np.float64),
         means=np.asarray(document["means"], dtype=np.float64),
         covariances=np.asarray(document["covariances"], dtype=np.float64),
+        levels=None if document.get("levels") is None else np.asarray(document["levels"], dtype=np.float64),
+        cover=_cover_contents(document.get("cover"), document["link"], len(document["weights"])),
     )

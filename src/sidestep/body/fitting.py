@@ -157,7 +157,7 @@ def fit_links(
         else:
             number = settings.number_for(link)
         mixture = fit_mixture(points, number, covariance=settings.covariance, seed=seed)
-        fits.append((_assess(link, points, mixture, curve), mixture))
+        fits.append((assess(link, points, mixture, curve), mixture))
         report(link, 1)
     return tuple(fits)
 
@@ -169,9 +169,8 @@ def mahalanobis_squared(points: NDArray[np.float64], mixture: Mixture) -> NDArra
     return np.asarray(np.einsum("nki,kij,nkj->nk", offsets, precisions, offsets))
 
 
-def _assess(
-    link: str, points: NDArray[np.float64], mixture: Mixture, curve: CriterionCurve | None
-) -> LinkFit:
+def assess(link: str, points: NDArray[np.float64], mixture: Mixture, curve: CriterionCurve | None) -> LinkFit:
+    """How well a mixture describes points (N, 3) on the surface of a link."""
     inside = (mahalanobis_squared(points, mixture) <= ELLIPSOID_STD**2).any(axis=1)
     distances, _ = cKDTree(mixture.means).query(points)
     return LinkFit(
