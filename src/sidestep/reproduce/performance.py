@@ -97,7 +97,7 @@ def _frequency(
 def _table(frequencies: dict[str, Array], evaluations: dict[str, Array], settings: Settings) -> Table:
     from sidestep.reproduce.runner import cpu_name
 
-    rows = []
+    rows: list[tuple[str, ...]] = []
     base = frequencies["analytic, dense"]
     for method in METHODS:
         found = frequencies[method]

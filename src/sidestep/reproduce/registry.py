@@ -57,6 +57,13 @@ _SIX = "Chapter 6: the seven-joint arm"
 _APPENDIX = "Appendix"
 
 PARTS: tuple[Part, ...] = (
+    Part("2.1", "Plane and sphere", _TWO_THREE, "surfaces", "plane_and_sphere", ("2.1",)),
+    Part("3.1", "Point clouds of links", _TWO_THREE, "body_model", "point_clouds", ("3.1",)),
+    Part("3.2", "AIC and BIC", _TWO_THREE, "body_model", "criteria", ("3.2",)),
+    Part("3.3", "The mixture on the arm", _TWO_THREE, "body_model", "mixture", ("3.3",)),
+    Part("3.4", "Arm and obstacle", _TWO_THREE, "body_model", "task_space", ("3.4",)),
+    Part("3.5", "How a Gaussian moves", _TWO_THREE, "body_model", "gaussian_motion", ("3.5",)),
+    Part("3.7", "The embedding", _TWO_THREE, "surfaces", "joint_space", ("3.7",)),
     Part("5.1", "Flat space", _FIVE, "flat_space", "flat_space", ("5.1",)),
     Part("5.3", "Pure geodesic", _FIVE, "avoidance", "geodesic", ("5.3", "5.3-height")),
     Part("5.4", "Without and with a switch", _FIVE, "avoidance", "switching", ("5.4",)),

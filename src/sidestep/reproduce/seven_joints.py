@@ -181,7 +181,8 @@ def _rates(key: str, mode: str, title: str, answers: str, motions: Mapping[str, 
     for j in range(7):
         left.plot(run.time, run.v[:, j], color=style.JOINT_COLOURS[j], linewidth=0.9, label=f"joint {j + 1}")
         right.plot(run.time, run.acceleration[:, j], color=style.JOINT_COLOURS[j], linewidth=0.9)
-    style.time_axes(left, "joint velocity [rad/s]", title="(a) velocities", legend=True)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=7)
+    style.time_axes(left, "joint velocity [rad/s]", title="(a) velocities")
     style.time_axes(right, "joint acceleration [rad/s²]", title="(b) accelerations")
     return Figure(
         key=key,
