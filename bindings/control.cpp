@@ -7,6 +7,7 @@
 #include "arguments.hpp"
 #include "module.hpp"
 #include "sidestep/control/acceleration_bounds.hpp"
+#include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/control/quadratic_program.hpp"
 #include "sidestep/control/torque_controller.hpp"
 
@@ -117,11 +118,94 @@ void bind_acceleration_bounds(nb::module_& m) {
       "not finite. Source: Del Prete (2018), made exact for held accelerations.");
 }
 
+/// Clearances, or those of a Step; null for None. They live as long as the handle.
+const Clearances* as_clearances(nb::handle value, nb::object& keep) {
+  if (value.is_none()) {
+    return nullptr;
+  }
+  keep = nb::isinstance<Clearances>(value) ? nb::borrow(value) : nb::getattr(value, "clearances", nb::none());
+  if (!nb::isinstance<Clearances>(keep)) {
+    throw nb::type_error("clearances must be Clearances or a Step");
+  }
+  return nb::cast<const Clearances*>(keep);
+}
+
+void bind_safety(nb::module_& m) {
+  nb::class_<Clearances>(m, "Clearances",
+                         "Clearances h(q, t) of parts of an arm with what their motion needs; arrays are copies.")
+      .def(
+          "__init__",
+          [](Clearances* self, const ArrayLike& values, const ArrayLike& rates, const ArrayLike& curvatures,
+             const ArrayLike& gradients, const std::vector<int>& nearest) {
+            const auto num = static_cast<Eigen::Index>(nearest.size());
+            const Array rows = as_array(gradients, "gradients");
+            if (rows.ndim() != 2) {
+              throw nb::value_error("gradients must have shape (m, nv)");
+            }
+            const auto nv = static_cast<Eigen::Index>(rows.shape(1));
+            Clearances result(static_cast<int>(nv), static_cast<int>(num));
+            result.values = as_vector(values, "values", num);
+            result.rates = as_vector(rates, "rates", num);
+            result.curvatures = as_vector(curvatures, "curvatures", num);
+            result.gradients = as_matrix(gradients, "gradients", num, nv).transpose();
+            result.nearest = Eigen::Map<const Eigen::VectorXi>(nearest.data(), num);
+            new (self) Clearances(std::move(result));
+          },
+          nb::kw_only(), nb::arg("values"), nb::arg("rates"), nb::arg("curvatures"), nb::arg("gradients"),
+          nb::arg("nearest"))
+      .def_prop_ro("values", [](const Clearances& c) { return to_numpy(c.values); },
+                   "h (m,) [m]; inf beyond the reach, where the rest has no meaning.")
+      .def_prop_ro("rates", [](const Clearances& c) { return to_numpy(c.rates); },
+                   "dh/dt (m,) [m/s], obstacle velocities included.")
+      .def_prop_ro("curvatures", [](const Clearances& c) { return to_numpy(c.curvatures); },
+                   "d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity.")
+      .def_prop_ro("gradients", [](const Clearances& c) { return to_numpy_matrix(c.gradients.transpose()); },
+                   "dh/dq (m, nv) [m/rad].")
+      .def_prop_ro("nearest",
+                   [](const Clearances& c) {
+                     return std::vector<int>(c.nearest.data(), c.nearest.data() + c.nearest.size());
+                   },
+                   "Index of the nearest obstacle point (m), -1 beyond the reach.");
+
+  const SafetySettings defaults;
+  nb::class_<SafetySettings>(
+      m, "SafetySettings",
+      "What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing\n"
+      "speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest\n"
+      "one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;\n"
+      "lookahead [s] and max_rows: when more clearances are active, those with the smallest room predicted that far\n"
+      "ahead are kept. Raises ValueError that names the setting.")
+      .def(
+          "__init__",
+          [](SafetySettings* self, double margin, double rate, double braking_fraction, double correction,
+             double lookahead, int max_rows) {
+            const SafetySettings settings{margin, rate, braking_fraction, correction, lookahead, max_rows};
+            settings.validate();
+            new (self) SafetySettings(settings);
+          },
+          nb::kw_only(), nb::arg("margin") = defaults.margin, nb::arg("rate") = defaults.rate,
+          nb::arg("braking_fraction") = defaults.braking_fraction, nb::arg("correction") = defaults.correction,
+          nb::arg("lookahead") = defaults.lookahead, nb::arg("max_rows") = defaults.max_rows)
+      .def_ro("margin", &SafetySettings::margin)
+      .def_ro("rate", &SafetySettings::rate)
+      .def_ro("braking_fraction", &SafetySettings::braking_fraction)
+      .def_ro("correction", &SafetySettings::correction)
+      .def_ro("lookahead", &SafetySettings::lookahead)
+      .def_ro("max_rows", &SafetySettings::max_rows)
+      .def("__repr__", [](const SafetySettings& s) {
+        return "SafetySettings(margin=" + std::to_string(s.margin) + ", rate=" + std::to_string(s.rate) +
+               ", braking_fraction=" + std::to_string(s.braking_fraction) + ", correction=" +
+               std::to_string(s.correction) + ", lookahead=" + std::to_string(s.lookahead) + ", max_rows=" +
+               std::to_string(s.max_rows) + ")";
+      });
+}
+
 void bind_torque_controller(nb::module_& m) {
   nb::enum_<TorqueStatus>(m, "TorqueStatus", "How a control step ended, from best to worst.")
       .value("ok", TorqueStatus::ok, "tracked, no limit in the way")
       .value("limited", TorqueStatus::limited, "optimal, with a limit in the way")
-      .value("relaxed", TorqueStatus::relaxed, "the torque limits do not allow the acceleration bounds")
+      .value("relaxed", TorqueStatus::relaxed, "velocity or acceleration limits gave way")
+      .value("relaxed_safety", TorqueStatus::relaxed_safety, "not all clearances and position limits can be kept")
       .value("fallback_invalid_input", TorqueStatus::fallback_invalid_input, "unusable input, damped stop")
       .value("fallback_solver", TorqueStatus::fallback_solver, "program not solved, damped stop")
       .def("__str__", [](TorqueStatus status) { return name(status); })
@@ -133,7 +217,15 @@ void bind_torque_controller(nb::module_& m) {
       .value("acceleration", TorqueFault::acceleration)
       .value("mass_matrix", TorqueFault::mass_matrix)
       .value("bias", TorqueFault::bias)
+      .value("clearances", TorqueFault::clearances)
       .def("__str__", [](TorqueFault fault) { return name(fault); });
+
+  nb::class_<SafetyRow>(m, "SafetyRow", "What one control step did about one clearance.")
+      .def_ro("coordinate", &SafetyRow::coordinate, "Which clearance.")
+      .def_ro("nearest", &SafetyRow::nearest, "Its nearest obstacle point.")
+      .def_ro("required", &SafetyRow::required, "Smallest grad h . x [m/s^2] that was asked for.")
+      .def_ro("slack", &SafetyRow::slack, "By how much the solution falls short of it [m/s^2].")
+      .def_ro("multiplier", &SafetyRow::multiplier, "What the row costs the task, >= 0; the largest one dominates.");
 
   nb::class_<TorqueSolution>(m, "TorqueSolution", "What one control step gives.")
       .def_ro("status", &TorqueSolution::status)
@@ -149,7 +241,20 @@ void bind_torque_controller(nb::module_& m) {
       .def_prop_ro("upper", [](const TorqueSolution& s) { return to_numpy(s.upper); },
                    "(nv,) [/s^2] upper acceleration bounds.")
       .def_prop_ro("active", [](const TorqueSolution& s) { return nb::tuple(nb::cast(s.active)); },
-                   nb::sig("def active(self) -> tuple[Limit, ...]"), "The limits in the way of each joint.");
+                   nb::sig("def active(self) -> tuple[Limit, ...]"), "The limits in the way of each joint.")
+      .def_prop_ro("safety",
+                   [](const TorqueSolution& s) {
+                     const auto first = s.safety.begin();
+                     return nb::tuple(nb::cast(std::vector<SafetyRow>(first, first + s.num_safety_rows)));
+                   },
+                   nb::sig("def safety(self) -> tuple[SafetyRow, ...]"),
+                   "The clearances that were considered, most critical first.")
+      .def_prop_ro("dominant",
+                   [](const TorqueSolution& s) -> nb::object {
+                     return s.dominant < 0 ? nb::none() : nb::cast(s.safety[static_cast<std::size_t>(s.dominant)]);
+                   },
+                   nb::sig("def dominant(self) -> SafetyRow | None"),
+                   "The clearance that bends the motion most; None if none does.");
 
   nb::class_<TorqueController>(m, "TorqueController",
                                "Torque that tracks a wanted acceleration within every limit of the arm:\n"
@@ -159,14 +264,16 @@ void bind_torque_controller(nb::module_& m) {
       .def(
           "__init__",
           [](TorqueController* self, const Robot& robot, double period, const ArrayLike& tracking_weight,
-             const ArrayLike& torque_weight, double slack_weight, double position_margin, double stop_time,
-             double stop_damping) {
+             const ArrayLike& torque_weight, double slack_weight, double safety_weight, double position_margin,
+             double stop_time, double stop_damping, const SafetySettings& safety) {
             const int nv = robot.num_coordinates();
             TorqueControllerSettings settings;
             settings.period = period;
             settings.tracking_weight = as_filled_vector(tracking_weight, "tracking_weight", nv);
             settings.torque_weight = as_filled_vector(torque_weight, "torque_weight", nv);
             settings.slack_weight = slack_weight;
+            settings.safety_weight = safety_weight;
+            settings.safety = safety;
             settings.position_margin = position_margin;
             settings.stop_time = stop_time;
             settings.stop_damping = stop_damping;
@@ -176,32 +283,81 @@ void bind_torque_controller(nb::module_& m) {
           nb::arg("tracking_weight") = TorqueControllerSettings().tracking_weight[0],
           nb::arg("torque_weight") = TorqueControllerSettings().torque_weight[0],
           nb::arg("slack_weight") = TorqueControllerSettings().slack_weight,
+          nb::arg("safety_weight") = TorqueControllerSettings().safety_weight,
           nb::arg("position_margin") = TorqueControllerSettings().position_margin,
           nb::arg("stop_time") = TorqueControllerSettings().stop_time,
           nb::arg("stop_damping") = TorqueControllerSettings().stop_damping,
+          nb::arg("safety") = SafetySettings(),
           "period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];\n"
           "torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the\n"
-          "steepest tracking cost; position_margin [rad | m]: position limits are moved inwards by it;\n"
-          "stop_time [s]: time constant of the damped stop; stop_damping [-]: its damping without a mass matrix, over\n"
-          "effort limit / velocity limit. Raises ValueError that names the setting.")
+          "steepest tracking cost; safety_weight [-]: price of leaving clearances and position limits over that;\n"
+          "position_margin [rad | m]: position limits are moved inwards by it; stop_time [s]: time constant of the\n"
+          "damped stop; stop_damping [-]: its damping without a mass matrix, over effort limit / velocity limit;\n"
+          "safety: SafetySettings. Raises ValueError that names the setting.")
       .def(
           "solve",
           [](TorqueController& controller, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration, const ArrayLike& mass_matrix,
-             const ArrayLike& bias) {
+             const ArrayLike& bias, nb::handle clearances) {
             const int nv = controller.num_coordinates();
-            TorqueSolution solution(nv);
+            TorqueSolution solution(nv, controller.settings().safety.max_rows);
+            nb::object keep;
             static_cast<void>(controller.solve(as_vector(q, "q", nv), as_vector(v, "v", nv),
                                                as_vector(acceleration, "acceleration", nv),
                                                as_matrix(mass_matrix, "mass_matrix", nv, nv),
-                                               as_vector(bias, "bias", nv), solution));
+                                               as_vector(bias, "bias", nv), as_clearances(clearances, keep), solution));
             return solution;
           },
-          nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::arg("mass_matrix"), nb::arg("bias"),
+          nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::arg("mass_matrix"), nb::arg("bias"), nb::kw_only(),
+          nb::arg("clearances").none() = nb::none(),
+          nb::sig("def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
+                  "acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, "
+                  "bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution"),
           "One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),\n"
-          "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity). Returns a TorqueSolution; values that are not\n"
-          "finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.")
+          "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. Returns a\n"
+          "TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.")
       .def_prop_ro("num_coordinates", &TorqueController::num_coordinates)
       .def("count", &TorqueController::count, nb::arg("status"), "Number of solves that ended with this status.");
+}
+
+void bind_acceleration_filter(nb::module_& m) {
+  const AccelerationFilterSettings defaults;
+  nb::class_<AccelerationFilter>(
+      m, "AccelerationFilter",
+      "The acceleration nearest to a wanted one within the limits of joints and clearances, for motion without torque:\n"
+      "TorqueController with unit masses and unlimited effort. Position, velocity and acceleration limits are never\n"
+      "left; only clearances can give way (status relaxed_safety). One object per thread.")
+      .def(
+          "__init__",
+          [](AccelerationFilter* self, const Robot& robot, double period, double position_margin, double stop_time,
+             const SafetySettings& safety) {
+            new (self) AccelerationFilter(robot, {period, position_margin, stop_time, safety});
+          },
+          nb::arg("robot"), nb::kw_only(), nb::arg("period") = defaults.period,
+          nb::arg("position_margin") = defaults.position_margin, nb::arg("stop_time") = defaults.stop_time,
+          nb::arg("safety") = SafetySettings(),
+          "period [s]: how long an acceleration is held; position_margin [rad | m]; stop_time [s]: of the damped stop\n"
+          "for unusable input; safety: SafetySettings. Raises ValueError that names the setting.")
+      .def(
+          "apply",
+          [](AccelerationFilter& filter, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration,
+             nb::handle clearances) {
+            const int nv = filter.num_coordinates();
+            TorqueSolution solution(nv, filter.max_safety_rows());
+            nb::object keep;
+            static_cast<void>(filter.apply(as_vector(q, "q", nv), as_vector(v, "v", nv),
+                                           as_vector(acceleration, "acceleration", nv),
+                                           as_clearances(clearances, keep), solution));
+            return solution;
+          },
+          nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::kw_only(), nb::arg("clearances").none() = nb::none(),
+          nb::sig("def apply(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
+                  "acceleration: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) "
+                  "-> TorqueSolution"),
+          "q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], clearances at (q, v), which a Step has.\n"
+          "Returns a TorqueSolution, of which `acceleration` is the result. Raises ValueError on wrong shapes.")
+      .def_prop_ro("period", &AccelerationFilter::period)
+      .def_prop_ro("num_coordinates", &AccelerationFilter::num_coordinates)
+      .def("count", &AccelerationFilter::count, nb::arg("status"), "Number of calls that ended with this status.");
 }
 
 }  // namespace
@@ -209,7 +365,9 @@ void bind_torque_controller(nb::module_& m) {
 void bind_control(nb::module_& m) {
   bind_quadratic_program(m);
   bind_acceleration_bounds(m);
+  bind_safety(m);
   bind_torque_controller(m);
+  bind_acceleration_filter(m);
 }
 
 }  // namespace sidestep::python

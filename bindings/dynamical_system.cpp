@@ -88,6 +88,8 @@ void bind_step(nb::module_& m) {
       .def_prop_ro("jacobian",
                    [](const Step& s) { return to_numpy_matrix(s.result.jacobian_transposed.transpose()); },
                    "dpsi/dq (m, nv).")
+      .def_prop_ro("clearances", [](const Step& s) { return s.result.clearances; },
+                   "Clearances of the coordinates that are barriers of them (m).")
       .def_prop_ro("metric", [](const Step& s) { return to_numpy_matrix(s.result.metric.matrix()); },
                    "G = I + J^T J (nv, nv).");
 }
@@ -102,7 +104,10 @@ void bind_rollout(nb::module_& m) {
   result.def_prop_ro("time", [](const Rollout& r) { return to_numpy(r.time); }, "[s]")
       .def_ro("statuses", &Rollout::statuses, "One StepStatus per row.")
       .def_prop_ro("step_seconds", [](const Rollout& r) { return to_numpy(r.step_seconds); },
-                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.");
+                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.")
+      .def_ro("filter_statuses", &Rollout::filter_statuses, "One TorqueStatus per row; empty without a filter.")
+      .def_prop_ro("safety_slack", [](const Rollout& r) { return to_numpy(r.safety_slack); },
+                   "(steps + 1,) largest shortfall of a clearance's constraint [m/s^2]; empty without a filter.");
   matrix_property(result, "q", &Rollout::q, "(steps + 1, nv) [rad]");
   matrix_property(result, "v", &Rollout::v, "(steps + 1, nv) [rad/s]");
   matrix_property(result, "acceleration", &Rollout::acceleration, "(steps + 1, nv) [rad/s^2]");
@@ -112,24 +117,28 @@ void bind_rollout(nb::module_& m) {
   m.def(
       "rollout",
       [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goal, const Obstacles& obstacles,
-         double period, int steps, nb::handle integrator, bool time_steps) {
+         double period, int steps, nb::handle integrator, bool time_steps, const AccelerationFilter* filter) {
         const int nv = system.robot().num_coordinates();
         const Eigen::VectorXd start = as_vector(q, "q", nv);
         const Eigen::VectorXd velocity = as_vector(v, "v", nv);
         const Eigen::VectorXd target = as_vector(goal, "goal", nv);
-        const RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"),
-                                       time_steps};
+        RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"), time_steps};
+        if (filter != nullptr) {
+          settings.filter = *filter;
+        }
         nb::gil_scoped_release release;
         return rollout(system, start, velocity, target, obstacles, settings);
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
-      nb::arg("time_steps") = false,
+      nb::arg("time_steps") = false, nb::arg("filter") = nb::none(),
       nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
               "goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, "
-              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout"),
+              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, "
+              "filter: AccelerationFilter | None = None) -> Rollout"),
       "Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.\n"
-      "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.");
+      "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
+      "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4.");
 }
 
 }  // namespace

@@ -82,16 +82,19 @@ void bind_embedding(nb::module_& m) {
       "activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.\n"
       "strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer\n"
       "and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between\n"
-      "neighbouring points. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
+      "neighbouring points. reach [m]: clearances are measured up to here, so that what keeps them sees an obstacle\n"
+      "from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
       .def(
           "__init__",
           [](ClearanceBarrier* self, const Robot& robot, const Body& body, double activation, double strength,
-             double power, double floor, double temperature) {
-            new (self) ClearanceBarrier(robot, body, {activation, strength, power, floor}, temperature);
+             double power, double floor, double temperature, double reach) {
+            new (self) ClearanceBarrier(robot, body, {activation, strength, power, floor}, temperature, reach);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("activation") = 0.10, nb::arg("strength") = 0.1,
-          nb::arg("power") = 2.0, nb::arg("floor") = 0.002, nb::arg("temperature") = 0.002)
+          nb::arg("power") = 2.0, nb::arg("floor") = 0.002, nb::arg("temperature") = 0.002,
+          nb::arg("reach") = 0.3)
       .def_prop_ro("activation", [](const ClearanceBarrier& b) { return b.barrier().activation; })
+      .def_prop_ro("reach", &ClearanceBarrier::reach)
       .def_prop_ro("components",
                    [](const ClearanceBarrier& b) {
                      std::vector<int> components;

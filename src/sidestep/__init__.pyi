@@ -22,7 +22,11 @@ from ._core import is_fallback as is_fallback
 from ._core import metric_matrix as metric_matrix
 from ._core import rollout as rollout
 from .body import Body as Body
+from .control import AccelerationFilter as AccelerationFilter
+from .control import Clearances as Clearances
 from .control import Limit as Limit
+from .control import SafetyRow as SafetyRow
+from .control import SafetySettings as SafetySettings
 from .control import TorqueController as TorqueController
 from .control import TorqueFault as TorqueFault
 from .control import TorqueSolution as TorqueSolution

@@ -440,6 +440,10 @@ class Step:
         """dpsi/dq (m, nv)."""
 
     @property
+    def clearances(self) -> Clearances:
+        """Clearances of the coordinates that are barriers of them (m)."""
+
+    @property
     def metric(self) -> numpy.typing.NDArray[numpy.float64]:
         """G = I + J^T J (nv, nv)."""
 
@@ -624,6 +628,64 @@ def acceleration_bounds(limits: Robot | JointLimits, q: numpy.typing.ArrayLike, 
     not finite. Source: Del Prete (2018), made exact for held accelerations.
     """
 
+class Clearances:
+    """
+    Clearances h(q, t) of parts of an arm with what their motion needs; arrays are copies.
+    """
+
+    def __init__(self, *, values: numpy.typing.ArrayLike, rates: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike, gradients: numpy.typing.ArrayLike, nearest: Sequence[int]) -> None: ...
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """h (m,) [m]; inf beyond the reach, where the rest has no meaning."""
+
+    @property
+    def rates(self) -> numpy.typing.NDArray[numpy.float64]:
+        """dh/dt (m,) [m/s], obstacle velocities included."""
+
+    @property
+    def curvatures(self) -> numpy.typing.NDArray[numpy.float64]:
+        """d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity."""
+
+    @property
+    def gradients(self) -> numpy.typing.NDArray[numpy.float64]:
+        """dh/dq (m, nv) [m/rad]."""
+
+    @property
+    def nearest(self) -> list[int]:
+        """Index of the nearest obstacle point (m), -1 beyond the reach."""
+
+class SafetySettings:
+    """
+    What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing
+    speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest
+    one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;
+    lookahead [s] and max_rows: when more clearances are active, those with the smallest room predicted that far
+    ahead are kept. Raises ValueError that names the setting.
+    """
+
+    def __init__(self, *, margin: float = 0.005, rate: float = 20.0, braking_fraction: float = 0.5, correction: float = 0.5, lookahead: float = 0.1, max_rows: int = 32) -> None: ...
+
+    @property
+    def margin(self) -> float: ...
+
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def braking_fraction(self) -> float: ...
+
+    @property
+    def correction(self) -> float: ...
+
+    @property
+    def lookahead(self) -> float: ...
+
+    @property
+    def max_rows(self) -> int: ...
+
+    def __repr__(self) -> str: ...
+
 class TorqueStatus(enum.Enum):
     """How a control step ended, from best to worst."""
 
@@ -636,12 +698,15 @@ class TorqueStatus(enum.Enum):
     """optimal, with a limit in the way"""
 
     relaxed = 2
-    """the torque limits do not allow the acceleration bounds"""
+    """velocity or acceleration limits gave way"""
 
-    fallback_invalid_input = 3
+    relaxed_safety = 3
+    """not all clearances and position limits can be kept"""
+
+    fallback_invalid_input = 4
     """unusable input, damped stop"""
 
-    fallback_solver = 4
+    fallback_solver = 5
     """program not solved, damped stop"""
 
     @property
@@ -663,6 +728,31 @@ class TorqueFault(enum.Enum):
     mass_matrix = 4
 
     bias = 5
+
+    clearances = 6
+
+class SafetyRow:
+    """What one control step did about one clearance."""
+
+    @property
+    def coordinate(self) -> int:
+        """Which clearance."""
+
+    @property
+    def nearest(self) -> int:
+        """Its nearest obstacle point."""
+
+    @property
+    def required(self) -> float:
+        """Smallest grad h . x [m/s^2] that was asked for."""
+
+    @property
+    def slack(self) -> float:
+        """By how much the solution falls short of it [m/s^2]."""
+
+    @property
+    def multiplier(self) -> float:
+        """What the row costs the task, >= 0; the largest one dominates."""
 
 class TorqueSolution:
     """What one control step gives."""
@@ -699,6 +789,14 @@ class TorqueSolution:
     def active(self) -> tuple[Limit, ...]:
         """The limits in the way of each joint."""
 
+    @property
+    def safety(self) -> tuple[SafetyRow, ...]:
+        """The clearances that were considered, most critical first."""
+
+    @property
+    def dominant(self) -> SafetyRow | None:
+        """The clearance that bends the motion most; None if none does."""
+
 class TorqueController:
     """
     Torque that tracks a wanted acceleration within every limit of the arm:
@@ -707,20 +805,21 @@ class TorqueController:
     Source: Bosc, equation T6.3, corrected. One object per thread.
     """
 
-    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25) -> None:
+    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, safety_weight: float = 1000.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, safety: SafetySettings = ...) -> None:
         """
         period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];
         torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the
-        steepest tracking cost; position_margin [rad | m]: position limits are moved inwards by it;
-        stop_time [s]: time constant of the damped stop; stop_damping [-]: its damping without a mass matrix, over
-        effort limit / velocity limit. Raises ValueError that names the setting.
+        steepest tracking cost; safety_weight [-]: price of leaving clearances and position limits over that;
+        position_margin [rad | m]: position limits are moved inwards by it; stop_time [s]: time constant of the
+        damped stop; stop_damping [-]: its damping without a mass matrix, over effort limit / velocity limit;
+        safety: SafetySettings. Raises ValueError that names the setting.
         """
 
-    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike) -> TorqueSolution:
+    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution:
         """
         One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),
-        bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity). Returns a TorqueSolution; values that are not
-        finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
+        bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. Returns a
+        TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
         """
 
     @property
@@ -728,5 +827,33 @@ class TorqueController:
 
     def count(self, status: TorqueStatus) -> int:
         """Number of solves that ended with this status."""
+
+class AccelerationFilter:
+    """
+    The acceleration nearest to a wanted one within the limits of joints and clearances, for motion without torque:
+    TorqueController with unit masses and unlimited effort. Position, velocity and acceleration limits are never
+    left; only clearances can give way (status relaxed_safety). One object per thread.
+    """
+
+    def __init__(self, robot: Robot, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, safety: SafetySettings = ...) -> None:
+        """
+        period [s]: how long an acceleration is held; position_margin [rad | m]; stop_time [s]: of the damped stop
+        for unusable input; safety: SafetySettings. Raises ValueError that names the setting.
+        """
+
+    def apply(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution:
+        """
+        q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], clearances at (q, v), which a Step has.
+        Returns a TorqueSolution, of which `acceleration` is the result. Raises ValueError on wrong shapes.
+        """
+
+    @property
+    def period(self) -> float: ...
+
+    @property
+    def num_coordinates(self) -> int: ...
+
+    def count(self, status: TorqueStatus) -> int:
+        """Number of calls that ended with this status."""
 
 __version__: str

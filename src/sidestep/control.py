@@ -1,10 +1,14 @@
 """Torque control within the limits of an arm (the control folder of the core)."""
 
 from sidestep._core import (
+    AccelerationFilter,
+    Clearances,
     Limit,
     QuadraticProgram,
     QuadraticProgramStatus,
     QuadraticSolution,
+    SafetyRow,
+    SafetySettings,
     TorqueController,
     TorqueFault,
     TorqueSolution,
@@ -13,10 +17,14 @@ from sidestep._core import (
 )
 
 __all__ = [
+    "AccelerationFilter",
+    "Clearances",
     "Limit",
     "QuadraticProgram",
     "QuadraticProgramStatus",
     "QuadraticSolution",
+    "SafetyRow",
+    "SafetySettings",
     "TorqueController",
     "TorqueFault",
     "TorqueSolution",

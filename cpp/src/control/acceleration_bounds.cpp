@@ -55,6 +55,7 @@ AccelerationInterval acceleration_interval(double q, double v, const ScalarLimit
   const double V = limits.velocity, A = limits.acceleration;
   double high = largest_next_velocity(limits.upper - q, v, A, period);
   double low = -largest_next_velocity(q - limits.lower, -v, A, period);
+  const double position_lower = (low - v) / period, position_upper = (high - v) / period;
   const Limit high_limit = high < V ? Limit::position_upper : Limit::velocity_upper;
   const Limit low_limit = low > -V ? Limit::position_lower : Limit::velocity_lower;
   high = std::clamp(high, -V, V);
@@ -63,7 +64,7 @@ AccelerationInterval acceleration_interval(double q, double v, const ScalarLimit
     // Only from states that are not viable: both position limits cannot be kept. Come as close to rest as they allow.
     low = high = std::clamp(0.0, high, low);
   }
-  AccelerationInterval interval{(low - v) / period, (high - v) / period, low_limit, high_limit};
+  AccelerationInterval interval{(low - v) / period, (high - v) / period, low_limit, high_limit, 0.0, 0.0};
   if (interval.upper >= A) {
     interval.upper_limit = Limit::acceleration_upper;
   }
@@ -72,6 +73,8 @@ AccelerationInterval acceleration_interval(double q, double v, const ScalarLimit
   }
   interval.lower = std::clamp(interval.lower, -A, A);
   interval.upper = std::clamp(interval.upper, -A, A);
+  interval.position_lower = std::min(position_lower, interval.lower);
+  interval.position_upper = std::max(position_upper, interval.upper);
   return interval;
 }
 
@@ -79,7 +82,9 @@ AccelerationBounds::AccelerationBounds(int num_coordinates)
     : lower(Eigen::VectorXd::Constant(num_coordinates, -infinity)),
       upper(Eigen::VectorXd::Constant(num_coordinates, infinity)),
       lower_limit(static_cast<std::size_t>(num_coordinates), Limit::none),
-      upper_limit(static_cast<std::size_t>(num_coordinates), Limit::none) {}
+      upper_limit(static_cast<std::size_t>(num_coordinates), Limit::none),
+      position_lower(lower),
+      position_upper(upper) {}
 
 void AccelerationBounds::update(const JointLimits& limits, const Eigen::Ref<const Eigen::VectorXd>& q,
                                 const Eigen::Ref<const Eigen::VectorXd>& v, double period,
@@ -90,6 +95,8 @@ void AccelerationBounds::update(const JointLimits& limits, const Eigen::Ref<cons
     const AccelerationInterval interval = acceleration_interval(q[i], v[i], joint, period);
     lower[i] = interval.lower;
     upper[i] = interval.upper;
+    position_lower[i] = interval.position_lower;
+    position_upper[i] = interval.position_upper;
     lower_limit[static_cast<std::size_t>(i)] = interval.lower_limit;
     upper_limit[static_cast<std::size_t>(i)] = interval.upper_limit;
   }

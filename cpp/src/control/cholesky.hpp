@@ -26,4 +26,15 @@ inline bool cholesky(const Eigen::MatrixXd& A, Eigen::MatrixXd& L) noexcept {
   return true;
 }
 
+/// x := A⁻¹ x with the factor L of A, by its two triangular solves. Allocates nothing.
+inline void solve_in_place(const Eigen::MatrixXd& L, Eigen::VectorXd& x) noexcept {
+  const Eigen::Index n = L.rows();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    x[i] = (x[i] - L.row(i).head(i).dot(x.head(i))) / L(i, i);
+  }
+  for (Eigen::Index i = n - 1; i >= 0; --i) {
+    x[i] = (x[i] - L.col(i).tail(n - 1 - i).dot(x.tail(n - 1 - i))) / L(i, i);
+  }
+}
+
 }  // namespace sidestep

@@ -102,12 +102,15 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
       low = data.lower[i];
       high = data.upper[i];
     } else {
+      low = data.row_lower[i - n_];
+      high = data.row_upper[i - n_];
+      if (low == -infinity && high == infinity) {
+        continue;  // a row that is not in use
+      }
       const auto row = data.A.row(i - n_);
       value = row.dot(x_);
       terms = row.cwiseAbs().dot(x_.cwiseAbs().transpose());
       norm = row_norms_[i - n_];
-      low = data.row_lower[i - n_];
-      high = data.row_upper[i - n_];
     }
     const bool below = low - value > value - high;
     const double side = below ? low : high;

@@ -23,6 +23,11 @@ constexpr double symmetry_tolerance = 1e-6;
 constexpr double torque_tolerance = 1e-6;
 // Slack below this, relative to 1 /s^2 plus the bound, is rounding of the second program and not worth a status.
 constexpr double slack_tolerance = 1e-9;
+// Clearances and position limits that no acceleration within this many times the limits can break are left out of the
+// second program.
+constexpr double relaxed_reach = 10.0;
+// The smallest second program; the next ones double.
+constexpr int fewest_relaxed_rows = 4;
 // Damping [Nm s/rad | N s/m] of the stop for joints without an effort or a velocity limit to derive it from.
 constexpr double unlimited_stop_damping = 1.0;
 
@@ -58,6 +63,7 @@ const char* name(TorqueStatus status) noexcept {
     case TorqueStatus::ok: return "ok";
     case TorqueStatus::limited: return "limited";
     case TorqueStatus::relaxed: return "relaxed";
+    case TorqueStatus::relaxed_safety: return "relaxed_safety";
     case TorqueStatus::fallback_invalid_input: return "fallback_invalid_input";
     case TorqueStatus::fallback_solver: return "fallback_solver";
   }
@@ -72,17 +78,19 @@ const char* name(TorqueFault fault) noexcept {
     case TorqueFault::acceleration: return "acceleration";
     case TorqueFault::mass_matrix: return "mass_matrix";
     case TorqueFault::bias: return "bias";
+    case TorqueFault::clearances: return "clearances";
   }
   return "unknown";
 }
 
-TorqueSolution::TorqueSolution(int num_coordinates)
+TorqueSolution::TorqueSolution(int num_coordinates, int max_safety_rows)
     : torque(Eigen::VectorXd::Zero(num_coordinates)),
       acceleration(Eigen::VectorXd::Zero(num_coordinates)),
       slack(Eigen::VectorXd::Zero(num_coordinates)),
       lower(Eigen::VectorXd::Constant(num_coordinates, -infinity)),
       upper(Eigen::VectorXd::Constant(num_coordinates, infinity)),
-      active(static_cast<std::size_t>(num_coordinates), Limit::none) {}
+      active(static_cast<std::size_t>(num_coordinates), Limit::none),
+      safety(static_cast<std::size_t>(max_safety_rows)) {}
 
 void TorqueControllerSettings::validate(const Robot& robot) const {
   const int nv = robot.num_coordinates();
@@ -90,6 +98,8 @@ void TorqueControllerSettings::validate(const Robot& robot) const {
   check_weight(tracking_weight, "tracking_weight", nv, false);
   check_weight(torque_weight, "torque_weight", nv, true);
   check_positive(slack_weight, "slack_weight");
+  check_positive(safety_weight, "safety_weight");
+  safety.validate();
   check_positive(stop_time, "stop_time");
   check_positive(stop_damping, "stop_damping");
   if (!(position_margin >= 0.0)) {
@@ -113,31 +123,45 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       tracking_weight_(expanded(settings_.tracking_weight, nv_)),
       torque_cost_(expanded(settings_.torque_weight, nv_).cwiseQuotient(limits_.effort.cwiseAbs2())),
       bounds_(nv_),
-      hard_data_(nv_, nv_),
-      relaxed_data_(2 * nv_, 3 * nv_),
-      hard_(nv_, nv_),
-      relaxed_(2 * nv_, 3 * nv_),
+      rows_(nv_, settings_.safety),
+      hard_data_(nv_, nv_ + rows_.max_size()),
+      hard_(nv_, nv_ + rows_.max_size()),
+      relaxed_rows_(static_cast<std::size_t>(rows_.max_size() + 2 * nv_)),
+      row_multipliers_(Eigen::VectorXd::Zero(rows_.max_size())),
+      box_(relaxed_reach * limits_.acceleration),
+      box_lower_(-box_),
       mass_(Eigen::MatrixXd::Zero(nv_, nv_)),
       mass_cholesky_(Eigen::MatrixXd::Zero(nv_, nv_)),
       velocity_(Eigen::VectorXd::Zero(nv_)),
       wanted_(Eigen::VectorXd::Zero(nv_)),
       bias_(Eigen::VectorXd::Zero(nv_)) {
-  // Second program, over (q̈, s): rows q̈ - s <= upper, q̈ + s >= lower, then the torque rows; s >= 0.
-  relaxed_data_.A.topLeftCorner(nv_, nv_).setIdentity();
-  relaxed_data_.A.block(0, nv_, nv_, nv_).diagonal().setConstant(-1.0);
-  relaxed_data_.A.block(nv_, 0, nv_, nv_).setIdentity();
-  relaxed_data_.A.block(nv_, nv_, nv_, nv_).setIdentity();
-  relaxed_data_.lower.tail(nv_).setZero();
-  relaxed_data_.H.bottomRightCorner(nv_, nv_).diagonal() = tracking_weight_;
+  const int most = rows_.max_size() + 2 * nv_;
+  for (int num = fewest_relaxed_rows; num < most; num *= 2) {
+    relaxed_.emplace_back(nv_, num);
+  }
+  relaxed_.emplace_back(nv_, most);
+}
+
+TorqueController::Relaxed::Relaxed(int nv, int num)
+    : num_rows(num), data(2 * nv + num, 3 * nv + num), program(2 * nv + num, 3 * nv + num) {
+  // Over x = (q̈, s, r): q̈ - s <= upper, q̈ + s >= lower, the torque rows, normals q̈ + r >= lower; s >= 0, r >= 0.
+  data.A.topLeftCorner(nv, nv).setIdentity();
+  data.A.block(0, nv, nv, nv).diagonal().setConstant(-1.0);
+  data.A.block(nv, 0, nv, nv).setIdentity();
+  data.A.block(nv, nv, nv, nv).setIdentity();
+  data.A.bottomRightCorner(num, num).setIdentity();
+  data.lower.tail(nv + num).setZero();
 }
 
 TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
                                      const Eigen::Ref<const Eigen::VectorXd>& v,
                                      const Eigen::Ref<const Eigen::VectorXd>& acceleration,
                                      const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                     const Eigen::Ref<const Eigen::VectorXd>& bias, TorqueSolution& solution) noexcept {
+                                     const Eigen::Ref<const Eigen::VectorXd>& bias, const Clearances* clearances,
+                                     TorqueSolution& solution) noexcept {
   const auto usable = [this](const auto& x) { return x.size() == nv_ && x.allFinite(); };
   const bool q_known = usable(q), v_known = usable(v), wanted_known = usable(acceleration), bias_known = usable(bias);
+  const bool clear = clearances == nullptr || rows_.usable(*clearances);
   bool mass_known = mass_matrix.rows() == nv_ && mass_matrix.cols() == nv_ && mass_matrix.allFinite();
   if (mass_known) {
     mass_ = mass_matrix;
@@ -148,6 +172,7 @@ TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
                    : !wanted_known ? TorqueFault::acceleration
                    : !mass_known   ? TorqueFault::mass_matrix
                    : !bias_known   ? TorqueFault::bias
+                   : !clear        ? TorqueFault::clearances
                                    : TorqueFault::none;
   if (v_known) {
     velocity_ = v;
@@ -169,8 +194,16 @@ TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
   }
 
   TorqueStatus status = TorqueStatus::fallback_invalid_input;
+  rows_.clear();
+  row_multipliers_.setZero();
+  solution.num_safety_rows = 0;
+  solution.dominant = -1;
   if (q_known && v_known && mass_known && bias_known) {
-    if (wanted_known) {
+    if (clearances != nullptr && clear) {
+      const BrakingTorque braking{mass_cholesky_, bias_};
+      rows_.update(*clearances, limits_, settings_.period, &braking);
+    }
+    if (wanted_known && clear) {
       wanted_ = acceleration;
     } else {
       wanted_ = -velocity_ / settings_.stop_time;
@@ -178,14 +211,12 @@ TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
     if (solve_within_bounds(solution)) {
       const bool free = std::all_of(solution.active.begin(), solution.active.end(),
                                     [](Limit limit) { return limit == Limit::none; });
-      status = free ? TorqueStatus::ok : TorqueStatus::limited;
-    } else if (solve_relaxed(solution)) {
-      status = solution.slack.isZero(0.0) ? TorqueStatus::limited : TorqueStatus::relaxed;
+      status = free && row_multipliers_.isZero(0.0) ? TorqueStatus::ok : TorqueStatus::limited;
     } else {
-      stop(true, solution);
-      status = TorqueStatus::fallback_solver;
+      status = solve_relaxed(solution);
     }
-    if (!wanted_known && status != TorqueStatus::fallback_solver) {
+    report_safety(solution);
+    if (!(wanted_known && clear) && status != TorqueStatus::fallback_solver) {
       status = TorqueStatus::fallback_invalid_input;
     }
   } else {
@@ -231,13 +262,23 @@ bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
   }
   hard_data_.lower = bounds_.lower;
   hard_data_.upper = bounds_.upper;
-  hard_data_.A = mass_;
-  hard_data_.row_lower = -limits_.effort - bias_;
-  hard_data_.row_upper = limits_.effort - bias_;
+  hard_data_.A.topRows(nv_) = mass_;
+  hard_data_.row_lower.head(nv_) = -limits_.effort - bias_;
+  hard_data_.row_upper.head(nv_) = limits_.effort - bias_;
+  hard_data_.row_lower.tail(rows_.max_size()).setConstant(-infinity);
+  for (int k = 0; k < rows_.size(); ++k) {
+    if (!rows_.satisfied_within(k, bounds_.lower, bounds_.upper)) {
+      hard_data_.A.row(nv_ + k) = rows_.normals.row(k);
+      hard_data_.row_lower[nv_ + k] = rows_.lower[k];
+    }
+  }
   if (hard_.solve(hard_data_) != QuadraticProgramStatus::solved) {
     return false;
   }
   solution.acceleration = hard_.solution();
+  for (int k = 0; k < rows_.size(); ++k) {
+    row_multipliers_[k] = std::max(-hard_.multipliers()[2 * nv_ + k], 0.0);
+  }
   for (int i = 0; i < nv_; ++i) {
     const double at_bound = hard_.multipliers()[i], at_effort = hard_.multipliers()[nv_ + i];
     const auto joint = static_cast<std::size_t>(i);
@@ -251,41 +292,126 @@ bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
   return accept(solution);
 }
 
-bool TorqueController::solve_relaxed(TorqueSolution& solution) noexcept {
-  double steepest = 0.0;
+void TorqueController::collect_relaxed_rows() noexcept {
+  num_relaxed_rows_ = 0;
+  const auto append = [this](int row) { relaxed_rows_[static_cast<std::size_t>(num_relaxed_rows_++)] = row; };
+  for (int k = 0; k < rows_.size(); ++k) {
+    const bool kept = settings_.hard_bounds ? rows_.satisfied_within(k, bounds_.lower, bounds_.upper)
+                                            : rows_.satisfied_within(k, box_lower_, box_);
+    if (!kept) {
+      append(k);
+    }
+  }
+  for (int i = 0; i < nv_ && !settings_.hard_bounds; ++i) {
+    if (std::isfinite(bounds_.position_lower[i]) && bounds_.position_lower[i] > -box_[i]) {
+      append(-1 - 2 * i);
+    }
+    if (std::isfinite(bounds_.position_upper[i]) && bounds_.position_upper[i] < box_[i]) {
+      append(-2 - 2 * i);
+    }
+  }
+}
+
+TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept {
+  collect_relaxed_rows();
+  Relaxed& relaxed = *std::find_if(relaxed_.begin(), relaxed_.end() - 1,
+                                   [this](const Relaxed& r) { return r.num_rows >= num_relaxed_rows_; });
+  QuadraticProgramData& data = relaxed.data;
+  double farthest = 0.0, steepest = 0.0;
   for (int i = 0; i < nv_; ++i) {
     const double nearest = std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i]);
+    farthest = std::max(farthest, std::abs(wanted_[i] - nearest));
     steepest = std::max(steepest, tracking_weight_[i] * (1.0 + std::abs(wanted_[i] - nearest)));
   }
-  relaxed_data_.H.topLeftCorner(nv_, nv_) = hard_data_.H;
-  relaxed_data_.g.head(nv_) = hard_data_.g;
-  relaxed_data_.g.tail(nv_).setConstant(settings_.slack_weight * steepest);
-  relaxed_data_.row_upper.head(nv_) = bounds_.upper;
-  relaxed_data_.row_lower.segment(nv_, nv_) = bounds_.lower;
-  relaxed_data_.A.bottomLeftCorner(nv_, nv_) = mass_;
-  relaxed_data_.row_lower.tail(nv_) = hard_data_.row_lower;
-  relaxed_data_.row_upper.tail(nv_) = hard_data_.row_upper;
-  if (relaxed_.solve(relaxed_data_) != QuadraticProgramStatus::solved) {
-    return false;
+  const double price = settings_.slack_weight * steepest;
+  data.H.topLeftCorner(nv_, nv_) = hard_data_.H;
+  data.H.diagonal().segment(nv_, nv_) = tracking_weight_;
+  data.H.diagonal().tail(relaxed.num_rows).setConstant(tracking_weight_.maxCoeff());
+  data.g.setZero();
+  data.g.head(nv_) = hard_data_.g;
+  data.A.block(2 * nv_, 0, nv_, nv_) = mass_;
+  data.row_lower.segment(2 * nv_, nv_) = hard_data_.row_lower.head(nv_);
+  data.row_upper.segment(2 * nv_, nv_) = hard_data_.row_upper.head(nv_);
+  if (settings_.hard_bounds) {
+    data.lower.head(nv_) = bounds_.lower;
+    data.upper.head(nv_) = bounds_.upper;
+  } else {
+    data.row_upper.head(nv_) = bounds_.upper;
+    data.row_lower.segment(nv_, nv_) = bounds_.lower;
+    data.g.segment(nv_, nv_).setConstant(price);
   }
-  const auto multipliers = relaxed_.multipliers().tail(3 * nv_);
+  data.row_lower.tail(relaxed.num_rows).setConstant(-infinity);
+  data.A.block(3 * nv_, 0, relaxed.num_rows, nv_).setZero();
+  for (int n = 0; n < num_relaxed_rows_; ++n) {
+    const int row = relaxed_rows_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
+    data.g[2 * nv_ + n] = settings_.safety_weight * price;
+    if (row >= 0) {
+      data.A.row(at).head(nv_) = rows_.normals.row(row);
+      data.row_lower[at] = rows_.lower[row];
+    } else {
+      const int joint = (-1 - row) / 2;
+      const bool upper = (-1 - row) % 2 == 1;
+      data.A(at, joint) = upper ? -1.0 : 1.0;
+      data.row_lower[at] = upper ? -bounds_.position_upper[joint] : bounds_.position_lower[joint];
+    }
+  }
+  if (relaxed.program.solve(data) != QuadraticProgramStatus::solved) {
+    stop(true, solution);
+    return TorqueStatus::fallback_solver;
+  }
+  solution.acceleration = relaxed.program.solution().head(nv_);
+  const Eigen::VectorXd& multipliers = relaxed.program.multipliers();
+  const int first_row = 2 * nv_ + relaxed.num_rows;  // multipliers of the bounds come before those of the rows
+  const auto outside = [farthest](double amount, double bound) {
+    return std::abs(amount) > slack_tolerance * (1.0 + std::abs(bound) + farthest) ? amount : 0.0;
+  };
+  bool bounds_kept = true, safe = true;
   for (int i = 0; i < nv_; ++i) {
-    const double q_ddot = relaxed_.solution()[i];
-    const double outside = q_ddot - std::clamp(q_ddot, bounds_.lower[i], bounds_.upper[i]);
-    const double bound = outside > 0.0 ? bounds_.upper[i] : bounds_.lower[i];
-    const bool rounding = std::abs(outside) <= slack_tolerance * (1.0 + std::abs(bound));
-    solution.acceleration[i] = q_ddot;
-    solution.slack[i] = rounding ? 0.0 : outside;
+    const double q_ddot = solution.acceleration[i];
+    const double beyond = q_ddot - std::clamp(q_ddot, bounds_.lower[i], bounds_.upper[i]);
+    solution.slack[i] = outside(beyond, beyond > 0.0 ? bounds_.upper[i] : bounds_.lower[i]);
+    bounds_kept = bounds_kept && solution.slack[i] == 0.0;
     const auto joint = static_cast<std::size_t>(i);
-    const double at_effort = multipliers[2 * nv_ + i];
-    solution.active[joint] = (multipliers[i] > 0.0         ? bounds_.upper_limit[joint]
-                              : multipliers[nv_ + i] < 0.0 ? bounds_.lower_limit[joint]
-                                                           : Limit::none) |
+    const double at_upper = std::max(multipliers[i], multipliers[first_row + i]);
+    const double at_lower = std::min(multipliers[i], multipliers[first_row + nv_ + i]);
+    const double at_effort = multipliers[first_row + 2 * nv_ + i];
+    solution.active[joint] = (at_upper > 0.0   ? bounds_.upper_limit[joint]
+                              : at_lower < 0.0 ? bounds_.lower_limit[joint]
+                                               : Limit::none) |
                              (at_effort > 0.0   ? Limit::torque_upper
                               : at_effort < 0.0 ? Limit::torque_lower
                                                 : Limit::none);
   }
-  return accept(solution);
+  for (int n = 0; n < num_relaxed_rows_; ++n) {
+    const int row = relaxed_rows_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
+    const double bound = data.row_lower[at];
+    const double short_by = bound - data.A.row(at).head(nv_).dot(solution.acceleration.transpose());
+    safe = safe && !(outside(short_by, bound) > 0.0);
+    if (row >= 0) {
+      row_multipliers_[row] = std::max(-multipliers[first_row + at], 0.0);
+    }
+  }
+  if (!accept(solution)) {
+    stop(true, solution);
+    return TorqueStatus::fallback_solver;
+  }
+  return !safe ? TorqueStatus::relaxed_safety : !bounds_kept ? TorqueStatus::relaxed : TorqueStatus::limited;
+}
+
+void TorqueController::report_safety(TorqueSolution& solution) noexcept {
+  solution.num_safety_rows = std::min(rows_.size(), static_cast<int>(solution.safety.size()));
+  double largest = 0.0;
+  for (int k = 0; k < solution.num_safety_rows; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const double short_by = rows_.lower[k] - rows_.normals.row(k).dot(solution.acceleration.transpose());
+    const bool rounding = short_by <= slack_tolerance * (1.0 + std::abs(rows_.lower[k]) + wanted_.norm());
+    solution.safety[at] = {rows_.coordinates[at], rows_.nearest[at], rows_.lengths[k] * rows_.lower[k],
+                           rounding ? 0.0 : rows_.lengths[k] * short_by, row_multipliers_[k]};
+    if (row_multipliers_[k] > largest) {
+      largest = row_multipliers_[k];
+      solution.dominant = k;
+    }
+  }
 }
 
 bool TorqueController::accept(TorqueSolution& solution) noexcept {
@@ -328,17 +454,8 @@ void TorqueController::stop(bool mass_known, TorqueSolution& solution) noexcept 
     }
   }
   if (mass_known) {
-    // M^-1 (torque - bias) by the two triangular solves of the Cholesky factor.
     solution.acceleration = solution.torque - bias_;
-    for (int i = 0; i < nv_; ++i) {
-      solution.acceleration[i] -= mass_cholesky_.row(i).head(i).dot(solution.acceleration.head(i));
-      solution.acceleration[i] /= mass_cholesky_(i, i);
-    }
-    for (int i = nv_ - 1; i >= 0; --i) {
-      const int below = nv_ - 1 - i;
-      solution.acceleration[i] -= mass_cholesky_.col(i).tail(below).dot(solution.acceleration.tail(below));
-      solution.acceleration[i] /= mass_cholesky_(i, i);
-    }
+    solve_in_place(mass_cholesky_, solution.acceleration);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "sidestep/dynamical_system/rollout.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -15,6 +16,20 @@ void check_size(const Eigen::VectorXd& vector, const char* name, int nv) {
   if (vector.size() != nv) {
     throw std::invalid_argument(std::string(name) + " has " + std::to_string(vector.size()) + " entries, expected " +
                                 std::to_string(nv));
+  }
+}
+
+void check_filter(const AccelerationFilter& filter, int nv, const RolloutSettings& settings) {
+  if (filter.num_coordinates() != nv) {
+    throw std::invalid_argument("the filter is for " + std::to_string(filter.num_coordinates()) +
+                                " coordinates, the system has " + std::to_string(nv));
+  }
+  if (filter.period() != settings.period) {
+    throw std::invalid_argument("the filter has a period of " + std::to_string(filter.period()) +
+                                " s, the rollout of " + std::to_string(settings.period) + " s; they must be equal");
+  }
+  if (settings.integrator == Integrator::runge_kutta_4) {
+    throw std::invalid_argument("a filter holds the acceleration for a period: use semi_implicit_euler or second_order");
   }
 }
 
@@ -55,6 +70,10 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
     throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at least 1");
   }
   const double dt = settings.period;
+  std::optional<AccelerationFilter> filter = settings.filter;
+  if (filter) {
+    check_filter(*filter, nv, settings);
+  }
   const Eigen::Index rows = settings.steps + 1;
   const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, nv);
   Rollout result{Eigen::VectorXd::LinSpaced(rows, 0.0, dt * settings.steps),
@@ -64,8 +83,11 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
                  Eigen::MatrixXd::Zero(rows, system.num_embedding_coordinates()),
                  of_joints,
                  {},
-                 Eigen::VectorXd(settings.time_steps ? rows : 0)};
+                 Eigen::VectorXd(settings.time_steps ? rows : 0),
+                 {},
+                 Eigen::VectorXd::Zero(filter ? rows : 0)};
   result.statuses.reserve(static_cast<std::size_t>(rows));
+  TorqueSolution filtered(nv);
   GeometricSystem::Workspace w(system);
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
@@ -75,7 +97,17 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
     if (settings.time_steps) {
       result.step_seconds[k] = std::chrono::duration<double>(Clock::now() - begin).count();
     }
-    const Eigen::VectorXd a = w.acceleration;
+    Eigen::VectorXd a = w.acceleration;
+    if (filter) {
+      // After a fallback the workspace holds no clearances of this state.
+      const Clearances* clearances = is_fallback(status) ? nullptr : &w.clearances;
+      result.filter_statuses.push_back(filter->apply(q, v, a, clearances, filtered));
+      a = filtered.acceleration;
+      for (int n = 0; n < filtered.num_safety_rows; ++n) {
+        result.safety_slack[k] =
+            std::max(result.safety_slack[k], filtered.safety[static_cast<std::size_t>(n)].slack);
+      }
+    }
     result.q.row(k) = q;
     result.v.row(k) = v;
     result.acceleration.row(k) = a;

@@ -1,5 +1,10 @@
 #include "sidestep/embedding/clearance_barrier.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
 namespace sidestep {
 namespace {
 
@@ -10,12 +15,20 @@ const BarrierFunction& validated(const BarrierFunction& barrier, const char* own
 
 }  // namespace
 
-ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature)
-    : Embedding(robot), field_(robot, body, temperature), barrier_(validated(barrier, "clearance barrier")) {}
+ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature,
+                                   double reach)
+    : Embedding(robot),
+      field_(robot, body, temperature),
+      barrier_(validated(barrier, "clearance barrier")),
+      reach_(std::max(reach, barrier.activation)) {
+  if (!std::isfinite(reach)) {
+    throw std::invalid_argument("clearance barrier: reach is " + std::to_string(reach) + " m, must be finite");
+  }
+}
 
 void ClearanceBarrier::add_to(EmbeddingView out, const KinematicState& state,
                               const Obstacles& obstacles) const noexcept {
-  field_.evaluate(state, obstacles, barrier_.activation, out.clearances);
+  field_.evaluate(state, obstacles, reach_, out.clearances);
   add_barriers(barrier_, out);
 }
 
@@ -25,7 +38,7 @@ void add_barriers(const BarrierFunction& barrier, EmbeddingView out) noexcept {
       continue;
     }
     // ψ = f(h): ∇ψ = f' ∇h,  ψ̈ = f' ḧ + f'' ḣ².
-    const BarrierFunction::Value f = barrier(out.clearances.values[k]);
+    const BarrierFunction::Value f = barrier(out.clearances.values[k]);  // zero beyond the activation distance
     const double rate = out.clearances.rates[k];
     out.values[k] += f.value;
     out.jacobian_transposed.col(k) += f.first * out.clearances.gradients.col(k);

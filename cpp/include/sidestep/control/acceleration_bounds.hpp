@@ -32,6 +32,7 @@ constexpr bool contains(Limit set, Limit limit) noexcept {
 struct AccelerationInterval {
   double lower, upper;
   Limit lower_limit, upper_limit;
+  double position_lower, position_upper;  ///< the same without velocity and acceleration limits: wider, or equal
 };
 
 /// The limits of one joint: lower <= q <= upper, |v| <= velocity, |a| <= acceleration.
@@ -87,6 +88,7 @@ struct AccelerationBounds {
 
   Eigen::VectorXd lower, upper;  ///< (nv) [rad/s^2 | m/s^2]
   std::vector<Limit> lower_limit, upper_limit;
+  Eigen::VectorXd position_lower, position_upper;  ///< (nv), what the position limits alone ask for
 };
 
 }  // namespace sidestep

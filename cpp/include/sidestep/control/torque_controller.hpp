@@ -6,6 +6,7 @@
 
 #include "sidestep/control/acceleration_bounds.hpp"
 #include "sidestep/control/quadratic_program.hpp"
+#include "sidestep/control/safety_rows.hpp"
 #include "sidestep/kinematics/robot.hpp"
 
 namespace sidestep {
@@ -14,21 +15,31 @@ namespace sidestep {
 enum class TorqueStatus {
   ok,                      ///< the wanted acceleration is tracked, no limit in the way
   limited,                 ///< optimal within the limits, and at least one of them is in the way
-  relaxed,                 ///< the torque limits do not allow the acceleration bounds of some joint (see slack)
+  relaxed,                 ///< velocity or acceleration limits gave way to clearances, position or torque limits
+  relaxed_safety,          ///< not all clearances and position limits can be kept (see safety, slack)
   fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
   fallback_solver,         ///< the quadratic program could not be solved: damped stop
 };
 
 /// Which input is unusable.
-enum class TorqueFault { none, position, velocity, acceleration, mass_matrix, bias };
+enum class TorqueFault { none, position, velocity, acceleration, mass_matrix, bias, clearances };
 
 /// Short names, for example "limited", "mass_matrix".
 const char* name(TorqueStatus status) noexcept;
 const char* name(TorqueFault fault) noexcept;
 
+/// What one control step did about one clearance.
+struct SafetyRow {
+  int coordinate;     ///< which clearance
+  int nearest;        ///< its nearest obstacle point
+  double required;    ///< smallest ∇h·q̈ [m/s²] that was asked for
+  double slack;       ///< by how much the solution falls short of it [m/s²]; 0 unless relaxed_safety
+  double multiplier;  ///< what the row costs the task, >= 0; the largest one dominates
+};
+
 /// What one control step gives. Made once, written by every solve.
 struct TorqueSolution {
-  explicit TorqueSolution(int num_coordinates);
+  explicit TorqueSolution(int num_coordinates, int max_safety_rows = SafetySettings().max_rows);
 
   TorqueStatus status = TorqueStatus::ok;
   TorqueFault fault = TorqueFault::none;
@@ -37,6 +48,9 @@ struct TorqueSolution {
   Eigen::VectorXd slack;                           ///< acceleration beyond its bounds [/s^2], signed; 0 unless relaxed
   Eigen::VectorXd lower, upper;                    ///< the acceleration bounds used [/s^2]; NaN if q or v is unusable
   std::vector<Limit> active;                       ///< the limits in the way of each joint
+  std::vector<SafetyRow> safety;                   ///< the first num_safety_rows, most critical first
+  int num_safety_rows = 0;
+  int dominant = -1;                               ///< the entry of `safety` that bends the motion most; -1 if none
 };
 
 struct TorqueControllerSettings {
@@ -51,6 +65,12 @@ struct TorqueControllerSettings {
   Eigen::VectorXd torque_weight = Eigen::VectorXd::Constant(1, 1e-6);
   /// Price of leaving the acceleration bounds when they cannot be kept: that many times the steepest tracking cost [-].
   double slack_weight = 1e3;
+  /// Price of leaving a clearance or a position limit: that many times the price of the other bounds [-].
+  double safety_weight = 1e3;
+  /// What is kept of the clearances, where they are given.
+  SafetySettings safety = {};
+  /// Velocity and acceleration limits do not give way to clearances. For motion without torque, see AccelerationFilter.
+  bool hard_bounds = false;
   /// Position limits are moved inwards by this much [rad | m].
   double position_margin = 0.0;
   /// Time constant of the damped stop q̈ = -v/stop_time [s].
@@ -66,13 +86,17 @@ struct TorqueControllerSettings {
 ///
 ///   minimise    1/2 (q̈ - a)'Q(q̈ - a) + 1/2 t'Rt,     t = torque / effort limit
 ///   subject to  M q̈ + h = torque                      (h: Coriolis, centrifugal and gravity forces)
-///               |torque| <= effort limit               (hard)
-///               lower(q, v) <= q̈ <= upper(q, v)        (see acceleration_bounds.hpp; soft)
+///               |torque| <= effort limit
+///               ∇h_k·q̈ >= required_k                   (clearances, see safety_rows.hpp)
+///               lower(q, v) <= q̈ <= upper(q, v)        (see acceleration_bounds.hpp)
 ///
-/// The torque is eliminated by the first constraint. The bounds are kept exactly whenever the torque limits allow it;
-/// else a second program adds slack s >= 0 to them at the cost p's + s's/2, with p large enough to be exact in practice.
+/// The torque is eliminated by the first constraint. What is sacrificed, in this order: the task, which is the cost;
+/// velocity and acceleration limits (unless hard_bounds); clearances and position limits; torque limits never. A first
+/// program has every constraint hard. If it is infeasible, a second one adds slack to each of them but the torque
+/// limits, at the cost p's with prices p so far apart, and so far above the task's, that the order is kept in practice.
 ///
-/// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time.
+/// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
+/// clearances are unusable, the same without them.
 /// Otherwise torque = M (-v/stop_time) + h clipped to the effort limits; if M is unusable, h - D v clipped; an unusable
 /// h is replaced by the last usable one (zero before the first), an unusable v by zero. Every fallback is counted.
 ///
@@ -88,7 +112,17 @@ class TorqueController {
                                    const Eigen::Ref<const Eigen::VectorXd>& v,
                                    const Eigen::Ref<const Eigen::VectorXd>& acceleration,
                                    const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                   const Eigen::Ref<const Eigen::VectorXd>& bias, TorqueSolution& solution) noexcept;
+                                   const Eigen::Ref<const Eigen::VectorXd>& bias, TorqueSolution& solution) noexcept {
+    return solve(q, v, acceleration, mass_matrix, bias, nullptr, solution);
+  }
+
+  /// The same with the clearances at (q, v), for example those of a GeometricSystem::Workspace; none if null.
+  [[nodiscard]] TorqueStatus solve(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                   const Eigen::Ref<const Eigen::VectorXd>& v,
+                                   const Eigen::Ref<const Eigen::VectorXd>& acceleration,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
+                                   const Eigen::Ref<const Eigen::VectorXd>& bias, const Clearances* clearances,
+                                   TorqueSolution& solution) noexcept;
 
   const TorqueControllerSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return nv_; }
@@ -96,9 +130,19 @@ class TorqueController {
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
  private:
+  /// The second program for up to `num_rows` clearances and position limits.
+  struct Relaxed {
+    Relaxed(int nv, int num_rows);
+    int num_rows;
+    QuadraticProgramData data;  // over (q̈, slack of the bounds, slack of the rows)
+    QuadraticProgram program;
+  };
+
   bool solve_within_bounds(TorqueSolution& solution) noexcept;
-  bool solve_relaxed(TorqueSolution& solution) noexcept;
+  TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
+  void collect_relaxed_rows() noexcept;
   bool accept(TorqueSolution& solution) noexcept;
+  void report_safety(TorqueSolution& solution) noexcept;
   void stop(bool mass_known, TorqueSolution& solution) noexcept;
   bool factorise_mass() noexcept;
 
@@ -107,11 +151,18 @@ class TorqueController {
   JointLimits limits_;
   Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
   AccelerationBounds bounds_;
-  QuadraticProgramData hard_data_, relaxed_data_;
-  QuadraticProgram hard_, relaxed_;
+  SafetyRows rows_;
+  QuadraticProgramData hard_data_;
+  QuadraticProgram hard_;
+  std::vector<Relaxed> relaxed_;                   // by number of rows, so that the usual few stay cheap
+  // Rows of the second program: k >= 0 is row k of rows_, k < 0 a position limit of joint (-1 - k)/2, odd ones upper.
+  std::vector<int> relaxed_rows_;
+  int num_relaxed_rows_ = 0;
+  Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
+  Eigen::VectorXd box_, box_lower_;                // beyond which the second program does not look
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
-  std::int64_t counts_[5] = {};
+  std::int64_t counts_[6] = {};
 };
 
 }  // namespace sidestep

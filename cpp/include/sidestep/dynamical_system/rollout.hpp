@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
+#include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
 
 namespace sidestep {
@@ -19,16 +21,21 @@ struct RolloutSettings {
   int steps = 1000;
   Integrator integrator = Integrator::semi_implicit_euler;
   bool time_steps = false;  ///< measure each call of GeometricSystem::acceleration
+  /// What the acceleration passes before it is applied; none if empty. Of the same period, and not with runge_kutta_4,
+  /// whose stages are not held.
+  std::optional<AccelerationFilter> filter = {};
 };
 
 /// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.
 struct Rollout {
   Eigen::VectorXd time;                ///< [s]
-  Eigen::MatrixXd q, v, acceleration;  ///< (steps + 1, nv)
+  Eigen::MatrixXd q, v, acceleration;  ///< (steps + 1, nv); the acceleration applied, filtered if there is a filter
   Eigen::MatrixXd values;              ///< ψ (steps + 1, m), NaN where the step fell back
   Eigen::MatrixXd switch_weights;      ///< (steps + 1, nv), the same
   std::vector<StepStatus> statuses;    ///< one per row
   Eigen::VectorXd step_seconds;        ///< [s] that the acceleration of each row took; empty if not asked for
+  std::vector<TorqueStatus> filter_statuses;  ///< one per row; empty without a filter
+  Eigen::VectorXd safety_slack;        ///< largest shortfall of a row's clearances [m/s²]; empty without a filter
 };
 
 /// Integrates the system from (q, v), obstacles moving at their velocities.

@@ -14,18 +14,23 @@ namespace sidestep {
 /// become infinite and the ellipsoids cannot touch. Moving obstacles enter dψ/dt and d²ψ/dt² exactly.
 class ClearanceBarrier final : public Embedding {
  public:
-  /// The body must be calibrated. Throws std::invalid_argument that names what is wrong.
-  ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature = 0.002);
+  /// The body must be calibrated. Clearances are measured up to `reach` [m], at least to the activation distance: what
+  /// keeps them (TorqueController, AccelerationFilter) must see an obstacle from as far as the arm needs to stop.
+  /// Throws std::invalid_argument that names what is wrong.
+  ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature = 0.002,
+                   double reach = 0.3);
 
   int num_coordinates() const noexcept override { return field_.size(); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
 
   const ClearanceField& field() const noexcept { return field_; }
   const BarrierFunction& barrier() const noexcept { return barrier_; }
+  double reach() const noexcept { return reach_; }
 
  private:
   ClearanceField field_;
   BarrierFunction barrier_;
+  double reach_;
 };
 
 /// Adds ψ_k = f(h_k) with its derivatives, for every clearance within reach that `out.clearances` holds.

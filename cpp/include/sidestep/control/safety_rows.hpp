@@ -1,0 +1,118 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sidestep/embedding/clearances.hpp"
+#include "sidestep/kinematics/robot.hpp"
+
+namespace sidestep {
+
+/// How one clearance may shrink.
+struct ClosingLimits {
+  double comfortable;  ///< A: deceleration [m/s²] that is planned with
+  double hardest;      ///< deceleration [m/s²] that is demanded at most, when A turns out to be too little
+  double rate;         ///< γ [1/s]: close to the margin the closing speed is γ times the room left
+  double correction;   ///< fraction of an excess of closing speed that is taken away per period, in (0, 1]
+};
+
+// From a clearance to a linear constraint on the acceleration.
+//
+// Let s = h − margin be the room left and u = −dh/dt the closing speed, obstacle motion included. With c = d²h/dt² at
+// q̈ = 0 and the acceleration a held for one period T, the closing speed is  w = u − (c + ∇h·a) T  afterwards, up to
+// terms of order T². So a bound w ≤ w_max is one linear inequality,
+//     ∇h·a ≥ (u − w_max)/T − c.
+//
+// Which closing speeds leave enough room? Close to the margin γ s, so that the room shrinks at most exponentially; the
+// deceleration along that line is γ u, which a fast approach could not deliver. So from u = A/γ on, the parabola of
+// constant deceleration A that continues the line with the same slope:
+//     room needed   p(u) = u/γ                       for u ≤ A/γ,
+//                   p(u) = u²/2A + A/2γ²             beyond,             p(−u) = −p(u).
+// (The exponential line is the second-order exponential barrier condition h'' ≥ −(γ₁+γ₂)h' − γ₁γ₂ s with γ₂ → ∞; the
+// parabola is what a plain barrier condition lacks: it knows how hard the arm can brake.)
+//
+// Sampled exactly. The next state has to be viable, p(w) ≤ s₊, both under exact integration, s₊ = s − T(u + w)/2, and
+// under semi-implicit Euler, s₊ = s − T w:
+//     p(w) + c T w ≤ s − (1 − c) T u,       c = 1/2 when braking (w < u), 1 when not,
+// whose largest solution is a root of a line or a parabola. If s ≥ p(u) now, then decelerating by at most A meets it:
+// on the parabola w = u − AT under exact integration gives p(u) − p(w) = T(u + w)/2 with equality, on the line less than
+// γ u ≤ A does, and semi-implicit Euler needs less. So for one clearance on its own, with deceleration A available, the
+// margin is kept for ever and no more than A is ever demanded, whatever T is.
+//
+// Outside (s < p(u): an obstacle that appeared, a disturbance, another constraint that won) meeting it at once would
+// be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
+// the profile itself decelerates with, plus correction·e/T, and never above the hardest deceleration the limits allow.
+// A room that is negative grows back the same way, with a closing speed of p⁻¹(s) < 0.
+
+/// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
+/// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.
+double demanded_deceleration(double room, double closing_speed, const ClosingLimits& limits, double period) noexcept;
+
+struct SafetySettings {
+  /// Clearance that is kept [m]. Covers what the model does not see: the reduction over points is high by up to its
+  /// temperature (2 mm by default), tracking error, one period of delay.
+  double margin = 0.005;
+  /// γ [1/s]. Larger lets the arm come close quicker and reacts more to noise; γT must stay well below 1.
+  double rate = 20.0;
+  /// A over the largest deceleration that the joint limits allow in the direction of ∇h [-]. What is left serves the
+  /// curvature c, other clearances and limits, and joints that cannot give all at once.
+  double braking_fraction = 0.5;
+  /// Fraction of an excess of closing speed that is taken away per period [-].
+  double correction = 0.5;
+  /// When more clearances are active than `max_rows`, those with the smallest room predicted this far ahead are kept,
+  /// s − u lookahead [s].
+  double lookahead = 0.1;
+  /// Room for that many rows [-].
+  int max_rows = 32;
+
+  /// Throws std::invalid_argument that names the setting, its value and what is allowed.
+  void validate() const;
+};
+
+/// What the torque adds to the knowledge of how hard the arm can brake: the Cholesky factor of M, and the bias.
+struct BrakingTorque {
+  const Eigen::MatrixXd& mass_cholesky;
+  const Eigen::VectorXd& bias;
+};
+
+/// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|.
+class SafetyRows {
+ public:
+  /// Throws std::invalid_argument if the settings are not valid.
+  SafetyRows(int num_coordinates, SafetySettings settings);
+
+  void clear() noexcept { size_ = 0; }
+
+  /// Whether the sizes match and every entry within reach is finite.
+  bool usable(const Clearances& clearances) const noexcept;
+
+  /// The most critical clearances of usable ones. The hardest deceleration is Σ_j |∂h/∂q_j| (acceleration limit)_j or,
+  /// given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. No allocation.
+  void update(const Clearances& clearances, const JointLimits& limits, double period,
+              const BrakingTorque* torque = nullptr) noexcept;
+
+  /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
+  bool satisfied_within(int k, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) const noexcept;
+
+  int size() const noexcept { return size_; }
+  int max_size() const noexcept { return settings_.max_rows; }
+  const SafetySettings& settings() const noexcept { return settings_; }
+
+  using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  RowMatrix normals;                ///< (max, nv), the first size() in use
+  Eigen::VectorXd lower;            ///< (max) [rad/s²]: required/length
+  Eigen::VectorXd lengths;          ///< (max) |∇h| [m/rad]
+  std::vector<int> coordinates;     ///< (max) which clearance a row belongs to, most critical first
+  std::vector<int> nearest;         ///< (max) its nearest obstacle point
+
+ private:
+  double hardest_deceleration(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
+                              const BrakingTorque* torque) noexcept;
+
+  SafetySettings settings_;
+  int size_ = 0;
+  Eigen::VectorXd urgency_;  // (max) predicted room of the rows chosen, ascending
+  Eigen::VectorXd response_; // (nv) M⁻¹ ∇h
+};
+
+}  // namespace sidestep

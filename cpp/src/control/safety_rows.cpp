@@ -1,0 +1,165 @@
+#include "sidestep/control/safety_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "cholesky.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+// A clearance whose gradient is shorter than this [m/rad] is one that no joint can change.
+constexpr double shortest_gradient = 1e-9;
+// Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
+constexpr double smallest_deceleration = 1e-6;
+
+/// The speed w with p(w) + delay w = room; with delay = 0 the inverse of p. Odd in the room.
+double speed_within(double room, double delay, double A, double rate) noexcept {
+  const double size = std::abs(room);
+  double speed = size / (1.0 / rate + delay);
+  if (speed > A / rate) {
+    speed = A * (std::sqrt(delay * delay + 2.0 * (size - 0.5 * A / (rate * rate)) / A) - delay);
+  }
+  return std::copysign(speed, room);
+}
+
+/// p(u): the room that a closing speed needs.
+double room_needed(double speed, double A, double rate) noexcept {
+  const double size = std::abs(speed);
+  return std::copysign(size > A / rate ? 0.5 * (size * size / A + A / (rate * rate)) : size / rate, speed);
+}
+
+void check(bool allowed, const char* setting, double value, const char* range) {
+  if (!allowed) {
+    throw std::invalid_argument(std::string("safety: ") + setting + " is " + std::to_string(value) + ", must be " +
+                                range);
+  }
+}
+
+}  // namespace
+
+double demanded_deceleration(double room, double u, const ClosingLimits& limits, double period) noexcept {
+  const double A = limits.comfortable, rate = limits.rate;
+  const bool braking = room_needed(u, A, rate) + u * period > room;
+  const double c = braking ? 0.5 : 1.0;
+  const double next = speed_within(room - (1.0 - c) * u * period, c * period, A, rate);
+  const double at_once = (u - next) / period;
+  const double allowed = speed_within(room, 0.0, A, rate);
+  if (u <= allowed) {
+    return at_once;
+  }
+  const double along_profile = std::clamp(rate * allowed, -A, A);
+  return std::min({at_once, along_profile + limits.correction * (u - allowed) / period, limits.hardest});
+}
+
+void SafetySettings::validate() const {
+  check(margin >= 0.0 && margin < infinity, "margin", margin, "finite and >= 0");
+  check(rate > 0.0 && rate < infinity, "rate", rate, "finite and positive");
+  check(braking_fraction > 0.0 && braking_fraction <= 1.0, "braking_fraction", braking_fraction, "in (0, 1]");
+  check(correction > 0.0 && correction <= 1.0, "correction", correction, "in (0, 1]");
+  check(lookahead >= 0.0 && lookahead < infinity, "lookahead", lookahead, "finite and >= 0");
+  check(max_rows >= 0, "max_rows", max_rows, ">= 0");
+}
+
+SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
+    : normals(RowMatrix::Zero(settings.max_rows < 0 ? 0 : settings.max_rows, num_coordinates)),
+      lower(Eigen::VectorXd::Zero(normals.rows())),
+      lengths(Eigen::VectorXd::Zero(normals.rows())),
+      coordinates(static_cast<std::size_t>(normals.rows())),
+      nearest(static_cast<std::size_t>(normals.rows())),
+      settings_((settings.validate(), settings)),
+      urgency_(Eigen::VectorXd::Zero(normals.rows())),
+      response_(Eigen::VectorXd::Zero(num_coordinates)) {}
+
+bool SafetyRows::usable(const Clearances& clearances) const noexcept {
+  const Eigen::Index num = clearances.nearest.size();
+  if (clearances.values.size() != num || clearances.rates.size() != num || clearances.curvatures.size() != num ||
+      clearances.gradients.rows() != normals.cols() || clearances.gradients.cols() != num) {
+    return false;
+  }
+  for (Eigen::Index k = 0; k < num; ++k) {
+    if (clearances.nearest[k] >= 0 &&
+        !(std::isfinite(clearances.values[k]) && std::isfinite(clearances.rates[k]) &&
+          std::isfinite(clearances.curvatures[k]) && clearances.gradients.col(k).allFinite())) {
+      return false;
+    }
+  }
+  return true;
+}
+
+double SafetyRows::hardest_deceleration(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
+                                        const BrakingTorque* torque) noexcept {
+  double of_limits = 0.0, of_torque = 0.0;
+  for (Eigen::Index j = 0; j < gradient.size(); ++j) {
+    if (gradient[j] != 0.0) {
+      of_limits += std::abs(gradient[j]) * limits.acceleration[j];
+    }
+  }
+  if (torque == nullptr) {
+    return of_limits;
+  }
+  response_ = gradient;
+  solve_in_place(torque->mass_cholesky, response_);
+  for (Eigen::Index j = 0; j < gradient.size(); ++j) {
+    if (response_[j] != 0.0) {
+      of_torque += std::abs(response_[j]) * limits.effort[j] - response_[j] * torque->bias[j];
+    }
+  }
+  return std::min(of_limits, of_torque);
+}
+
+void SafetyRows::update(const Clearances& clearances, const JointLimits& limits, double period,
+                        const BrakingTorque* torque) noexcept {
+  // Insert into the list of the most critical, which is kept sorted; it is short.
+  size_ = 0;
+  for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
+    if (clearances.nearest[k] < 0 || max_size() == 0 ||
+        !(clearances.gradients.col(k).norm() > shortest_gradient)) {
+      continue;
+    }
+    const double room = clearances.values[k] - settings_.margin;
+    const double urgency = room + settings_.lookahead * clearances.rates[k];
+    if (size_ == max_size() && urgency >= urgency_[size_ - 1]) {
+      continue;
+    }
+    int at = size_ < max_size() ? size_++ : size_ - 1;
+    for (; at > 0 && urgency_[at - 1] > urgency; --at) {
+      urgency_[at] = urgency_[at - 1];
+      coordinates[static_cast<std::size_t>(at)] = coordinates[static_cast<std::size_t>(at) - 1];
+    }
+    urgency_[at] = urgency;
+    coordinates[static_cast<std::size_t>(at)] = static_cast<int>(k);
+  }
+  for (int row = 0; row < size_; ++row) {
+    const int k = coordinates[static_cast<std::size_t>(row)];
+    const auto gradient = clearances.gradients.col(k);
+    const double hardest = std::max(hardest_deceleration(gradient, limits, torque), smallest_deceleration);
+    const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,
+                                settings_.rate, settings_.correction};
+    const double demand =
+        demanded_deceleration(clearances.values[k] - settings_.margin, -clearances.rates[k], closing, period);
+    const double length = gradient.norm();
+    normals.row(row) = gradient.transpose() / length;
+    lower[row] = (demand - clearances.curvatures[k]) / length;
+    lengths[row] = length;
+    nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];
+  }
+}
+
+bool SafetyRows::satisfied_within(int k, const Eigen::VectorXd& box_lower,
+                                  const Eigen::VectorXd& box_upper) const noexcept {
+  double smallest = 0.0;
+  for (Eigen::Index j = 0; j < box_lower.size(); ++j) {
+    const double n = normals(k, j);
+    if (n != 0.0) {
+      smallest += n > 0.0 ? n * box_lower[j] : n * box_upper[j];
+    }
+  }
+  return smallest >= lower[k];
+}
+
+}  // namespace sidestep
