@@ -263,13 +263,17 @@ class ClearanceBarrier(Embedding):
     activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.
     strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer
     and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between
-    neighbouring points. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
+    neighbouring points. reach [m]: clearances are measured up to here, so that what keeps them sees an obstacle
+    from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.3) -> None: ...
 
     @property
     def activation(self) -> float: ...
+
+    @property
+    def reach(self) -> float: ...
 
     @property
     def components(self) -> list[int]:
@@ -511,6 +515,16 @@ class Rollout:
         """
 
     @property
+    def filter_statuses(self) -> list[TorqueStatus]:
+        """One TorqueStatus per row; empty without a filter."""
+
+    @property
+    def safety_slack(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (steps + 1,) largest shortfall of a clearance's constraint [m/s^2]; empty without a filter.
+        """
+
+    @property
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """(steps + 1, nv) [rad]"""
 
@@ -530,10 +544,11 @@ class Rollout:
     def switch(self) -> numpy.typing.NDArray[numpy.float64]:
         """Weights of the harmonic part (steps + 1, nv)"""
 
-def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout:
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None) -> Rollout:
     """
     Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.
-    period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.
+    period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
+    filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4.
     """
 
 class QuadraticProgramStatus(enum.Enum):
