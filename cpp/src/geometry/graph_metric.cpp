@@ -2,62 +2,80 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 namespace sidestep {
 
 GraphMetric::GraphMetric(int nv, int m)
-    : matrix_(Eigen::MatrixXd::Identity(nv, nv)),
+    : used_(static_cast<std::size_t>(m), 0),
       jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m)),
-      small_matrix_(Eigen::MatrixXd::Identity(std::min(m, nv), std::min(m, nv))),
-      factor_(small_matrix_),
+      factor_(Eigen::MatrixXd::Zero(nv, nv)),
       along_(Eigen::VectorXd::Zero(m)) {}
 
 void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed) noexcept {
-  jacobian_transposed_ = jacobian_transposed;
-  const auto& J_T = jacobian_transposed_;
-  matrix_.setIdentity();
-  matrix_ += J_T.lazyProduct(J_T.transpose());
-  if (J_T.cols() > J_T.rows()) {
-    factor_.compute(matrix_);
-  } else {
-    small_matrix_.setIdentity();
-    small_matrix_ += J_T.transpose().lazyProduct(J_T);
-    if (J_T.cols() > 1) {
-      factor_.compute(small_matrix_);
+  num_used_ = 0;
+  for (Eigen::Index a = 0; a < jacobian_transposed.cols(); ++a) {
+    if ((jacobian_transposed.col(a).array() != 0.0).any()) {
+      jacobian_transposed_.col(num_used_) = jacobian_transposed.col(a);
+      used_[static_cast<std::size_t>(num_used_++)] = a;
     }
+  }
+  const auto J_T = columns();
+  if (num_used_ == 1) {
+    factor_(0, 0) = std::sqrt(1.0 + J_T.squaredNorm());
+  } else if (num_used_ > 1) {
+    const Eigen::Index size = std::min(num_used_, J_T.rows());
+    Eigen::Ref<Eigen::MatrixXd> matrix = factor_.topLeftCorner(size, size);
+    matrix.setIdentity();
+    if (is_small()) {
+      matrix += J_T.transpose().lazyProduct(J_T);
+    } else {
+      matrix += J_T.lazyProduct(J_T.transpose());
+    }
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(matrix);
   }
 }
 
-void GraphMetric::solve_small(Eigen::Ref<Eigen::VectorXd> c) const noexcept {
-  if (c.size() == 1) {
-    c[0] /= small_matrix_(0, 0);
+Eigen::MatrixXd GraphMetric::matrix() const {
+  const Eigen::Index nv = jacobian_transposed_.rows();
+  return Eigen::MatrixXd::Identity(nv, nv) + columns() * columns().transpose();
+}
+
+void GraphMetric::solve_factored(Eigen::Ref<Eigen::VectorXd> x) const noexcept {
+  if (x.size() == 1) {
+    x[0] /= factor_(0, 0) * factor_(0, 0);
   } else {
-    factor_.solveInPlace(c);
+    const auto L = factor_.topLeftCorner(x.size(), x.size());
+    L.triangularView<Eigen::Lower>().solveInPlace(x);
+    L.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
   }
 }
 
 void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept {
-  const auto& J_T = jacobian_transposed_;
-  if (J_T.cols() > J_T.rows()) {
-    factor_.solveInPlace(x);
-  } else if (J_T.cols() > 0) {
-    along_ = J_T.transpose().lazyProduct(x);
-    solve_small(along_);
-    x -= J_T.lazyProduct(along_);
+  if (num_used_ == 0) {
+    return;
   }
+  if (!is_small()) {
+    solve_factored(x);
+    return;
+  }
+  auto along = along_.head(num_used_);
+  along = columns().transpose().lazyProduct(x);
+  solve_factored(along);
+  x -= columns().lazyProduct(along);
 }
 
 void GraphMetric::solve_pullback(const Eigen::Ref<const Eigen::VectorXd>& c, Eigen::Ref<Eigen::VectorXd> x) noexcept {
-  const auto& J_T = jacobian_transposed_;
-  if (J_T.cols() > J_T.rows()) {
-    x = J_T.lazyProduct(c);
-    factor_.solveInPlace(x);
-  } else if (J_T.cols() > 0) {
-    along_ = c;
-    solve_small(along_);
-    x = J_T.lazyProduct(along_);
-  } else {
-    x.setZero();
+  auto along = along_.head(num_used_);
+  for (Eigen::Index a = 0; a < num_used_; ++a) {
+    along[a] = c[used_[static_cast<std::size_t>(a)]];
+  }
+  if (num_used_ > 0 && is_small()) {
+    solve_factored(along);
+  }
+  x = columns().lazyProduct(along);
+  if (!is_small()) {
+    solve_factored(x);
   }
 }
 

@@ -7,8 +7,14 @@ namespace sidestep {
 KinematicState::KinematicState(const Robot& robot)
     : q_(robot.num_coordinates()), v_(robot.num_coordinates()), links_(robot.joints().size()) {
   for (std::size_t i = 0; i < links_.size(); ++i) {
-    links_[i].parent = robot.joints()[i].parent;
-    links_[i].coordinate = robot.joints()[i].coordinate;
+    const Joint& joint = robot.joints()[i];
+    links_[i].parent = joint.parent;
+    links_[i].coordinate = joint.coordinate;
+    const Eigen::Vector3d& a = joint.axis;
+    const Eigen::Matrix3d R_PJ = joint.X_PJ.linear();
+    Eigen::Matrix3d cross;
+    cross << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
+    rotations_.push_back({R_PJ * a * a.transpose(), R_PJ - R_PJ * a * a.transpose(), R_PJ * cross});
   }
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.num_coordinates());
   update(robot, zero, zero);
@@ -26,28 +32,20 @@ void KinematicState::update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd
     const double position = joint.multiplier * q[joint.coordinate] + joint.offset;
     const double velocity = v[joint.coordinate];
 
-    const Eigen::Matrix3d R_WJ = parent.R_WL * joint.X_PJ.linear();
     const Eigen::Vector3d p_WJ = parent.p_WL + parent.R_WL * joint.X_PJ.translation();
-    const Eigen::Vector3d axis_W = R_WJ * joint.axis;
     if (joint.type == JointType::revolute) {
-      // Rodrigues: R_WJ exp(position [axis]×), with the axis in the joint frame.
-      const Eigen::Vector3d& a = joint.axis;
-      const double s = std::sin(position);
-      const double c = std::cos(position);
-      const Eigen::Vector3d b = (1.0 - c) * a;
-      Eigen::Matrix3d rotation;
-      rotation << c + b.x() * a.x(), b.x() * a.y() - s * a.z(), b.x() * a.z() + s * a.y(),  //
-          b.y() * a.x() + s * a.z(), c + b.y() * a.y(), b.y() * a.z() - s * a.x(),          //
-          b.z() * a.x() - s * a.y(), b.z() * a.y() + s * a.x(), c + b.z() * a.z();
-      link.R_WL.noalias() = R_WJ * rotation;
+      const Rotation& rotation = rotations_[i];
+      const Eigen::Matrix3d R_PL =
+          rotation.fixed + std::cos(position) * rotation.cosine + std::sin(position) * rotation.sine;
+      link.R_WL = parent.R_WL.lazyProduct(R_PL);
       link.p_WL = p_WJ;
-      link.screw.angular = joint.multiplier * axis_W;
+      link.screw.angular = joint.multiplier * (link.R_WL * joint.axis);
       link.screw.linear = p_WJ.cross(link.screw.angular);
     } else {
-      link.R_WL = R_WJ;
-      link.p_WL = p_WJ + position * axis_W;
+      link.R_WL = parent.R_WL.lazyProduct(joint.X_PJ.linear());
       link.screw.angular.setZero();
-      link.screw.linear = joint.multiplier * axis_W;
+      link.screw.linear = joint.multiplier * (link.R_WL * joint.axis);
+      link.p_WL = p_WJ + position * (link.R_WL * joint.axis);
     }
 
     const Eigen::Vector3d joint_angular = velocity * link.screw.angular;

@@ -10,8 +10,11 @@ namespace sidestep {
 ///
 ///     G = I + Jᵀ J                                              (T2.9, T4.1 for m = 1)
 ///
+/// Coordinates whose gradient is zero, such as barriers out of reach, cost nothing: only the others are used.
+///
 /// Next to an obstacle J is large, and G alone loses the digits of all other directions: |J|² is 1e12 beside a thin
-/// Gaussian. While m <= nv the small matrix S = I + J Jᵀ is factorised instead (Woodbury; Sherman–Morrison for m = 1):
+/// Gaussian. While at most nv coordinates are in use the small matrix S = I + J Jᵀ is factorised instead (Woodbury;
+/// Sherman–Morrison for one):
 ///
 ///     G⁻¹ x = x − Jᵀ S⁻¹ J x,     G⁻¹ Jᵀ c = Jᵀ S⁻¹ c.
 ///
@@ -30,16 +33,19 @@ class GraphMetric {
   /// x ← G⁻¹ Jᵀ c for c (m). No allocation.
   void solve_pullback(const Eigen::Ref<const Eigen::VectorXd>& c, Eigen::Ref<Eigen::VectorXd> x) noexcept;
 
-  const Eigen::MatrixXd& matrix() const noexcept { return matrix_; }
+  /// G itself (nv × nv), for tests and plots.
+  Eigen::MatrixXd matrix() const;
 
  private:
-  void solve_small(Eigen::Ref<Eigen::VectorXd> c) const noexcept;
+  auto columns() const noexcept { return jacobian_transposed_.leftCols(num_used_); }
+  bool is_small() const noexcept { return num_used_ <= jacobian_transposed_.rows(); }
+  void solve_factored(Eigen::Ref<Eigen::VectorXd> x) const noexcept;
 
-  Eigen::MatrixXd matrix_;               // G
-  Eigen::MatrixXd jacobian_transposed_;  // Jᵀ (nv × m)
-  Eigen::MatrixXd small_matrix_;         // S, where m <= nv
-  Eigen::LLT<Eigen::MatrixXd> factor_;   // of S where m <= nv, else of G
-  Eigen::VectorXd along_;                // J x, then S⁻¹ J x (m)
+  Eigen::Index num_used_ = 0;            // coordinates with a gradient
+  std::vector<Eigen::Index> used_;       // which ones
+  Eigen::MatrixXd jacobian_transposed_;  // their gradients, as columns
+  Eigen::MatrixXd factor_;               // Cholesky factor of S, or of G, in the top left corner
+  Eigen::VectorXd along_;                // J x, then S⁻¹ J x
 };
 
 /// The geodesic acceleration g = −Ξ v = −G⁻¹ Jᵀ c (T5.3 in closed form), from J (m × nv) and c = d²ψ/dt² (m).

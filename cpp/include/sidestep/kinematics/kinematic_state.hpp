@@ -50,8 +50,16 @@ class KinematicState {
   int num_links() const noexcept { return static_cast<int>(links_.size()); }
 
  private:
+  /// The rotation of a joint about its unit axis a, R_PJ exp(θ [a]×) = fixed + cos θ · cosine + sin θ · sine (Rodrigues).
+  struct Rotation {
+    Eigen::Matrix3d fixed;   // R_PJ a aᵀ
+    Eigen::Matrix3d cosine;  // R_PJ (I − a aᵀ)
+    Eigen::Matrix3d sine;    // R_PJ [a]×
+  };
+
   Eigen::VectorXd q_, v_;
   std::vector<Link> links_;
+  std::vector<Rotation> rotations_;
 };
 
 /// Pose X_WF of a frame.
