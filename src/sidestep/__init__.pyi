@@ -1,4 +1,5 @@
 from ._core import BinarySwitch as BinarySwitch
+from ._core import ClearanceBarrier as ClearanceBarrier
 from ._core import CollisionDensity as CollisionDensity
 from ._core import DampingForm as DampingForm
 from ._core import DistanceSwitch as DistanceSwitch
@@ -8,8 +9,11 @@ from ._core import GeodesicOnly as GeodesicOnly
 from ._core import GeometricSystem as GeometricSystem
 from ._core import HarmonicOnly as HarmonicOnly
 from ._core import Integrator as Integrator
+from ._core import JointLimitBarrier as JointLimitBarrier
 from ._core import JointLimitPotential as JointLimitPotential
+from ._core import PlaneBarrier as PlaneBarrier
 from ._core import Rollout as Rollout
+from ._core import SelfCollisionBarrier as SelfCollisionBarrier
 from ._core import SigmoidSwitch as SigmoidSwitch
 from ._core import Step as Step
 from ._core import StepStatus as StepStatus

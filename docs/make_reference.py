@@ -1,0 +1,51 @@
+"""Writes docs/reference.md from the public names and the first sentence of each docstring.
+
+Run it after adding or renaming a public name; a test fails while the page differs from what this would write.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+
+import sidestep
+
+PAGE = Path(__file__).parent / "reference.md"
+STUB = Path(sidestep.__file__).parent / "__init__.pyi"
+HEADING = {"_core": "Core: embeddings, geometry, dynamical system"}
+INTRODUCTION = """# Reference
+
+Every public name of `sidestep`; `python docs/make_reference.py` writes this page. `help(sidestep.NAME)` has arguments,
+shapes, units, frames and errors.
+"""
+
+
+def first_sentence(name: str) -> str:
+    """The first sentence of a public object's docstring, or what comes before its formula, on one line."""
+    text = inspect.getdoc(getattr(sidestep, name)) or ""
+    if re.match(rf"{name}\(.*\)( -> .*)?$", text.split("\n")[0]):  # a signature that the binding put first
+        text = text.split("\n", 1)[1].strip()
+    paragraph = re.split(r"\n\s*\n|\n    ", text)[0]
+    line = " ".join(paragraph.split())
+    return re.split(r"(?<=[a-z\])])\. (?=[A-Z])", line)[0].rstrip(",;:").replace("|", "/")
+
+
+def page() -> str:
+    """The whole page."""
+    names: dict[str, list[str]] = {}
+    for module, name in re.findall(
+        r"^from \.(\w+)\S* import (\w+)", STUB.read_text(encoding="utf-8"), re.MULTILINE
+    ):
+        if not name.startswith("__"):
+            names.setdefault(module, []).append(name)
+    parts = [INTRODUCTION]
+    for module, members in sorted(names.items()):
+        parts.append(f"\n## {HEADING.get(module, module.replace('_', ' ').capitalize())}\n")
+        parts.append("| name | what it is |\n|---|---|")
+        parts += [f"| `{name}` | {first_sentence(name)} |" for name in sorted(members)]
+    return "\n".join(parts) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
