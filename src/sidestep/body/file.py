@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from sidestep.robot import Robot
 
 FORMAT = "sidestep-body"
-FORMAT_VERSION = 2  # 2 added covers and levels; raise it when a reader of the old files would misread a new one, or when fits change
+# 2 added covers and levels. To be raised when a reader of the old files would misread a new one, or when fits change.
+FORMAT_VERSION = 2
 READABLE_VERSIONS = (1, FORMAT_VERSION)  # version 1 has no levels: good for the density, not for a barrier
 
 
