@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from sidestep._core import __version__
-from sidestep.cli import fit_command, list_commands, reproduce_command, run_command
+from sidestep.cli import bench_command, fit_command, list_commands, reproduce_command, run_command
 
 app = typer.Typer(
     name="sidestep",
@@ -27,6 +27,7 @@ app.command("schema")(list_commands.schema)
 app.command("robots")(list_commands.robots)
 app.command("fit")(fit_command.fit)
 app.command("reproduce")(reproduce_command.reproduce)
+app.add_typer(bench_command.app, name="bench")
 
 
 def main() -> None:

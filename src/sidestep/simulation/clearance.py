@@ -8,6 +8,7 @@ the triangles of the collision meshes.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import coal
@@ -109,6 +110,13 @@ class ExactClearance:
         if not self._links:
             raise ValueError(f"robot {robot.name!r} has no moving link with a collision mesh to measure from")
         self._objects = [_object_solid(item) for item in self.objects]
+
+    def among(self, objects: Sequence[SceneObject]) -> ExactClearance:
+        """The same robot among other objects; shares the links, which take long to prepare."""
+        other = copy(self)
+        other.objects = check_scene(objects)
+        other._objects = [_object_solid(item) for item in other.objects]
+        return other
 
     def distance(self, q: Array, object_poses: Array | None = None) -> Clearance:
         """The closest pair at one configuration.

@@ -214,10 +214,10 @@ def _rms(run: SimulationRun | None, a: str, b: str) -> float | None:
 
 def _violations(run: Run) -> LimitViolations:
     limits = run.robot.limits
-    position = _excess(np.maximum(limits.lower - run.q, run.q - limits.upper), np.zeros(1))
-    velocity = _excess(np.abs(run.v), limits.velocity)
-    acceleration = _excess(np.abs(run.achieved), limits.acceleration)
-    torque = _excess(np.abs(run.torque), limits.effort) if isinstance(run, SimulationRun) else None
+    position = excess_over(np.maximum(limits.lower - run.q, run.q - limits.upper), np.zeros(1))
+    velocity = excess_over(np.abs(run.v), limits.velocity)
+    acceleration = excess_over(np.abs(run.achieved), limits.acceleration)
+    torque = excess_over(np.abs(run.torque), limits.effort) if isinstance(run, SimulationRun) else None
     return LimitViolations(
         position=position[0],
         velocity=velocity[0],
@@ -230,7 +230,7 @@ def _violations(run: Run) -> LimitViolations:
     )
 
 
-def _excess(values: Array, limit: Array) -> tuple[int, float]:
+def excess_over(values: Array, limit: Array) -> tuple[int, float]:
     """Number of samples beyond a limit (nv,) that carry any excess, and the largest excess."""
     excess = values - limit
     beyond = excess > LIMIT_SLACK * np.maximum(limit, 1.0)

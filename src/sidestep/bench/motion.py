@@ -1,0 +1,172 @@
+"""One motion of a method through a problem: integrated, or under torque control in MuJoCo."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import GeometricSystem, Obstacles, TorqueController, rollout
+from sidestep.bench.problems import ReachProblem
+from sidestep.robot import Robot
+from sidestep.simulation import Arrival, Simulation
+
+Array = npt.NDArray[np.float64]
+
+CHUNK = 1.0  # [s] integrated between two looks at arrival
+
+
+@dataclass(frozen=True)
+class MotionSettings:
+    """How problems are run.
+
+    Attributes:
+        period: control period [s]. duration: after it the arm has not arrived [s].
+        tolerance: it has arrived once every joint is this close to the goal [rad | m].
+        torque: under torque control in MuJoCo, with the real masses, instead of integrated.
+
+    Raises:
+        ValueError: a number that is not positive.
+    """
+
+    period: float = 0.001
+    duration: float = 30.0
+    tolerance: float = 0.05
+    torque: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("period", "duration", "tolerance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} is {value}, must be positive and finite")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What happened, up to arrival or the end: T rows, one per period.
+
+    Attributes:
+        q, v, a: (T, nv); a is the change of v over the period, except in the last row.
+        object_poses: (T, N, 7) of the balls.
+        torque: (T, nv), or None where there was none.
+        contacts: of MuJoCo, 0 without physics.
+        arrived: within the duration.
+        step_seconds: wall time [s] of steps: of the system alone, or with torque control of both from Python.
+    """
+
+    q: Array
+    v: Array
+    a: Array
+    object_poses: Array
+    torque: Array | None
+    contacts: int
+    arrived: bool
+    step_seconds: Array
+
+
+def move(robot: Robot, system: GeometricSystem, problem: ReachProblem, settings: MotionSettings) -> Motion:
+    """Runs one problem."""
+    run = _under_torque if settings.torque else _integrated
+    return run(robot, system, problem, settings)
+
+
+def _integrated(
+    robot: Robot, system: GeometricSystem, problem: ReachProblem, settings: MotionSettings
+) -> Motion:
+    total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, CHUNK))
+    q, v = problem.start, np.zeros_like(problem.start)
+    rows: list[tuple[Array, Array, Array]] = []
+    times: list[Array] = []
+    done, arrived = 0, False
+    while done < total and not arrived:
+        steps = min(chunk, total - done)
+        part = rollout(
+            system,
+            q,
+            v,
+            problem.goal,
+            _at(problem, done * settings.period),
+            period=settings.period,
+            steps=steps,
+            time_steps=True,
+        )
+        near = np.abs(part.q - problem.goal).max(axis=1) < settings.tolerance
+        keep = steps
+        if near.any():
+            keep, arrived = int(near.argmax()) + 1, True
+        # The last row is where the next part begins; only at the end of the motion is it kept here.
+        last = keep + 1 if not arrived and done + steps == total else keep
+        rows.append((part.q[:last], part.v[:last], part.acceleration[:last]))
+        times.append(part.step_seconds[:last])
+        q, v = part.q[steps], part.v[steps]
+        done += keep
+    q, v, a = (np.concatenate(columns) for columns in zip(*rows, strict=True))
+    at = settings.period * np.arange(len(q))
+    poses = np.zeros((len(q), len(problem.centers), 7))
+    poses[:, :, :3] = problem.centers + at[:, None, None] * problem.velocities
+    poses[:, :, 3] = 1.0
+    return Motion(q, v, a, poses, None, 0, arrived, np.concatenate(times))
+
+
+def _under_torque(
+    robot: Robot, system: GeometricSystem, problem: ReachProblem, settings: MotionSettings
+) -> Motion:
+    simulation = Simulation(robot, problem.objects, timestep=settings.period)
+    timer = _Timer()
+    run = simulation.run(
+        _TimedSystem(system, timer),
+        _TimedController(TorqueController(robot, period=settings.period), timer),
+        problem.start,
+        problem.goal,
+        settings.duration,
+        lambda time: _at(problem, time),
+        arrival=Arrival(position=settings.tolerance, speed=float("inf"), hold=0.0),
+    )
+    return Motion(
+        run.q,
+        run.v,
+        run.achieved,
+        run.object_poses,
+        run.torque,
+        len(run.contacts),
+        run.arrived,
+        np.array(timer.steps),
+    )
+
+
+def _at(problem: ReachProblem, time: float) -> Obstacles:
+    if len(problem.centers) == 0:
+        return Obstacles.none()
+    return Obstacles(problem.centers + time * problem.velocities, problem.radii, problem.velocities)
+
+
+class _Timer:
+    """Adds the time of a step's two calls."""
+
+    def __init__(self) -> None:
+        self.steps: list[float] = []
+
+
+class _TimedSystem:
+    def __init__(self, system: GeometricSystem, timer: _Timer) -> None:
+        self._system, self._timer = system, timer
+
+    def acceleration(self, q: Array, v: Array, goal: Array, obstacles: Obstacles) -> Any:
+        begin = time.perf_counter()
+        step = self._system.acceleration(q, v, goal, obstacles)
+        self._timer.steps.append(time.perf_counter() - begin)
+        return step
+
+
+class _TimedController:
+    def __init__(self, controller: TorqueController, timer: _Timer) -> None:
+        self._controller, self._timer = controller, timer
+
+    def solve(self, *args: Any, **kwargs: Any) -> Any:
+        begin = time.perf_counter()
+        solution = self._controller.solve(*args, **kwargs)
+        self._timer.steps[-1] += time.perf_counter() - begin
+        return solution

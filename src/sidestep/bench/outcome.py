@@ -1,0 +1,153 @@
+"""What came of a motion, judged on exact meshes between samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.bench.motion import Motion, MotionSettings
+from sidestep.bench.problems import ReachProblem
+from sidestep.bench.step_times import StepTimes
+from sidestep.robot import Robot
+from sidestep.simulation import ExactClearance, SelfCollision
+from sidestep.simulation.evaluation import excess_over
+
+Array = npt.NDArray[np.float64]
+
+TOLERANCE = 1e-3  # [m] of minimum clearances: the true one is at most this much smaller than the one reported
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one problem, from the start to arrival or the end of the time.
+
+    Attributes:
+        index: of the problem. arrived: within the time. time_s: of the motion. steps: of it.
+        error_rad: largest joint error at its end.
+        straight_line_blocked: of the problem.
+        min_clearance_m: exact, from any ball, between samples too; None without balls. Below 0: overlap.
+        clearance_pair, clearance_time_s: between what, and when.
+        contacts: contact points that MuJoCo counted; 0 without physics.
+        min_self_clearance_m: exact, between the links that may not touch; None without such. 0: touch.
+        self_pair: between which.
+        limits: worst excess of the limits that were broken at a sample, by name, in the limit's unit.
+        diverged: the state was not finite any more; the motion ends there.
+    """
+
+    index: int
+    arrived: bool
+    time_s: float
+    steps: int
+    error_rad: float
+    straight_line_blocked: bool
+    min_clearance_m: float | None
+    clearance_pair: str
+    clearance_time_s: float
+    contacts: int
+    min_self_clearance_m: float | None
+    self_pair: str
+    limits: dict[str, float]
+    diverged: bool
+
+    @property
+    def collision(self) -> bool:
+        """It touched a ball."""
+        return self.contacts > 0 or (self.min_clearance_m is not None and self.min_clearance_m <= 0.0)
+
+    @property
+    def self_collision(self) -> bool:
+        """It touched itself."""
+        return self.min_self_clearance_m is not None and self.min_self_clearance_m <= 0.0
+
+    @property
+    def success(self) -> bool:
+        """It arrived and touched nothing on the way."""
+        return self.arrived and not self.collision and not self.self_collision
+
+    @property
+    def stuck(self) -> bool:
+        """It touched nothing and did not arrive."""
+        return not self.arrived and not self.collision and not self.self_collision
+
+    def reasons(self) -> list[str]:
+        """What went wrong, a sentence each; empty when nothing did."""
+        found = []
+        if self.diverged:
+            found.append(f"the motion diverged after {self.time_s:.3f} s")
+        if self.collision:
+            clearance = 0.0 if self.min_clearance_m is None else self.min_clearance_m
+            counted = f", {self.contacts} MuJoCo contacts" if self.contacts else ""
+            found.append(
+                f"collision: {self.clearance_pair} {1e3 * clearance:.1f} mm"
+                f" at {self.clearance_time_s:.2f} s{counted}"
+            )
+        if self.self_collision:
+            found.append(f"self-collision: {self.self_pair}")
+        if self.stuck:
+            found.append(f"stuck: {self.error_rad:.2f} rad from the goal after {self.time_s:.1f} s")
+        found += [f"{name} limit exceeded by {value:.3g}" for name, value in self.limits.items()]
+        return found
+
+
+class Judge:
+    """Judges motions of one robot on its exact meshes.
+
+    Args:
+        robot: the arm. self_collision: its checker, if it is made already.
+    """
+
+    def __init__(self, robot: Robot, *, self_collision: SelfCollision | None = None) -> None:
+        self.robot = robot
+        self._self = self_collision or SelfCollision(robot)
+        self._clearance = ExactClearance(robot, ())
+
+    def judge(self, problem: ReachProblem, motion: Motion, settings: MotionSettings) -> Outcome:
+        """What came of a motion through a problem; see `Outcome`."""
+        finite = np.isfinite(motion.q).all(axis=1) & np.isfinite(motion.v).all(axis=1)
+        end = len(motion.q) if finite.all() else int(finite.argmin())
+        q = motion.q[:end]
+        clearance, pair, when = None, "", 0.0
+        if problem.objects:
+            exact = self._clearance.among(problem.objects)
+            worst = exact.minimum_over(q, motion.object_poses[:end], tolerance=TOLERANCE)
+            clearance = worst.clearance.distance
+            pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
+            when = worst.sample * settings.period
+        own = self._self.minimum_over(q, tolerance=TOLERANCE)
+        return Outcome(
+            index=problem.index,
+            arrived=motion.arrived,
+            time_s=settings.period * (end - 1),
+            steps=len(motion.step_seconds),
+            error_rad=float(np.abs(q[-1] - problem.goal).max()),
+            straight_line_blocked=problem.straight_line_blocked,
+            min_clearance_m=clearance,
+            clearance_pair=pair,
+            clearance_time_s=float(when),
+            contacts=motion.contacts,
+            min_self_clearance_m=own.distance if own.pair else None,
+            self_pair=" - ".join(own.pair),
+            limits=self._limits(motion, end),
+            diverged=end < len(motion.q),
+        )
+
+    def _limits(self, motion: Motion, end: int) -> dict[str, float]:
+        limits = self.robot.limits
+        q = motion.q[:end]
+        beyond = {
+            "position": excess_over(np.maximum(limits.lower - q, q - limits.upper), np.zeros(1)),
+            "velocity": excess_over(np.abs(motion.v[:end]), limits.velocity),
+            "acceleration": excess_over(np.abs(motion.a[:end]), limits.acceleration),
+        }
+        if motion.torque is not None:
+            beyond["torque"] = excess_over(np.abs(motion.torque[:end]), limits.effort)
+        return {name: worst for name, (count, worst) in beyond.items() if count > 0}
+
+
+def times_of(motion: Motion) -> StepTimes:
+    """The times of the steps of a motion."""
+    times = StepTimes()
+    times.add(motion.step_seconds)
+    return times

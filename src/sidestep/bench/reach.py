@@ -1,0 +1,199 @@
+"""Runs reach problems over processes and counts what came of them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import platform
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from sidestep._core import __version__
+from sidestep.bench.methods import Method, build_system
+from sidestep.bench.motion import MotionSettings, move
+from sidestep.bench.outcome import Judge, Outcome, times_of
+from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
+from sidestep.bench.step_times import StepTimes
+from sidestep.robot import Robot
+from sidestep.simulation import SelfCollision
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class BenchSettings:
+    """What is run.
+
+    Attributes:
+        problems: what is drawn. count: how many, from index 0.
+        method: how the arm is moved. motion: how problems are run.
+        jobs: processes.
+
+    Raises:
+        ValueError: count or jobs below 1.
+    """
+
+    problems: ProblemSettings
+    count: int = 100
+    method: Method = Method.barrier
+    motion: MotionSettings = MotionSettings()
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("count", "jobs"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}, must be at least 1")
+
+
+@dataclass(frozen=True, eq=False)
+class BenchResult:
+    """What came of all problems, in order.
+
+    Attributes:
+        settings: what was asked for. problems, outcomes: one each, by index. times: of all steps.
+    """
+
+    settings: BenchSettings
+    problems: tuple[ReachProblem, ...]
+    outcomes: tuple[Outcome, ...]
+    times: StepTimes
+
+    def to_document(self, *, failures: bool = False) -> dict[str, Any]:
+        """The figures for JSON; counts are numbers of problems, with `failures` also which and why.
+
+        Each problem is one of success, collision or self_collision (or both), stuck; limit_violations counts
+        problems in which a position, velocity, acceleration or torque limit was broken at any step.
+        """
+        outcomes = self.outcomes
+        clearances = [item.min_clearance_m for item in outcomes if item.min_clearance_m is not None]
+        own = [item.min_self_clearance_m for item in outcomes if item.min_self_clearance_m is not None]
+        arrivals = [item.time_s for item in outcomes if item.success]
+        broken = sorted({name for item in outcomes for name in item.limits})
+        document: dict[str, Any] = {
+            "robot": self.problems[0].robot,
+            "method": self.settings.method.value,
+            "torque": self.settings.motion.torque,
+            "problems": len(outcomes),
+            "success": sum(item.success for item in outcomes),
+            "collision": sum(item.collision for item in outcomes),
+            "stuck": sum(item.stuck for item in outcomes),
+            "self_collision": sum(item.self_collision for item in outcomes),
+            "limit_violations": sum(bool(item.limits) for item in outcomes),
+            "limits_broken": {
+                name: {
+                    "problems": sum(name in item.limits for item in outcomes),
+                    "worst_excess": max(item.limits.get(name, 0.0) for item in outcomes),
+                }
+                for name in broken
+            },
+            "min_clearance_m": min(clearances, default=None),
+            "min_self_clearance_m": min(own, default=None),
+            "straight_line_blocked": sum(item.straight_line_blocked for item in outcomes),
+            "success_where_blocked": sum(item.success and item.straight_line_blocked for item in outcomes),
+            "median_arrival_s": float(np.median(arrivals)) if arrivals else None,
+            "steps": sum(item.steps for item in outcomes),
+            "step_us": self.times.microseconds(),
+            "settings": {
+                "obstacles": len(self.problems[0].radii),
+                "seed": self.problems[0].seed,
+                "moving_m_s": self.settings.problems.moving,
+                **{key: value for key, value in asdict(self.settings.motion).items() if key != "torque"},
+            },
+            "jobs": self.settings.jobs,
+            "cpu": cpu_name(),
+            "version": __version__,
+        }
+        if failures:
+            document["failures"] = [
+                {"index": item.index, "reasons": item.reasons()} for item in outcomes if item.reasons()
+            ]
+        return document
+
+
+def run_bench(
+    settings: BenchSettings,
+    *,
+    problems: Sequence[ReachProblem] | None = None,
+    progress: Progress | None = None,
+) -> BenchResult:
+    """Runs problems and judges them; the same settings give the same outcomes with any number of processes.
+
+    Args:
+        settings: what to run.
+        problems: run these instead of drawing any; `settings.problems` and `count` are then not used.
+        progress: told of how many are done, of all, and a word about the last one.
+    """
+    robot = settings.problems.robot if problems is None else problems[0].robot
+    tasks: list[int | ReachProblem] = list(range(settings.count)) if problems is None else list(problems)
+    if progress is not None:
+        progress(0, len(tasks), "preparing the robot")
+    worker = _Worker(settings, robot)  # here first: bodies are made once, and the processes find them cached
+    drawn, outcomes, times = [], [], StepTimes()
+    for problem, outcome, steps in _results(worker, tasks):
+        drawn.append(problem)
+        outcomes.append(outcome)
+        times.merge(steps)
+        if progress is not None:
+            progress(len(outcomes), len(tasks), (outcome.reasons() or ["arrived"])[0])
+    order = np.argsort([problem.index for problem in drawn], kind="stable")
+    return BenchResult(settings, tuple(drawn[k] for k in order), tuple(outcomes[k] for k in order), times)
+
+
+class _Worker:
+    """What a process needs for any problem."""
+
+    def __init__(self, settings: BenchSettings, robot_name: str) -> None:
+        self.settings, self.robot_name = settings, robot_name
+        self._robot = Robot.named(robot_name)
+        own = SelfCollision(self._robot)
+        self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
+        self._judge = Judge(self._robot, self_collision=own)
+        self._system = build_system(settings.method, self._robot)
+
+    def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
+        problem = self._generator.problem(task) if isinstance(task, int) else task
+        motion = move(self._robot, self._system, problem, self.settings.motion)
+        return problem, self._judge.judge(problem, motion, self.settings.motion), times_of(motion)
+
+
+_worker: _Worker | None = None  # of this process
+
+
+def _start(settings: BenchSettings, robot_name: str) -> None:
+    global _worker
+    _worker = _Worker(settings, robot_name)
+
+
+def _run(task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
+    assert _worker is not None
+    return _worker.run(task)
+
+
+def _results(
+    worker: _Worker, tasks: Sequence[int | ReachProblem]
+) -> Iterator[tuple[ReachProblem, Outcome, StepTimes]]:
+    jobs = min(worker.settings.jobs, len(tasks))
+    if jobs == 1:
+        yield from map(worker.run, tasks)
+        return
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(jobs, initializer=_start, initargs=(worker.settings, worker.robot_name)) as pool:
+        yield from pool.imap_unordered(_run, tasks)
+
+
+def default_jobs() -> int:
+    """The processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def cpu_name() -> str:
+    """The model of the processor, or what the platform says of it."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    except OSError:
+        models = []
+    return models[0] if models else platform.processor() or platform.machine()

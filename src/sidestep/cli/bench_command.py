@@ -1,0 +1,142 @@
+"""`sidestep bench`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sidestep.bench.methods import Method
+from sidestep.cli.output import console, write_json
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sidestep.bench import BenchResult, BenchSettings, ReachProblem
+
+app = typer.Typer(help="Benchmarks on random problems.", no_args_is_help=True)
+
+
+@app.callback()
+def _bench() -> None:
+    pass  # keeps `reach` a command of its own
+
+
+@app.command("reach")
+def reach(
+    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    obstacles: Annotated[int, typer.Option(min=0, help="Balls per problem.")] = 10,
+    problems: Annotated[int, typer.Option(min=1, help="Number of problems.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the problems.")] = 0,
+    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.barrier,
+    moving: Annotated[
+        float, typer.Option(min=0.0, metavar="SPEED", help="Balls drift at up to this speed [m/s].")
+    ] = 0.0,
+    torque: Annotated[
+        bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
+    ] = False,
+    duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 30.0,
+    period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
+    problems_file: Annotated[
+        Path | None, typer.Option(help="Run the problems of this file, written by --export.")
+    ] = None,
+    export: Annotated[Path | None, typer.Option(help="Write the problems to this file (JSON).")] = None,
+    failures: Annotated[
+        bool, typer.Option("--failures", help="List the problems that went wrong, and why.")
+    ] = False,
+    json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Random reach problems: balls of 5-10 cm radius in the reachable shell, a random start, a random goal.
+
+    Collisions are judged on exact meshes between samples, until arrival or the end of the time. The same seed
+    gives the same problems and outcomes, with any number of processes. Exit code: 0 when nothing was touched
+    and no limit broken, 1 when not, 2 on bad input.
+    """
+    from sidestep.bench import (
+        BenchSettings,
+        MotionSettings,
+        ProblemSettings,
+        default_jobs,
+        read_problems,
+        write_problems,
+    )
+
+    given = None if problems_file is None else read_problems(problems_file)
+    settings = BenchSettings(
+        problems=ProblemSettings(
+            robot=robot if given is None else given[0].robot, obstacles=obstacles, seed=seed, moving=moving
+        ),
+        count=problems,
+        method=method,
+        motion=MotionSettings(period=period, duration=duration, torque=torque),
+        jobs=jobs or default_jobs(),
+    )
+    terminal = console(quiet=quiet, to_stderr=json == "-")
+    result = _run_and_show(settings, given, terminal)
+    document = result.to_document(failures=failures)
+    if export is not None:
+        write_problems(export, result.problems)
+    if not quiet:
+        terminal.print(_table(document))
+        for item in document.get("failures", ()):
+            terminal.print(f"{item['index']:5d}  {'; '.join(item['reasons'])}", highlight=False, markup=False)
+    if json is not None:
+        write_json(document, json)
+    clean = not (document["collision"] or document["self_collision"] or document["limit_violations"])
+    raise typer.Exit(0 if clean else 1)
+
+
+def _run_and_show(
+    settings: BenchSettings, given: tuple[ReachProblem, ...] | None, terminal: Console
+) -> BenchResult:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from sidestep.bench import run_bench
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("[dim]{task.fields[last]}"),
+        console=terminal,
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task(f"{settings.problems.robot} {settings.method.value}", total=None, last="")
+
+        def show(done: int, in_all: int, last: str) -> None:
+            bar.update(task, completed=done, total=in_all, last=last)
+
+        return run_bench(settings, problems=given, progress=show)
+
+
+def _table(document: dict[str, Any]) -> object:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
+    table.add_column(style="dim")
+    table.add_column(justify="right")
+    count = document["problems"]
+    for key in ("success", "collision", "self_collision", "stuck", "limit_violations"):
+        share = f"{100.0 * document[key] / count:.1f} %"
+        table.add_row(key.replace("_", " "), f"{document[key]} of {count}  ({share})")
+    for name, found in document["limits_broken"].items():
+        table.add_row(f"  {name}", f"{found['problems']}, worst excess {found['worst_excess']:.3g}")
+    table.add_row("straight line blocked", f"{document['straight_line_blocked']} of {count}")
+    for key in ("min_clearance_m", "min_self_clearance_m"):
+        value = document[key]
+        table.add_row(
+            key.removesuffix("_m").replace("_", " "), "-" if value is None else f"{1e3 * value:.1f} mm"
+        )
+    times = "  ".join(f"{name} {value}" for name, value in document["step_us"].items())
+    table.add_row("steps", f"{document['steps']}")
+    table.add_row("step [us]", times)
+    return table

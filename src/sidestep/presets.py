@@ -1,0 +1,147 @@
+"""One set of numbers for every robot and scene: the systems that Sidestep recommends or compares with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sidestep._core import (
+    ClearanceBarrier,
+    CollisionDensity,
+    DistanceSwitch,
+    Embedding,
+    GeometricSystem,
+    JointLimitBarrier,
+    JointLimitPotential,
+    Obstacles,
+    SelfCollisionBarrier,
+    Sum,
+)
+from sidestep.body import Body
+from sidestep.robot import Robot
+from sidestep.simulation import SelfCollision
+
+GAP_SAMPLES = (
+    200  # configurations by which it is found which pairs of links the covering ellipsoids keep apart
+)
+GAP_SHARE = (
+    0.95  # share of them in which the ellipsoids of a pair must be apart: otherwise they are no measure
+)
+
+
+@dataclass(frozen=True)
+class Barriers:
+    """The numbers of the recommended system; see the barriers of the core for what each trades.
+
+    Attributes:
+        stiffness [1/s^2], damping [1/s]: of the pull to the goal.
+        activation [m], strength, power: of obstacles.
+        limit_activation [rad | m], limit_strength: of joint limits.
+        self_activation [m], self_strength: of self-collision.
+    """
+
+    stiffness: float = 2.0
+    damping: float = 3.0
+    activation: float = 0.1
+    strength: float = 0.1
+    power: float = 2.0
+    limit_activation: float = 0.1
+    limit_strength: float = 0.02
+    self_activation: float = 0.05
+    self_strength: float = 0.02
+
+
+@dataclass(frozen=True)
+class Thesis:
+    """The numbers of the thesis (Bosc 2024, 6.2.2); slope and Gaussians per link are not stated there.
+
+    Attributes:
+        stiffness [1/s^2], damping [1/s]: of the pull to the goal.
+        outer, inner: distance thresholds [m] of the two first and the last joint, and of those between.
+        slope: of the switch [1/m]. components: Gaussians per link.
+    """
+
+    stiffness: float = 0.5
+    damping: float = 1.5
+    outer: float = 0.1
+    inner: float = 0.2
+    slope: float = 20.0
+    components: int = 2
+
+
+def barrier_system(
+    robot: Robot, body: Body | None = None, *, numbers: Barriers = Barriers(), self_collision: bool = True
+) -> GeometricSystem:
+    """The recommended system: a barrier for every part of the body, every joint limit, every pair of links.
+
+    Args:
+        robot: the arm. body: a covering body of it; by default `Body.cover(robot)`.
+        numbers: in place of the defaults.
+        self_collision: whether pairs of links get barriers.
+    """
+    body = body if body is not None else Body.cover(robot)
+    parts: list[Embedding] = [
+        ClearanceBarrier(
+            robot, body, activation=numbers.activation, strength=numbers.strength, power=numbers.power
+        ),
+        JointLimitBarrier(
+            robot, activation=numbers.limit_activation, strength=numbers.limit_strength, power=numbers.power
+        ),
+    ]
+    pairs = barrier_pairs(robot, body) if self_collision else ()
+    if pairs:
+        parts.append(
+            SelfCollisionBarrier(
+                robot,
+                body,
+                pairs,
+                activation=numbers.self_activation,
+                strength=numbers.self_strength,
+                power=numbers.power,
+            )
+        )
+    return GeometricSystem(parts, stiffness=numbers.stiffness, damping=numbers.damping)
+
+
+def thesis_system(
+    robot: Robot, body: Body | None = None, *, switched: bool = True, numbers: Thesis = Thesis()
+) -> GeometricSystem:
+    """The thesis's system: one summed density, with the distance switch (T6.2) or unswitched (T2.12).
+
+    Args:
+        robot: the arm. body: a mixture; by default `Body.fit` with the thesis's number of Gaussians.
+        switched: with the distance switch. numbers: in place of the defaults.
+    """
+    body = body if body is not None else Body.fit(robot, components=numbers.components)
+    nv = robot.num_coordinates
+    thresholds = np.full(nv, numbers.inner)
+    thresholds[[*range(min(2, nv)), nv - 1]] = numbers.outer
+    return GeometricSystem(
+        [Sum([CollisionDensity(robot, body), JointLimitPotential(robot)])],
+        stiffness=numbers.stiffness,
+        damping=numbers.damping,
+        switch=DistanceSwitch(thresholds=thresholds, slope=numbers.slope) if switched else None,
+    )
+
+
+def barrier_pairs(robot: Robot, body: Body) -> tuple[tuple[str, str], ...]:
+    """The pairs of links for `SelfCollisionBarrier`: those that may collide and whose ellipsoids can part.
+
+    Ellipsoids are larger than links. Where those of a pair overlap in more than 5 % of random configurations
+    that are free of self-collision, they are no measure of its distance, and the pair is left out.
+    """
+    check = SelfCollision(robot)
+    covered = set(body.links)
+    pairs = [pair for pair in check.pairs if covered.issuperset(pair)]
+    if not pairs:
+        return ()
+    barrier = SelfCollisionBarrier(robot, body, pairs)
+    rng, rest = np.random.default_rng(0), np.zeros(robot.num_coordinates)
+    apart, free = np.zeros(len(pairs)), 0
+    for _ in range(GAP_SAMPLES):
+        q = robot.random_configuration(rng)
+        if not check.touching(q):
+            free += 1
+            apart += barrier.evaluate(q, rest, Obstacles.none()).clearances > 0.0
+    return tuple(pair for pair, count in zip(pairs, apart, strict=True) if count >= GAP_SHARE * free)
