@@ -121,7 +121,7 @@ def mixture(settings: Settings) -> Iterator[Item]:
             answers="Figure 3.3.",
             parameters=f"{COMPONENTS} Gaussians a link, full covariances, EM on 2000 points a link, seed "
             f"{settings.seed}.",
-            differs="The thesis does not state the numbers of Gaussians it draws, nor the size of the ellipsoids.",
+            differs="The thesis states neither the numbers of Gaussians nor the size of the ellipsoids.",
         ),
         drawing=figure,
         data={"weights": body.weights, "means_m": body.means, "covariances_m2": body.covariances},
@@ -149,8 +149,8 @@ def task_space(settings: Settings) -> Iterator[Item]:
         )
         everything.append(points)
     style.mark_obstacle(ax, *OBSTACLE, label="")
-    _equal(ax, np.concatenate([*everything, OBSTACLE[None]]), unit="m", zoom=1.15)
-    ax.legend(loc="center left", bbox_to_anchor=(1.05, 0.5), markerscale=3)
+    _equal(ax, np.concatenate([*everything, OBSTACLE[None]]), unit="m", zoom=1.0)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside right center", markerscale=3)
     ax.view_init(elev=16, azim=-60)
     yield Figure(
         key="3.4",

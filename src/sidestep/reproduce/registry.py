@@ -81,7 +81,16 @@ PARTS: tuple[Part, ...] = (
         "switches",
         ("6.1", "6.2", "6.3", "6.4", "6.5", "6.6", "6.7", "6.8", "B.1", "B.2", "6.1-switches"),
     ),
+    Part(
+        "6.2",
+        "Torque control in MuJoCo",
+        _SIX,
+        "simulated",
+        "simulated",
+        ("6.10", "6.11", "6.12", "6.13", "6.14", "6.2-criteria"),
+    ),
     Part("table-6.1", "Computation frequency", _SIX, "performance", "computation_frequency", ("table-6.1",)),
+    Part("A.1", "Pairs of joints", _APPENDIX, "projections", "projections", ("A.1",)),
 )
 
 

@@ -41,7 +41,7 @@ def add_scene(
     if tip_path is not None:
         ax.plot(*tip_path.T, color="#0072B2", linewidth=1.3, zorder=1)
     ax.set(xlim=(-0.3, 0.8), ylim=(-0.35, 0.75), zlim=(0.0, 1.1))
-    ax.set_box_aspect((1.1, 1.1, 1.1), zoom=0.98 if labelled else 1.25)
+    ax.set_box_aspect((1.1, 1.1, 1.1), zoom=0.98 if labelled else 1.45)
     ax.view_init(elev=view[0], azim=view[1])
     ticks = [0.0, 0.4, 0.8]
     ax.set(xticks=[0.0, 0.4, 0.8], yticks=[0.0, 0.4], zticks=ticks)
@@ -54,7 +54,7 @@ def add_scene(
         axis.labelpad = -6
         axis.pane.set_alpha(0.3)
     if title:
-        ax.set_title(title, y=0.97)
+        ax.set_title(title, y=0.97 if labelled else 1.0)
     return ax
 
 
