@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
-from sidestep.body.cover_certificate import complete
+from sidestep.body.cover_certificate import certify, complete
 from sidestep.body.cover_overshoot import interior_coverage, overshoot, union_volume
-from sidestep.body.cover_refine import Ellipsoids, RefineSettings, initial, refine
+from sidestep.body.cover_refine import OUTLINE, REPAIR, Ellipsoids, initial, refine
 from sidestep.body.cover_surface import Array, LinkSurface
 from sidestep.body.fitting import LinkFit, assess, mahalanobis_squared
 from sidestep.body.mixture import Mixture
@@ -28,8 +28,13 @@ MEAN_SHARE = 0.03  # of a link's size: the mean overshoot aimed at, 4 mm on an a
 FIXED_ALLOWANCE = (
     2.0  # links that no joint moves may overshoot by this factor more: only self-collision sees them
 )
-GROWTH = 1.25  # numbers of ellipsoids tried on a link grow by this factor
+LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
+GROWTH = 1.3  # numbers of ellipsoids tried on a link grow by this factor
 CERTIFICATE_TOLERANCE = 1 / 400  # of a link's size: longest edge of a triangle that is not cut further
+NUM_REPAIRS = 3  # rounds after the outline; each takes off a few per cent, later ones nothing
+BARE_TOLERANCE = 1 / 150  # of a link's size: how finely bare spots are located for a repair
+NUM_BARE = 600  # corners of bare triangles added per repair
+TRIAL_DIRECTIONS = 400  # boundary points per ellipsoid while covers are compared
 NUM_SAMPLES = 4000  # surface points that steer the refinement; coverage itself is proven without samples
 SOLID_LEVEL = 5.0  # (y - mu)^T Sigma^-1 (y - mu) on the boundary of a solid ellipsoid of covariance Sigma
 LEVEL_ROUNDING = 1e-9  # levels are larger by this share: rounding of the covariances cannot bare a corner
@@ -122,40 +127,52 @@ class _Solution:
     ellipsoids: Ellipsoids
     mean: float
     maximum: float
-    coverage: float
 
 
 class _LinkProblem:
     """One link with the best cover known for every number of ellipsoids tried."""
 
-    def __init__(self, triangles: Array, *, allowance: float, seed: int) -> None:
+    def __init__(self, triangles: Array, *, seed: int) -> None:
         self.surface = LinkSurface(triangles)
-        self.allowance = allowance
         self.seed = seed
-        self.samples = _steering_samples(self.surface, np.random.default_rng(seed))
+        self.samples = self.surface.steering_points(NUM_SAMPLES, np.random.default_rng(seed))
         self.solutions: dict[int, _Solution] = {}
 
     def solve(self, number: int) -> _Solution:
-        if number not in self.solutions:
-            start = initial(self.surface, self.samples, number, self.seed)
-            refined = refine(self.surface, self.samples, start, RefineSettings())
-            tolerance = CERTIFICATE_TOLERANCE * self.surface.size
-            ellipsoids, certificate = complete(
-                self.surface.triangles,
-                refined,
-                tolerance=tolerance,
-                points=self.surface.pieces.reshape(-1, 3),
+        """The best cover found: an outline, then rounds that refine it where the proof found it bare."""
+        if number in self.solutions:
+            return self.solutions[number]
+        rng = np.random.default_rng(self.seed)
+        surface, samples = self.surface, self.samples
+        tolerance = CERTIFICATE_TOLERANCE * surface.size
+        outline = refine(surface, samples, initial(surface, samples, number, self.seed), OUTLINE)
+        best: _Solution | None = None
+        for repair in range(NUM_REPAIRS + 1):
+            if repair > 0:
+                bare = certify(surface.triangles, outline, tolerance=BARE_TOLERANCE * surface.size).remaining
+                corners = bare.reshape(-1, 3)
+                if len(corners) > NUM_BARE:
+                    corners = corners[rng.choice(len(corners), NUM_BARE, replace=False)]
+                samples = np.concatenate([samples, corners])
+                outline = refine(surface, samples, outline, REPAIR)
+            covering, _ = complete(
+                surface.triangles, outline, tolerance=tolerance, points=surface.pieces.reshape(-1, 3)
             )
-            measured = overshoot(self.surface, ellipsoids)
-            share = certificate.covered_area / certificate.total_area
-            self.solutions[number] = _Solution(ellipsoids, measured.mean, measured.maximum, min(share, 1.0))
-        return self.solutions[number]
+            measured = overshoot(surface, covering, directions=TRIAL_DIRECTIONS)
+            solution = _Solution(covering, measured.mean, measured.maximum)
+            if best is None or self._excess(solution) < self._excess(best):
+                best = solution
+        assert best is not None
+        self.solutions[number] = best
+        return best
 
     def excess(self, number: int) -> float:
         """Overshoot over what is aimed at: the mean of its two measures."""
-        solution = self.solve(number)
-        scale = self.allowance * self.surface.size
-        return 0.5 * (solution.maximum / (MAX_SHARE * scale) + solution.mean / (MEAN_SHARE * scale))
+        return self._excess(self.solve(number))
+
+    def _excess(self, solution: _Solution) -> float:
+        size = self.surface.size
+        return 0.5 * (solution.maximum / (MAX_SHARE * size) + solution.mean / (MEAN_SHARE * size))
 
     def trade_off(self) -> tuple[TradeOff, ...]:
         return tuple(TradeOff(k, s.mean, s.maximum) for k, s in sorted(self.solutions.items()))
@@ -170,25 +187,31 @@ def cover_links(
         ValueError: if the settings do not suit the robot.
     """
     settings.validate(robot)
-    joint_of = {frame.name: frame.joint for frame in robot.frames}
+    twins: dict[bytes, _LinkProblem] = {}
     problems: dict[str, _LinkProblem] = {}
     for link in links_with_geometry(robot):
-        mesh = robot.collision_mesh(link)
-        assert mesh is not None
-        problems[link] = _LinkProblem(
-            np.asarray(mesh.triangles, dtype=np.float64),
-            allowance=FIXED_ALLOWANCE if joint_of[link] < 0 else 1.0,
-            seed=link_seed(link, seed=settings.seed),
-        )
-    numbers = _numbers(problems, settings, progress)
-    return tuple(
-        (_assess(robot, link, problem, numbers[link]), problem.solve(numbers[link]).ellipsoids)
-        for link, problem in problems.items()
-    )
+        triangles = _triangles(robot, link)
+        key = np.unique(triangles.reshape(-1, 3).round(9), axis=0).tobytes()  # fingers are often equal
+        if key not in twins:
+            twins[key] = _LinkProblem(triangles, seed=link_seed(link, seed=settings.seed))
+        problems[link] = twins[key]
+    moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
+    allowances = {link: 1.0 if moves[link] else FIXED_ALLOWANCE for link in problems}
+    numbers = _numbers(problems, allowances, settings, progress)
+    return tuple(_assess(robot, link, problem, numbers[link]) for link, problem in problems.items())
+
+
+def _triangles(robot: Robot, link: str) -> Array:
+    mesh = robot.collision_mesh(link)
+    assert mesh is not None  # only links with geometry are asked for
+    return np.asarray(mesh.triangles, dtype=np.float64)
 
 
 def _numbers(
-    problems: Mapping[str, _LinkProblem], settings: CoverSettings, progress: CoverProgress | None
+    problems: Mapping[str, _LinkProblem],
+    allowances: Mapping[str, float],
+    settings: CoverSettings,
+    progress: CoverProgress | None,
 ) -> dict[str, int]:
     total = settings.max_components
 
@@ -205,56 +228,56 @@ def _numbers(
         report(link, len(problems), len(problems))
         return numbers
     best = dict.fromkeys(problems, 1)
-    reached = dict(best)  # largest number tried: more are not always better, as the refinement is local
     while True:
         spare = total - sum(best.values())
-        gains = {}
+        gains: list[tuple[float, str, int]] = []
         for link, problem in problems.items():
-            if problem.excess(best[link]) <= 1.0:
+            now = problem.excess(best[link]) / allowances[link]
+            if now <= 1.0:
                 continue
-            following = max(best[link] + 1, reached[link])
-            while following - best[link] <= spare:
-                report(link, total - spare, total)
-                reached[link] = following
-                gain = problem.excess(best[link]) ** 2 - problem.excess(following) ** 2
-                if gain > 0.0:
-                    gains[link] = (gain / (following - best[link]), following)
-                    break
+            following = best[link]
+            for _ in range(LOOKAHEAD):
                 following = max(following + 1, round(GROWTH * following))
+                if following - best[link] > spare:
+                    break
+                report(link, total - spare, total)
+                gain = now**2 - (problem.excess(following) / allowances[link]) ** 2
+                if gain > 0.0:
+                    gains.append((gain / (following - best[link]), link, following))
         if not gains:
             break
-        link = max(gains, key=lambda name: gains[name][0])
-        best[link] = gains[link][1]
+        _, link, number = max(gains)
+        best[link] = number
     report(link, total, total)
     return best
 
 
-def _assess(robot: Robot, link: str, problem: _LinkProblem, number: int) -> LinkCover:
-    solution = problem.solve(number)
+def _assess(robot: Robot, link: str, problem: _LinkProblem, number: int) -> tuple[LinkCover, Ellipsoids]:
+    surface = problem.surface
+    triangles = _triangles(robot, link)
+    tolerance = CERTIFICATE_TOLERANCE * surface.size
+    ellipsoids, certificate = complete(
+        triangles, problem.solve(number).ellipsoids, tolerance=tolerance, points=triangles.reshape(-1, 3)
+    )
+    measured = overshoot(surface, ellipsoids)
     mesh = robot.collision_mesh(link)
     assert mesh is not None
     closed = bool(mesh.is_watertight)
     volume = abs(float(mesh.volume if closed else mesh.convex_hull.volume))
-    axes = np.linalg.svd(solution.ellipsoids.shapes, compute_uv=False)
-    return LinkCover(
+    axes = np.linalg.svd(ellipsoids.shapes, compute_uv=False)
+    cover = LinkCover(
         link=link,
         num_components=number,
-        coverage=solution.coverage,
-        mean_overshoot=solution.mean,
-        max_overshoot=solution.maximum,
-        volume_ratio=union_volume(solution.ellipsoids, np.random.default_rng(problem.seed)) / volume,
+        coverage=1.0 if certificate.complete else min(1.0, certificate.covered_area / certificate.total_area),
+        mean_overshoot=measured.mean,
+        max_overshoot=measured.maximum,
+        volume_ratio=union_volume(ellipsoids, np.random.default_rng(problem.seed)) / volume,
         volume_of="mesh" if closed else "hull",
-        interior_coverage=interior_coverage(problem.surface, solution.ellipsoids),
+        interior_coverage=interior_coverage(surface, ellipsoids),
         slimness=float((axes[:, 2] / axes[:, 0]).min()),
         trade_off=problem.trade_off(),
     )
-
-
-def _steering_samples(surface: LinkSurface, rng: np.random.Generator) -> Array:
-    corners = np.unique(surface.triangles.reshape(-1, 3).round(9), axis=0)
-    if len(corners) > NUM_SAMPLES // 3:
-        corners = corners[rng.choice(len(corners), NUM_SAMPLES // 3, replace=False)]
-    return np.concatenate([corners, surface.sample(NUM_SAMPLES - len(corners), rng)])
+    return cover, ellipsoids
 
 
 def cover_mixtures(

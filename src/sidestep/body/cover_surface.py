@@ -168,6 +168,14 @@ class LinkSurface:
         result[outside] = self.distance(points[outside])
         return result
 
+    def steering_points(self, limit: int, rng: np.random.Generator) -> Array:
+        """Corners of pieces of half the size, at most `limit` (N, 3); those of the triangles come first."""
+        corners = _distinct(self.triangles)
+        fine = _distinct(bisect_to_size(self.pieces, 0.5 * self.piece_size))
+        if len(fine) > limit:
+            fine = fine[rng.choice(len(fine), limit, replace=False)]
+        return np.concatenate([corners[: limit // 2], fine])
+
     def sample(self, count: int, rng: np.random.Generator) -> Array:
         """Points (count, 3) uniform on the surface."""
         edges = self.triangles[:, 1:] - self.triangles[:, :1]
@@ -227,6 +235,10 @@ def _winding_along_rays(triangles: Array, shape: NDArray[np.intp]) -> NDArray[np
     )  # nodes 0 … below - 1 see the crossing above
     np.add.at(winding, (column[:, 0], column[:, 1], below), np.sign(total).astype(np.int64))
     return np.asarray(np.cumsum(winding[:, :, ::-1], axis=2)[:, :, ::-1][:, :, 1:])
+
+
+def _distinct(triangles: Array) -> Array:
+    return np.asarray(np.unique(triangles.reshape(-1, 3).round(7), axis=0))  # 0.1 um: the same corner
 
 
 def _cross(a: Array, b: Array) -> Array:
