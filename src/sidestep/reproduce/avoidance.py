@@ -196,7 +196,7 @@ def switching(settings: Settings) -> Iterator[Item]:
     duration = 60.0
     unswitched = move(Unswitched(), duration=duration)
     switched = move(BinarySwitch(KAPPAS[-1]), duration=20.0, period=FINE)
-    energies = {"unswitched": _energy(unswitched), "switched": _energy(switched)}
+    energies = {"unswitched": energy(unswitched), "switched": energy(switched)}
     figure = style.new_figure(12.0)
     axes = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
     grid, values = planar.field(
@@ -247,7 +247,7 @@ def switching(settings: Settings) -> Iterator[Item]:
     )
 
 
-def _energy(run: Rollout, *, thickness: float = planar.LOW) -> Array:
+def energy(run: Rollout, *, thickness: float = planar.LOW) -> Array:
     """½ (vᵀGv + K |q - q*|²): what T2.12 dissipates."""
     density = planar.density(thickness=thickness)
     slopes = np.array(

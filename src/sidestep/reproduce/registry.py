@@ -90,6 +90,7 @@ PARTS: tuple[Part, ...] = (
         ("6.10", "6.11", "6.12", "6.13", "6.14", "6.2-criteria"),
     ),
     Part("table-6.1", "Computation frequency", _SIX, "performance", "computation_frequency", ("table-6.1",)),
+    Part("errata", "Errata", _APPENDIX, "errata", "errata", ("errata",)),
     Part("A.1", "Pairs of joints", _APPENDIX, "projections", "projections", ("A.1",)),
 )
 

@@ -75,7 +75,7 @@ class AutogradSystem:
         """ψ, gradient (d,) and Hessian (d, d)."""
         at = self._torch.tensor(q, dtype=self._torch.float64, requires_grad=True)
         hessian = self._torch.autograd.functional.jacobian(self._gradient, at)
-        return float(self.psi(at)), self._gradient(at).detach().numpy(), hessian.numpy()
+        return float(self.psi(at).detach()), self._gradient(at).detach().numpy(), hessian.numpy()
 
     def acceleration(
         self, q: Array, v: Array, goal: Array, *, stiffness: float = 0.5, damping: float = 1.5
