@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from sidestep import _core
 from sidestep.robot import catalogue
-from sidestep.robot.link import Array, Link
+from sidestep.robot.link import Array, Geometry, Link
 from sidestep.robot.source import read_description
+from sidestep.robot.tool import tree_with_tool
 from sidestep.robot.tree import KinematicTree, build_tree
 from sidestep.robot.urdf import parse_urdf
 
@@ -117,6 +118,30 @@ class Robot(_core.Robot):
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.num_coordinates} coordinates, {len(self._links)} links)"
+
+    def with_tool(
+        self,
+        name: str,
+        shape: Geometry | str | Path,
+        *,
+        link: str,
+        pose: ArrayLike | None = None,
+        mass: float = 0.0,
+    ) -> Robot:
+        """This robot with a tool or payload fixed to one of its links, as a link of its own.
+
+        Args:
+            name: of the new link.
+            shape: a mesh file [m], or a `Geometry` (box, cylinder, sphere, mesh) placed in the tool's frame.
+            link: the link that holds it.
+            pose: of the tool's frame in the link's frame (4, 4); the link's frame itself by default.
+            mass: [kg], spread evenly over the shape (its convex hull if the mesh is open); 0 adds no inertia.
+
+        Raises:
+            ValueError: that names the argument and what is allowed. FileNotFoundError: there is no such mesh.
+        """
+        tree = tree_with_tool(self, self._links, name, shape, link=link, pose=pose, mass=mass)
+        return Robot(self.name, tree)
 
     @property
     def links(self) -> tuple[Link, ...]:
