@@ -113,7 +113,7 @@ def test_bad_shapes_are_refused_with_the_value(tmp_path: Path, l_shape: Path) ->
         Cylinder(0.1, 0.0)
     with pytest.raises(ValueError, match=r"pose has shape \(3,\), expected \(4, 4\)"):
         Sphere(0.1, pose=np.zeros(3))
-    with pytest.raises(ValueError, match="pose is not a rotation and a translation"):
+    with pytest.raises(ValueError, match="pose is not a rigid transform"):
         Box((1.0, 1.0, 1.0), pose=np.diag([2.0, 1.0, 1.0, 1.0]))
     with pytest.raises(FileNotFoundError, match=r"absent\.stl' does not exist"):
         MeshShape(tmp_path / "absent.stl")

@@ -9,7 +9,6 @@ import pytest
 from PIL import Image
 
 from sidestep.report import write_report
-from sidestep.report.drawing import Camera, paint
 from sidestep.scenario import Scenario, ScenarioResult, run_scenario
 
 TEXT = """\
@@ -101,24 +100,3 @@ def test_the_page_needs_nothing_else(folder: Path, result: ScenarioResult) -> No
     assert "An &lt;arm&gt; &amp; a ball." in page
     assert result.sentence() in page
     assert "http" not in page.replace("http-equiv", "")
-
-
-def test_near_triangles_hide_far_ones() -> None:
-    far = np.array([[[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]]])
-    near = 0.5 * far + [0.0, 0.0, 1.0]
-    camera = Camera(azimuth=-90.0, elevation=90.0, visible=far.reshape(-1, 3), size=(60, 60))
-    picture = np.asarray(paint(camera, [(near, (255, 0, 0)), (far, (0, 0, 255))]), dtype=int)
-    middle, low = picture[30, 30], picture[55, 10]
-    assert middle[0] > 100
-    assert middle[2] == 0
-    assert low[2] > 100
-    assert low[0] == 0
-    assert picture[2, 2].tolist() == [255, 255, 255]
-
-
-def test_the_view_from_above_has_x_to_the_right_and_y_up() -> None:
-    corners = np.array([[0.0, 0.0, 0.0], [2.0, 2.0, 0.0]])
-    camera = Camera(azimuth=-90.0, elevation=90.0, visible=corners, size=(100, 100))
-    pixels = camera.project(np.array([[0.0, 0, 0], [2.0, 0, 0], [0, 2.0, 0]]))
-    # 94 of 100 pixels show the 2 m; rounding of sines and cosines
-    np.testing.assert_allclose(pixels[:, :2], [[3, 97], [97, 97], [3, 3]], atol=1e-9)

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from sidestep import ExactClearance, Robot, SceneObject
+from sidestep.pose import from_quaternion, pose_vector
 from sidestep.simulation.clearance import travel_per_joint
-from sidestep.simulation.pose import pose_vector, rotation_matrix
 
 STRETCHED = np.zeros(2)  # planar2: link2 is a box from x = 0.5 to 1, y and z within half its width
 
@@ -214,7 +214,7 @@ def test_pose_vector_round_trip() -> None:
         pose = trimesh.transformations.random_rotation_matrix(rng.random(3))
         vector = pose_vector(pose)
         assert vector[3] >= 0.0
-        np.testing.assert_allclose(rotation_matrix(vector[3:]), pose[:3, :3], atol=1e-12)
+        np.testing.assert_allclose(from_quaternion(vector[3:]), pose[:3, :3], atol=1e-12)
 
 
 def _vertices(robot: Robot, q: np.ndarray, link: str) -> np.ndarray:

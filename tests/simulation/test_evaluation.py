@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from sidestep import KinematicRun, Robot, SceneObject, SimulationRun, evaluate
+from sidestep.pose import pose_at, pose_vector
 from sidestep.simulation import Contact
-from sidestep.simulation.pose import pose_vector
 
 DT = 0.01
 
@@ -166,8 +166,7 @@ def test_contacts_displacement_and_clearance() -> None:
 def test_grazing_between_samples_is_no_contact_but_not_collision_free() -> None:
     """Two samples only, a thin rod in between: no contact was counted, exact clearance knows better."""
     at = 0.8 * np.array([np.cos(0.7), np.sin(0.7)])
-    rod = SceneObject("rod", "cylinder", size=(5e-4, 0.5))
-    rod.pose[:2, 3] = at
+    rod = SceneObject("rod", "cylinder", size=(5e-4, 0.5), pose=pose_at([*at, 0.0]))
     q = np.array([[0.0, 0.0], [1.5, 0.0]])
     poses = np.broadcast_to(pose_vector(rod.pose), (2, 1, 7))
     result = evaluate(replace(_simulated(q), objects=(rod,), object_poses=poses))

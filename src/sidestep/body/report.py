@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from sidestep.body.body import Body
 from sidestep.body.fitting import ELLIPSOID_STD, LinkFit
 from sidestep.body.sampling import sample_link
+from sidestep.drawing.palette import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from sidestep.pose import moved
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,8 +22,7 @@ if TYPE_CHECKING:
 
     from sidestep.robot import Robot
 
-# Okabe and Ito's palette, told apart with every kind of colour vision; black and yellow are left out
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+PALETTE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)  # of ellipsoids side by side
 CLOUD_COLOUR = "#555555"
 POINTS_DRAWN = 600  # per link: enough to see the surface through the ellipsoids
 DPI = 130
@@ -121,7 +122,7 @@ def draw_arm(body: Body, robot: Robot, q: ArrayLike | None = None) -> Figure:
         for number, name in enumerate(fit.link for fit in body.link_fits):
             pose = robot.pose(configuration, name)
             colour = PALETTE[number % len(PALETTE)]
-            points = _drawn_points(body, robot, name) @ pose[:3, :3].T + pose[:3, 3]
+            points = moved(_drawn_points(body, robot, name), pose)
             axes.scatter(*points.T, s=1.5, color=CLOUD_COLOUR, alpha=0.6, linewidths=0, depthshade=False)
             reached += [points, *draw_ellipsoids(axes, body, name, pose=pose, colours=(colour,))]
         _frame(axes, np.concatenate(reached), unit="m", zoom=0.88)  # beyond it wide arms are cut off

@@ -61,7 +61,7 @@ class _Follower:
     """Updates the bar of a run now and then. Obstacles that were pushed are taken where they started."""
 
     def __init__(self, parts: Assembly, bar: Progress, task: object) -> None:
-        from sidestep.simulation.pose import pose_vector
+        from sidestep.pose import pose_vector
 
         self._parts, self._bar, self._task = parts, bar, task
         self._clearance = ExactClearance(parts.robot, parts.objects) if parts.objects else None

@@ -3,7 +3,8 @@
 from sidestep._core import Obstacles
 from sidestep.obstacles.cloud import load_point_cloud, merge_in_voxels
 from sidestep.obstacles.scene import obstacles_from_shapes
-from sidestep.obstacles.shapes import Box, Cylinder, MeshShape, Shape, Sphere, pose_at
+from sidestep.obstacles.shapes import Box, Cylinder, MeshShape, Shape, Sphere
+from sidestep.pose import pose_at
 
 __all__ = [
     "Box",

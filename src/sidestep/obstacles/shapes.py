@@ -9,9 +9,11 @@ from typing import Protocol
 
 import numpy as np
 import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from sidestep.mesh import read_mesh
 from sidestep.obstacles import covering
+from sidestep.pose import checked_pose, moved
 
 Points = NDArray[np.float64]
 
@@ -48,7 +50,7 @@ class Sphere:
 
     def __post_init__(self) -> None:
         _check_lengths("sphere", radius=self.radius)
-        object.__setattr__(self, "pose", _checked_pose("sphere", self.pose))
+        object.__setattr__(self, "pose", checked_pose(self.pose, "sphere: pose"))
 
     @property
     def centre(self) -> Points:
@@ -56,7 +58,7 @@ class Sphere:
         return self.pose[:3, 3].copy()
 
     def sample(self, spacing: float) -> Points:
-        return _moved(covering.sphere(self.radius, spacing), self.pose)
+        return moved(covering.sphere(self.radius, spacing), self.pose)
 
     def mesh(self) -> trimesh.Trimesh:
         """Triangles with corners on the sphere: an approximation from inside."""
@@ -81,10 +83,10 @@ class Box:
             raise ValueError(f"box: size has {len(size)} lengths, expected 3")
         _check_lengths("box", **dict(zip(("size x", "size y", "size z"), size, strict=True)))
         object.__setattr__(self, "size", size)
-        object.__setattr__(self, "pose", _checked_pose("box", self.pose))
+        object.__setattr__(self, "pose", checked_pose(self.pose, "box: pose"))
 
     def sample(self, spacing: float) -> Points:
-        return _moved(covering.box(self.size, spacing), self.pose)
+        return moved(covering.box(self.size, spacing), self.pose)
 
     def mesh(self) -> trimesh.Trimesh:
         return _placed(trimesh.creation.box(extents=self.size), self.pose)
@@ -106,10 +108,10 @@ class Cylinder:
 
     def __post_init__(self) -> None:
         _check_lengths("cylinder", radius=self.radius, length=self.length)
-        object.__setattr__(self, "pose", _checked_pose("cylinder", self.pose))
+        object.__setattr__(self, "pose", checked_pose(self.pose, "cylinder: pose"))
 
     def sample(self, spacing: float) -> Points:
-        return _moved(covering.cylinder(self.radius, self.length, spacing), self.pose)
+        return moved(covering.cylinder(self.radius, self.length, spacing), self.pose)
 
     def mesh(self) -> trimesh.Trimesh:
         """Triangles with corners on the cylinder: an approximation from inside."""
@@ -139,7 +141,7 @@ class MeshShape:
             raise ValueError(
                 f"mesh '{self.path}': scale is {self.scale}, must be one or three positive numbers"
             )
-        object.__setattr__(self, "pose", _checked_pose(f"mesh '{self.path}'", self.pose))
+        object.__setattr__(self, "pose", checked_pose(self.pose, f"mesh '{self.path}': pose"))
 
     def sample(self, spacing: float) -> Points:
         return covering.triangles(self.mesh(), spacing)
@@ -150,48 +152,15 @@ class MeshShape:
         Raises:
             ValueError: if the file cannot be read as a mesh, or holds no triangles.
         """
-        try:
-            mesh = trimesh.load_mesh(str(self.path))
-        except Exception as error:  # the readers raise anything; the file's name must reach the user
-            raise ValueError(f"mesh file '{self.path}' cannot be read: {error}") from error
-        if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-            raise ValueError(f"mesh file '{self.path}' holds no triangles")
+        mesh = read_mesh(Path(self.path))
         mesh.apply_transform(np.diag([*np.broadcast_to(np.asarray(self.scale, dtype=np.float64), 3), 1.0]))
         return _placed(mesh, self.pose)
-
-
-def pose_at(translation: ArrayLike) -> NDArray[np.float64]:
-    """A pose (4, 4) without rotation, at a translation (3,) [m]."""
-    pose = np.eye(4)
-    pose[:3, 3] = np.asarray(translation, dtype=np.float64)
-    return pose
 
 
 def _check_lengths(shape: str, **lengths: float) -> None:
     for name, value in lengths.items():
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{shape}: {name} is {value}, must be positive and finite [m]")
-
-
-def _checked_pose(shape: str, pose: ArrayLike) -> NDArray[np.float64]:
-    X = np.array(pose, dtype=np.float64)
-    if X.shape != (4, 4):
-        raise ValueError(f"{shape}: pose has shape {X.shape}, expected (4, 4)")
-    rotation = X[:3, :3]
-    rigid = (
-        np.isfinite(X).all()
-        and np.array_equal(X[3], [0.0, 0.0, 0.0, 1.0])
-        and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)  # poses are written with a few digits
-        and np.linalg.det(rotation) > 0.0
-    )
-    if not rigid:
-        raise ValueError(f"{shape}: pose is not a rotation and a translation:\n{X}")
-    X.setflags(write=False)
-    return X
-
-
-def _moved(points: Points, pose: NDArray[np.float64]) -> Points:
-    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
 def _placed(mesh: trimesh.Trimesh, pose: NDArray[np.float64]) -> trimesh.Trimesh:

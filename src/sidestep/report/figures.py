@@ -1,4 +1,4 @@
-"""Figures of a run over time. Colours by Okabe and Ito, told apart with every kind of colour vision."""
+"""Figures of a run over time."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from sidestep._core import JointType
+from sidestep.drawing.palette import BLACK, BLUE, GREEN, ORANGE, SERIES, VERMILLION
 from sidestep.scenario.result import ScenarioResult
 from sidestep.simulation import SimulationRun
 
@@ -20,10 +21,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-BLUE, ORANGE, GREEN, RED, PURPLE, SKY, BLACK = (
-    "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#000000"
-)  # fmt: skip
-JOINT_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, BLACK)
 JOINT_STYLES = ("-", "--", "-.", ":")
 DPI = 120
 LIMIT_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": (0, (1, 1)), "linewidth": 1.2}
@@ -139,7 +136,7 @@ def clearance_figure(result: ScenarioResult) -> Figure | None:
         return None
     figure, axes = _single("Exact clearance, meshes of the arm to obstacles", "clearance [mm]")
     axes.plot(result.clearance_time, 1000.0 * result.clearance, color=BLUE, label="clearance")
-    axes.axhline(0.0, color=RED, linestyle="--", label="contact")
+    axes.axhline(0.0, color=VERMILLION, linestyle="--", label="contact")
     minimum, when = result.evaluation.min_clearance_m, result.evaluation.clearance_time_s
     if minimum is not None and when is not None:
         label = f"minimum {1000.0 * minimum:.1f} mm ({result.evaluation.clearance_pair})"
@@ -204,7 +201,7 @@ def _single(title: str, label: str) -> tuple[Figure, Axes]:
 
 def _lines(axes: Axes, time: Array, columns: Array, names: list[str]) -> None:
     for index, name in enumerate(names):
-        colour = JOINT_COLOURS[index % len(JOINT_COLOURS)]
+        colour = SERIES[index % len(SERIES)]
         axes.plot(time, columns[:, index], color=colour, linestyle=JOINT_STYLES[index % 4], label=name)
     if len(names) > 1:
         axes.legend(frameon=False, fontsize=8, ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sidestep import Robot
+from sidestep.drawing import draw_arm
+from sidestep.drawing.palette import BLUE
 from sidestep.reproduce.item import Array
 from sidestep.simulation import SceneObject
-from sidestep.simulation.drawing import draw_arm
 
 
 def add_scene(
@@ -39,7 +40,7 @@ def add_scene(
     ax: Any = figure.add_subplot(*place, projection="3d", computed_zorder=False)
     draw_arm(ax, robot, q, objects=objects, object_poses=object_poses)
     if tip_path is not None:
-        ax.plot(*tip_path.T, color="#0072B2", linewidth=1.3, zorder=1)
+        ax.plot(*tip_path.T, color=BLUE, linewidth=1.3, zorder=1)
     ax.set(xlim=(-0.3, 0.8), ylim=(-0.35, 0.75), zlim=(0.0, 1.1))
     ax.set_box_aspect((1.1, 1.1, 1.1), zoom=0.98 if labelled else 1.45)
     ax.view_init(elev=view[0], azim=view[1])

@@ -14,12 +14,18 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from sidestep.drawing import palette
+from sidestep.drawing.palette import BLACK as BLACK
+from sidestep.drawing.palette import BLUE as BLUE
+from sidestep.drawing.palette import GREEN as GREEN
+from sidestep.drawing.palette import ORANGE as ORANGE
+from sidestep.drawing.palette import PURPLE as PURPLE
+from sidestep.drawing.palette import SKY as SKY
+from sidestep.drawing.palette import VERMILLION as VERMILLION
+from sidestep.drawing.palette import YELLOW as YELLOW
 from sidestep.reproduce.item import Array
 
-# Okabe and Ito's palette (2008).
-BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
-JOINT_COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK)
+JOINT_COLOURS = palette.SERIES
 
 PAGE_WIDTH = 16.0  # [cm] the width at which a page shows a figure
 DPI = 150

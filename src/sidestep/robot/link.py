@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sidestep.mesh import read_mesh
+
 if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
     import trimesh
 
@@ -99,12 +101,7 @@ def _file_mesh(path: Path) -> trimesh.Trimesh:
     """The triangles of a mesh file in metres. COLLADA: its unit is applied, its up axis is not, as in ROS."""
     import trimesh
 
-    try:
-        mesh = trimesh.load_mesh(path)
-    except Exception as error:  # the readers behind trimesh raise anything; the user needs the file's name
-        raise ValueError(f"mesh file {path} cannot be read: {error}") from error
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise ValueError(f"mesh file {path} holds no triangles")
+    mesh = read_mesh(path)
     if path.suffix.lower() == ".dae" and mesh.units is not None:
         mesh.apply_transform(np.diag([*[trimesh.units.unit_conversion(mesh.units, "meters")] * 3, 1.0]))
     return mesh

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sidestep._core import Frame, Joint, JointLimits, JointType
+from sidestep.pose import about_axis, checked_pose, pose_at
 from sidestep.robot.link import Array, Link
-from sidestep.robot.rotation import about_axis
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
+CORE_TOLERANCE = 1e-9  # on R Rᵀ - 1, the core's own
 DEFAULT_ACCELERATION_LIMIT = 10.0
 """Acceleration limit where none is given, [rad/s^2] or [m/s^2], as URDF has none: the FR3's official value on
 every joint, that of the thesis's controller, and the order of what other arms of this size are rated for."""
@@ -58,7 +59,9 @@ def build_tree(
     coordinates = {name: index for index, name in enumerate(names)}
 
     joints: list[Joint] = []
-    root_pose = np.eye(4) if base_pose is None else _rigid(base_pose, "base_pose")
+    root_pose = (
+        np.eye(4) if base_pose is None else checked_pose(base_pose, "base_pose", tolerance=CORE_TOLERANCE)
+    )
     placed: dict[str, tuple[int, Array]] = {
         urdf.root: (-1, root_pose)
     }  # link -> its joint, pose in that joint
@@ -180,28 +183,9 @@ def _kept_joints(urdf: Urdf, drives: dict[str, _Drive], tip: str | None) -> list
 
 
 def _motion(joint: UrdfJoint, value: float) -> Array:
-    motion = np.eye(4)
     if joint.type == "prismatic":
-        motion[:3, 3] = value * joint.axis
-    else:
-        motion[:3, :3] = about_axis(joint.axis, value)
-    return motion
-
-
-def _rigid(value: ArrayLike, name: str) -> Array:
-    pose = np.asarray(value, dtype=np.float64)
-    if pose.shape != (4, 4):
-        raise ValueError(f"{name} has shape {pose.shape}, expected (4, 4)")
-    rotation = pose[:3, :3]
-    rigid = (
-        np.isfinite(pose).all()
-        and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)  # the core's own tolerance
-        and np.linalg.det(rotation) > 0.0
-        and np.array_equal(pose[3], [0.0, 0.0, 0.0, 1.0])
-    )
-    if not rigid:
-        raise ValueError(f"{name} is not a rigid transform (rotation, translation, last row 0 0 0 1)")
-    return pose
+        return pose_at(value * joint.axis)
+    return pose_at(np.zeros(3), about_axis(joint.axis, value))
 
 
 def _limits(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.link import Array, Geometry, Inertial, Link
-from sidestep.robot.rotation import from_roll_pitch_yaw
 from sidestep.robot.source import Description
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed")
@@ -242,14 +242,12 @@ def _geometry(element: ElementTree.Element, description: Description, owner: str
 
 def _placement(element: ElementTree.Element, owner: str) -> Array:
     """The pose (4, 4) of <origin>: roll, pitch, yaw about fixed axes, translation; identity if absent."""
-    placement = np.eye(4)
     origin = element.find("origin")
-    if origin is not None:
-        where = f"{owner}: <origin>"
-        rpy = _numbers(origin, "rpy", where, count=3, default="0 0 0")
-        placement[:3, :3] = from_roll_pitch_yaw(rpy)
-        placement[:3, 3] = _numbers(origin, "xyz", where, count=3, default="0 0 0")
-    return placement
+    if origin is None:
+        return np.eye(4)
+    where = f"{owner}: <origin>"
+    rpy = _numbers(origin, "rpy", where, count=3, default="0 0 0")
+    return pose_at(_numbers(origin, "xyz", where, count=3, default="0 0 0"), from_roll_pitch_yaw(rpy))
 
 
 def _attribute(element: ElementTree.Element, key: str, owner: str) -> str:

@@ -28,7 +28,9 @@ from sidestep import (
     Unswitched,
 )
 from sidestep._core import JointType, Obstacles
+from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
+from sidestep.pose import from_roll_pitch_yaw, moved, pose_at
 from sidestep.scenario.scenario import (
     BasePose,
     EmbeddingChoice,
@@ -38,7 +40,6 @@ from sidestep.scenario.scenario import (
     Scenario,
     Shape,
     SwitchChoice,
-    rotation_matrix,
 )
 from sidestep.scenario.validation import ScenarioError
 from sidestep.simulation import SceneObject
@@ -148,9 +149,7 @@ def start_velocity(state: JointState, robot: Robot) -> Array:
 
 def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, ...]:
     """The solid of an obstacle; a point cloud gives one ball per point, called NAME.0, NAME.1, …"""
-    shape, pose = item.shape, np.eye(4)
-    pose[:3, :3] = rotation_matrix(item.rotation_deg)
-    pose[:3, 3] = item.position
+    shape, pose = item.shape, _pose(item)
     velocity, interval = np.array(item.velocity), (0.0, float("inf"))
     if item.motion is not None:
         interval = (item.motion.begin, item.motion.end)
@@ -187,7 +186,7 @@ def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, 
                 )
             ball = solid("sphere", (radius,))
             return tuple(
-                replace(ball, name=f"{name}.{index}", pose=_translated(pose, point))
+                replace(ball, name=f"{name}.{index}", pose=pose @ pose_at(point))
                 for index, point in enumerate(cloud)
             )
     raise AssertionError(f"the schema lets no other shape through, got {shape}")
@@ -196,14 +195,9 @@ def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, 
 def _mesh(path: Path, scale: float) -> trimesh.Trimesh:
     if not path.is_file():
         raise FileNotFoundError(f"shape.file: there is no file {path}")
-    vertices = trimesh.load_mesh(path)
-    return trimesh.Trimesh(vertices=scale * vertices.vertices, faces=vertices.faces)
-
-
-def _translated(pose: Array, point: Array) -> Array:
-    moved = pose.copy()
-    moved[:3, 3] += pose[:3, :3] @ point
-    return moved
+    mesh = read_mesh(path)
+    mesh.vertices *= scale
+    return mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +227,7 @@ def _seen(views: tuple[_View, ...], time: float) -> Obstacles:
         pose = view.thing.pose_at(time)
         begin, end = view.thing.moves_during
         moves = view.thing.motion == "moving" and begin <= time < end
-        points.append(view.points @ pose[:3, :3].T + pose[:3, 3])
+        points.append(moved(view.points, pose))
         radii.append(np.full(len(view.points), view.radius))
         velocities.append(np.tile(view.thing.velocity if moves else np.zeros(3), (len(view.points), 1)))
     return Obstacles(np.concatenate(points), np.concatenate(radii), np.concatenate(velocities))
@@ -307,11 +301,9 @@ def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:
     return array
 
 
-def _pose(base: BasePose) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3] = rotation_matrix(base.rotation_deg)
-    pose[:3, 3] = base.position
-    return pose
+def _pose(thing: BasePose | Obstacle) -> Array:
+    roll, pitch, yaw = np.deg2rad(thing.rotation_deg)
+    return pose_at(thing.position, from_roll_pitch_yaw((roll, pitch, yaw)))
 
 
 def _at(place: str, scenario: Scenario, make: Callable[[], _T]) -> _T:

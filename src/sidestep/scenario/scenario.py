@@ -11,8 +11,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-import numpy.typing as npt
 import yaml
 
 from sidestep.scenario.validation import ScenarioError, check_document, parse_yaml
@@ -269,15 +267,6 @@ class Scenario:
 def shipped_scenarios() -> tuple[str, ...]:
     """Names of the scenarios that come with the package."""
     return tuple(sorted(p.stem for p in _shipped_folder().glob("*.yaml")))
-
-
-def rotation_matrix(rotation_deg: Vector3) -> npt.NDArray[np.float64]:
-    """Rotation (3, 3) R = Rz(yaw) Ry(pitch) Rx(roll) by angles [deg] (roll, pitch, yaw), fixed axes."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(np.deg2rad(rotation_deg)), np.sin(np.deg2rad(rotation_deg))
-    rx = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
-    ry = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
-    rz = np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(rz @ ry @ rx, dtype=np.float64)
 
 
 def _shipped_folder() -> Path:

@@ -1,7 +1,6 @@
 """Physics, exact clearance, and what a run achieved."""
 
 from sidestep.simulation.clearance import Clearance, ExactClearance, PathClearance
-from sidestep.simulation.drawing import draw_arm, render_frames
 from sidestep.simulation.evaluation import Evaluation, LimitViolations, evaluate
 from sidestep.simulation.kinematic import run_kinematically
 from sidestep.simulation.model import SimulationModel, build_model
@@ -27,9 +26,7 @@ __all__ = [
     "SimulationModel",
     "SimulationRun",
     "build_model",
-    "draw_arm",
     "evaluate",
-    "render_frames",
     "run_kinematically",
     "seen_obstacles",
 ]

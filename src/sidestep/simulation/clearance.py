@@ -17,8 +17,8 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import JointType
+from sidestep.pose import from_quaternion, moved, pose_vector
 from sidestep.robot import Robot
-from sidestep.simulation.pose import pose_vector, rotation_matrix
 from sidestep.simulation.scene import SceneObject, check_scene
 
 Array = npt.NDArray[np.float64]
@@ -246,7 +246,7 @@ class ExactClearance:
     def _pair(self, i: int, j: int, X_WL: Array, pose: Array) -> Clearance:
         """One link, with its frame at X_WL (4, 4), and one object at `pose` (7,)."""
         link, item = self._links[i], self._objects[j]
-        R, p = rotation_matrix(pose[3:]), pose[:3]
+        R, p = from_quaternion(pose[3:]), pose[:3]
         X_link = coal.Transform3s(X_WL[:3, :3], X_WL[:3, 3])
         X_item = coal.Transform3s(R, p)
         result = coal.DistanceResult()
@@ -288,7 +288,7 @@ def travel_per_joint(
     frame = next(f for f in robot.frames if f.name == link)
     bound = np.zeros(robot.num_coordinates)
     limits = robot.limits
-    vertices = mesh.vertices @ frame.placement[:3, :3].T + frame.placement[:3, 3]
+    vertices = moved(mesh.vertices, frame.placement)
     reach = float(np.linalg.norm(vertices, axis=1).max())
     index, first = frame.joint, True
     while index >= 0 and index not in beyond:

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, rollout
+from sidestep.pose import pose_vector
 from sidestep.robot import Robot
-from sidestep.simulation.pose import pose_vector
 from sidestep.simulation.run import (
     Arrival,
     ArrivalWatch,

@@ -11,9 +11,9 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import JointType
+from sidestep.pose import pose_at, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.convex_parts import convex_parts
-from sidestep.simulation.pose import pose_vector
 from sidestep.simulation.scene import SceneObject, check_scene
 
 Array = npt.NDArray[np.float64]
@@ -251,9 +251,7 @@ def _set_inertia(body: mujoco.MjsBody, robot: Robot, joint: int) -> None:
         )
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
-    turned = np.eye(4)
-    turned[:3, :3], turned[:3, 3] = axes, com
-    pose = pose_vector(turned)
+    pose = pose_vector(pose_at(com, axes))
     body.explicitinertial = True
     body.mass, body.ipos, body.iquat = mass, pose[:3], pose[3:]
     body.inertia = np.minimum(principal, [np.inf, np.inf, principal[0] + principal[1]])

@@ -12,6 +12,7 @@ import trimesh
 
 from sidestep._core import Obstacles
 from sidestep.obstacles import Box, Cylinder, Shape, Sphere
+from sidestep.pose import checked_pose, pose_at
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["sphere", "box", "cylinder", "mesh"]
@@ -69,12 +70,10 @@ class SceneObject:
             raise ValueError(
                 f"object {self.name!r}: size of a {self.kind} is {meaning}, positive, got {self.size}"
             )
-        pose = np.array(self.pose, dtype=float)
-        if pose.shape != (4, 4) or not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-6):
-            raise ValueError(f"object {self.name!r}: pose must be a (4, 4) rigid transform")
+        pose = checked_pose(self.pose, f"object {self.name!r}: pose")
         velocity = np.array(self.velocity, dtype=float)
-        if velocity.shape != (3,) or not np.all(np.isfinite(velocity)) or not np.all(np.isfinite(pose)):
-            raise ValueError(f"object {self.name!r}: velocity must be (3,), pose and velocity finite")
+        if velocity.shape != (3,) or not np.all(np.isfinite(velocity)):
+            raise ValueError(f"object {self.name!r}: velocity must be (3,), finite, got {self.velocity}")
         if not (np.isfinite(self.mass) and self.mass > 0.0):
             raise ValueError(f"object {self.name!r}: mass must be positive, got {self.mass}")
         if not 0.0 <= self.moves_during[0] <= self.moves_during[1]:
@@ -99,13 +98,11 @@ class SceneObject:
         moves_during: tuple[float, float] = (0.0, float("inf")),
     ) -> SceneObject:
         """A sphere at `center` (3,) [m] in the world."""
-        pose = np.eye(4)
-        pose[:3, 3] = center
         return cls(
             name,
             "sphere",
             size=(radius,),
-            pose=pose,
+            pose=pose_at(center),
             motion=motion,
             mass=mass,
             velocity=np.asarray(velocity, dtype=float),

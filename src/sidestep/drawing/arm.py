@@ -1,0 +1,128 @@
+"""An arm and the solids around it as shaded triangles, by Matplotlib: no display, no driver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+from matplotlib.colors import to_rgb
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from sidestep.drawing.palette import VERMILLION
+from sidestep.mesh import simplified
+from sidestep.pose import moved, pose_matrix
+from sidestep.robot import Robot
+
+Array = npt.NDArray[np.float64]
+Colour = tuple[float, float, float]
+
+ARM_COLOUR: Colour = (0.78, 0.82, 0.88)
+BASE_COLOUR: Colour = (0.60, 0.63, 0.68)
+OBSTACLE_COLOUR: Colour = to_rgb(VERMILLION)
+LIGHT = np.array([0.35, -0.55, 0.76])  # unit-length direction towards the lamp, world
+AMBIENT = 0.35  # share of light that reaches a face turned away from the lamp
+ARM_TRIANGLES = 8000  # at most, of the whole arm: 0.04 s to draw
+FINEST_CELL = 2e-3  # [m] detail that nobody sees in a picture of an arm
+
+
+class Solid(Protocol):
+    """A thing to draw beside an arm, such as a `SceneObject`."""
+
+    @property
+    def pose(self) -> Array:
+        """Pose (4, 4) in the world."""
+
+    def __hash__(self) -> int: ...
+
+    def surface(self) -> trimesh.Trimesh:
+        """The surface in the frame of the thing [m]."""
+
+
+def draw_arm(
+    ax: Any,
+    robot: Robot,
+    q: Array,
+    *,
+    objects: Sequence[Solid] = (),
+    object_poses: Array | None = None,
+    colour: Colour = ARM_COLOUR,
+    opacity: float = 1.0,
+) -> Poly3DCollection:
+    """Draws an arm and the solids around it on a 3D axes, as one collection: near triangles hide far ones.
+
+    Args:
+        ax: Matplotlib axes with projection "3d".
+        robot, q: the arm at configuration (nv,).
+        objects: what stands around it.
+        object_poses: (num_objects, 7) position and quaternion (w, x, y, z), or None: their own.
+        colour: of the moving links; opacity: of everything.
+    """
+    collection = Poly3DCollection(np.zeros((0, 3, 3)), linewidths=0.4)
+    show_arm(collection, robot, q, objects=objects, object_poses=object_poses, colour=colour, opacity=opacity)
+    ax.add_collection3d(collection)
+    return collection
+
+
+def show_arm(
+    collection: Poly3DCollection,
+    robot: Robot,
+    q: Array,
+    *,
+    objects: Sequence[Solid] = (),
+    object_poses: Array | None = None,
+    colour: Colour = ARM_COLOUR,
+    opacity: float = 1.0,
+) -> None:
+    """Moves what `draw_arm` drew to another configuration; arguments as there."""
+    triangles, colours = [np.zeros((0, 3, 3))], [np.zeros((0, 3))]
+    for link, moves, shape in arm_triangles(robot):
+        triangles.append(moved(shape, robot.pose(q, link)))
+        colours.append(_shaded(triangles[-1], colour if moves else BASE_COLOUR))
+    for i, item in enumerate(objects):
+        pose = item.pose if object_poses is None else pose_matrix(object_poses[i])
+        triangles.append(moved(solid_triangles(item), pose))
+        colours.append(_shaded(triangles[-1], OBSTACLE_COLOUR))
+    rgb = np.concatenate(colours)
+    rgba = np.column_stack([rgb, np.full(len(rgb), opacity)])
+    collection.set_verts(np.concatenate(triangles))
+    collection.set_facecolor(rgba)
+    collection.set_edgecolor(rgba if opacity == 1.0 else "none")  # edges close hairlines between triangles
+
+
+@lru_cache(maxsize=8)
+def arm_triangles(robot: Robot) -> tuple[tuple[str, bool, Array], ...]:
+    """Per link: its name, whether a joint moves it, and its triangles (F, 3, 3) in the link frame [m]."""
+    joint_of = {frame.name: frame.joint for frame in robot.frames}
+    meshes: dict[str, trimesh.Trimesh] = {}
+    for link in robot.links:
+        shapes = [geometry.mesh() for geometry in link.visuals or link.collisions]
+        if shapes:
+            merged: Any = trimesh.util.concatenate(shapes)
+            meshes[link.name] = merged
+    cell = FINEST_CELL
+    coarse = dict(meshes)
+    while sum(len(mesh.faces) for mesh in coarse.values()) > ARM_TRIANGLES:
+        coarse = {name: simplified(mesh, cell) for name, mesh in meshes.items()}
+        cell *= 1.3
+    return tuple(
+        (name, joint_of[name] >= 0, np.array(mesh.triangles, dtype=float)) for name, mesh in coarse.items()
+    )
+
+
+@lru_cache(maxsize=64)
+def solid_triangles(item: Solid) -> Array:
+    """Triangles (F, 3, 3) of a solid in its own frame [m]."""
+    return np.array(item.surface().triangles, dtype=float)
+
+
+def _shaded(triangles: Array, colour: Colour) -> Array:
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    facing = (normals @ LIGHT) / np.where(lengths > 0.0, lengths, 1.0)
+    brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(0.5 + 0.5 * facing, 0.0, 1.0)
+    shaded: Array = np.clip(brightness[:, None] * np.array(colour), 0.0, 1.0)
+    return shaded

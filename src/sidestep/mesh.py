@@ -1,0 +1,44 @@
+"""Triangle meshes: read from files, and made coarser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
+    import trimesh
+
+
+def read_mesh(path: Path) -> trimesh.Trimesh:
+    """The triangles of a file that trimesh reads (.stl, .obj, .dae, .ply, .glb …), in the file's coordinates.
+
+    Raises:
+        ValueError: the file cannot be read as a mesh, or holds no triangles.
+    """
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(path)
+    except Exception as error:  # the readers behind trimesh raise anything; the user needs the file's name
+        raise ValueError(f"mesh file '{path}' cannot be read: {error}") from error
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise ValueError(f"mesh file '{path}' holds no triangles")
+    return mesh
+
+
+def simplified(mesh: trimesh.Trimesh, cell: float) -> trimesh.Trimesh:
+    """A coarser mesh: vertices in one cube of side `cell` [m] become their mean (Rossignac, Borrel, 1993)."""
+    import trimesh
+
+    keys = np.floor(mesh.vertices / cell).astype(np.int64)
+    _, cluster = np.unique(keys, axis=0, return_inverse=True)
+    cluster = cluster.reshape(-1)
+    counts = np.bincount(cluster)
+    means = np.stack([np.bincount(cluster, mesh.vertices[:, k]) / counts for k in range(3)], axis=1)
+    faces = cluster[mesh.faces]
+    distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    faces = faces[distinct]
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return trimesh.Trimesh(means, faces[np.sort(first)], process=False)

@@ -1,0 +1,93 @@
+"""Rigid poses: rotations (3, 3), poses (4, 4), and MuJoCo's pose vectors (7,)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def about_axis(axis: Array, angle: float) -> Array:
+    """The rotation (3, 3) by `angle` [rad] about a unit axis (3,), by Rodrigues' formula
+    R = 1 + sin(angle) K + (1 - cos(angle)) K^2 with K x = axis × x."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Array = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+    return rotation
+
+
+def from_roll_pitch_yaw(rpy: Sequence[float]) -> Array:
+    """The rotation (3, 3) by roll, pitch, yaw [rad] about the fixed x, y and z axes, in this order."""
+    x, y, z = np.eye(3)
+    return about_axis(z, rpy[2]) @ about_axis(y, rpy[1]) @ about_axis(x, rpy[0])
+
+
+def from_quaternion(quaternion: Array) -> Array:
+    """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def pose_at(translation: npt.ArrayLike, rotation: npt.ArrayLike | None = None) -> Array:
+    """A pose (4, 4) at a translation (3,) [m], turned by a rotation (3, 3), or not at all."""
+    X = np.eye(4)
+    X[:3, 3] = np.asarray(translation, dtype=np.float64)
+    if rotation is not None:
+        X[:3, :3] = np.asarray(rotation, dtype=np.float64)
+    return X
+
+
+def checked_pose(value: npt.ArrayLike, owner: str, *, tolerance: float = 1e-6) -> Array:
+    """A copy of a pose (4, 4) that cannot be written to.
+
+    Args:
+        value: the pose.
+        owner: what an error calls it.
+        tolerance: on R Rᵀ - 1; by default that of a pose which was written down with a few digits.
+
+    Raises:
+        ValueError: it is not a rigid transform with finite entries.
+    """
+    X = np.array(value, dtype=np.float64)
+    if X.shape != (4, 4):
+        raise ValueError(f"{owner} has shape {X.shape}, expected (4, 4): a rigid transform")
+    rotation = X[:3, :3]
+    rigid = (
+        np.isfinite(X).all()
+        and np.array_equal(X[3], [0.0, 0.0, 0.0, 1.0])
+        and np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance)
+        and np.linalg.det(rotation) > 0.0
+    )
+    if not rigid:
+        raise ValueError(f"{owner} is not a rigid transform (rotation, translation, last row 0 0 0 1):\n{X}")
+    X.setflags(write=False)
+    return X
+
+
+def pose_matrix(vector: Array) -> Array:
+    """(4, 4) pose of a (7,) position and quaternion (w, x, y, z)."""
+    return pose_at(vector[:3], from_quaternion(vector[3:]))
+
+
+def pose_vector(pose: Array) -> Array:
+    """(7,) position and quaternion (w, x, y, z), w >= 0, of a (4, 4) pose."""
+    from scipy.spatial.transform import Rotation  # here: importing it takes longer than loading a robot
+
+    quaternion = np.roll(Rotation.from_matrix(pose[:3, :3]).as_quat(), 1)
+    return np.concatenate([pose[:3, 3], quaternion if quaternion[0] >= 0.0 else -quaternion])
+
+
+def moved(points: Array, pose: Array) -> Array:
+    """Points (..., 3) of a frame at `pose` (4, 4), in the world."""
+    world: Array = points @ pose[:3, :3].T + pose[:3, 3]
+    return world

@@ -1,0 +1,64 @@
+"""Rotations against SciPy's, pose vectors there and back, and what is no pose."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sidestep.pose import (
+    about_axis,
+    checked_pose,
+    from_roll_pitch_yaw,
+    moved,
+    pose_at,
+    pose_matrix,
+    pose_vector,
+)
+
+
+def test_rotations_agree_with_scipy() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        axis, angle, rpy = rng.normal(size=3), rng.uniform(-7, 7), rng.uniform(-7, 7, size=3)
+        axis /= np.linalg.norm(axis)
+        # a handful of products of numbers below 1: rounding stays below 3e-15
+        np.testing.assert_allclose(
+            about_axis(axis, angle), Rotation.from_rotvec(angle * axis).as_matrix(), rtol=0, atol=3e-15
+        )
+        np.testing.assert_allclose(
+            from_roll_pitch_yaw(rpy), Rotation.from_euler("xyz", rpy).as_matrix(), rtol=0, atol=3e-15
+        )
+
+
+def test_quaternions_and_pose_vectors_agree_with_scipy() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        turn = Rotation.random(random_state=rng)
+        pose = pose_at(rng.normal(size=3), turn.as_matrix())
+        vector = pose_vector(pose)
+        w, *xyz = vector[3:]
+        assert w >= 0.0
+        # products of numbers up to 1, and a quaternion found again by a square root
+        np.testing.assert_allclose(
+            Rotation.from_quat([*xyz, w]).as_matrix(), pose[:3, :3], rtol=0, atol=1e-14
+        )
+        np.testing.assert_allclose(pose_matrix(vector), pose, rtol=0, atol=1e-14)
+
+
+def test_points_are_moved_as_by_the_matrix() -> None:
+    pose = pose_at([1.0, 2.0, 3.0], about_axis(np.array([0.0, 0.0, 1.0]), np.pi / 2))
+    np.testing.assert_allclose(moved(np.array([[[1.0, 0.0, 0.0]]]), pose), [[[1.0, 3.0, 3.0]]], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (np.eye(3), r"arm: pose has shape \(3, 3\), expected \(4, 4\)"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "arm: pose is not a rigid transform"),
+        (np.diag([1.0, 1.0, 1.0, 2.0]), "arm: pose is not a rigid transform"),
+        (1.001 * np.eye(4), "arm: pose is not a rigid transform"),
+        (np.full((4, 4), np.nan), "arm: pose is not a rigid transform"),
+    ],
+)
+def test_what_is_no_pose_is_refused(value: np.ndarray, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        checked_pose(value, "arm: pose")
