@@ -67,7 +67,8 @@ class Workspace:
         dim = len(self.directions)
         inner, outer = (share * self.reach for share in SHELL)
         distance = rng.uniform(inner**dim, outer**dim) ** (1.0 / dim)
-        return self.shoulder + distance * self.direction(rng)
+        point: Array = self.shoulder + distance * self.direction(rng)
+        return point
 
     def direction(self, rng: np.random.Generator) -> Array:
         """A uniform unit vector (3,) in which the arm can move."""
@@ -208,7 +209,8 @@ class ProblemGenerator:
         )
 
     def _balls(self, rng: np.random.Generator) -> tuple[Array, Array]:
-        centers, radii = [], []
+        centers: list[Array] = []
+        radii: list[float] = []
         while len(centers) < self.settings.obstacles:
             center, radius = self.workspace.sample(rng), rng.uniform(*RADII)
             if self._from_base(center) >= radius + BASE_CLEARANCE:

@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import platform
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ class BenchSettings:
     problems: ProblemSettings
     count: int = 100
     method: Method = Method.barrier
-    motion: MotionSettings = MotionSettings()
+    motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
 
     def __post_init__(self) -> None:
@@ -99,7 +99,12 @@ class BenchResult:
             "settings": {
                 "obstacles": len(self.problems[0].radii),
                 "seed": self.problems[0].seed,
-                "moving_m_s": self.settings.problems.moving,
+                "fastest_obstacle_m_s": max(
+                    (
+                        float(np.linalg.norm(item.velocities, axis=1).max(initial=0.0))
+                        for item in self.problems
+                    )
+                ),
                 **{key: value for key, value in asdict(self.settings.motion).items() if key != "torque"},
             },
             "jobs": self.settings.jobs,

@@ -49,8 +49,8 @@ class SelfCollision:
     """Distance between the links of an arm on their exact meshes, by Coal.
 
     Left out, as tools for SRDF do, are pairs that cannot or need not part: "rigid" (no joint between them),
-    "adjacent" (one joint between them), "always" (touch in 95 % of random configurations) and "allowed" (asked
-    for). Pairs that never touched in those samples are kept: sampling cannot prove it.
+    "adjacent" (one joint between them), "always" (touch in 95 % of random configurations) and "allowed"
+    (asked for). Pairs that never touched in those samples are kept: sampling cannot prove it.
 
     Args:
         robot: with collision meshes.

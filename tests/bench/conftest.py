@@ -1,0 +1,24 @@
+"""A planar arm with a small covering body, so that a benchmark takes a second."""
+
+from __future__ import annotations
+
+import pytest
+
+from sidestep import Body, Robot, presets
+from sidestep.bench import ProblemGenerator, ProblemSettings
+
+
+@pytest.fixture(scope="session")
+def generator() -> ProblemGenerator:
+    return ProblemGenerator(ProblemSettings(robot="planar3", obstacles=3, seed=5))
+
+
+@pytest.fixture(scope="session")
+def system(generator: ProblemGenerator) -> object:
+    body = Body.cover(generator.robot, components=3, cache=False)
+    return presets.barrier_system(generator.robot, body)
+
+
+@pytest.fixture(scope="session")
+def arm() -> Robot:
+    return Robot.named("fr3")

@@ -1,0 +1,112 @@
+"""The judge finds what was planted, and only that."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from sidestep import GeometricSystem
+from sidestep.bench import Judge, Motion, MotionSettings, ProblemGenerator, ReachProblem, move
+
+SETTINGS = MotionSettings()
+
+
+@pytest.fixture(scope="module")
+def judge(generator: ProblemGenerator) -> Judge:
+    return Judge(generator.robot, self_collision=generator.self_collision)
+
+
+def planted(center: tuple[float, float, float], radius: float, generator: ProblemGenerator) -> ReachProblem:
+    """The stretched planar arm (1.5 m along x) turns by a quarter."""
+    return ReachProblem(
+        robot="planar3",
+        seed=0,
+        index=0,
+        start=np.zeros(3),
+        goal=np.array([1.5, 0.0, 0.0]),
+        centers=np.array([center]),
+        velocities=np.zeros((1, 3)),
+        radii=np.array([radius]),
+        straight_line_blocked=True,
+    )
+
+
+def swept(problem: ReachProblem, *, samples: int) -> Motion:
+    """Straight to the goal, whatever is in the way."""
+    q = problem.start + np.linspace(0.0, 1.0, samples)[:, None] * (problem.goal - problem.start)
+    poses = np.zeros((samples, 1, 7))
+    poses[:, :, :3], poses[:, :, 3] = problem.centers, 1.0
+    still = np.zeros_like(q)
+    return Motion(q, still, still, poses, None, 0, True, np.zeros(samples))
+
+
+def test_a_planted_collision_between_samples_is_reported(generator: ProblemGenerator, judge: Judge) -> None:
+    problem = planted((1.4 * np.cos(0.75), 1.4 * np.sin(0.75), 0.0), 0.01, generator)
+    outcome = judge.judge(problem, swept(problem, samples=2), SETTINGS)
+    assert outcome.collision
+    assert not outcome.success
+    assert not outcome.stuck
+    assert outcome.clearance_pair == "link3 - obstacle_0"
+    assert "collision" in outcome.reasons()[0]
+
+
+def test_a_miss_is_no_collision(generator: ProblemGenerator, judge: Judge) -> None:
+    problem = planted((1.8 * np.cos(0.75), 1.8 * np.sin(0.75), 0.0), 0.05, generator)
+    outcome = judge.judge(problem, swept(problem, samples=50), SETTINGS)
+    assert outcome.success
+    assert outcome.reasons() == []
+    assert outcome.min_clearance_m is not None
+    assert (
+        0.2 < outcome.min_clearance_m < 0.26
+    )  # 1.8 - 1.5 - 0.05 less half the width of the link, about 4 cm
+
+
+def test_a_fold_is_a_self_collision(generator: ProblemGenerator, judge: Judge) -> None:
+    problem = dataclasses.replace(planted((3.0, 0.0, 0.0), 0.05, generator), goal=np.array([0.0, 2.6, 2.6]))
+    outcome = judge.judge(problem, swept(problem, samples=2), SETTINGS)
+    assert outcome.self_collision
+    assert not outcome.collision
+    assert not outcome.success
+    assert outcome.self_pair == "link1 - link3"
+
+
+def test_limits_are_named(generator: ProblemGenerator, judge: Judge) -> None:
+    problem = planted((3.0, 0.0, 0.0), 0.05, generator)
+    motion = swept(problem, samples=50)
+    fast = np.zeros_like(motion.q)
+    fast[7, 1] = generator.robot.limits.velocity[1] + 0.25
+    outcome = judge.judge(problem, dataclasses.replace(motion, v=fast), SETTINGS)
+    assert outcome.limits == {"velocity": pytest.approx(0.25)}
+
+
+def test_a_state_that_is_not_finite_ends_the_motion(generator: ProblemGenerator, judge: Judge) -> None:
+    problem = planted((3.0, 0.0, 0.0), 0.05, generator)
+    motion = dataclasses.replace(swept(problem, samples=50), arrived=False)
+    motion.q[20:] = np.nan
+    outcome = judge.judge(problem, motion, SETTINGS)
+    assert outcome.diverged
+    assert outcome.stuck
+    assert outcome.time_s == pytest.approx(0.019)
+
+
+def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, system: GeometricSystem) -> None:
+    problem = planted((3.0, 0.0, 0.0), 0.05, generator)
+    motion = move(generator.robot, system, problem, SETTINGS)
+    assert motion.arrived
+    error = np.abs(motion.q - problem.goal).max(axis=1)
+    assert error[-1] < 0.05 <= error[-2]
+    assert len(motion.q) == len(motion.v) == len(motion.object_poses) == len(motion.step_seconds)
+    assert np.all(motion.step_seconds > 0.0)
+    # 1e-12: rounding of one addition; semi-implicit Euler across the chunks too
+    np.testing.assert_allclose(motion.q[1:], motion.q[:-1] + 1e-3 * motion.v[1:], atol=1e-12)
+
+
+def test_a_motion_that_does_not_arrive_has_one_row_more_than_steps(
+    generator: ProblemGenerator, system: GeometricSystem
+) -> None:
+    problem = planted((3.0, 0.0, 0.0), 0.05, generator)
+    motion = move(generator.robot, system, problem, MotionSettings(duration=1.2))
+    assert not motion.arrived
+    assert len(motion.q) == 1201

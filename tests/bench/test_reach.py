@@ -1,0 +1,64 @@
+"""Whole benchmarks: counts add up, and processes do not matter."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sidestep.bench import BenchSettings, Method, MotionSettings, ProblemSettings, run_bench
+from sidestep.cli import app
+
+SETTINGS = BenchSettings(
+    problems=ProblemSettings(robot="planar3", obstacles=2, seed=1),
+    count=4,
+    method=Method.unswitched,
+    motion=MotionSettings(duration=5.0),
+)
+
+
+@pytest.fixture(scope="module")
+def serial() -> dict[str, object]:
+    return run_bench(SETTINGS).to_document(failures=True)
+
+
+def test_every_problem_is_counted_once(serial: dict[str, int]) -> None:
+    touched = serial["problems"] - serial["success"] - serial["stuck"]
+    assert serial["problems"] == 4
+    assert max(serial["collision"], serial["self_collision"]) <= touched
+    assert touched <= serial["collision"] + serial["self_collision"]
+    assert set(serial["step_us"]) == {"median", "p99", "p99.9", "max"}
+    assert serial["step_us"]["median"] <= serial["step_us"]["p99"] <= serial["step_us"]["max"]
+    json.dumps(serial, allow_nan=False)
+
+
+def test_processes_do_not_change_the_outcome(serial: dict[str, object]) -> None:
+    parallel = run_bench(replace(SETTINGS, jobs=2)).to_document(failures=True)
+    for document in (serial, parallel):
+        document.pop("step_us")  # times differ, nothing else does
+        document.pop("jobs")
+    assert parallel == serial
+
+
+def test_the_command_writes_figures_and_the_problems(serial: dict[str, object], tmp_path: Path) -> None:
+    file, out = tmp_path / "problems.json", tmp_path / "out.json"
+    command = ["bench", "reach", "--robot", "planar3", "--obstacles", "2", "--problems", "4", "--seed", "1"]
+    how = ["--method", "unswitched", "--duration", "5", "--jobs", "1", "--json", str(out)]
+    first = CliRunner().invoke(app, [*command, *how, "--export", str(file)])
+    assert first.exit_code in (0, 1), first.output
+    drawn = json.loads(out.read_text())
+    for key in ("success", "collision", "stuck", "self_collision", "steps", "min_clearance_m"):
+        assert drawn[key] == serial[key]
+    again = CliRunner().invoke(app, ["bench", "reach", "--problems-file", str(file), *how])
+    assert again.exit_code == first.exit_code
+    read = json.loads(out.read_text())
+    for key in ("success", "collision", "stuck", "self_collision", "steps", "min_clearance_m"):
+        assert read[key] == serial[key]
+
+
+def test_nothing_to_run_is_refused() -> None:
+    with pytest.raises(ValueError, match="count"):
+        replace(SETTINGS, count=0)
