@@ -46,7 +46,7 @@ def certify(triangles: Array, ellipsoids: Ellipsoids, *, tolerance: float) -> Ce
         batch, todo = todo[:BATCH], todo[BATCH:]
         pieces += len(batch)
         inside = (ellipsoids.radii(batch.reshape(-1, 3)) <= 1.0).reshape(len(batch), 3, -1)
-        proven = inside.all(axis=1).any(axis=1)
+        proven = np.any(np.all(inside, axis=1), axis=1)
         covered += float(_areas(batch[proven]).sum())
         batch = batch[~proven]
         edges = np.linalg.norm(batch[:, [1, 2, 0]] - batch, axis=2)

@@ -25,7 +25,7 @@ class Ellipsoids:
         flat = inverse.reshape(-1, 3) @ points.T - np.einsum("kij,kj->ki", inverse, self.centres).reshape(
             -1, 1
         )
-        return np.sqrt(np.square(flat.reshape(-1, 3, len(points))).sum(axis=1)).T
+        return np.asarray(np.sqrt(np.square(flat.reshape(-1, 3, len(points))).sum(axis=1)).T)
 
     def scaled(self, factors: Array) -> Ellipsoids:
         return Ellipsoids(self.centres, self.shapes * factors[:, None, None])
@@ -148,7 +148,7 @@ def rounded(shapes: Array, slimness: float) -> Array:
     """Symmetric shapes of the same ellipsoids, the shortest semi-axis at least `slimness` of the longest."""
     u, s, _ = np.linalg.svd(shapes)
     s = np.maximum(s, slimness * s[:, :1])
-    return np.einsum("kij,kj,klj->kil", u, s, u)
+    return np.asarray(np.einsum("kij,kj,klj->kil", u, s, u))
 
 
 def initial(surface: LinkSurface, samples: Array, number: int, seed: int) -> Ellipsoids:

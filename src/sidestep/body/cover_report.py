@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -115,7 +115,7 @@ def _draw_links(body: Body, robot: Robot) -> Figure:
                 alpha=0.18,
                 linewidth=0,
             )
-        _frame(axes, np.concatenate([np.asarray(surface), boundary.reshape(-1, 3)]), unit="mm")
+        _frame(axes, np.concatenate([np.asarray(surface), boundary.reshape(-1, 3)]), unit="mm", zoom=0.82)
         axes.set_title(f"{cover.link}: {cover.num_components}", fontsize=10)
     figure.suptitle(
         f"{body.robot_name}: surface points and {body.num_components} covering ellipsoids, link frames"
@@ -133,7 +133,10 @@ def _draw_overshoot(body: Body, robot: Robot) -> Figure:
         measured = overshoot(LinkSurface(np.asarray(mesh.triangles)), ellipsoids_of(body, cover.link))
         order = measured.distances.argsort()
         share = np.cumsum(measured.areas[order]) / measured.areas.sum()
-        style = {"color": PALETTE[index % len(PALETTE)], "linestyle": styles[index // len(PALETTE) % 3]}
+        style: dict[str, Any] = {
+            "color": PALETTE[index % len(PALETTE)],
+            "linestyle": styles[index // len(PALETTE) % 3],
+        }
         left.plot(1000.0 * measured.distances[order], 100.0 * share, label=cover.link, **style)
         tried = [(point.num_components, 1000.0 * point.mean_overshoot) for point in cover.trade_off]
         right.plot(*zip(*tried, strict=True), marker="o", markersize=3, **style)

@@ -50,14 +50,14 @@ def distance_to_triangles(points: Array, triangles: Array) -> Array:
     above = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0) & (area > 0.0)
     plane = np.abs(np.einsum("ni,ni->n", ap, normal)) / np.sqrt(safe)
     edges = np.minimum.reduce([_distance_to_segments(points, s, t) for s, t in ((a, b), (b, c), (c, a))])
-    return np.where(above, np.minimum(plane, edges), edges)
+    return np.asarray(np.where(above, np.minimum(plane, edges), edges))
 
 
 def _distance_to_segments(points: Array, start: Array, end: Array) -> Array:
     along = end - start
     length = np.einsum("ni,ni->n", along, along)
     share = np.einsum("ni,ni->n", points - start, along) / np.where(length > 0.0, length, 1.0)
-    return np.linalg.norm(points - start - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1)
+    return np.asarray(np.linalg.norm(points - start - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ class DistanceField:
             for j in (0, 1):
                 for k in (0, 1):
                     inside &= self.values[cell[:, 0] + i, cell[:, 1] + j, cell[:, 2] + k] < 0.0
-        return inside
+        return np.asarray(inside)
 
     @property
     def nodes(self) -> Array:
