@@ -110,3 +110,14 @@ def test_a_motion_that_does_not_arrive_has_one_row_more_than_steps(
     motion = move(generator.robot, system, problem, MotionSettings(duration=1.2))
     assert not motion.arrived
     assert len(motion.q) == 1201
+
+
+def test_a_safe_motion_keeps_every_limit(
+    generator: ProblemGenerator, system: GeometricSystem, judge: Judge
+) -> None:
+    settings = MotionSettings(duration=2.0, safe=True)
+    for index in range(2):
+        problem = generator.problem(index)
+        outcome = judge.judge(problem, move(generator.robot, system, problem, settings), settings)
+        assert outcome.limits == {}
+        assert not outcome.collision

@@ -16,6 +16,11 @@ class Method(StrEnum):
     unswitched = "unswitched"  #: the same without the switch (T2.12)
     barrier = "barrier"  #: a barrier per ellipsoid of a covering body, per joint limit and per pair of links
 
+    @property
+    def safe(self) -> bool:
+        """Whether clearances and limits bound the acceleration as well: part of the method, not of the thesis's."""
+        return self is Method.barrier
+
 
 def build_system(method: Method, robot: Robot) -> GeometricSystem:
     """The system of a method for a robot; bodies come from the user's cache or are made now."""

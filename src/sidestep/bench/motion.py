@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, Obstacles, TorqueController, rollout
+from sidestep._core import AccelerationFilter, GeometricSystem, Obstacles, TorqueController, rollout
 from sidestep.bench.problems import ReachProblem
 from sidestep.robot import Robot
 from sidestep.simulation import Arrival, Simulation
@@ -27,6 +27,8 @@ class MotionSettings:
         period: control period [s]. duration: after it the arm has not arrived [s].
         tolerance: it has arrived once every joint is this close to the goal [rad | m].
         torque: under torque control in MuJoCo, with the real masses, instead of integrated.
+        safe: clearances and limits bound the acceleration as well (`AccelerationFilter`, or the rows of the
+            torque controller); for systems of barriers, as others have no clearances.
 
     Raises:
         ValueError: a number that is not positive.
@@ -36,6 +38,7 @@ class MotionSettings:
     duration: float = 30.0
     tolerance: float = 0.05
     torque: bool = False
+    safe: bool = False
 
     def __post_init__(self) -> None:
         for name in ("period", "duration", "tolerance"):
@@ -78,6 +81,7 @@ def _integrated(
 ) -> Motion:
     total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, CHUNK))
     q, v = problem.start, np.zeros_like(problem.start)
+    guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
     rows: list[tuple[Array, Array, Array]] = []
     times: list[Array] = []
     done, arrived = 0, False
@@ -92,6 +96,7 @@ def _integrated(
             period=settings.period,
             steps=steps,
             time_steps=True,
+            filter=guard,
         )
         near = np.abs(part.q - problem.goal).max(axis=1) < settings.tolerance
         keep = steps
@@ -118,7 +123,7 @@ def _under_torque(
     timer = _Timer()
     run = simulation.run(
         _TimedSystem(system, timer),
-        _TimedController(TorqueController(robot, period=settings.period), timer),
+        _TimedController(TorqueController(robot, period=settings.period), timer, safe=settings.safe),
         problem.start,
         problem.goal,
         settings.duration,
@@ -144,10 +149,11 @@ def _at(problem: ReachProblem, time: float) -> Obstacles:
 
 
 class _Timer:
-    """Adds the time of a step's two calls."""
+    """Adds the time of a step's two calls, and hands the step of the first to the second."""
 
     def __init__(self) -> None:
         self.steps: list[float] = []
+        self.step: Any = None
 
 
 class _TimedSystem:
@@ -158,15 +164,17 @@ class _TimedSystem:
         begin = time.perf_counter()
         step = self._system.acceleration(q, v, goal, obstacles)
         self._timer.steps.append(time.perf_counter() - begin)
+        self._timer.step = step
         return step
 
 
 class _TimedController:
-    def __init__(self, controller: TorqueController, timer: _Timer) -> None:
-        self._controller, self._timer = controller, timer
+    def __init__(self, controller: TorqueController, timer: _Timer, *, safe: bool) -> None:
+        self._controller, self._timer, self._safe = controller, timer, safe
 
-    def solve(self, *args: Any, **kwargs: Any) -> Any:
+    def solve(self, q: Array, v: Array, acceleration: Array, mass_matrix: Array, bias: Array) -> Any:
+        clearances = self._timer.step if self._safe else None
         begin = time.perf_counter()
-        solution = self._controller.solve(*args, **kwargs)
+        solution = self._controller.solve(q, v, acceleration, mass_matrix, bias, clearances=clearances)
         self._timer.steps[-1] += time.perf_counter() - begin
         return solution

@@ -100,10 +100,7 @@ class BenchResult:
                 "obstacles": len(self.problems[0].radii),
                 "seed": self.problems[0].seed,
                 "fastest_obstacle_m_s": max(
-                    (
-                        float(np.linalg.norm(item.velocities, axis=1).max(initial=0.0))
-                        for item in self.problems
-                    )
+                    float(np.linalg.norm(item.velocities, axis=1).max(initial=0.0)) for item in self.problems
                 ),
                 **{key: value for key, value in asdict(self.settings.motion).items() if key != "torque"},
             },

@@ -74,7 +74,7 @@ def reach(
         ),
         count=problems,
         method=method,
-        motion=MotionSettings(period=period, duration=duration, torque=torque),
+        motion=MotionSettings(period=period, duration=duration, torque=torque, safe=method.safe),
         jobs=jobs or default_jobs(),
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")
