@@ -5,15 +5,27 @@
 
 #include "arguments.hpp"
 #include "module.hpp"
+#include "sidestep/dynamical_system/progress_monitor.hpp"
 #include "sidestep/dynamical_system/rollout.hpp"
 
 namespace sidestep::python {
 namespace {
 
+/// A diagnosis with the label of the coordinate that dominates.
+struct Explanation {
+  Diagnosis diagnosis;
+  CoordinateLabel label;
+
+  Explanation(const GeometricSystem& system, const Diagnosis& d)
+      : diagnosis(d),
+        label(d.coordinate < 0 ? CoordinateLabel{} : system.labels()[static_cast<std::size_t>(d.coordinate)]) {}
+};
+
 /// What Python gets from a step: the workspace as it was when the step ended.
 struct Step {
   StepStatus status;
   GeometricSystem::Workspace result;
+  Explanation explanation;
 };
 
 /// An enumerator, or its name; raises ValueError that lists the allowed names.
@@ -29,6 +41,35 @@ Enum as_enum(nb::handle value, const char* name) {
   }
   const std::string allowed = nb::cast<std::string>(nb::str(", ").attr("join")(members));
   throw nb::value_error((std::string(name) + " is " + nb::repr(value).c_str() + ", must be one of: " + allowed).c_str());
+}
+
+/// A goal, or a configuration as an array.
+Goal as_goal(nb::handle value, Eigen::Index nv) {
+  if (nb::isinstance<PoseGoal>(value)) {
+    return nb::cast<const PoseGoal&>(value);
+  }
+  if (nb::isinstance<JointGoal>(value)) {
+    const auto& goal = nb::cast<const JointGoal&>(value);
+    if (goal.position.size() != nv) {
+      throw nb::value_error(("goal has " + std::to_string(goal.position.size()) + " entries, expected " +
+                             std::to_string(nv)).c_str());
+    }
+    return goal;
+  }
+  return JointGoal(as_vector(value, "goal", nv));
+}
+
+Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
+  const Array array = as_array(value, "pose");
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  if (position_only && array.ndim() == 1) {
+    pose.translation() = as_vector(value, "pose", 3);
+    return pose;
+  }
+  const Eigen::MatrixXd matrix = as_matrix(value, "pose", 4, 4);
+  pose.linear() = matrix.topLeftCorner<3, 3>();
+  pose.translation() = matrix.topRightCorner<3, 1>();
+  return pose;
 }
 
 Switch as_switch(nb::handle value) { return value.is_none() ? Switch{Unswitched{}} : nb::cast<Switch>(value); }
@@ -65,17 +106,136 @@ void bind_switches(nb::module_& m) {
       .def_ro("slope", &DistanceSwitch::slope);
 }
 
+void bind_goals(nb::module_& m) {
+  nb::class_<JointGoal>(m, "JointGoal",
+                        "A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.\n"
+                        "position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] of a goal that moves, zero by default.")
+      .def(
+          "__init__",
+          [](JointGoal* self, const ArrayLike& position, nb::handle velocity) {
+            Eigen::VectorXd q = as_vector(position, "position");
+            const Eigen::Index nv = q.size();
+            new (self) JointGoal(std::move(q), velocity.is_none() ? Eigen::VectorXd(Eigen::VectorXd::Zero(nv))
+                                                                  : as_vector(velocity, "velocity", nv));
+          },
+          nb::arg("position"), nb::arg("velocity") = nb::none(),
+          nb::sig("def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None) "
+                  "-> None"))
+      .def_prop_ro("position", [](const JointGoal& g) { return to_numpy(g.position); })
+      .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); });
+
+  nb::class_<PoseGoal>(
+      m, "PoseGoal",
+      "A pose of a frame as a goal,\n"
+      "    U = k_p |p - p*|^2 / 2 + k_R |log(R*^T R)|^2 / 2.\n"
+      "pose (4, 4) in the world, or (3,) where position_only. position_stiffness k_p [1/(m s)^2],\n"
+      "orientation_stiffness k_R [1/s^2]. rest (nv,) with posture_stiffness [1/s^2]: a configuration that the joints are\n"
+      "drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin\n"
+      "[m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.\n"
+      "Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is\n"
+      "none, a stiffness out of range. A pose that is not finite or out of reach gives a status in the step.")
+      .def(
+          "__init__",
+          [](PoseGoal* self, const Robot& robot, const std::string& frame, const ArrayLike& pose, bool position_only,
+             double position_stiffness, double orientation_stiffness, nb::handle rest, double posture_stiffness,
+             nb::handle twist) {
+            const int nv = robot.num_coordinates();
+            new (self) PoseGoal(robot, frame, as_pose(pose, position_only),
+                                {position_only, position_stiffness, orientation_stiffness,
+                                 rest.is_none() ? Eigen::VectorXd() : as_vector(rest, "rest", nv), posture_stiffness},
+                                twist.is_none() ? Vector6d(Vector6d::Zero()) : Vector6d(as_vector(twist, "twist", 6)));
+          },
+          nb::arg("robot"), nb::arg("frame"), nb::arg("pose"), nb::kw_only(), nb::arg("position_only") = false,
+          nb::arg("position_stiffness") = PoseGoalSettings().position_stiffness,
+          nb::arg("orientation_stiffness") = PoseGoalSettings().orientation_stiffness, nb::arg("rest") = nb::none(),
+          nb::arg("posture_stiffness") = 0.0, nb::arg("twist") = nb::none(),
+          nb::sig("def __init__(self, robot: Robot, frame: str, pose: numpy.typing.ArrayLike, *, position_only: bool = "
+                  "False, position_stiffness: float = 4.0, orientation_stiffness: float = 0.5, rest: "
+                  "numpy.typing.ArrayLike | None = None, posture_stiffness: float = 0.0, twist: "
+                  "numpy.typing.ArrayLike | None = None) -> None"))
+      .def_prop_ro("frame", [](const PoseGoal& g) { return g.frame().name; })
+      .def_prop_ro("pose", [](const PoseGoal& g) { return to_numpy_matrix(g.pose.matrix()); }, "(4, 4) in the world.")
+      .def_prop_ro("position_only", [](const PoseGoal& g) { return g.settings.position_only; });
+}
+
+void bind_diagnosis(nb::module_& m) {
+  nb::enum_<MotionState>(m, "MotionState", "What the motion of one step is about.")
+      .value("free", MotionState::free, "On the way, nothing in it.")
+      .value("sliding", MotionState::sliding, "On the way, bent by a barrier.")
+      .value("arriving", MotionState::arriving, "As near to the goal as counts as there.")
+      .value("stuck", MotionState::stuck, "At rest short of the goal: a local minimum, or a pose out of reach.")
+      .value("blocked_at_goal", MotionState::blocked_at_goal, "Stuck, and the goal itself is inside a barrier.")
+      .value("inside_barrier", MotionState::inside_barrier, "A clearance is below its floor: moving out.")
+      .value("fallback", MotionState::fallback, "The step is a fallback, nothing is known.");
+  nb::enum_<CoordinateLabel::Kind>(m, "CoordinateKind", "What an embedding coordinate is about.")
+      .value("potential", CoordinateLabel::Kind::potential, "No clearance: a density, a sum.")
+      .value("obstacle", CoordinateLabel::Kind::obstacle, "A link against the obstacle points.")
+      .value("self", CoordinateLabel::Kind::self, "Two links of the robot.")
+      .value("plane", CoordinateLabel::Kind::plane, "A link against a plane.")
+      .value("joint_limit", CoordinateLabel::Kind::joint_limit, "A joint against a position limit.");
+  using E = Explanation;
+  nb::class_<E>(m, "Diagnosis",
+                "Why a motion is what it is, from one step. Stuck: |v| < 0.02 rad/s short of the goal, and the metric lets\n"
+                "less than 5 % of the goal's pull through (or there is none): a local minimum. The coordinate named is the\n"
+                "one with the largest share in what is held back.")
+      .def_prop_ro("state", [](const E& e) { return e.diagnosis.state; })
+      .def_prop_ro("coordinate", [](const E& e) { return e.diagnosis.coordinate; }, "The dominating one; -1: none.")
+      .def_prop_ro("kind", [](const E& e) { return e.label.kind; }, "Of the dominating coordinate.")
+      .def_prop_ro("name", [](const E& e) { return e.label.name; }, "Its link, or joint for a limit; empty: none.")
+      .def_prop_ro("other", [](const E& e) { return e.label.other; }, "The second link; or 'lower' or 'upper'.")
+      .def_prop_ro("point", [](const E& e) { return e.diagnosis.point; }, "Its nearest obstacle point; -1: none.")
+      .def_prop_ro("clearance", [](const E& e) { return e.diagnosis.clearance; }, "Its clearance [m; rad].")
+      .def_prop_ro("share", [](const E& e) { return e.diagnosis.share; }, "Its share of what is held back.")
+      .def_prop_ro("blocked", [](const E& e) { return e.diagnosis.blocked; },
+                   "The part of the goal's pull that is held back, 1 - |G^-1 dU| / |dU|.")
+      .def_prop_ro("speed", [](const E& e) { return e.diagnosis.speed; }, "|v| [rad/s].")
+      .def_prop_ro("joint_error", [](const E& e) { return e.diagnosis.joint_error; }, "Largest [rad]; nan for a pose.")
+      .def_prop_ro("position_error", [](const E& e) { return e.diagnosis.position_error; }, "[m]; nan for joints.")
+      .def_prop_ro("rotation_error", [](const E& e) { return e.diagnosis.rotation_error; }, "[rad]; nan if not wanted.")
+      .def("describe", [](const E& e) { return e.diagnosis.describe(e.label); }, "In one English sentence.")
+      .def("__str__", [](const E& e) { return e.diagnosis.describe(e.label); });
+
+  nb::class_<ProgressMonitor>(m, "ProgressMonitor",
+                              "Says when a motion has come no nearer to its goal for `patience` [s]: when the goal's\n"
+                              "potential has not fallen by `fraction` of its least value.")
+      .def(nb::init<double, double>(), nb::kw_only(), nb::arg("patience") = 2.0, nb::arg("fraction") = 0.02)
+      .def("update", &ProgressMonitor::update, nb::arg("time"), nb::arg("potential"),
+           "Takes `Step.goal_potential` at a time [s]; whether patience has run out.")
+      .def("reset", &ProgressMonitor::reset, "For a new goal.");
+
+  nb::class_<Recovery>(m, "Recovery",
+                       "What is done with an arm inside a barrier. speed [m/s] with which it leaves, rate [1/s] at which it\n"
+                       "takes that up, margin [m] below the floor at which the push is full, rebound [rad/s]: the largest\n"
+                       "joint speed that a barrier gives back.")
+      .def(
+          "__init__",
+          [](Recovery* self, double speed, double rate, double margin, double rebound) {
+            new (self) Recovery{speed, rate, margin, rebound};
+            self->validate();
+          },
+          nb::kw_only(), nb::arg("speed") = Recovery().speed, nb::arg("rate") = Recovery().rate,
+          nb::arg("margin") = Recovery().margin, nb::arg("rebound") = Recovery().rebound)
+      .def_ro("speed", &Recovery::speed)
+      .def_ro("rate", &Recovery::rate)
+      .def_ro("margin", &Recovery::margin)
+      .def_ro("rebound", &Recovery::rebound);
+}
+
 void bind_step(nb::module_& m) {
   nb::enum_<StepStatus>(m, "StepStatus", "What a step of the system says about its result.")
       .value("ok", StepStatus::ok, "The equations hold.")
       .value("outside_limits", StepStatus::outside_limits, "They hold, but a joint is outside its position limits.")
+      .value("goal_out_of_reach", StepStatus::goal_out_of_reach, "They hold, but the frame cannot be where the goal is.")
+      .value("inside_barrier", StepStatus::inside_barrier,
+             "They hold, with a push out: a clearance is below its barrier's floor.")
       .value("goal_outside_limits", StepStatus::goal_outside_limits, "Fallback: the goal is outside the limits.")
       .value("invalid_state", StepStatus::invalid_state, "Fallback: q or v is not finite.")
-      .value("invalid_goal", StepStatus::invalid_goal, "Fallback: the goal is not finite.")
+      .value("invalid_goal", StepStatus::invalid_goal, "Fallback: the goal is not finite, or of another robot.")
       .value("not_finite", StepStatus::not_finite, "Fallback: the equations gave a value that is not finite.");
   m.def("is_fallback", &is_fallback, nb::arg("status"),
         "Whether the acceleration is the fallback: a damped stop within the acceleration limits.");
 
+  bind_diagnosis(m);
   nb::class_<Step>(m, "Step", "The result of one step; arrays are copies.")
       .def_ro("status", &Step::status)
       .def_prop_ro("acceleration", [](const Step& s) { return to_numpy(s.result.acceleration); }, "a (nv,) [rad/s^2].")
@@ -91,7 +251,19 @@ void bind_step(nb::module_& m) {
       .def_prop_ro("clearances", [](const Step& s) { return s.result.clearances; },
                    "Clearances of the coordinates that are barriers of them (m).")
       .def_prop_ro("metric", [](const Step& s) { return to_numpy_matrix(s.result.metric.matrix()); },
-                   "G = I + J^T J (nv, nv).");
+                   "G = I + J^T J (nv, nv).")
+      .def_prop_ro("attraction", [](const Step& s) { return to_numpy(s.result.attraction); },
+                   "-G^-1 dU/dq (nv) [rad/s^2]: what the metric lets through of the goal's pull.")
+      .def_prop_ro("recovery", [](const Step& s) { return to_numpy(s.result.recovery); },
+                   "The push out of barriers (nv,) [rad/s^2]; zero outside.")
+      .def_prop_ro("inside", [](const Step& s) { return s.result.inside; },
+                   "The coordinate deepest below its barrier's floor; -1: none.")
+      .def_prop_ro("goal_gradient", [](const Step& s) { return to_numpy(s.result.pull.gradient); }, "dU/dq (nv,).")
+      .def_prop_ro("goal_potential", [](const Step& s) { return s.result.pull.potential; },
+                   "U [rad^2/s^2], without the posture pull.")
+      .def_prop_ro("clearances", [](const Step& s) { return to_numpy(s.result.clearances.values); },
+                   "h (m,) of the barriers [m; rad for joint limits]; inf beyond their reach.")
+      .def_ro("diagnosis", &Step::explanation, "Why the motion is what it is.");
 }
 
 void bind_rollout(nb::module_& m) {
@@ -116,12 +288,12 @@ void bind_rollout(nb::module_& m) {
 
   m.def(
       "rollout",
-      [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goal, const Obstacles& obstacles,
+      [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal, const Obstacles& obstacles,
          double period, int steps, nb::handle integrator, bool time_steps, const AccelerationFilter* filter) {
         const int nv = system.robot().num_coordinates();
         const Eigen::VectorXd start = as_vector(q, "q", nv);
         const Eigen::VectorXd velocity = as_vector(v, "v", nv);
-        const Eigen::VectorXd target = as_vector(goal, "goal", nv);
+        const Goal target = as_goal(goal, nv);
         RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"), time_steps};
         if (filter != nullptr) {
           settings.filter = *filter;
@@ -133,10 +305,11 @@ void bind_rollout(nb::module_& m) {
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
       nb::arg("time_steps") = false, nb::arg("filter") = nb::none(),
       nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
-              "goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, "
+              "goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, "
+              "steps: int, "
               "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, "
               "filter: AccelerationFilter | None = None) -> Rollout"),
-      "Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.\n"
+      "Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.\n"
       "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
       "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4.");
 }
@@ -148,21 +321,26 @@ void bind_dynamical_system(nb::module_& m) {
       .value("plain", DampingForm::plain, "h = -G^-1 K (q - q*) - D v (T5.4).")
       .value("metric", DampingForm::metric, "h = -G^-1 (K (q - q*) + D v) (T2.12).");
   bind_switches(m);
+  bind_goals(m);
   bind_step(m);
 
-  nb::class_<GeometricSystem>(
+  nb::class_<GeometricSystem> system(
       m, "GeometricSystem",
       "A damped spring that moves on the graph of psi: obstacles bend its path (Bosc 2024, chapter 5),\n"
-      "    h = -G^-1 K (q - q*) - D v,   g = -G^-1 J^T d2psi/dt2,   a = h + g or as the switch weighs them.\n"
+      "    h = -G^-1 dU/dq - D (v - v*),   g = -G^-1 J^T d2psi/dt2,   a = h + g or as the switch weighs them,\n"
+      "with dU/dq = K (q - q*) and v* = 0 for a configuration at rest.\n"
       "Embeddings in the list are stacked, each with its own coordinates; an empty list and robot=... give flat\n"
       "space.\n"
       "stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive\n"
       "semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.\n"
-      "Raises ValueError that names the setting at fault.")
+      "recovery: what a barrier does with an arm inside it.\n"
+      "Raises ValueError that names the setting at fault.");
+  system
       .def(
           "__init__",
           [](GeometricSystem* self, std::vector<std::shared_ptr<const Embedding>> embeddings, const ArrayLike& stiffness,
-             const ArrayLike& damping, nb::handle damping_form, nb::handle combination, nb::handle flat) {
+             const ArrayLike& damping, nb::handle damping_form, nb::handle combination, nb::handle flat,
+             const Recovery& recovery) {
             if (embeddings.empty() == flat.is_none()) {
               throw nb::value_error(
                   "give either embeddings, which know their robot, or an empty list and robot=... for flat space");
@@ -173,14 +351,16 @@ void bind_dynamical_system(nb::module_& m) {
                                              as_square_matrix(damping, "damping", nv),
                                              as_enum<DampingForm>(damping_form, "damping_form"),
                                              as_switch(combination)};
+            settings.recovery = recovery;
             new (self) GeometricSystem(robot, std::move(embeddings), std::move(settings));
           },
           nb::arg("embeddings"), nb::kw_only(), nb::arg("stiffness") = 0.5, nb::arg("damping") = 1.5,
           nb::arg("damping_form") = "plain", nb::arg("switch") = nb::none(), nb::arg("robot") = nb::none(),
+          nb::arg("recovery") = Recovery(),
           nb::sig("def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, "
                   "damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', "
                   "switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch "
-                  "| None = None, robot: Robot | None = None) -> None"))
+                  "| None = None, robot: Robot | None = None, recovery: Recovery = ...) -> None"))
       .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
       .def_prop_ro("stiffness", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().stiffness); })
       .def_prop_ro("damping", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().damping); })
@@ -188,17 +368,50 @@ void bind_dynamical_system(nb::module_& m) {
       .def_prop_ro("switch", [](const GeometricSystem& s) { return s.settings().combination; })
       .def(
           "acceleration",
-          [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goal,
+          [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal,
              const Obstacles& obstacles) {
             const int nv = system.robot().num_coordinates();
-            Step step{StepStatus::ok, GeometricSystem::Workspace(system)};
-            step.status = system.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv),
-                                              as_vector(goal, "goal", nv), obstacles, step.result);
+            Step step{StepStatus::ok, GeometricSystem::Workspace(system), {system, {}}};
+            step.status = system.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv), as_goal(goal, nv),
+                                              obstacles, step.result);
+            step.explanation = Explanation(system, system.diagnose(step.result));
             return step;
           },
           nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"),
-          "One step at q, v (nv,) [rad, rad/s] towards goal (nv,). Values that are not finite and goals outside\n"
+          nb::sig("def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: "
+                  "numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> Step"),
+          "One step at q, v (nv,) [rad, rad/s] towards a configuration (nv,), a JointGoal or a PoseGoal. Values that are not finite and goals outside\n"
           "the limits give a status and a damped stop, not an exception; wrong shapes raise ValueError.");
+  system
+      .def(
+          "diagnose",
+          [](const GeometricSystem& s, const ArrayLike& q, const ArrayLike& v, nb::handle goal,
+             const Obstacles& obstacles) {
+            const int nv = s.robot().num_coordinates();
+            GeometricSystem::Workspace workspace(s);
+            return Explanation(s, s.diagnose(as_vector(q, "q", nv), as_vector(v, "v", nv), as_goal(goal, nv), obstacles,
+                                             workspace));
+          },
+          nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"),
+          nb::sig("def diagnose(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: "
+                  "numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> Diagnosis"),
+          "The diagnosis of a step, and whether a stop is because the goal, a configuration, is itself blocked.")
+      .def(
+          "goal_clearance",
+          [](const GeometricSystem& s, nb::handle goal, const Obstacles& obstacles) {
+            if (nb::isinstance<PoseGoal>(goal)) {
+              throw nb::value_error("goal must be a configuration: a pose may be reached in many");
+            }
+            const int nv = s.robot().num_coordinates();
+            const Goal at = as_goal(goal, nv);
+            GeometricSystem::Workspace w(s);
+            static_cast<void>(s.acceleration(std::get<JointGoal>(at).position, Eigen::VectorXd::Zero(nv), at, obstacles, w));
+            return w.clearances.values.size() == 0 ? std::numeric_limits<double>::infinity()
+                                                   : w.clearances.values.minCoeff();
+          },
+          nb::arg("goal"), nb::arg("obstacles"),
+          nb::sig("def goal_clearance(self, goal: numpy.typing.ArrayLike | JointGoal, obstacles: Obstacles) -> float"),
+          "The smallest clearance of any barrier at a goal configuration; inf beyond their reach.");
   bind_rollout(m);
 }
 

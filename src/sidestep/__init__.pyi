@@ -1,7 +1,9 @@
 from ._core import BinarySwitch as BinarySwitch
 from ._core import ClearanceBarrier as ClearanceBarrier
 from ._core import CollisionDensity as CollisionDensity
+from ._core import CoordinateKind as CoordinateKind
 from ._core import DampingForm as DampingForm
+from ._core import Diagnosis as Diagnosis
 from ._core import DistanceSwitch as DistanceSwitch
 from ._core import Embedding as Embedding
 from ._core import EmbeddingEvaluation as EmbeddingEvaluation
@@ -9,9 +11,14 @@ from ._core import GeodesicOnly as GeodesicOnly
 from ._core import GeometricSystem as GeometricSystem
 from ._core import HarmonicOnly as HarmonicOnly
 from ._core import Integrator as Integrator
+from ._core import JointGoal as JointGoal
 from ._core import JointLimitBarrier as JointLimitBarrier
 from ._core import JointLimitPotential as JointLimitPotential
+from ._core import MotionState as MotionState
 from ._core import PlaneBarrier as PlaneBarrier
+from ._core import PoseGoal as PoseGoal
+from ._core import ProgressMonitor as ProgressMonitor
+from ._core import Recovery as Recovery
 from ._core import Rollout as Rollout
 from ._core import SelfCollisionBarrier as SelfCollisionBarrier
 from ._core import SigmoidSwitch as SigmoidSwitch

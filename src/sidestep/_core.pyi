@@ -383,6 +383,44 @@ class DistanceSwitch:
     @property
     def slope(self) -> float: ...
 
+class JointGoal:
+    """
+    A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.
+    position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] of a goal that moves, zero by default.
+    """
+
+    def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None) -> None: ...
+
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+class PoseGoal:
+    """
+    A pose of a frame as a goal,
+        U = k_p |p - p*|^2 / 2 + k_R |log(R*^T R)|^2 / 2.
+    pose (4, 4) in the world, or (3,) where position_only. position_stiffness k_p [1/(m s)^2],
+    orientation_stiffness k_R [1/s^2]. rest (nv,) with posture_stiffness [1/s^2]: a configuration that the joints are
+    drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin
+    [m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.
+    Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is
+    none, a stiffness out of range. A pose that is not finite or out of reach gives a status in the step.
+    """
+
+    def __init__(self, robot: Robot, frame: str, pose: numpy.typing.ArrayLike, *, position_only: bool = False, position_stiffness: float = 4.0, orientation_stiffness: float = 0.5, rest: numpy.typing.ArrayLike | None = None, posture_stiffness: float = 0.0, twist: numpy.typing.ArrayLike | None = None) -> None: ...
+
+    @property
+    def frame(self) -> str: ...
+
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(4, 4) in the world."""
+
+    @property
+    def position_only(self) -> bool: ...
+
 class StepStatus(enum.Enum):
     """What a step of the system says about its result."""
 
@@ -392,22 +430,170 @@ class StepStatus(enum.Enum):
     outside_limits = 1
     """They hold, but a joint is outside its position limits."""
 
-    goal_outside_limits = 2
+    goal_out_of_reach = 2
+    """They hold, but the frame cannot be where the goal is."""
+
+    inside_barrier = 3
+    """They hold, with a push out: a clearance is below its barrier's floor."""
+
+    goal_outside_limits = 4
     """Fallback: the goal is outside the limits."""
 
-    invalid_state = 3
+    invalid_state = 5
     """Fallback: q or v is not finite."""
 
-    invalid_goal = 4
-    """Fallback: the goal is not finite."""
+    invalid_goal = 6
+    """Fallback: the goal is not finite, or of another robot."""
 
-    not_finite = 5
+    not_finite = 7
     """Fallback: the equations gave a value that is not finite."""
 
 def is_fallback(status: StepStatus) -> bool:
     """
     Whether the acceleration is the fallback: a damped stop within the acceleration limits.
     """
+
+class MotionState(enum.Enum):
+    """What the motion of one step is about."""
+
+    free = 0
+    """On the way, nothing in it."""
+
+    sliding = 1
+    """On the way, bent by a barrier."""
+
+    arriving = 2
+    """As near to the goal as counts as there."""
+
+    stuck = 3
+    """At rest short of the goal: a local minimum, or a pose out of reach."""
+
+    blocked_at_goal = 4
+    """Stuck, and the goal itself is inside a barrier."""
+
+    inside_barrier = 5
+    """A clearance is below its floor: moving out."""
+
+    fallback = 6
+    """The step is a fallback, nothing is known."""
+
+class CoordinateKind(enum.Enum):
+    """What an embedding coordinate is about."""
+
+    potential = 0
+    """No clearance: a density, a sum."""
+
+    obstacle = 1
+    """A link against the obstacle points."""
+
+    self = 2
+    """Two links of the robot."""
+
+    plane = 3
+    """A link against a plane."""
+
+    joint_limit = 4
+    """A joint against a position limit."""
+
+class Diagnosis:
+    """
+    Why a motion is what it is, from one step. Stuck: |v| < 0.02 rad/s short of the goal, and the metric lets
+    less than 5 % of the goal's pull through (or there is none): a local minimum. The coordinate named is the
+    one with the largest share in what is held back.
+    """
+
+    @property
+    def state(self) -> MotionState: ...
+
+    @property
+    def coordinate(self) -> int:
+        """The dominating one; -1: none."""
+
+    @property
+    def kind(self) -> CoordinateKind:
+        """Of the dominating coordinate."""
+
+    @property
+    def name(self) -> str:
+        """Its link, or joint for a limit; empty: none."""
+
+    @property
+    def other(self) -> str:
+        """The second link; or 'lower' or 'upper'."""
+
+    @property
+    def point(self) -> int:
+        """Its nearest obstacle point; -1: none."""
+
+    @property
+    def clearance(self) -> float:
+        """Its clearance [m; rad]."""
+
+    @property
+    def share(self) -> float:
+        """Its share of what is held back."""
+
+    @property
+    def blocked(self) -> float:
+        """The part of the goal's pull that is held back, 1 - |G^-1 dU| / |dU|."""
+
+    @property
+    def speed(self) -> float:
+        """|v| [rad/s]."""
+
+    @property
+    def joint_error(self) -> float:
+        """Largest [rad]; nan for a pose."""
+
+    @property
+    def position_error(self) -> float:
+        """[m]; nan for joints."""
+
+    @property
+    def rotation_error(self) -> float:
+        """[rad]; nan if not wanted."""
+
+    def describe(self) -> str:
+        """In one English sentence."""
+
+    def __str__(self) -> str: ...
+
+class ProgressMonitor:
+    """
+    Says when a motion has come no nearer to its goal for `patience` [s]: when the goal's
+    potential has not fallen by `fraction` of its least value.
+    """
+
+    def __init__(self, *, patience: float = 2.0, fraction: float = 0.02) -> None: ...
+
+    def update(self, time: float, potential: float) -> bool:
+        """
+        Takes `Step.goal_potential` at a time [s]; whether patience has run out.
+        """
+
+    def reset(self) -> None:
+        """For a new goal."""
+
+class Recovery:
+    """
+    What is done with an arm inside a barrier. speed [m/s] with which it leaves, rate [1/s] at which it
+    takes that up, margin [m] below the floor at which the push is full, rebound [rad/s]: the largest
+    joint speed that a barrier gives back.
+    """
+
+    def __init__(self, *, speed: float = 0.1, rate: float = 20.0, margin: float = 0.005, rebound: float = 1.0) -> None: ...
+
+    @property
+    def speed(self) -> float: ...
+
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def margin(self) -> float: ...
+
+    @property
+    def rebound(self) -> float: ...
 
 class Step:
     """The result of one step; arrays are copies."""
@@ -444,25 +630,55 @@ class Step:
         """dpsi/dq (m, nv)."""
 
     @property
-    def clearances(self) -> Clearances:
-        """Clearances of the coordinates that are barriers of them (m)."""
+    def clearances(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        h (m,) of the barriers [m; rad for joint limits]; inf beyond their reach.
+        """
 
     @property
     def metric(self) -> numpy.typing.NDArray[numpy.float64]:
         """G = I + J^T J (nv, nv)."""
 
+    @property
+    def attraction(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        -G^-1 dU/dq (nv) [rad/s^2]: what the metric lets through of the goal's pull.
+        """
+
+    @property
+    def recovery(self) -> numpy.typing.NDArray[numpy.float64]:
+        """The push out of barriers (nv,) [rad/s^2]; zero outside."""
+
+    @property
+    def inside(self) -> int:
+        """The coordinate deepest below its barrier's floor; -1: none."""
+
+    @property
+    def goal_gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """dU/dq (nv,)."""
+
+    @property
+    def goal_potential(self) -> float:
+        """U [rad^2/s^2], without the posture pull."""
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Why the motion is what it is."""
+
 class GeometricSystem:
     """
     A damped spring that moves on the graph of psi: obstacles bend its path (Bosc 2024, chapter 5),
-        h = -G^-1 K (q - q*) - D v,   g = -G^-1 J^T d2psi/dt2,   a = h + g or as the switch weighs them.
+        h = -G^-1 dU/dq - D (v - v*),   g = -G^-1 J^T d2psi/dt2,   a = h + g or as the switch weighs them,
+    with dU/dq = K (q - q*) and v* = 0 for a configuration at rest.
     Embeddings in the list are stacked, each with its own coordinates; an empty list and robot=... give flat
     space.
     stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive
     semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.
+    recovery: what a barrier does with an arm inside it.
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None) -> None: ...
+    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, recovery: Recovery = ...) -> None: ...
 
     @property
     def num_embedding_coordinates(self) -> int: ...
@@ -479,10 +695,20 @@ class GeometricSystem:
     @property
     def switch(self) -> Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch: ...
 
-    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles) -> Step:
+    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> Step:
         """
-        One step at q, v (nv,) [rad, rad/s] towards goal (nv,). Values that are not finite and goals outside
+        One step at q, v (nv,) [rad, rad/s] towards a configuration (nv,), a JointGoal or a PoseGoal. Values that are not finite and goals outside
         the limits give a status and a damped stop, not an exception; wrong shapes raise ValueError.
+        """
+
+    def diagnose(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> Diagnosis:
+        """
+        The diagnosis of a step, and whether a stop is because the goal, a configuration, is itself blocked.
+        """
+
+    def goal_clearance(self, goal: numpy.typing.ArrayLike | JointGoal, obstacles: Obstacles) -> float:
+        """
+        The smallest clearance of any barrier at a goal configuration; inf beyond their reach.
         """
 
 class Integrator(enum.Enum):
@@ -544,9 +770,9 @@ class Rollout:
     def switch(self) -> numpy.typing.NDArray[numpy.float64]:
         """Weights of the harmonic part (steps + 1, nv)"""
 
-def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None) -> Rollout:
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None) -> Rollout:
     """
-    Integrates the system from q, v (nv,) towards goal (nv,), obstacles moving at their velocities.
+    Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.
     period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
     filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4.
     """

@@ -61,11 +61,18 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
                                   robot_.name() + "'");
     }
     num_embedding_coordinates_ += embedding->num_coordinates();
+    for (int k = 0; k < embedding->num_coordinates(); ++k) {
+      labels_.push_back(embedding->label(k));
+    }
     measures_distances = measures_distances || embedding->measures_distances();
   }
   check_gain(settings_.stiffness, "stiffness", nv);
   check_gain(settings_.damping, "damping", nv);
   check_positive(settings_.fallback_rate, "fallback rate");
+  settings_.recovery.validate();
+  floors_ = Eigen::VectorXd::NullaryExpr(num_embedding_coordinates_, [this](Eigen::Index k) {
+    return labels_[static_cast<std::size_t>(k)].floor;
+  });
   std::visit(Overloaded{
                  [](const Unswitched&) {}, [](const HarmonicOnly&) {}, [](const GeodesicOnly&) {},
                  [](const BinarySwitch& s) { check_finite(s.threshold, "switch threshold"); },
@@ -92,52 +99,78 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
     : acceleration(Eigen::VectorXd::Zero(system.robot().num_coordinates())),
       harmonic(acceleration),
       geodesic(acceleration),
+      attraction(acceleration),
+      recovery(acceleration),
       switch_weights(acceleration),
       values(Eigen::VectorXd::Zero(system.num_embedding_coordinates())),
       curvatures(values),
       jacobian_transposed(Eigen::MatrixXd::Zero(acceleration.size(), values.size())),
       clearances(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       metric(system.robot().num_coordinates(), system.num_embedding_coordinates()),
+      pull(system.robot().num_coordinates()),
       state_(system.robot()),
-      displacement_(acceleration),
-      distances_(acceleration) {}
+      relative_velocity_(acceleration),
+      distances_(acceleration),
+      rest_(acceleration),
+      recovery_(system.robot().num_coordinates(), system.num_embedding_coordinates()),
+      joint_goal_(JointGoal(acceleration)) {}
 
 StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
                                          Eigen::Ref<const Eigen::VectorXd> goal, const Obstacles& obstacles,
                                          Workspace& w) const noexcept {
+  std::get<JointGoal>(w.joint_goal_).position = goal;
+  return acceleration(q, v, w.joint_goal_, obstacles, w);
+}
+
+StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+                                         const Goal& goal, const Obstacles& obstacles,
+                                         Workspace& w) const noexcept {
   if (!q.allFinite() || !v.allFinite()) {
     return fall_back(StepStatus::invalid_state, v, w);
   }
-  if (!goal.allFinite()) {
+  const GoalFault fault = check(goal, robot_);
+  if (fault == GoalFault::invalid) {
     return fall_back(StepStatus::invalid_goal, v, w);
   }
-  if (outside(goal, robot_.limits())) {
+  if (fault == GoalFault::outside_limits) {
     return fall_back(StepStatus::goal_outside_limits, v, w);
   }
 
   w.state_.update(robot_, q, v);
   embed(obstacles, w);
   w.metric.update(w.jacobian_transposed);
+  w.pull.update(goal, w.state_, settings_.stiffness);
 
-  // h = −G⁻¹ K (q − q*) − D v, or with D v inside the bracket.
-  w.displacement_ = q - goal;
-  w.harmonic = -settings_.stiffness.lazyProduct(w.displacement_);
+  // h = −G⁻¹ ∂U − D (v − v*), or with D (v − v*) under G⁻¹ too.
+  w.attraction = -w.pull.gradient;
+  w.metric.solve_in_place(w.attraction);
+  w.relative_velocity_ = v - w.pull.velocity;
+  w.harmonic = settings_.damping.lazyProduct(w.relative_velocity_);
   if (settings_.damping_form == DampingForm::metric) {
-    w.harmonic -= settings_.damping.lazyProduct(v);
     w.metric.solve_in_place(w.harmonic);
-  } else {
-    w.metric.solve_in_place(w.harmonic);
-    w.harmonic -= settings_.damping.lazyProduct(v);
   }
+  w.harmonic = w.attraction - w.harmonic;
   // g = −G⁻¹ Jᵀ d²ψ/dt².
+  const bool falls_freely = std::holds_alternative<GeodesicOnly>(settings_.combination);
+  if (!falls_freely) {
+    soften_rebound(settings_.recovery, w.jacobian_transposed, w.clearances, w.curvatures);
+  }
   w.metric.solve_pullback(w.curvatures, w.geodesic);
   w.geodesic = -w.geodesic;
 
   combine(obstacles, w);
+  w.inside = w.recovery_.update(settings_.recovery, floors_, w.clearances, w.jacobian_transposed, w.recovery);
+  if (!falls_freely) {
+    w.acceleration += w.recovery;
+  }
   if (!w.acceleration.allFinite()) {
     return fall_back(StepStatus::not_finite, v, w);
   }
-  return outside(q, robot_.limits()) ? StepStatus::outside_limits : StepStatus::ok;
+  w.status_ = w.inside >= 0                      ? StepStatus::inside_barrier
+              : outside(q, robot_.limits())      ? StepStatus::outside_limits
+              : fault == GoalFault::out_of_reach ? StepStatus::goal_out_of_reach
+                                                 : StepStatus::ok;
+  return w.status_;
 }
 
 void GeometricSystem::embed(const Obstacles& obstacles, Workspace& w) const noexcept {
@@ -201,6 +234,7 @@ StepStatus GeometricSystem::fall_back(StepStatus status, Eigen::Ref<const Eigen:
     const double limit = robot_.limits().acceleration[i];
     w.acceleration[i] = std::isfinite(v[i]) ? std::clamp(-settings_.fallback_rate * v[i], -limit, limit) : 0.0;
   }
+  w.status_ = status;
   return status;
 }
 

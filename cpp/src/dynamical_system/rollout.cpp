@@ -33,9 +33,9 @@ void check_filter(const AccelerationFilter& filter, int nv, const RolloutSetting
   }
 }
 
-/// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles at t + dt.
+/// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t + dt.
 /// A stage that falls back brakes; the status that is recorded is that of the step's own state.
-void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, const Eigen::VectorXd& goal,
+void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, Goal& goal,
                    Obstacles& obstacles, double dt, const Eigen::VectorXd& a1, Eigen::VectorXd& q,
                    Eigen::VectorXd& v) {
   const double half = 0.5 * dt;
@@ -44,11 +44,13 @@ void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w,
     return w.acceleration;
   };
   obstacles.advance(half);
+  advance(goal, half);
   const Eigen::VectorXd v2 = v + half * a1;
   const Eigen::VectorXd a2 = stage(q + half * v, v2);
   const Eigen::VectorXd v3 = v + half * a2;
   const Eigen::VectorXd a3 = stage(q + half * v2, v3);
   obstacles.advance(half);
+  advance(goal, half);
   const Eigen::VectorXd v4 = v + dt * a3;
   const Eigen::VectorXd a4 = stage(q + dt * v3, v4);
   q += dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
@@ -58,11 +60,13 @@ void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w,
 }  // namespace
 
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, const Eigen::VectorXd& start_velocity,
-                const Eigen::VectorXd& goal, Obstacles obstacles, const RolloutSettings& settings) {
+                Goal goal, Obstacles obstacles, const RolloutSettings& settings) {
   const int nv = system.robot().num_coordinates();
   check_size(start, "q", nv);
   check_size(start_velocity, "v", nv);
-  check_size(goal, "goal", nv);
+  if (const auto* joint = std::get_if<JointGoal>(&goal)) {
+    check_size(joint->position, "goal", nv);
+  }
   if (!(settings.period > 0.0) || !std::isfinite(settings.period)) {
     throw std::invalid_argument("period is " + std::to_string(settings.period) + " s, must be positive and finite");
   }
@@ -124,11 +128,13 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
         v += dt * a;
         q += dt * v;
         obstacles.advance(dt);
+        advance(goal, dt);
         break;
       case Integrator::second_order:
         q += dt * v + 0.5 * dt * dt * a;
         v += dt * a;
         obstacles.advance(dt);
+        advance(goal, dt);
         break;
       case Integrator::runge_kutta_4:
         runge_kutta_4(system, w, goal, obstacles, dt, a, q, v);

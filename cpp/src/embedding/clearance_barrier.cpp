@@ -20,7 +20,8 @@ ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, Barrier
     : Embedding(robot),
       field_(robot, body, temperature),
       barrier_(validated(barrier, "clearance barrier")),
-      reach_(std::max(reach, barrier.activation)) {
+      reach_(std::max(reach, barrier.activation)),
+      links_(body.links) {
   if (!std::isfinite(reach)) {
     throw std::invalid_argument("clearance barrier: reach is " + std::to_string(reach) + " m, must be finite");
   }
@@ -30,6 +31,10 @@ void ClearanceBarrier::add_to(EmbeddingView out, const KinematicState& state,
                               const Obstacles& obstacles) const noexcept {
   field_.evaluate(state, obstacles, reach_, out.clearances);
   add_barriers(barrier_, out);
+}
+
+CoordinateLabel ClearanceBarrier::label(int k) const {
+  return {CoordinateLabel::Kind::obstacle, links_[static_cast<std::size_t>(field_.component(k))], {}, barrier_.floor};
 }
 
 void add_barriers(const BarrierFunction& barrier, EmbeddingView out) noexcept {

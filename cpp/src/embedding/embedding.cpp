@@ -2,6 +2,8 @@
 
 namespace sidestep {
 
+CoordinateLabel Embedding::label(int /*k*/) const { return {}; }
+
 void Embedding::lower_distances(Eigen::Ref<Eigen::VectorXd> /*distances*/, const KinematicState& /*state*/,
                                 const Obstacles& /*obstacles*/) const noexcept {}
 

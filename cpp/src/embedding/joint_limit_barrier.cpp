@@ -27,11 +27,27 @@ void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
     const auto k = static_cast<Eigen::Index>(i);
     const PositionLimit& limit = limits_[i];
     const double v = state.v()[limit.joint_coordinate];
-    const auto f = barrier_(limit.sign * (state.q()[limit.joint_coordinate] - limit.position));
+    const double h = limit.sign * (state.q()[limit.joint_coordinate] - limit.position);
+    if (!(h < barrier_.activation)) {
+      continue;
+    }
+    out.clearances.values[k] = h;
+    out.clearances.rates[k] = limit.sign * v;
+    out.clearances.curvatures[k] = 0.0;
+    out.clearances.gradients.col(k).setZero();
+    out.clearances.gradients(limit.joint_coordinate, k) = limit.sign;
+    const auto f = barrier_(h);
     out.values[k] += f.value;
     out.jacobian_transposed(limit.joint_coordinate, k) += limit.sign * f.first;
     out.curvatures[k] += f.second * v * v;
   }
+}
+
+CoordinateLabel JointLimitBarrier::label(int k) const {
+  const PositionLimit& limit = limits_[static_cast<std::size_t>(k)];
+  return {CoordinateLabel::Kind::joint_limit,
+          robot().coordinate_names()[static_cast<std::size_t>(limit.joint_coordinate)],
+          limit.sign > 0.0 ? "lower" : "upper", barrier_.floor};
 }
 
 }  // namespace sidestep

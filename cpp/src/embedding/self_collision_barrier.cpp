@@ -118,7 +118,7 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
   }
   const std::vector<BodyEllipsoid> all = body_ellipsoids(robot, body, owner);
   const auto group = [&](const std::string& link) {
-    Group g{robot.frames()[static_cast<std::size_t>(robot.frame_index(link))].joint,
+    Group g{link, robot.frames()[static_cast<std::size_t>(robot.frame_index(link))].joint,
             of_link(all, body, link, owner), Eigen::Vector3d::Zero(), 0.0};
     for (const BodyEllipsoid& e : g.ellipsoids) {
       g.centre += e.mean / static_cast<double>(g.ellipsoids.size());
@@ -175,6 +175,11 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
   add_barriers(barrier_, out);
 }
 
+CoordinateLabel SelfCollisionBarrier::label(int k) const {
+  const Pair& pair = pairs_[static_cast<std::size_t>(k)];
+  return {CoordinateLabel::Kind::self, pair.first.link, pair.second.link, barrier_.floor};
+}
+
 PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point,
                            const Eigen::Vector3d& normal, const std::vector<std::string>& links,
                            BarrierFunction barrier, double temperature)
@@ -182,7 +187,8 @@ PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Ve
       normal_(normal.normalized()),
       offset_(normal_.dot(point)),
       barrier_(barrier),
-      temperature_(temperature) {
+      temperature_(temperature),
+      names_(links) {
   constexpr const char* owner = "plane barrier";
   barrier_.validate(owner);
   check_temperature(temperature, owner);
@@ -199,6 +205,10 @@ PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Ve
       throw std::invalid_argument(std::string(owner) + ": no joint moves link '" + link + "'");
     }
   }
+}
+
+CoordinateLabel PlaneBarrier::label(int k) const {
+  return {CoordinateLabel::Kind::plane, names_[static_cast<std::size_t>(k)], {}, barrier_.floor};
 }
 
 void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,

@@ -4,13 +4,16 @@
 #include <memory>
 #include <vector>
 
+#include "sidestep/dynamical_system/diagnosis.hpp"
+#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/dynamical_system/recovery.hpp"
 #include "sidestep/dynamical_system/switch.hpp"
 #include "sidestep/embedding/embedding.hpp"
 #include "sidestep/geometry/graph_metric.hpp"
 
 namespace sidestep {
 
-/// Where damping acts: h = −G⁻¹ K (q − q*) − D v (plain, T5.4), or h = −G⁻¹ (K (q − q*) + D v) (metric, T2.12).
+/// Where damping acts: h = −G⁻¹ ∂U − D (v − v*) (plain, T5.4), or h = −G⁻¹ (∂U + D (v − v*)) (metric, T2.12).
 enum class DampingForm { plain, metric };
 
 struct GeometricSystemSettings {
@@ -19,28 +22,32 @@ struct GeometricSystemSettings {
   DampingForm damping_form = DampingForm::plain;
   Switch combination = Unswitched{};
   double fallback_rate = 10.0;                    ///< [1/s] the damped stop of the fallback is q̈ = −rate v
+  Recovery recovery = {};                         ///< what a barrier does with an arm inside it
 };
 
 /// What a step of the system says about its result.
 enum class StepStatus {
   ok,                   ///< the equations hold
   outside_limits,       ///< the equations hold, but a joint is outside its position limits
+  goal_out_of_reach,    ///< the equations hold, but the frame cannot be where the goal is
+  inside_barrier,       ///< the equations hold, with a push: a clearance is below its barrier's floor
   goal_outside_limits,  ///< fallback: the goal is outside the position limits
   invalid_state,        ///< fallback: q or v is not finite
-  invalid_goal,         ///< fallback: the goal is not finite
+  invalid_goal,         ///< fallback: the goal is not finite, or made for another robot
   not_finite,           ///< fallback: the equations gave a value that is not finite
 };
 
 /// Whether the acceleration is the fallback, a damped stop within the acceleration limits.
 constexpr bool is_fallback(StepStatus status) noexcept {
-  return status != StepStatus::ok && status != StepStatus::outside_limits;
+  return status == StepStatus::goal_outside_limits || status == StepStatus::invalid_state ||
+         status == StepStatus::invalid_goal || status == StepStatus::not_finite;
 }
 
 /// A damped spring that moves on the graph of ψ: obstacles bend its path (Bosc 2024, chapter 5).
 ///
-///     harmonic   h = −G⁻¹ K (q − q*) − D v        (T5.4)
+///     harmonic   h = −G⁻¹ ∂U − D (v − v*)         (T5.4; ∂U = K (q − q*) and v* = 0 for a configuration at rest)
 ///     geodesic   g = −G⁻¹ Jᵀ d²ψ/dt²              (T5.3 in closed form)
-///     a = h + g, or weighted joint by joint as the Switch says.
+///     a = h + g, or weighted joint by joint as the Switch says, plus the push of recovery.hpp out of barriers.
 ///
 /// Immutable; a Workspace per thread holds everything that changes. Several embeddings are stacked: each has its own
 /// coordinates. None at all gives flat space.
@@ -57,16 +64,24 @@ class GeometricSystem {
 
     Eigen::VectorXd acceleration;         ///< a (nv) [rad/s²]
     Eigen::VectorXd harmonic, geodesic;   ///< h and g (nv) [rad/s²]
+    Eigen::VectorXd attraction;           ///< −G⁻¹ ∂U (nv) [rad/s²]: what the metric lets through of the goal's pull
+    Eigen::VectorXd recovery;             ///< the push out of barriers (nv) [rad/s²]; zero outside
+    int inside = -1;                      ///< the coordinate deepest below its floor; -1: none
     Eigen::VectorXd switch_weights;       ///< s (nv): 1 is harmonic
     Eigen::VectorXd values, curvatures;   ///< ψ and d²ψ/dt² (m)
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
     Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
     GraphMetric metric;
+    GoalPull pull;                        ///< ∂U, v* and the way left
 
    private:
     friend class GeometricSystem;
     KinematicState state_;
-    Eigen::VectorXd displacement_, distances_;
+    Eigen::VectorXd relative_velocity_, distances_;
+    Eigen::VectorXd rest_;
+    RecoveryWorkspace recovery_;
+    Goal joint_goal_;
+    StepStatus status_ = StepStatus::ok;
   };
 
   /// One step at (q, v) [rad, rad/s] towards `goal` [rad]. Never throws, never allocates; the status must be read.
@@ -75,6 +90,21 @@ class GeometricSystem {
                                         Eigen::Ref<const Eigen::VectorXd> goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
 
+  /// The same towards any goal, see goal.hpp.
+  [[nodiscard]] StepStatus acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+                                        const Goal& goal, const Obstacles& obstacles,
+                                        Workspace& workspace) const noexcept;
+
+  /// Why the motion of the step that `workspace` holds is what it is, see diagnosis.hpp. No allocation.
+  Diagnosis diagnose(const Workspace& workspace) const noexcept;
+
+  /// The same, and whether a stop is because the goal itself is blocked. Takes a step at the goal too, so not for every
+  /// step of a loop. A pose may be reached in many configurations and is not examined.
+  Diagnosis diagnose(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v, const Goal& goal,
+                     const Obstacles& obstacles, Workspace& workspace) const noexcept;
+
+  /// What every embedding coordinate stands for (m).
+  const std::vector<CoordinateLabel>& labels() const noexcept { return labels_; }
   const Robot& robot() const noexcept { return robot_; }
   const GeometricSystemSettings& settings() const noexcept { return settings_; }
   int num_embedding_coordinates() const noexcept { return num_embedding_coordinates_; }
@@ -88,6 +118,8 @@ class GeometricSystem {
   std::vector<std::shared_ptr<const Embedding>> embeddings_;
   GeometricSystemSettings settings_;
   int num_embedding_coordinates_ = 0;
+  std::vector<CoordinateLabel> labels_;
+  Eigen::VectorXd floors_;
 };
 
 }  // namespace sidestep

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
@@ -38,9 +39,13 @@ struct Rollout {
   Eigen::VectorXd safety_slack;        ///< largest shortfall of a row's clearances [m/s²]; empty without a filter
 };
 
-/// Integrates the system from (q, v), obstacles moving at their velocities.
+/// Integrates the system from (q, v), obstacles and goal moving at their velocities.
 /// Throws std::invalid_argument on sizes, or a period or number of steps that is not positive.
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                const Eigen::VectorXd& goal, Obstacles obstacles, const RolloutSettings& settings);
+                Goal goal, Obstacles obstacles, const RolloutSettings& settings);
+inline Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                       const Eigen::VectorXd& goal, Obstacles obstacles, const RolloutSettings& settings) {
+  return rollout(system, q, v, Goal(JointGoal(goal)), std::move(obstacles), settings);
+}
 
 }  // namespace sidestep

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "sidestep/embedding/barrier_function.hpp"
 #include "sidestep/embedding/clearance_field.hpp"
 #include "sidestep/embedding/embedding.hpp"
@@ -23,6 +26,8 @@ class ClearanceBarrier final : public Embedding {
   int num_coordinates() const noexcept override { return field_.size(); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
 
+  CoordinateLabel label(int k) const override;
+
   const ClearanceField& field() const noexcept { return field_; }
   const BarrierFunction& barrier() const noexcept { return barrier_; }
   double reach() const noexcept { return reach_; }
@@ -31,6 +36,7 @@ class ClearanceBarrier final : public Embedding {
   ClearanceField field_;
   BarrierFunction barrier_;
   double reach_;
+  std::vector<std::string> links_;  // of the body's components
 };
 
 /// Adds ψ_k = f(h_k) with its derivatives, for every clearance within reach that `out.clearances` holds.

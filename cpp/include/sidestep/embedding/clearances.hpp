@@ -11,7 +11,7 @@ struct ClearanceView {
   Eigen::Ref<Eigen::VectorXd> rates;       ///< dh/dt (m) [m/s], obstacle velocities included
   Eigen::Ref<Eigen::VectorXd> curvatures;  ///< d²h/dt² at q̈ = 0 (m) [m/s²]
   Eigen::Ref<Eigen::MatrixXd> gradients;   ///< ∂h/∂q as columns (nv × m) [m/rad]
-  Eigen::Ref<Eigen::VectorXi> nearest;     ///< (m) index of the nearest obstacle point, -1 beyond the reach
+  Eigen::Ref<Eigen::VectorXi> nearest;     ///< (m) index of the nearest obstacle point, -1 where there is none
 };
 
 /// The room such views look into. Where the clearance is +inf the other entries have no meaning.

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -18,6 +20,21 @@ struct EmbeddingView {
   ClearanceView clearances;                         ///< for barriers of clearances; others leave it as it is
 };
 
+/// What one coordinate of an embedding stands for. Fixed at construction, for messages and for what acts on clearances.
+struct CoordinateLabel {
+  enum class Kind {
+    potential,    ///< no clearance: a density, a sum
+    obstacle,     ///< a link's ellipsoid against the obstacle points
+    self,         ///< two links of the robot
+    plane,        ///< a link against a plane
+    joint_limit,  ///< a joint against a position limit; the clearance is in the joint's unit
+  };
+  Kind kind = Kind::potential;
+  std::string name = {};   ///< of the link, or of the coordinate for a joint limit
+  std::string other = {};  ///< the second link of a pair; "lower" or "upper" for a joint limit
+  double floor = -std::numeric_limits<double>::infinity();  ///< below this clearance the arm counts as inside
+};
+
 /// Extra coordinates ψ(q, t) that embed the joint space in R^(nv + m) as the graph q ↦ (q, ψ(q, t)).
 ///
 /// Only ψ, ∂ψ/∂q and the m scalars d²ψ/dt² along the motion are needed by the dynamics: the geodesic term follows
@@ -33,6 +50,9 @@ class Embedding {
 
   /// Adds to `out`, which the caller has zeroed. No allocation.
   virtual void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept = 0;
+
+  /// What coordinate k stands for. Allocates: to be asked at construction, not in the loop.
+  virtual CoordinateLabel label(int k) const;
 
   /// Lowers `distances` (nv) to the distance [m] between the obstacles and what each joint carries directly
   /// (thesis T6.1). Embeddings without a body leave it as it is. No allocation.

@@ -20,6 +20,7 @@ class JointLimitBarrier final : public Embedding {
 
   int num_coordinates() const noexcept override { return static_cast<int>(limits_.size()); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
+  CoordinateLabel label(int k) const override;
 
  private:
   struct PositionLimit {

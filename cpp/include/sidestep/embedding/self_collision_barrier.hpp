@@ -28,9 +28,11 @@ class SelfCollisionBarrier final : public Embedding {
 
   int num_coordinates() const noexcept override { return static_cast<int>(pairs_.size()); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
+  CoordinateLabel label(int k) const override;
 
  private:
   struct Group {
+    std::string link;
     int joint;
     std::vector<BodyEllipsoid> ellipsoids;
     Eigen::Vector3d centre;  // of a ball around them
@@ -56,6 +58,7 @@ class PlaneBarrier final : public Embedding {
 
   int num_coordinates() const noexcept override { return static_cast<int>(links_.size()); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
+  CoordinateLabel label(int k) const override;
 
  private:
   Eigen::Vector3d normal_;
@@ -63,6 +66,7 @@ class PlaneBarrier final : public Embedding {
   BarrierFunction barrier_;
   double temperature_;
   std::vector<std::vector<BodyEllipsoid>> links_;
+  std::vector<std::string> names_;  // of the links
 };
 
 }  // namespace sidestep

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "sidestep/embedding/clearances.hpp"
+#include "sidestep/geometry/graph_metric.hpp"
+
+namespace sidestep {
+
+// An arm inside a barrier, because an obstacle appeared on it or jumped: what brings it out.
+//
+// Geodesics do not: at rest the geodesic term is zero, and below its floor a barrier is linear in h, so it keeps dh/dt.
+// Nor does the goal, whose pull along ∇h is divided by 1 + ψ'² |∇h|², 1e10 or so. Two things are added.
+//
+// 1. A push. For each clearance h below its floor, with its depth d = floor − h > 0 and the weight w = smoothstep(d /
+//    margin), zero with its derivative at the floor, one at full margin,
+//        the wanted d²h/dt² is   w · rate · max(speed − dh/dt, 0),
+//    which makes h grow with `speed` and never holds back an arm that leaves faster. Its acceleration along ∇h,
+//        u_k ∇h_k / (|∇h_k|² + ε),        ε > 0: bounded where the joints can hardly change h,
+//    is averaged over the clearances inside when there are several (the ellipsoids of one link push the same way, and
+//    their pushes must not add up). It is bent by the barriers that it would drive the arm into, and by no other: it goes
+//    through G_S = I + Σ_S J_jᵀ J_j with S grown, a few times over, by the coordinates with J_j · push > 0, whose ψ rises.
+//    The barriers it leads out of are left out, or they would hold it back as they hold back the goal.
+//
+// 2. No rebound. A geodesic keeps its energy ½ (|v|² + |dψ/dt|²). Leaving a barrier of slope ψ' = 1e5 at 1 cm/s that is
+//    an energy of 5e5, which becomes joint speed as the slope falls. An arm that moves has no such dψ/dt, but one
+//    that is pushed out has, and so has one that an obstacle moves away from. So where h grows, the share of dψ/dt
+//    beyond `rebound` is left out of d²ψ/dt² = ψ' h'' + ψ'' h'²: the second term is scaled by (rebound / |ψ' h'|)².
+//    A motion slower than `rebound` among obstacles at rest does not change.
+struct Recovery {
+  double speed = 0.1;    ///< with which an arm leaves a barrier [m/s | rad/s]
+  double rate = 20.0;    ///< with which it takes up that speed [1/s]; 0: no push
+  double margin = 0.005; ///< depth below the floor at which the push is full [m | rad]
+  double rebound = 1.0;  ///< largest joint speed that a barrier gives back [rad/s]
+
+  /// Throws std::invalid_argument that names the setting, its value and what is allowed.
+  void validate() const;
+};
+
+/// Limits ψ'' h'² in the curvatures (m) of clearances that grow, as above. No allocation.
+void soften_rebound(const Recovery& settings, const Eigen::MatrixXd& jacobian_transposed, const Clearances& clearances,
+                    Eigen::VectorXd& curvatures) noexcept;
+
+/// The push, and the room it needs.
+class RecoveryWorkspace {
+ public:
+  RecoveryWorkspace(int nv, int m);
+
+  /// Writes the push (nv) for clearances (m) with these floors; zero if none is below. Returns the coordinate deepest
+  /// below its floor, or -1. No allocation.
+  int update(const Recovery& settings, const Eigen::VectorXd& floors, const Clearances& clearances,
+             const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept;
+
+ private:
+  void bend(const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept;
+
+  GraphMetric metric_;
+  Eigen::MatrixXd jacobian_transposed_;  // of the coordinates in S
+  Eigen::VectorXd bent_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,110 @@
+#include "sidestep/dynamical_system/recovery.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace sidestep {
+namespace {
+
+// ε: a clearance that the joints change by less than 5 cm/rad is pushed less than it asks for [(m/rad)²].
+constexpr double least_gradient_squared = 0.05 * 0.05;
+
+// S has settled after two or three.
+constexpr int most_passes = 4;
+
+double smoothstep(double x) noexcept {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+void check(bool allowed, const char* setting, double value, const char* range) {
+  if (!allowed || !std::isfinite(value)) {
+    throw std::invalid_argument(std::string("recovery: ") + setting + " is " + std::to_string(value) +
+                                ", must be finite and " + range);
+  }
+}
+
+}  // namespace
+
+void Recovery::validate() const {
+  check(speed > 0.0, "speed", speed, "positive");
+  check(rate >= 0.0, "rate", rate, "not negative");
+  check(margin > 0.0, "margin", margin, "positive");
+  check(rebound >= 0.0, "rebound", rebound, "not negative");
+}
+
+void soften_rebound(const Recovery& settings, const Eigen::MatrixXd& jacobian_transposed, const Clearances& clearances,
+                    Eigen::VectorXd& curvatures) noexcept {
+  for (Eigen::Index k = 0; k < curvatures.size(); ++k) {
+    if (!std::isfinite(clearances.values[k]) || !(clearances.rates[k] > 0.0)) {
+      continue;
+    }
+    const auto gradient = clearances.gradients.col(k);
+    const double squared = gradient.squaredNorm();
+    if (!(squared > 0.0)) {
+      continue;
+    }
+    const double slope = jacobian_transposed.col(k).dot(gradient) / squared;  // ψ' of J = ψ' ∇h
+    const double psi_rate = std::abs(slope) * clearances.rates[k];
+    if (psi_rate > settings.rebound) {
+      const double kept = settings.rebound / psi_rate;
+      const double linear = slope * clearances.curvatures[k];
+      curvatures[k] = linear + kept * kept * (curvatures[k] - linear);
+    }
+  }
+}
+
+RecoveryWorkspace::RecoveryWorkspace(int nv, int m)
+    : metric_(nv, m), jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m)), bent_(Eigen::VectorXd::Zero(nv)) {}
+
+int RecoveryWorkspace::update(const Recovery& settings, const Eigen::VectorXd& floors, const Clearances& clearances,
+                              const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept {
+  push.setZero();
+  int deepest = -1;
+  double depth = 0.0, total = 0.0;
+  for (Eigen::Index k = 0; k < floors.size(); ++k) {
+    const double below = floors[k] - clearances.values[k];
+    if (!(below > 0.0)) {
+      continue;
+    }
+    if (below > depth) {
+      depth = below;
+      deepest = static_cast<int>(k);
+    }
+    const double weight = smoothstep(below / settings.margin);
+    const auto gradient = clearances.gradients.col(k);
+    const double wanted = settings.rate * std::max(settings.speed - clearances.rates[k], 0.0);
+    push += weight * wanted / (gradient.squaredNorm() + least_gradient_squared) * gradient;
+    total += weight;
+  }
+  if (deepest >= 0) {
+    push /= std::max(total, 1.0);
+    bend(jacobian_transposed, push);
+  }
+  return deepest;
+}
+
+void RecoveryWorkspace::bend(const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept {
+  jacobian_transposed_.setZero();
+  bent_ = push;
+  for (int pass = 0; pass < most_passes; ++pass) {
+    bool grown = false;
+    for (Eigen::Index j = 0; j < jacobian_transposed.cols(); ++j) {
+      if (jacobian_transposed_.col(j).isZero(0.0) && jacobian_transposed.col(j).dot(bent_) > 0.0) {
+        jacobian_transposed_.col(j) = jacobian_transposed.col(j);
+        grown = true;
+      }
+    }
+    if (!grown) {
+      break;
+    }
+    metric_.update(jacobian_transposed_);
+    bent_ = push;
+    metric_.solve_in_place(bent_);
+  }
+  push = bent_;
+}
+
+}  // namespace sidestep
