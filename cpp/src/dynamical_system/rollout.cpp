@@ -98,9 +98,6 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   for (Eigen::Index k = 0; k < rows; ++k) {
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
     const StepStatus status = system.acceleration(q, v, goal, obstacles, w);
-    if (settings.time_steps) {
-      result.step_seconds[k] = std::chrono::duration<double>(Clock::now() - begin).count();
-    }
     Eigen::VectorXd a = w.acceleration;
     if (filter) {
       // After a fallback the workspace holds no clearances of this state.
@@ -111,6 +108,9 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
         result.safety_slack[k] =
             std::max(result.safety_slack[k], filtered.safety[static_cast<std::size_t>(n)].slack);
       }
+    }
+    if (settings.time_steps) {
+      result.step_seconds[k] = std::chrono::duration<double>(Clock::now() - begin).count();
     }
     result.q.row(k) = q;
     result.v.row(k) = v;

@@ -21,7 +21,7 @@ struct RolloutSettings {
   double period = 0.001;  ///< dt [s]
   int steps = 1000;
   Integrator integrator = Integrator::semi_implicit_euler;
-  bool time_steps = false;  ///< measure each call of GeometricSystem::acceleration
+  bool time_steps = false;  ///< measure each step: the acceleration, and the filter where there is one
   /// What the acceleration passes before it is applied; none if empty. Of the same period, and not with runge_kutta_4,
   /// whose stages are not held.
   std::optional<AccelerationFilter> filter = {};
