@@ -27,7 +27,7 @@ METHODS = ("torch.autograd", "analytic, dense", "core from Python", "core in C++
 def computation_frequency(settings: Settings) -> Iterator[Item]:
     """Steps a second for 2, 3 and 7 joints, one Gaussian per link, one obstacle."""
     steps, repetitions = (100, 3) if settings.quick else (STEPS, REPETITIONS)
-    budget = 2.0 if settings.quick else 25.0  # [s] for each number of the two slow rows
+    budget = 0.7 if settings.quick else 25.0  # [s] for each number of the two slow rows
     frequencies = {method: np.full(len(ROBOTS), np.nan) for method in METHODS}
     evaluations = {method: np.zeros(len(ROBOTS), dtype=int) for method in METHODS}
     for column, (joints, name) in enumerate(ROBOTS.items()):
