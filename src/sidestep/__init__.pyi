@@ -22,6 +22,7 @@ from ._core import Recovery as Recovery
 from ._core import Rollout as Rollout
 from ._core import SelfCollisionBarrier as SelfCollisionBarrier
 from ._core import SigmoidSwitch as SigmoidSwitch
+from ._core import SpeedRegulator as SpeedRegulator
 from ._core import Step as Step
 from ._core import StepStatus as StepStatus
 from ._core import Sum as Sum

@@ -112,8 +112,10 @@ double SafetyRows::hardest_deceleration(const Eigen::Ref<const Eigen::VectorXd>&
   return std::min(of_limits, of_torque);
 }
 
-void SafetyRows::update(const Clearances& clearances, const JointLimits& limits, double period,
-                        const BrakingTorque* torque) noexcept {
+void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
+                        double period, const BrakingTorque* torque) noexcept {
+  const double stop_time = v.cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
+  const double rate = stop_time * settings_.rate > 1.0 ? 1.0 / stop_time : settings_.rate;
   // Insert into the list of the most critical, which is kept sorted; it is short.
   size_ = 0;
   for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
@@ -139,7 +141,7 @@ void SafetyRows::update(const Clearances& clearances, const JointLimits& limits,
     const auto gradient = clearances.gradients.col(k);
     const double hardest = std::max(hardest_deceleration(gradient, limits, torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,
-                                settings_.rate, settings_.correction};
+                                rate, settings_.correction};
     const double demand =
         demanded_deceleration(clearances.values[k] - settings_.margin, -clearances.rates[k], closing, period);
     const double length = gradient.norm();

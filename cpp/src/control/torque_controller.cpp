@@ -23,8 +23,7 @@ constexpr double symmetry_tolerance = 1e-6;
 constexpr double torque_tolerance = 1e-6;
 // Slack below this, relative to 1 /s^2 plus the bound, is rounding of the second program and not worth a status.
 constexpr double slack_tolerance = 1e-9;
-// Clearances and position limits that no acceleration within this many times the limits can break are left out of the
-// second program.
+// Position limits that no acceleration within this many times the limits can break are left out of the second program.
 constexpr double relaxed_reach = 10.0;
 // The smallest second program; the next ones double.
 constexpr int fewest_relaxed_rows = 4;
@@ -129,7 +128,6 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       relaxed_rows_(static_cast<std::size_t>(rows_.max_size() + 2 * nv_)),
       row_multipliers_(Eigen::VectorXd::Zero(rows_.max_size())),
       box_(relaxed_reach * limits_.acceleration),
-      box_lower_(-box_),
       mass_(Eigen::MatrixXd::Zero(nv_, nv_)),
       mass_cholesky_(Eigen::MatrixXd::Zero(nv_, nv_)),
       velocity_(Eigen::VectorXd::Zero(nv_)),
@@ -201,7 +199,7 @@ TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
   if (q_known && v_known && mass_known && bias_known) {
     if (clearances != nullptr && clear) {
       const BrakingTorque braking{mass_cholesky_, bias_};
-      rows_.update(*clearances, limits_, settings_.period, &braking);
+      rows_.update(*clearances, velocity_, limits_, settings_.period, &braking);
     }
     if (wanted_known && clear) {
       wanted_ = acceleration;
@@ -275,7 +273,7 @@ bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
   if (hard_.solve(hard_data_) != QuadraticProgramStatus::solved) {
     return false;
   }
-  solution.acceleration = hard_.solution();
+  solution.acceleration = hard_.solution().cwiseMax(bounds_.lower).cwiseMin(bounds_.upper);  // rounding
   for (int k = 0; k < rows_.size(); ++k) {
     row_multipliers_[k] = std::max(-hard_.multipliers()[2 * nv_ + k], 0.0);
   }
@@ -296,9 +294,7 @@ void TorqueController::collect_relaxed_rows() noexcept {
   num_relaxed_rows_ = 0;
   const auto append = [this](int row) { relaxed_rows_[static_cast<std::size_t>(num_relaxed_rows_++)] = row; };
   for (int k = 0; k < rows_.size(); ++k) {
-    const bool kept = settings_.hard_bounds ? rows_.satisfied_within(k, bounds_.lower, bounds_.upper)
-                                            : rows_.satisfied_within(k, box_lower_, box_);
-    if (!kept) {
+    if (!(settings_.hard_bounds && rows_.satisfied_within(k, bounds_.lower, bounds_.upper))) {
       append(k);
     }
   }
@@ -360,6 +356,9 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
     return TorqueStatus::fallback_solver;
   }
   solution.acceleration = relaxed.program.solution().head(nv_);
+  if (settings_.hard_bounds) {
+    solution.acceleration = solution.acceleration.cwiseMax(bounds_.lower).cwiseMin(bounds_.upper);  // rounding
+  }
   const Eigen::VectorXd& multipliers = relaxed.program.multipliers();
   const int first_row = 2 * nv_ + relaxed.num_rows;  // multipliers of the bounds come before those of the rows
   const auto outside = [farthest](double amount, double bound) {
@@ -371,6 +370,8 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
     const double beyond = q_ddot - std::clamp(q_ddot, bounds_.lower[i], bounds_.upper[i]);
     solution.slack[i] = outside(beyond, beyond > 0.0 ? bounds_.upper[i] : bounds_.lower[i]);
     bounds_kept = bounds_kept && solution.slack[i] == 0.0;
+    const double beyond_position = q_ddot - std::clamp(q_ddot, bounds_.position_lower[i], bounds_.position_upper[i]);
+    safe = safe && outside(beyond_position, q_ddot - beyond_position) == 0.0;
     const auto joint = static_cast<std::size_t>(i);
     const double at_upper = std::max(multipliers[i], multipliers[first_row + i]);
     const double at_lower = std::min(multipliers[i], multipliers[first_row + nv_ + i]);

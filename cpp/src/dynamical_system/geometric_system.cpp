@@ -163,6 +163,10 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
   if (!falls_freely) {
     w.acceleration += w.recovery;
   }
+  if (settings_.speed) {
+    w.speed = (*settings_.speed)(v, w.acceleration, robot_.limits(), w.clearances);
+    w.acceleration += w.speed.drag * v;
+  }
   if (!w.acceleration.allFinite()) {
     return fall_back(StepStatus::not_finite, v, w);
   }

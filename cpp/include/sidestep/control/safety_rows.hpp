@@ -39,6 +39,11 @@ struct ClosingLimits {
 // γ u ≤ A does, and semi-implicit Euler needs less. So for one clearance on its own, with deceleration A available, the
 // margin is kept for ever and no more than A is ever demanded, whatever T is.
 //
+// Several clearances at once. Each may count on all joints for itself, and they may want opposite things of the same
+// joint. What they all can rely on is that the arm stops along its path: with τ = max_j |v_j| / (acceleration limit)_j
+// the acceleration −v/τ is within the limits, and every closing speed decelerates by u/τ. A line of slope γ demands γ u.
+// So with γ <= 1/τ one and the same acceleration meets all rows on their lines: γ is the smaller of `rate` and 1/τ.
+//
 // Outside (s < p(u): an obstacle that appeared, a disturbance, another constraint that won) meeting it at once would
 // be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
 // the profile itself decelerates with, plus correction·e/T, and never above the hardest deceleration the limits allow.
@@ -52,7 +57,7 @@ struct SafetySettings {
   /// Clearance that is kept [m]. Covers what the model does not see: the reduction over points is high by up to its
   /// temperature (2 mm by default), tracking error, one period of delay.
   double margin = 0.005;
-  /// γ [1/s]. Larger lets the arm come close quicker and reacts more to noise; γT must stay well below 1.
+  /// γ [1/s] of a slow arm. Larger lets it come close quicker and reacts more to noise; γT must stay well below 1.
   double rate = 20.0;
   /// A over the largest deceleration that the joint limits allow in the direction of ∇h [-]. What is left serves the
   /// curvature c, other clearances and limits, and joints that cannot give all at once.
@@ -86,9 +91,9 @@ class SafetyRows {
   /// Whether the sizes match and every entry within reach is finite.
   bool usable(const Clearances& clearances) const noexcept;
 
-  /// The most critical clearances of usable ones. The hardest deceleration is Σ_j |∂h/∂q_j| (acceleration limit)_j or,
+  /// The most critical clearances of usable ones, at velocity v (nv). The hardest deceleration is Σ_j |∂h/∂q_j| (acceleration limit)_j or,
   /// given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. No allocation.
-  void update(const Clearances& clearances, const JointLimits& limits, double period,
+  void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, double period,
               const BrakingTorque* torque = nullptr) noexcept;
 
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.

@@ -159,7 +159,7 @@ class TorqueController {
   std::vector<int> relaxed_rows_;
   int num_relaxed_rows_ = 0;
   Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
-  Eigen::VectorXd box_, box_lower_;                // beyond which the second program does not look
+  Eigen::VectorXd box_;                            // position limits beyond it are left out of the second program
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
   std::int64_t counts_[6] = {};

@@ -1,0 +1,281 @@
+#include "sidestep/control/safety_rows.hpp"
+
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "support/allocations.hpp"
+#include "support/random.hpp"
+#include "support/serial_arm.hpp"
+
+using namespace sidestep;
+using test::Random;
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+ClosingLimits random_limits(Random& random) {
+  const double A = random.magnitude(0.01, 100.0);
+  return {A, 2.0 * A, random.magnitude(1.0, 50.0), random.uniform(0.1, 1.0)};
+}
+
+/// p(u) of the derivation, written out once more.
+double room_needed(double u, const ClosingLimits& limits) {
+  const double A = limits.comfortable, rate = limits.rate;
+  return u <= A / rate ? u / rate : u * u / (2.0 * A) + A / (2.0 * rate * rate);
+}
+
+/// `num` clearances that are linear in q, h = gradient·q + offset.
+Clearances linear_clearances(Random& random, int nv, int num) {
+  Clearances clearances(nv, num);
+  for (int k = 0; k < num; ++k) {
+    clearances.gradients.col(k) = 0.3 * random.vector(nv);
+    clearances.values[k] = random.uniform(-0.01, 0.3);
+    clearances.rates[k] = random.uniform(-1.0, 1.0);
+    clearances.curvatures[k] = random.uniform(-1.0, 1.0);
+    clearances.nearest[k] = k;
+  }
+  return clearances;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(the_margin_is_kept_for_ever_and_without_hurry) {
+  // A double integrator that is pushed towards the margin as hard as is allowed, under both integration schemes.
+  Random random(0);
+  for (int trial = 0; trial < 3000; ++trial) {
+    const ClosingLimits limits = random_limits(random);
+    const double period = random.magnitude(1e-4, 0.02);
+    const bool exact = random.chance(0.5);
+    double closing = random.uniform(-0.5, 2.0);
+    double room = room_needed(std::max(closing, 0.0), limits) + random.magnitude(1e-6, 0.5);
+    for (int k = 0; k < 400; ++k) {
+      const double demand = demanded_deceleration(room, closing, limits, period);
+      // No more than the deceleration that was planned with. Rounding: closing speeds of 10 over a period of 1e-4.
+      BOOST_REQUIRE_LE(demand, limits.comfortable * (1.0 + 1e-9) + 1e-10);
+      const double push = random.chance(0.9) ? 10.0 * limits.comfortable : random.uniform(-1.0, 1.0);
+      const double deceleration = std::max(demand, -push);
+      const double next = closing - deceleration * period;
+      room -= exact ? 0.5 * (closing + next) * period : next * period;
+      closing = next;
+      BOOST_REQUIRE_GE(room, -1e-12);  // rounding
+      BOOST_REQUIRE_LE(room_needed(closing, limits), room + 1e-9 * (1.0 + room));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(the_margin_is_reached) {
+  // What is kept is the margin, not more: pushed on, the room shrinks with the time constant 1/rate.
+  const ClosingLimits limits{2.0, 4.0, 20.0, 0.5};
+  double room = 0.3, closing = 0.0;
+  for (int k = 0; k < 2000; ++k) {
+    const double next = closing - std::max(demanded_deceleration(room, closing, limits, 0.001), -5.0) * 0.001;
+    room -= 0.001 * next;
+    closing = next;
+  }
+  // 2 s: 0.55 s along the parabola, 1.4 s of time constant 0.05 s.
+  BOOST_TEST(room > 0.0);
+  BOOST_TEST(room < 1e-10);
+}
+
+BOOST_AUTO_TEST_CASE(demands_by_value) {
+  const ClosingLimits limits{2.0, 4.0, 10.0, 0.5};  // the line meets the parabola at 0.2 m/s, 0.02 m
+  const double T = 0.001;
+  // At rest on the margin, nothing may be taken; at rest and 1 mm away, w + ... with w = 0.001/(1/10 + T).
+  BOOST_TEST(demanded_deceleration(0.0, 0.0, limits, T) == 0.0);
+  BOOST_TEST(demanded_deceleration(0.001, 0.0, limits, T) == -0.001 / 0.101 / T, boost::test_tools::tolerance(1e-12));
+  // On the parabola, the deceleration planned with.
+  const double u = 0.8;
+  BOOST_TEST(demanded_deceleration(room_needed(u, limits), u, limits, T) == 2.0, boost::test_tools::tolerance(1e-9));
+  // On the line under exact integration, w = (s - uT/2)/(1/10 + T/2): a deceleration of 10 (u + w)/2.
+  const double w = (0.01 - 0.5 * T * 0.1) / (0.1 + 0.5 * T);
+  BOOST_TEST(demanded_deceleration(0.01, 0.1, limits, T) == 10.0 * 0.5 * (0.1 + w), boost::test_tools::tolerance(1e-9));
+  // Too fast by 1 mm/s on the parabola: 2 + 0.5 * 0.001/T, and never above the hardest.
+  BOOST_TEST(demanded_deceleration(room_needed(u, limits), u + 0.001, limits, T) == 2.5,
+             boost::test_tools::tolerance(1e-9));
+  BOOST_TEST(demanded_deceleration(0.01, 1.0, limits, T) == 4.0);
+  // Inside by 1 cm and at rest: wants to leave with 0.1 m/s, and 0.5 * 0.1/T is above the hardest.
+  BOOST_TEST(demanded_deceleration(-0.01, 0.0, limits, T) == 4.0);
+  // Leaving with that speed already: the speed may fall along the line, w = -(0.01 - uT/2)/(1/10 + T/2).
+  BOOST_TEST(std::abs(demanded_deceleration(-0.01, -0.1, limits, T) + 1.0) < 0.02);  // -10 u, up to T of order
+  // Limits that are infinite leave the line.
+  const ClosingLimits unlimited{infinity, infinity, 10.0, 0.5};
+  BOOST_TEST(demanded_deceleration(1.0, 0.0, unlimited, T) == -1.0 / 0.101 / T, boost::test_tools::tolerance(1e-12));
+}
+
+BOOST_AUTO_TEST_CASE(a_violation_decays_without_spikes) {
+  Random random(1);
+  for (int trial = 0; trial < 300; ++trial) {
+    const double A = random.magnitude(1.0, 20.0);
+    const ClosingLimits limits{A, 2.0 * A, random.uniform(5.0, 50.0), random.uniform(0.1, 1.0)};
+    const double period = 0.001, first_room = random.uniform(-0.2, 0.05), first_closing = random.uniform(-0.2, 1.0);
+    double room = first_room, closing = first_closing, lowest = room;
+    for (int k = 0; k < 5000; ++k) {
+      const double demand = demanded_deceleration(room, closing, limits, period);
+      BOOST_REQUIRE_LE(demand, limits.hardest);
+      const double next = closing - demand * period;
+      room -= 0.5 * (closing + next) * period;
+      closing = next;
+      lowest = std::min(lowest, room);
+    }
+    // Stops within the distance that A needs, plus that of the last part, which decays with at least 0.1 per period.
+    const double u = std::max(first_closing, 0.0);
+    BOOST_REQUIRE_GE(lowest, std::min(first_room, 0.0) - u * u / (2.0 * A) - 10.0 * period * u - 1e-12);
+    BOOST_REQUIRE_SMALL(room, 1e-3);  // and is back at the margin after 5 s, 25 time constants at least
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_row_by_value) {
+  JointLimits limits = JointLimits::unlimited(2);
+  limits.acceleration << 10.0, 5.0;
+  limits.effort << 30.0, 10.0;
+  Clearances clearances(2, 3);
+  clearances.nearest << -1, 7, -1;
+  clearances.values[1] = 0.105;
+  clearances.rates[1] = -0.4;
+  clearances.curvatures[1] = -0.7;
+  clearances.gradients.col(1) << 0.3, -0.4;
+  SafetyRows rows(2, {});
+  Eigen::VectorXd v = Eigen::VectorXd::Zero(2);
+  rows.update(clearances, v, limits, 0.001);
+  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_TEST(rows.coordinates[0] == 1);
+  BOOST_TEST(rows.nearest[0] == 7);
+  BOOST_TEST(rows.lengths[0] == 0.5, boost::test_tools::tolerance(1e-15));
+  BOOST_TEST(rows.normals(0, 0) == 0.6, boost::test_tools::tolerance(1e-15));
+  BOOST_TEST(rows.normals(0, 1) == -0.8, boost::test_tools::tolerance(1e-15));
+  // 0.3 * 10 + 0.4 * 5 = 5 m/s^2 at most, half of it planned with; margin 5 mm, rate 20/s.
+  const double demand = demanded_deceleration(0.1, 0.4, {2.5, 5.0, 20.0, 0.5}, 0.001);
+  BOOST_TEST(rows.lower[0] == (demand + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
+
+  // With torque: M = diag(4, 1), bias (6, -2): 0.3/4 (30 - 6) + 0.4 (10 - 2) = 1.8 + 3.2 = 5 again; with bias (22, -2)
+  // 0.6 + 3.2 = 3.8.
+  Eigen::MatrixXd cholesky(2, 2);
+  cholesky << 2.0, 0.0, 0.0, 1.0;
+  Eigen::VectorXd bias(2);
+  bias << 22.0, -2.0;
+  const BrakingTorque torque{cholesky, bias};
+  rows.update(clearances, v, limits, 0.001, &torque);
+  const double weaker = demanded_deceleration(0.1, 0.4, {1.9, 3.8, 20.0, 0.5}, 0.001);
+  BOOST_TEST(rows.lower[0] == (weaker + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
+
+  // Stopping takes 0.5 s: a line of 2/s instead of 20/s.
+  v << 1.0, -2.5;
+  rows.update(clearances, v, limits, 0.001);
+  const double slower = demanded_deceleration(0.1, 0.4, {2.5, 5.0, 2.0, 0.5}, 0.001);
+  BOOST_TEST(rows.lower[0] == (slower + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
+  v.setZero();
+  rows.update(clearances, v, limits, 0.001, &torque);
+
+  // Every acceleration within ±b gives at least -(0.6 + 0.8) b.
+  const double b = -rows.lower[0] / 1.4;
+  const Eigen::VectorXd box = Eigen::VectorXd::Constant(2, std::abs(b));
+  BOOST_TEST(rows.lower[0] < 0.0);
+  BOOST_TEST(rows.satisfied_within(0, -0.999 * box, 0.999 * box));
+  BOOST_TEST(!rows.satisfied_within(0, -1.001 * box, 1.001 * box));
+}
+
+BOOST_AUTO_TEST_CASE(the_most_critical_are_kept_in_order) {
+  Random random(2);
+  const JointLimits limits = test::arm_limits(5);
+  SafetySettings settings;
+  settings.max_rows = 6;
+  const Eigen::VectorXd v = Eigen::VectorXd::Zero(5);
+  for (int trial = 0; trial < 200; ++trial) {
+    const int num = random.integer(0, 20);
+    Clearances clearances = linear_clearances(random, 5, num);
+    int within_reach = 0;
+    for (int k = 0; k < num; ++k) {
+      if (random.chance(0.3)) {
+        clearances.nearest[k] = -1;
+        clearances.values[k] = infinity;
+        clearances.rates[k] = std::numeric_limits<double>::quiet_NaN();  // has no meaning beyond the reach
+      } else if (random.chance(0.1)) {
+        clearances.gradients.col(k).setZero();  // no joint moves it
+      } else {
+        ++within_reach;
+      }
+    }
+    SafetyRows rows(5, settings);
+    BOOST_REQUIRE(rows.usable(clearances));
+    rows.update(clearances, v, limits, 0.001);
+    BOOST_REQUIRE_EQUAL(rows.size(), std::min(within_reach, 6));
+    const auto urgency = [&](int k) { return clearances.values[k] + settings.lookahead * clearances.rates[k]; };
+    for (int row = 1; row < rows.size(); ++row) {
+      BOOST_REQUIRE_LE(urgency(rows.coordinates[static_cast<std::size_t>(row) - 1]),
+                       urgency(rows.coordinates[static_cast<std::size_t>(row)]));
+    }
+    int more_urgent = 0;
+    for (int k = 0; rows.size() > 0 && k < num; ++k) {
+      const bool counts = clearances.nearest[k] >= 0 && clearances.gradients.col(k).norm() > 0.0;
+      more_urgent +=
+          counts && urgency(k) <= urgency(rows.coordinates[static_cast<std::size_t>(rows.size()) - 1]) ? 1 : 0;
+    }
+    BOOST_REQUIRE_EQUAL(more_urgent, rows.size());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(unusable_clearances_are_noticed) {
+  Random random(3);
+  const SafetyRows rows(4, {});
+  const Clearances good = linear_clearances(random, 4, 3);
+  BOOST_TEST(rows.usable(good));
+  BOOST_TEST(!rows.usable(linear_clearances(random, 3, 3)));
+  for (const double bad : {infinity, std::numeric_limits<double>::quiet_NaN()}) {
+    Clearances c = good;
+    c.values[1] = bad;
+    BOOST_TEST(!rows.usable(c));
+    c = good, c.rates[1] = bad;
+    BOOST_TEST(!rows.usable(c));
+    c = good, c.curvatures[1] = bad;
+    BOOST_TEST(!rows.usable(c));
+    c = good, c.gradients(2, 1) = bad;
+    BOOST_TEST(!rows.usable(c));
+    c.nearest[1] = -1;
+    BOOST_TEST(rows.usable(c));
+  }
+  Clearances short_of_rates = good;
+  short_of_rates.rates.resize(2);
+  BOOST_TEST(!rows.usable(short_of_rates));
+}
+
+BOOST_AUTO_TEST_CASE(settings_are_checked) {
+  const auto message_of = [](auto&& change) {
+    SafetySettings settings;
+    change(settings);
+    try {
+      SafetyRows rows(3, settings);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  using S = SafetySettings;
+  BOOST_TEST(message_of([](S&) {}).empty());
+  BOOST_TEST(message_of([](S& s) { s.margin = -0.01; }).find("margin is -0.01") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.rate = 0.0; }).find("rate is 0") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.braking_fraction = 1.5; }).find("in (0, 1]") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.correction = 0.0; }).find("correction") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.lookahead = infinity; }).find("lookahead") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.max_rows = -1; }).find("max_rows") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(update_allocates_nothing) {
+  Random random(4);
+  const JointLimits limits = test::arm_limits(7);
+  SafetyRows rows(7, {});
+  const Eigen::MatrixXd cholesky = Eigen::MatrixXd::Identity(7, 7);
+  const Eigen::VectorXd bias = Eigen::VectorXd::Zero(7), v = bias;
+  const BrakingTorque torque{cholesky, bias};
+  for (int num : {0, 1, 16, 32, 80}) {
+    const Clearances clearances = linear_clearances(random, 7, num);
+    BOOST_REQUIRE_EQUAL(test::allocations_of([&] {
+                          if (rows.usable(clearances)) {
+                            rows.update(clearances, v, limits, 0.001, &torque);
+                          }
+                        }),
+                        0u);
+  }
+}
