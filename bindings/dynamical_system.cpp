@@ -289,8 +289,6 @@ void bind_step(nb::module_& m) {
       .def_prop_ro("goal_gradient", [](const Step& s) { return to_numpy(s.result.pull.gradient); }, "dU/dq (nv,).")
       .def_prop_ro("goal_potential", [](const Step& s) { return s.result.pull.potential; },
                    "U [rad^2/s^2], without the posture pull.")
-      .def_prop_ro("clearances", [](const Step& s) { return to_numpy(s.result.clearances.values); },
-                   "h (m,) of the barriers [m; rad for joint limits]; inf beyond their reach.")
       .def_ro("diagnosis", &Step::explanation, "Why the motion is what it is.");
 }
 

@@ -421,6 +421,29 @@ class PoseGoal:
     @property
     def position_only(self) -> bool: ...
 
+class SpeedRegulator:
+    """
+    Regulates the speed along a motion by an acceleration beta v, beta <= 0, which leaves the path of a geodesic as
+    it is: the smooth maximum rho of all ratios of speed to allowed speed obeys drho/dt <= rate (1 - rho)/min(rho, 1).
+    joint_fraction [-]: of the joint velocity limits that is allowed; rate [1/s]: how quickly that is approached;
+    closing_speed [m/s] and closing_slope [1/s]: the motion of the arm may shrink a clearance h by at most
+    closing_speed + closing_slope max(h, 0) per second. Raises ValueError that names the setting.
+    """
+
+    def __init__(self, *, joint_fraction: float = 0.9, rate: float = 10.0, closing_speed: float = float('inf'), closing_slope: float = 1.0) -> None: ...
+
+    @property
+    def joint_fraction(self) -> float: ...
+
+    @property
+    def rate(self) -> float: ...
+
+    @property
+    def closing_speed(self) -> float: ...
+
+    @property
+    def closing_slope(self) -> float: ...
+
 class StepStatus(enum.Enum):
     """What a step of the system says about its result."""
 
@@ -630,10 +653,18 @@ class Step:
         """dpsi/dq (m, nv)."""
 
     @property
-    def clearances(self) -> numpy.typing.NDArray[numpy.float64]:
+    def speed_ratio(self) -> float:
         """
-        h (m,) of the barriers [m; rad for joint limits]; inf beyond their reach.
+        rho of the SpeedRegulator: largest speed over the one allowed; 0 without one.
         """
+
+    @property
+    def speed_drag(self) -> float:
+        """beta <= 0 [1/s] of the SpeedRegulator, which adds beta v."""
+
+    @property
+    def clearances(self) -> Clearances:
+        """Clearances of the coordinates that are barriers of them (m)."""
 
     @property
     def metric(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -674,11 +705,12 @@ class GeometricSystem:
     space.
     stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive
     semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.
+    speed: a SpeedRegulator, which adds beta v to the acceleration.
     recovery: what a barrier does with an arm inside it.
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, recovery: Recovery = ...) -> None: ...
+    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, recovery: Recovery = ..., speed: SpeedRegulator | None = None) -> None: ...
 
     @property
     def num_embedding_coordinates(self) -> int: ...
