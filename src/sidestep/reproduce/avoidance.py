@@ -216,7 +216,7 @@ def switching(settings: Settings) -> Iterator[Item]:
     for ax, run, name in zip(axes[1], (unswitched, switched), energies, strict=True):
         ax.plot(run.time, energies[name], color=style.BLUE)
         ax.set_ylim(bottom=0.0)
-        style.time_axes(ax, "energy ½(vᵀGv + Kx²) [1/s²]")
+        style.time_axes(ax, "energy E [rad²/s²]")
     rest = float(np.linalg.norm(unswitched.q[-1] - planar.GOAL))
     gain = float(energies["switched"].max() / energies["switched"][0])
     yield Figure(
@@ -227,7 +227,8 @@ def switching(settings: Settings) -> Iterator[Item]:
             f"{rest:.2f} rad from the goal, moves at {np.abs(unswitched.v[-1]).max():.0e} rad/s and has kept "
             f"{1000 * planar.least_clearance(unswitched.q):.0f} mm of clearance. (b) With the switch it "
             f"arrives, but through the obstacle ({1000 * planar.least_clearance(switched.q):.0f} mm), with "
-            f"a peak of {np.abs(switched.v).max():.1f} rad/s and {gain:.0f} times its first energy.",
+            f"a peak of {np.abs(switched.v).max():.1f} rad/s and {gain:.0f} times its first energy. "
+            "Below: E = ½(vᵀGv + K|q - q*|²).",
             answers="Figure 5.4.",
             parameters=f"{_SETTING}; semi-implicit Euler with {FINE:g} s (b), Runge-Kutta with 1 ms (a).",
             differs="(a) agrees with the thesis, but it is not a stop: the only point of rest of T5.4 is the "
@@ -281,7 +282,7 @@ def kappa(settings: Settings) -> Iterator[Item]:
         style.mark_goal(ax, *planar.GOAL)
         ax.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6))
         style.joint_axes(ax, title=f"({letter}) κ = {k:g}, peak speed {np.abs(run.v).max():.1f} rad/s")
-    axes[1, 0].legend(loc="lower left", fontsize=6)
+    axes[0, 1].legend(loc="upper right", fontsize=6)
     _task_picture(axes[1, 1], runs[-1], f"(d) task space, κ = {KAPPAS[-1]:g}")
     for ax, series, label in (
         (axes[2, 0], 1000.0 * np.array(clearances), "least clearance [mm]"),
@@ -303,7 +304,7 @@ def kappa(settings: Settings) -> Iterator[Item]:
             parameters=f"{_SETTING}; deviation out of the plane {planar.LOW:g} m, semi-implicit Euler with "
             f"{FINE:g} s, 20 s (below: 10 s).",
             differs="In the thesis κ = 0.3 and 0.5 pass around the obstacle. With correct derivatives no "
-            "threshold avoids contact reliably from this start, and a larger κ makes the motion faster, "
+            "threshold avoids contact from this start, and a larger κ makes the motion faster, "
             "since the switch then opens on a steeper slope.",
         ),
         drawing=figure,

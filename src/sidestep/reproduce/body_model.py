@@ -91,8 +91,8 @@ def criteria(settings: Settings) -> Iterator[Item]:
             parameters=f"{count} points a link, full covariances, 1 to {most} Gaussians, 10-fold "
             f"cross-validation, seed {settings.seed}.",
             differs="The thesis's curves fall to the end of their range, 15, and lie on each other. It does "
-            "not say on which points they are evaluated; on held-out points, fewer in number, the penalty of "
-            "BIC shows and a best number exists or comes near.",
+            "not say on which points they are evaluated. On held-out points the penalty weighs more: the "
+            "two part, and each has a lowest point inside the range.",
         ),
         drawing=figure,
         data=data,

@@ -153,9 +153,9 @@ ERRATA: tuple[Erratum, ...] = (
     Erratum(
         13,
         "T2.5, T2.6, and the symbols after T2.11",
-        "The last term has g_μν x''ᵘ where the free index is λ. The symbols of the second kind contract "
+        "The last term has g_μν x''^μ where the free index is λ. The symbols of the second kind contract "
         "g^λm with derivatives that carry λ, not m.",
-        "g_μλ x''ᵘ; Γ^λ_μν = ½ g^λm (∂_ν g_mμ + ∂_μ g_mν - ∂_m g_μν).",
+        "g_μλ x''^μ; Γ^λ_μν = ½ g^λm (∂_ν g_mμ + ∂_μ g_mν - ∂_m g_μν).",
         "Taken literally the second kind is the first kind times the row sums of G⁻¹.",
         f"{_GEOMETRY}::test_second_kind_contracts_the_inner_index",
     ),

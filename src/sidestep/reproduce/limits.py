@@ -98,8 +98,9 @@ def joint_limits(settings: Settings) -> Iterator[Item]:
                 if outside.any()
                 else f"and is still inside after {delay:.0f} s. "
             )
-            + f"(b) Switched motion past the obstacle to a goal near the limit of joint 1; it ends at "
-            f"({end[0]:.2f}, {end[1]:.2f}) rad.",
+            + f"(b) Switched motion past the obstacle to a goal near the limit of joint 1; after 20 s "
+            f"it is at ({end[0]:.2f}, {end[1]:.2f}) rad"
+            + (", far outside the limits." if np.abs(end).max() > 3.5 else "."),
             answers="Figure 5.6.",
             parameters=f"Limits ±π, ζ with slope {SLOPE:g} /rad and height {HEIGHT:g} /m³ (sum over joints), "
             f"geodesic from (-0.5, -1.2) rad at 0.5 rad/s towards (0.8, -0.6); (b) K = "

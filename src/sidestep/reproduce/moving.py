@@ -68,11 +68,11 @@ def dropping(settings: Settings) -> Iterator[Item]:
         key="5.7",
         title="An obstacle drops into the workspace",
         caption=Caption(
-            shows="Above: ψ over the joints at four instants, and the motion so far; the ridge comes in "
-            "from the left and in the end stands across the way of joint 1. Below: arm and obstacle at the "
-            f"same instants. Least clearance {1000 * clearances[0]:.0f} mm; {1000 * clearances[1]:.0f} mm "
-            f"if the equations are not told the obstacle's velocity (the two motions differ by up to "
-            f"{apart:.2f} rad).",
+            shows="Above: ψ over the joints at four instants, and the motion so far; the "
+            "ridge grows, turns upright, and in the end stands across the way of joint 1. Below: arm and "
+            f"obstacle at the same instants. Least clearance {1000 * clearances[0]:.0f} mm; "
+            f"{1000 * clearances[1]:.0f} mm if the equations are not told the obstacle's velocity (the two "
+            f"motions differ by up to {apart:.2f} rad).",
             answers="Figure 5.7.",
             parameters=f"{_BODY}, obstacle from (-0.8, 2.3) to (-0.8, 0.5) m in {DROP_TIME:g} s, start "
             f"(-0.6, 0.5) rad, goal (1.5, 0.3) rad, K = {planar.STIFFNESS:g} /s², D = {planar.DAMPING:g} /s, "

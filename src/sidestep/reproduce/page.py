@@ -85,7 +85,10 @@ def _item(item: Item, files: Sequence[Path]) -> list[str]:
 
 
 def _number(item: Item) -> str:
-    return ("Figure " if isinstance(item, Figure) else "Table ") + html.escape(item.key)
+    """The label before a title; a table that the thesis does not have carries no number."""
+    kind = "Figure" if isinstance(item, Figure) else "Table"
+    numbered = isinstance(item, Figure) or item.key == "6.1"
+    return f"{kind} {html.escape(item.key)}." if numbered else f"{kind}."
 
 
 def _text(text: str) -> str:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from sidestep import Robot
 from sidestep.drawing import draw_arm
 from sidestep.drawing.palette import BLUE
+from sidestep.reproduce import style
 from sidestep.reproduce.item import Array
 from sidestep.simulation import SceneObject
 
@@ -26,6 +27,7 @@ def add_scene(
     title: str = "",
     view: tuple[float, float] = (18.0, 40.0),
     tip_path: Array | None = None,
+    goal: Array | None = None,
     labelled: bool = True,
 ) -> Any:
     """One picture: arm, obstacles, path of the tip, axes in metres.
@@ -34,13 +36,17 @@ def add_scene(
         place: rows, columns, index of the subplot.
         object_poses: of the objects, or where they start.
         view: elevation and azimuth [deg].
-        tip_path: (T, 3) [m], or None.
+        tip_path: (T, 3) [m], or None; its first point is marked as the start.
+        goal: configuration (nv,) whose tip is marked, or None.
         labelled: whether the axes carry labels.
     """
     ax: Any = figure.add_subplot(*place, projection="3d", computed_zorder=False)
     draw_arm(ax, robot, q, objects=objects, object_poses=object_poses)
     if tip_path is not None:
         ax.plot(*tip_path.T, color=BLUE, linewidth=1.3, zorder=1)
+        style.mark_start(ax, *tip_path[0])
+    if goal is not None:
+        style.mark_goal(ax, *robot.pose(goal, robot.frames[-1].name)[:3, 3])
     ax.set(xlim=(-0.3, 0.8), ylim=(-0.35, 0.75), zlim=(0.0, 1.1))
     ax.set_box_aspect((1.1, 1.1, 1.1), zoom=0.98 if labelled else 1.45)
     ax.view_init(elev=view[0], azim=view[1])

@@ -118,7 +118,14 @@ def _configurations(parts: Assembly, motions: Mapping[str, Motion]) -> Figure:
     path = tip_path(parts.robot, motions["unswitched"].run.q)
     add_scene(figure, (1, 2, 1), parts.robot, parts.start, objects=parts.objects, title="(a) start")
     add_scene(
-        figure, (1, 2, 2), parts.robot, parts.goal, objects=parts.objects, title="(b) goal", tip_path=path
+        figure,
+        (1, 2, 2),
+        parts.robot,
+        parts.goal,
+        objects=parts.objects,
+        title="(b) goal",
+        tip_path=path,
+        goal=parts.goal,
     )
     return Figure(
         key="6.1",
@@ -268,7 +275,8 @@ def _difference(mode: str, motion: Motion) -> str:
         "attraction and damping fade where they are needed, and the links go through the balls.",
     }[mode]
     touch = "" if motion.clearance < 0.0 else " Here nothing is touched."
-    return f"{common} Ours {end}.{touch}"
+    gaussians = "The number of Gaussians, which the thesis does not state, may play a part."
+    return f"{common} Ours {end}.{touch} {gaussians}"
 
 
 def _summary(motions: Mapping[str, Motion]) -> Table:

@@ -80,6 +80,7 @@ def _first_and_last(result: ScenarioResult) -> Figure:
         run.q[-1],
         title=f"(b) {run.time[-1]:.1f} s",
         tip_path=tip_path(run.robot, run.q),
+        goal=run.goal,
     )
     return Figure(
         key="6.10",
@@ -142,6 +143,7 @@ def _sequence(key: str, title: str, answers: str, results: dict[str, ScenarioRes
                 object_poses=run.object_poses[k],
                 title=f"{mode}, {run.time[k]:.1f} s" if column == 0 else f"{run.time[k]:.1f} s",
                 tip_path=path,
+                goal=run.goal,
                 view=(20.0, 60.0),
                 labelled=False,
             )
@@ -152,7 +154,8 @@ def _sequence(key: str, title: str, answers: str, results: dict[str, ScenarioRes
         title=title,
         caption=Caption(
             shows=" ".join(f"With {mode}: {result.sentence()}" for mode, result in results.items())
-            + " Pictures at equal shares of the way; one square of the grid is 0.4 m; blue: path of the tip.",
+            + " Pictures at equal shares of the way; one square of the grid is 0.4 m; blue: path of the tip, "
+            "disc and star: tip at start and goal.",
             answers=answers,
             parameters=f"{_SETTING}; obstacles, start and goal of section {section}.",
             differs=differs,
