@@ -150,16 +150,17 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
     w.metric.solve_in_place(w.harmonic);
   }
   w.harmonic = w.attraction - w.harmonic;
-  // g = −G⁻¹ Jᵀ d²ψ/dt².
+  // g = −G⁻¹ Jᵀ d²ψ/dt², in the one-sided form of recovery.hpp unless it is all there is.
   const bool falls_freely = std::holds_alternative<GeodesicOnly>(settings_.combination);
-  if (!falls_freely) {
-    soften_rebound(settings_.recovery, w.jacobian_transposed, w.clearances, w.curvatures);
+  w.inside = w.recovery_.update(settings_.recovery, floors_, w.clearances, w.jacobian_transposed, w.recovery);
+  if (falls_freely) {
+    w.metric.solve_pullback(w.curvatures, w.geodesic);
+  } else {
+    w.recovery_.solve_pullback(settings_.recovery, w.clearances, w.jacobian_transposed, w.curvatures, w.metric, w.geodesic);
   }
-  w.metric.solve_pullback(w.curvatures, w.geodesic);
   w.geodesic = -w.geodesic;
 
   combine(obstacles, w);
-  w.inside = w.recovery_.update(settings_.recovery, floors_, w.clearances, w.jacobian_transposed, w.recovery);
   if (!falls_freely) {
     w.acceleration += w.recovery;
   }

@@ -35,33 +35,17 @@ void Recovery::validate() const {
   check(rebound >= 0.0, "rebound", rebound, "not negative");
 }
 
-void soften_rebound(const Recovery& settings, const Eigen::MatrixXd& jacobian_transposed, const Clearances& clearances,
-                    Eigen::VectorXd& curvatures) noexcept {
-  for (Eigen::Index k = 0; k < curvatures.size(); ++k) {
-    if (!std::isfinite(clearances.values[k]) || !(clearances.rates[k] > 0.0)) {
-      continue;
-    }
-    const auto gradient = clearances.gradients.col(k);
-    const double squared = gradient.squaredNorm();
-    if (!(squared > 0.0)) {
-      continue;
-    }
-    const double slope = jacobian_transposed.col(k).dot(gradient) / squared;  // ψ' of J = ψ' ∇h
-    const double psi_rate = std::abs(slope) * clearances.rates[k];
-    if (psi_rate > settings.rebound) {
-      const double kept = settings.rebound / psi_rate;
-      const double linear = slope * clearances.curvatures[k];
-      curvatures[k] = linear + kept * kept * (curvatures[k] - linear);
-    }
-  }
-}
-
 RecoveryWorkspace::RecoveryWorkspace(int nv, int m)
-    : metric_(nv, m), jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m)), bent_(Eigen::VectorXd::Zero(nv)) {}
+    : metric_(nv, m),
+      jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m)),
+      bent_(Eigen::VectorXd::Zero(nv)),
+      fades_(Eigen::VectorXd::Ones(m)),
+      curvatures_(Eigen::VectorXd::Zero(m)) {}
 
 int RecoveryWorkspace::update(const Recovery& settings, const Eigen::VectorXd& floors, const Clearances& clearances,
                               const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept {
   push.setZero();
+  fades_.setOnes();
   int deepest = -1;
   double depth = 0.0, total = 0.0;
   for (Eigen::Index k = 0; k < floors.size(); ++k) {
@@ -78,6 +62,10 @@ int RecoveryWorkspace::update(const Recovery& settings, const Eigen::VectorXd& f
     const double wanted = settings.rate * std::max(settings.speed - clearances.rates[k], 0.0);
     push += weight * wanted / (gradient.squaredNorm() + least_gradient_squared) * gradient;
     total += weight;
+    const double length = weight * jacobian_transposed.col(k).norm();
+    if (length > 1.0 - weight) {
+      fades_[k] = (1.0 - weight) / length;
+    }
   }
   if (deepest >= 0) {
     push /= std::max(total, 1.0);
@@ -86,14 +74,45 @@ int RecoveryWorkspace::update(const Recovery& settings, const Eigen::VectorXd& f
   return deepest;
 }
 
+void RecoveryWorkspace::solve_pullback(const Recovery& settings, const Clearances& clearances,
+                                       const Eigen::MatrixXd& jacobian_transposed, const Eigen::VectorXd& curvatures,
+                                       GraphMetric& metric, Eigen::VectorXd& result) noexcept {
+  bool scaled = false;
+  for (Eigen::Index k = 0; k < curvatures.size(); ++k) {
+    double scale = fades_[k], curvature = curvatures[k];
+    if (std::isfinite(clearances.values[k]) && clearances.rates[k] > 0.0) {
+      const auto gradient = clearances.gradients.col(k);
+      const double squared = gradient.squaredNorm();
+      // ψ' of J = ψ' ∇h.
+      const double slope = squared > 0.0 ? jacobian_transposed.col(k).dot(gradient) / squared : 0.0;
+      const double psi_rate = std::abs(slope) * clearances.rates[k];
+      if (psi_rate * scale > settings.rebound) {
+        const double kept = settings.rebound / psi_rate;
+        const double linear = slope * clearances.curvatures[k];
+        curvature = linear + kept * kept * (curvature - linear);
+        scale = kept;
+      }
+    }
+    scaled = scaled || scale < 1.0;
+    curvatures_[k] = scale * curvature;
+    jacobian_transposed_.col(k) = scale * jacobian_transposed.col(k);
+  }
+  if (scaled) {
+    metric_.update(jacobian_transposed_);
+    metric_.solve_pullback(curvatures_, result);
+  } else {
+    metric.solve_pullback(curvatures, result);
+  }
+}
+
 void RecoveryWorkspace::bend(const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept {
   jacobian_transposed_.setZero();
   bent_ = push;
   for (int pass = 0; pass < most_passes; ++pass) {
     bool grown = false;
     for (Eigen::Index j = 0; j < jacobian_transposed.cols(); ++j) {
-      if (jacobian_transposed_.col(j).isZero(0.0) && jacobian_transposed.col(j).dot(bent_) > 0.0) {
-        jacobian_transposed_.col(j) = jacobian_transposed.col(j);
+      if (fades_[j] > 0.0 && jacobian_transposed_.col(j).isZero(0.0) && jacobian_transposed.col(j).dot(bent_) > 0.0) {
+        jacobian_transposed_.col(j) = fades_[j] * jacobian_transposed.col(j);
         grown = true;
       }
     }

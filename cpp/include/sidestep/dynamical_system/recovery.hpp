@@ -23,10 +23,14 @@ namespace sidestep {
 //    The barriers it leads out of are left out, or they would hold it back as they hold back the goal.
 //
 // 2. No rebound. A geodesic keeps its energy ½ (|v|² + |dψ/dt|²). Leaving a barrier of slope ψ' = 1e5 at 1 cm/s that is
-//    an energy of 5e5, which becomes joint speed as the slope falls. An arm that moves has no such dψ/dt, but one
-//    that is pushed out has, and so has one that an obstacle moves away from. So where h grows, the share of dψ/dt
-//    beyond `rebound` is left out of d²ψ/dt² = ψ' h'' + ψ'' h'²: the second term is scaled by (rebound / |ψ' h'|)².
-//    A motion slower than `rebound` among obstacles at rest does not change.
+//    an energy of 5e5, which becomes joint speed as the slope falls. An arm that moves by itself has no such dψ/dt, but
+//    one that is pushed out has, and so has one that an obstacle moves away from. So in the geodesic term a coordinate
+//    whose clearance grows is scaled, ψ → s ψ, with s = rebound / |dψ/dt| where that is below 1, and of its curvature ψ' h''
+//    + ψ'' h'² the second term, which is what gives the speed back, by another s² (s alone would feed energy in at every
+//    step, as s grows while the arm leaves). A motion slower than that among obstacles at rest does not change.
+//
+// 3. Fading. Several barriers that the arm is inside of would each keep their dh/dt: rigid constraints, too many for the
+//    joints. Both in the geodesic term and in S, J_k of one inside is shortened to (1 − w_k)/w_k at most.
 struct Recovery {
   double speed = 0.1;    ///< with which an arm leaves a barrier [m/s | rad/s]
   double rate = 20.0;    ///< with which it takes up that speed [1/s]; 0: no push
@@ -36,10 +40,6 @@ struct Recovery {
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;
 };
-
-/// Limits ψ'' h'² in the curvatures (m) of clearances that grow, as above. No allocation.
-void soften_rebound(const Recovery& settings, const Eigen::MatrixXd& jacobian_transposed, const Clearances& clearances,
-                    Eigen::VectorXd& curvatures) noexcept;
 
 /// The push, and the room it needs.
 class RecoveryWorkspace {
@@ -51,12 +51,20 @@ class RecoveryWorkspace {
   int update(const Recovery& settings, const Eigen::VectorXd& floors, const Clearances& clearances,
              const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept;
 
+  /// Writes G⁻¹ Jᵀ c (nv) with the coordinates scaled as in 2 and 3, after `update`; `metric` is G without scaling and
+  /// serves where there is none. No allocation.
+  void solve_pullback(const Recovery& settings, const Clearances& clearances,
+                      const Eigen::MatrixXd& jacobian_transposed, const Eigen::VectorXd& curvatures,
+                      GraphMetric& metric, Eigen::VectorXd& result) noexcept;
+
  private:
   void bend(const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept;
 
   GraphMetric metric_;
   Eigen::MatrixXd jacobian_transposed_;  // of the coordinates in S
   Eigen::VectorXd bent_;
+  Eigen::VectorXd fades_;                // to what J_k is shortened inside, else 1 (m)
+  Eigen::VectorXd curvatures_;           // scaled (m)
 };
 
 }  // namespace sidestep

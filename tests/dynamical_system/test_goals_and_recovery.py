@@ -1,0 +1,93 @@
+"""Goals, recovery and diagnosis from Python, on a real arm."""
+
+import numpy as np
+import pytest
+
+import sidestep as ss
+
+
+@pytest.fixture(scope="module")
+def robot() -> ss.Robot:
+    return ss.Robot.named("fr3")
+
+
+@pytest.fixture(scope="module")
+def system(robot: ss.Robot) -> ss.GeometricSystem:
+    """Balls of 8 cm around the origins of four links."""
+    links = ["fr3_link4", "fr3_link5", "fr3_link6", "fr3_link7"]
+    covariances = [0.08**2 * np.eye(3)] * 4
+    body = ss.Body(
+        links=links, weights=np.ones(4), means=np.zeros((4, 3)), covariances=covariances, levels=np.ones(4)
+    )
+    return ss.GeometricSystem([ss.ClearanceBarrier(robot, body), ss.JointLimitBarrier(robot)])
+
+
+def test_a_goal_as_an_array_is_a_joint_goal(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+    q, v, free = robot.neutral, np.full(7, 0.1), ss.Obstacles.none()
+    plain = system.acceleration(q, v, q + 0.1, free)
+    goal = system.acceleration(q, v, ss.JointGoal(q + 0.1), free)
+    np.testing.assert_array_equal(plain.acceleration, goal.acceleration)
+    moving = system.acceleration(q, v, ss.JointGoal(q + 0.1, np.full(7, 0.2)), free)
+    # damping 1.5 acts on v - v* instead of v
+    np.testing.assert_allclose(moving.acceleration - plain.acceleration, 1.5 * 0.2, rtol=1e-12)
+
+
+def test_the_pull_of_a_pose_is_the_gradient_of_its_potential(
+    robot: ss.Robot, system: ss.GeometricSystem
+) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        pose = robot.pose(robot.random_configuration(rng), "fr3_hand")
+        goal, q = ss.PoseGoal(robot, "fr3_hand", pose), robot.random_configuration(rng)
+
+        def potential(at: np.ndarray, goal: ss.PoseGoal = goal) -> float:
+            return system.acceleration(at, np.zeros(7), goal, ss.Obstacles.none()).goal_potential
+
+        slopes = [(potential(q + d) - potential(q - d)) / 2e-6 for d in 1e-6 * np.eye(7)]
+        step = system.acceleration(q, np.zeros(7), goal, ss.Obstacles.none())
+        if step.diagnosis.rotation_error < 3.1:  # not on the ridge of half turns
+            np.testing.assert_allclose(step.goal_gradient, slopes, atol=1e-7)  # rounding of U over the step
+
+
+def test_a_bad_pose_is_named(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+    with pytest.raises(ValueError, match="fr3_hand"):  # lists the known ones
+        ss.PoseGoal(robot, "gripper", np.eye(4))
+    with pytest.raises(
+        ValueError, match=r"no joint of robot 'fr3' moves frame 'fr3_link0'; those that one moves: .*fr3_link1"
+    ):
+        ss.PoseGoal(robot, "fr3_link0", np.eye(4))
+    with pytest.raises(ValueError, match="not a rotation"):
+        ss.PoseGoal(robot, "fr3_hand", 2.0 * np.eye(4))
+    q, free = robot.neutral, ss.Obstacles.none()
+    lost = ss.PoseGoal(robot, "fr3_hand", np.full((4, 4), np.nan))
+    assert system.acceleration(q, np.zeros(7), lost, free).status == ss.StepStatus.invalid_goal
+    far = ss.PoseGoal(robot, "fr3_hand", [3.0, 0.0, 0.0], position_only=True)
+    assert system.acceleration(q, np.zeros(7), far, free).status == ss.StepStatus.goal_out_of_reach
+
+
+def test_an_arm_found_inside_moves_out_and_says_so(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+    q = robot.neutral
+    beside = robot.pose(q, "fr3_link5")[:3, 3] + [0.0, 0.09, 0.0]
+    ball = ss.Obstacles([beside], 0.04)  # 3 cm deep
+    step = system.acceleration(q, np.zeros(7), q, ball)
+    assert step.status == ss.StepStatus.inside_barrier
+    assert not ss.is_fallback(step.status)
+    assert step.diagnosis.state == ss.MotionState.inside_barrier
+    assert step.diagnosis.kind == ss.CoordinateKind.obstacle
+    assert (step.diagnosis.name, step.diagnosis.point) == ("fr3_link5", 0)
+    assert step.diagnosis.clearance == pytest.approx(-0.03)
+    assert str(step.diagnosis) == (
+        "link fr3_link5 is inside the barrier of obstacle point 0, 30 mm deep, and moves out"
+    )
+    motion = ss.rollout(system, q, np.zeros(7), q, ball, steps=5000)
+    assert motion.statuses[-1] == ss.StepStatus.ok
+    # the push asks for 2 m/s^2 along h, and the rebound for about 1 rad/s
+    assert np.linalg.norm(motion.acceleration, axis=1).max() < 40.0
+    assert np.linalg.norm(motion.v, axis=1).max() < 3.0
+
+
+def test_a_blocked_goal_has_a_clearance_below_the_floor(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+    q = robot.neutral
+    on_it = ss.Obstacles([robot.pose(q, "fr3_link6")[:3, 3] + [0.0, 0.1, 0.0]], 0.03)
+    assert system.goal_clearance(q, on_it) == pytest.approx(-0.01, abs=2e-3)  # another link may be nearer
+    assert system.goal_clearance(q, ss.Obstacles.none()) > 0.0
