@@ -105,7 +105,7 @@ def _table(frequencies: dict[str, Array], evaluations: dict[str, Array], setting
             rows.append((method, *("PyTorch is not installed",) * 3, "-", "-"))
             continue
         cells = [f"{x:,.0f} Hz" if x >= 100 else f"{x:.1f} Hz" for x in found]
-        ratios = [f"{x / y:,.3g}" for x, y in zip(found, base, strict=True)]
+        ratios = [f"{r:,.0f}" if r >= 100 else f"{r:.3g}" for r in found / base]
         theirs = [f"{x:g}" for x in THESIS[method]] if method in THESIS else ["-"]
         rows.append((method, *cells, " / ".join(ratios), " / ".join(theirs)))
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
