@@ -53,7 +53,8 @@ def test_a_bad_pose_is_named(robot: ss.Robot, system: ss.GeometricSystem) -> Non
     with pytest.raises(ValueError, match="fr3_hand"):  # lists the known ones
         ss.PoseGoal(robot, "gripper", np.eye(4))
     with pytest.raises(
-        ValueError, match=r"no joint of robot 'fr3' moves frame 'fr3_link0'; those that one moves: .*fr3_link1"
+        ValueError,
+        match=r"no joint of robot 'fr3' moves frame 'fr3_link0'; those that one moves: .*fr3_link1",
     ):
         ss.PoseGoal(robot, "fr3_link0", np.eye(4))
     with pytest.raises(ValueError, match="not a rotation"):

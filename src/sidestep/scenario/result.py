@@ -27,6 +27,7 @@ class ScenarioResult:
         clearance_time, clearance: (C,) [s] and [m] exact distance between arm and obstacles at some samples;
             empty without obstacles. `evaluation.min_clearance_m` looks between the samples too.
         wall_time: what the run took on the clock, without the fit of the body [s].
+        stop: why the arm did not arrive, in a sentence; None if it did.
     """
 
     scenario: Scenario
@@ -36,6 +37,7 @@ class ScenarioResult:
     clearance_time: Array
     clearance: Array
     wall_time: float
+    stop: str | None = None
 
     @property
     def success(self) -> bool:
@@ -56,6 +58,7 @@ class ScenarioResult:
             "tolerance_rad": choice.tolerance,
             "period_s": choice.period,
             "wall_time_s": self.wall_time,
+            "stop": self.stop,
             "body_components": self.body.num_components,
             "sidestep_version": __version__,
         }
@@ -76,4 +79,5 @@ class ScenarioResult:
                 encounter = f", touches on the way ({pair})"
                 encounter += f" and pushes {pushed} away" if pushed else ""
         limits = "exceeds a limit" if evaluation.limits.any else "respects every limit"
-        return f"The arm {arrival}{encounter}, and {limits}."
+        reason = "" if self.stop is None else f" At the end: {self.stop}."
+        return f"The arm {arrival}{encounter}, and {limits}.{reason}"

@@ -12,6 +12,7 @@ from sidestep.scenario.assembly import Assembly, Progress, assemble
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.scenario import Scenario
 from sidestep.simulation import Arrival, ExactClearance, Run, Simulation, evaluate, run_kinematically
+from sidestep.simulation.run import obstacles_over_time
 
 Array = npt.NDArray[np.float64]
 OnStep = Callable[[float, Array], None]
@@ -59,7 +60,13 @@ def run_scenario(
         clearance_time=run.time[samples] if run.objects else np.zeros(0),
         clearance=clearance,
         wall_time=clock.perf_counter() - begin,
+        stop=None if evaluation.reached else _reason(parts, run),
     )
+
+
+def _reason(parts: Assembly, run: Run) -> str:
+    seen = obstacles_over_time(parts.seen)(float(run.time[-1]))
+    return parts.system.diagnose(run.q[-1], run.v[-1], parts.goal, seen).describe()
 
 
 def _arrival(scenario: Scenario) -> Arrival:
