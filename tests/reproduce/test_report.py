@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sidestep.reproduce import PARTS, Figure, Table, torch_autograd
+from sidestep.reproduce import PARTS, Figure, Table, performance, torch_autograd
 from sidestep.reproduce import planar as toy
 
 EXPECTED = {
@@ -145,3 +145,12 @@ def test_projections_have_a_stated_spread(report):
     # The mean over cells of a pair is the mean of psi, whichever pair: all samples land in every map.
     assert np.all(found["standard_error"] >= 0.0)
     assert [tuple(pair) for pair in found["pairs"][:2]] == [(1, 2), (1, 3)]
+
+
+def test_table_6_1_says_when_pytorch_is_missing():
+    rates = {method: np.array([1e3, 5e2, 1e2]) for method in performance.METHODS}
+    rates["torch.autograd"] = np.full(3, np.nan)
+    counts = {method: np.zeros(3, dtype=int) for method in performance.METHODS}
+    table = performance.table(rates, counts)
+    assert table.rows[0][:2] == ("torch.autograd", "PyTorch is not installed")
+    assert table.rows[1][4] == "1 / 1 / 1"

@@ -68,7 +68,7 @@ def computation_frequency(settings: Settings) -> Iterator[Item]:
             times.append((clock.perf_counter() - begin) / many)
         frequencies["core in C++"][column] = 1.0 / np.median(times)
         evaluations["core in C++"][column] = many * repetitions
-    yield _table(frequencies, evaluations, settings)
+    yield table(frequencies, evaluations)
 
 
 def _frequency(
@@ -94,7 +94,8 @@ def _frequency(
     return float(np.median(rates)), count
 
 
-def _table(frequencies: dict[str, Array], evaluations: dict[str, Array], settings: Settings) -> Table:
+def table(frequencies: dict[str, Array], evaluations: dict[str, Array]) -> Table:
+    """The table of frequencies [Hz] (NaN: not measured) and of evaluations behind them, per method."""
     from sidestep.reproduce.runner import cpu_name
 
     rows: list[tuple[str, ...]] = []
