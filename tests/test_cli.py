@@ -10,8 +10,10 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+import typer
 
 from sidestep import cli
+from sidestep.cli.run_command import parse_switch
 
 Invoke = Callable[..., int]
 
@@ -84,6 +86,32 @@ def test_the_switch_can_be_overridden(invoke: Invoke) -> None:
     document = json.loads(Path("f.json").read_text())
     assert document["switch"] == "geodesic_only"
     assert document["position_error_rad"] == pytest.approx(1.0, abs=1e-9)  # at rest it stays where it is
+
+
+def test_a_switch_with_numbers_can_be_given(invoke: Invoke) -> None:
+    invoke(
+        "run",
+        "small.yaml",
+        "--switch",
+        "sigmoid:0.5:10",
+        "-q",
+        "--no-report",
+        "--json",
+        "f.json",
+        "--duration",
+        "0.1",
+    )
+    assert json.loads(Path("f.json").read_text())["switch"] == "sigmoid"
+    switch = parse_switch("sigmoid:0.5:10")
+    assert (switch.type, switch.threshold, switch.slope) == ("sigmoid", 0.5, 10.0)
+
+
+@pytest.mark.parametrize(
+    "text", ["sigmoid", "sigmoid:0.5", "binary:x", "binary:nan", "sigmoid:1:-1", "distance:1"]
+)
+def test_a_wrong_switch_is_refused_with_the_allowed_forms(text: str) -> None:
+    with pytest.raises(typer.BadParameter, match=rf"'{text}' is not one of: none, .*binary:THRESHOLD"):
+        parse_switch(text)
 
 
 @pytest.mark.parametrize(

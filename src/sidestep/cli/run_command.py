@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -14,6 +15,7 @@ from sidestep.cli.output import console, write_json
 if TYPE_CHECKING:
     from sidestep.scenario import Scenario
     from sidestep.scenario.result import ScenarioResult
+    from sidestep.scenario.scenario import SwitchChoice, SwitchType
 
 DEMO_SCENARIO = "thesis-6.2.3"
 
@@ -25,12 +27,37 @@ class ModeChoice(StrEnum):
     kinematic = "kinematic"
 
 
-class PlainSwitch(StrEnum):
-    """The switches that need no further number."""
+SWITCH_FORMS = {  # how --switch is written, and what its numbers are
+    "none": (),
+    "harmonic_only": (),
+    "geodesic_only": (),
+    "binary": ("threshold",),
+    "sigmoid": ("threshold", "slope"),
+}
 
-    none = "none"
-    harmonic_only = "harmonic_only"
-    geodesic_only = "geodesic_only"
+
+def parse_switch(text: str) -> SwitchChoice:
+    """A switch as the command line writes it, such as "none" or "sigmoid:0.5:10" (threshold, slope).
+
+    Raises:
+        typer.BadParameter: naming the text and the allowed forms.
+    """
+    from sidestep.scenario.scenario import SwitchChoice
+
+    kind, *numbers = text.split(":")
+    names = SWITCH_FORMS.get(kind)
+    try:
+        if names is None or len(numbers) != len(names):
+            raise ValueError
+        values = dict(zip(names, map(float, numbers), strict=True))
+        if not all(math.isfinite(value) for value in values.values()) or values.get("slope", 1.0) <= 0.0:
+            raise ValueError
+    except ValueError:
+        forms = ", ".join(":".join((form, *map(str.upper, of))) for form, of in SWITCH_FORMS.items())
+        raise typer.BadParameter(f"{text!r} is not one of: {forms} (finite numbers, SLOPE > 0)") from None
+    return SwitchChoice(
+        cast("SwitchType", kind), threshold=values.get("threshold"), slope=values.get("slope")
+    )
 
 
 def run(
@@ -42,7 +69,11 @@ def run(
     ] = None,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the scenario's mode.")] = None,
     switch: Annotated[
-        PlainSwitch | None, typer.Option(help="Instead of the scenario's switch (others: in the file).")
+        str | None,
+        typer.Option(
+            metavar="none|harmonic_only|geodesic_only|binary:THRESHOLD|sigmoid:THRESHOLD:SLOPE",
+            help="Instead of the scenario's switch (a distance switch: in the file).",
+        ),
     ] = None,
     duration: Annotated[
         float | None,
@@ -69,9 +100,7 @@ def run(
         simulation = dataclasses.replace(simulation, duration=duration)
     system = chosen.system
     if switch is not None:
-        from sidestep.scenario.scenario import SwitchChoice
-
-        system = dataclasses.replace(system, switch=SwitchChoice(switch.value))
+        system = dataclasses.replace(system, switch=parse_switch(switch))
     chosen = dataclasses.replace(chosen, simulation=simulation, system=system)
     folder = (out or Path(f"sidestep-report-{chosen.name}")) if report or out is not None else None
     result = run_and_show(chosen, folder=folder, json=json, quiet=quiet)
