@@ -265,7 +265,7 @@ void bind_torque_controller(nb::module_& m) {
           "__init__",
           [](TorqueController* self, const Robot& robot, double period, const ArrayLike& tracking_weight,
              const ArrayLike& torque_weight, double slack_weight, double safety_weight, double position_margin,
-             double stop_time, double stop_damping, const SafetySettings& safety) {
+             double stop_time, double stop_damping, const SafetySettings* safety) {
             const int nv = robot.num_coordinates();
             TorqueControllerSettings settings;
             settings.period = period;
@@ -273,7 +273,7 @@ void bind_torque_controller(nb::module_& m) {
             settings.torque_weight = as_filled_vector(torque_weight, "torque_weight", nv);
             settings.slack_weight = slack_weight;
             settings.safety_weight = safety_weight;
-            settings.safety = safety;
+            settings.safety = safety == nullptr ? SafetySettings() : *safety;
             settings.position_margin = position_margin;
             settings.stop_time = stop_time;
             settings.stop_damping = stop_damping;
@@ -287,13 +287,13 @@ void bind_torque_controller(nb::module_& m) {
           nb::arg("position_margin") = TorqueControllerSettings().position_margin,
           nb::arg("stop_time") = TorqueControllerSettings().stop_time,
           nb::arg("stop_damping") = TorqueControllerSettings().stop_damping,
-          nb::arg("safety") = SafetySettings(),
+          nb::arg("safety") = nb::none(),
           "period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];\n"
           "torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the\n"
           "steepest tracking cost; safety_weight [-]: price of leaving clearances and position limits over that;\n"
           "position_margin [rad | m]: position limits are moved inwards by it; stop_time [s]: time constant of the\n"
           "damped stop; stop_damping [-]: its damping without a mass matrix, over effort limit / velocity limit;\n"
-          "safety: SafetySettings. Raises ValueError that names the setting.")
+          "safety: SafetySettings, by default as they are. Raises ValueError that names the setting.")
       .def(
           "solve",
           [](TorqueController& controller, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration, const ArrayLike& mass_matrix,
@@ -329,14 +329,15 @@ void bind_acceleration_filter(nb::module_& m) {
       .def(
           "__init__",
           [](AccelerationFilter* self, const Robot& robot, double period, double position_margin, double stop_time,
-             const SafetySettings& safety) {
-            new (self) AccelerationFilter(robot, {period, position_margin, stop_time, safety});
+             const SafetySettings* safety) {
+            new (self) AccelerationFilter(
+                robot, {period, position_margin, stop_time, safety == nullptr ? SafetySettings() : *safety});
           },
           nb::arg("robot"), nb::kw_only(), nb::arg("period") = defaults.period,
           nb::arg("position_margin") = defaults.position_margin, nb::arg("stop_time") = defaults.stop_time,
-          nb::arg("safety") = SafetySettings(),
+          nb::arg("safety") = nb::none(),
           "period [s]: how long an acceleration is held; position_margin [rad | m]; stop_time [s]: of the damped stop\n"
-          "for unusable input; safety: SafetySettings. Raises ValueError that names the setting.")
+          "for unusable input; safety: SafetySettings, by default as they are. Raises ValueError that names the setting.")
       .def(
           "apply",
           [](AccelerationFilter& filter, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration,

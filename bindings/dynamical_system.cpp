@@ -361,14 +361,14 @@ void bind_dynamical_system(nb::module_& m) {
       "stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive\n"
       "semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.\n"
       "speed: a SpeedRegulator, which adds beta v to the acceleration.\n"
-      "recovery: what a barrier does with an arm inside it.\n"
+      "recovery: what a barrier does with an arm inside it, by default Recovery().\n"
       "Raises ValueError that names the setting at fault.");
   system
       .def(
           "__init__",
           [](GeometricSystem* self, std::vector<std::shared_ptr<const Embedding>> embeddings, const ArrayLike& stiffness,
              const ArrayLike& damping, nb::handle damping_form, nb::handle combination, nb::handle flat,
-             const Recovery& recovery, const SpeedRegulator* speed) {
+             const Recovery* recovery, const SpeedRegulator* speed) {
             if (embeddings.empty() == flat.is_none()) {
               throw nb::value_error(
                   "give either embeddings, which know their robot, or an empty list and robot=... for flat space");
@@ -379,7 +379,9 @@ void bind_dynamical_system(nb::module_& m) {
                                              as_square_matrix(damping, "damping", nv),
                                              as_enum<DampingForm>(damping_form, "damping_form"),
                                              as_switch(combination)};
-            settings.recovery = recovery;
+            if (recovery != nullptr) {
+              settings.recovery = *recovery;
+            }
             if (speed != nullptr) {
               settings.speed = *speed;
             }
@@ -387,11 +389,11 @@ void bind_dynamical_system(nb::module_& m) {
           },
           nb::arg("embeddings"), nb::kw_only(), nb::arg("stiffness") = 0.5, nb::arg("damping") = 1.5,
           nb::arg("damping_form") = "plain", nb::arg("switch") = nb::none(), nb::arg("robot") = nb::none(),
-          nb::arg("recovery") = Recovery(), nb::arg("speed") = nb::none(),
+          nb::arg("recovery") = nb::none(), nb::arg("speed") = nb::none(),
           nb::sig("def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, "
                   "damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', "
                   "switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch "
-                  "| None = None, robot: Robot | None = None, recovery: Recovery = ..., "
+                  "| None = None, robot: Robot | None = None, recovery: Recovery | None = None, "
                   "speed: SpeedRegulator | None = None) -> None"))
       .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
       .def_prop_ro("stiffness", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().stiffness); })

@@ -706,11 +706,11 @@ class GeometricSystem:
     stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive
     semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.
     speed: a SpeedRegulator, which adds beta v to the acceleration.
-    recovery: what a barrier does with an arm inside it.
+    recovery: what a barrier does with an arm inside it, by default Recovery().
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, recovery: Recovery = ..., speed: SpeedRegulator | None = None) -> None: ...
+    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, recovery: Recovery | None = None, speed: SpeedRegulator | None = None) -> None: ...
 
     @property
     def num_embedding_coordinates(self) -> int: ...
@@ -1078,14 +1078,14 @@ class TorqueController:
     Source: Bosc, equation T6.3, corrected. One object per thread.
     """
 
-    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, safety_weight: float = 1000.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, safety: SafetySettings = ...) -> None:
+    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, safety_weight: float = 1000.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, safety: SafetySettings | None = None) -> None:
         """
         period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];
         torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the
         steepest tracking cost; safety_weight [-]: price of leaving clearances and position limits over that;
         position_margin [rad | m]: position limits are moved inwards by it; stop_time [s]: time constant of the
         damped stop; stop_damping [-]: its damping without a mass matrix, over effort limit / velocity limit;
-        safety: SafetySettings. Raises ValueError that names the setting.
+        safety: SafetySettings, by default as they are. Raises ValueError that names the setting.
         """
 
     def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution:
@@ -1108,10 +1108,10 @@ class AccelerationFilter:
     left; only clearances can give way (status relaxed_safety). One object per thread.
     """
 
-    def __init__(self, robot: Robot, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, safety: SafetySettings = ...) -> None:
+    def __init__(self, robot: Robot, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, safety: SafetySettings | None = None) -> None:
         """
         period [s]: how long an acceleration is held; position_margin [rad | m]; stop_time [s]: of the damped stop
-        for unusable input; safety: SafetySettings. Raises ValueError that names the setting.
+        for unusable input; safety: SafetySettings, by default as they are. Raises ValueError that names the setting.
         """
 
     def apply(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from sidestep._core import __version__
-from sidestep.bench.methods import Method, build_system
+from sidestep.bench.method import Method
+from sidestep.bench.methods import build_system
 from sidestep.bench.motion import MotionSettings, move
 from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sidestep.bench.methods import Method
+from sidestep.bench.method import Method
 from sidestep.cli.output import console, write_json
 
 if TYPE_CHECKING:

@@ -1,0 +1,17 @@
+from .method import Method as Method
+from .methods import build_system as build_system
+from .motion import Motion as Motion
+from .motion import MotionSettings as MotionSettings
+from .motion import move as move
+from .outcome import Judge as Judge
+from .outcome import Outcome as Outcome
+from .problem_file import read_problems as read_problems
+from .problem_file import write_problems as write_problems
+from .problems import ProblemGenerator as ProblemGenerator
+from .problems import ProblemSettings as ProblemSettings
+from .problems import ReachProblem as ReachProblem
+from .problems import Workspace as Workspace
+from .reach import BenchResult as BenchResult
+from .reach import BenchSettings as BenchSettings
+from .reach import default_jobs as default_jobs
+from .reach import run_bench as run_bench
