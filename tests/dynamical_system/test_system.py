@@ -1,5 +1,7 @@
 """The geometric system's parts, modes, damping forms and settings against NumPy."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -180,31 +182,40 @@ def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"stiffness": -1.0}, "stiffness must be finite, symmetric and positive semi-definite"),
-        ({"damping": [1.0, np.nan]}, "damping must be finite, symmetric and positive semi-definite"),
+        (lambda: {"stiffness": -1.0}, "stiffness must be finite, symmetric and positive semi-definite"),
+        (lambda: {"damping": [1.0, np.nan]}, "damping must be finite, symmetric and positive semi-definite"),
         (
-            {"damping": [[1.0, 0.5], [0.0, 1.0]]},
+            lambda: {"damping": [[1.0, 0.5], [0.0, 1.0]]},
             "damping must be finite, symmetric and positive semi-definite",
         ),
-        ({"stiffness": [[1.0, 2.0], [2.0, 1.0]]}, "stiffness must be finite, symmetric and positive semi-"),
-        ({"stiffness": np.eye(3)}, r"stiffness has shape \(3, 3\), expected \(2, 2\)"),
-        ({"damping": [1.0, 1.0, 1.0]}, r"damping has shape \(3,\), expected \(2,\)"),
-        ({"damping_form": "strong"}, "damping_form is 'strong', must be one of: plain, metric"),
-        ({"switch": ss.BinarySwitch(np.nan)}, "switch threshold must be finite"),
-        ({"switch": ss.SigmoidSwitch(1.0, 0.0)}, "switch slope is 0.0*, must be positive and finite"),
-        ({"switch": ss.SigmoidSwitch(np.inf, 1.0)}, "switch threshold must be finite"),
-        ({"switch": ss.DistanceSwitch([0.1], 1.0)}, "switch thresholds: expected 2 finite values, got 1"),
-        ({"switch": ss.DistanceSwitch([0.1, np.nan], 1.0)}, "switch thresholds: expected 2 finite values"),
         (
-            {"switch": ss.DistanceSwitch([0.1, 0.1], -1.0)},
+            lambda: {"stiffness": [[1.0, 2.0], [2.0, 1.0]]},
+            "stiffness must be finite, symmetric and positive semi-",
+        ),
+        (lambda: {"stiffness": np.eye(3)}, r"stiffness has shape \(3, 3\), expected \(2, 2\)"),
+        (lambda: {"damping": [1.0, 1.0, 1.0]}, r"damping has shape \(3,\), expected \(2,\)"),
+        (lambda: {"damping_form": "strong"}, "damping_form is 'strong', must be one of: plain, metric"),
+        (lambda: {"switch": ss.BinarySwitch(np.nan)}, "switch threshold must be finite"),
+        (lambda: {"switch": ss.SigmoidSwitch(1.0, 0.0)}, "switch slope is 0.0*, must be positive and finite"),
+        (lambda: {"switch": ss.SigmoidSwitch(np.inf, 1.0)}, "switch threshold must be finite"),
+        (
+            lambda: {"switch": ss.DistanceSwitch([0.1], 1.0)},
+            "switch thresholds: expected 2 finite values, got 1",
+        ),
+        (
+            lambda: {"switch": ss.DistanceSwitch([0.1, np.nan], 1.0)},
+            "switch thresholds: expected 2 finite values",
+        ),
+        (
+            lambda: {"switch": ss.DistanceSwitch([0.1, 0.1], -1.0)},
             "switch slope is -1.0*, must be positive and finite",
         ),
     ],
 )
-def test_a_bad_setting_is_named(settings: dict, message: str) -> None:
+def test_a_bad_setting_is_named(settings: Callable[[], dict], message: str) -> None:
     case = scene("planar2")
     with pytest.raises(ValueError, match=message):
-        ss.GeometricSystem([ss.CollisionDensity(case.robot, case.body)], **settings)
+        ss.GeometricSystem([ss.CollisionDensity(case.robot, case.body)], **settings())
 
 
 def test_embeddings_must_fit_the_system() -> None:
