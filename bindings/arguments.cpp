@@ -1,5 +1,6 @@
 #include "arguments.hpp"
 
+#include <cmath>
 #include <utility>
 
 namespace sidestep::python {
@@ -44,6 +45,18 @@ Eigen::VectorXd as_vector(nb::handle value, const char* name, Eigen::Index size)
     raise_shape(name, array, size >= 0 ? "(" + std::to_string(size) + ",)" : "(N,)");
   }
   return Eigen::Map<const Eigen::VectorXd>(array.data(), static_cast<Eigen::Index>(array.shape(0)));
+}
+
+Eigen::VectorXd as_finite_vector(nb::handle value, const char* name, Eigen::Index size) {
+  Eigen::VectorXd vector = as_vector(value, name, size);
+  for (Eigen::Index i = 0; i < vector.size(); ++i) {
+    if (!std::isfinite(vector[i])) {
+      throw nb::value_error((std::string(name) + "[" + std::to_string(i) + "] is " + std::to_string(vector[i]) +
+                             ", must be a finite number")
+                                .c_str());
+    }
+  }
+  return vector;
 }
 
 Eigen::VectorXd as_filled_vector(nb::handle value, const char* name, Eigen::Index size) {

@@ -18,6 +18,10 @@ Array as_array(nb::handle value, const char* name);
 /// A vector argument of `size` entries (any size if -1); raises ValueError with the shape got and the shape allowed.
 Eigen::VectorXd as_vector(nb::handle value, const char* name, Eigen::Index size = -1);
 
+/// The same, of finite numbers; raises ValueError with the first entry that is not. Not for the control loop, where a
+/// state that is not finite is a status.
+Eigen::VectorXd as_finite_vector(nb::handle value, const char* name, Eigen::Index size);
+
 /// A scalar or a vector of `size` entries, as a vector.
 Eigen::VectorXd as_filled_vector(nb::handle value, const char* name, Eigen::Index size);
 

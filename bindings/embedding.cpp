@@ -3,6 +3,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <stdexcept>
+#include <string>
+
 #include "arguments.hpp"
 #include "module.hpp"
 #include "sidestep/embedding/clearance_barrier.hpp"
@@ -13,6 +16,29 @@
 #include "sidestep/embedding/sum.hpp"
 
 namespace sidestep::python {
+namespace {
+
+/// Throws std::invalid_argument if the body was fitted to another robot than this. A body made by hand, and a robot
+/// of the core without geometry, have no fingerprint and are taken as they are.
+void check_fitted_to(const Robot& robot, const Body& body) {
+  const auto text = [](const nb::object& owner, const char* name) {
+    return nb::hasattr(owner, name) ? nb::cast<std::string>(owner.attr(name)) : std::string();
+  };
+  const nb::object body_object = nb::find(body), robot_object = nb::find(robot);
+  const std::string fitted_to = text(body_object, "fingerprint");
+  if (fitted_to.empty()) {
+    return;
+  }
+  const std::string here = text(robot_object, "fingerprint");
+  if (!here.empty() && fitted_to != here) {
+    throw std::invalid_argument("the body was fitted to robot '" + text(body_object, "robot_name") +
+                                "' (fingerprint " + fitted_to.substr(0, 12) + ") and cannot be used with robot '" +
+                                robot.name() + "' (fingerprint " + here.substr(0, 12) +
+                                "); their kinematic structure or geometry differs");
+  }
+}
+
+}  // namespace
 
 void bind_embedding(nb::module_& m) {
   nb::class_<EmbeddingEvaluation>(m, "EmbeddingEvaluation", "Values, Jacobian and curvatures of an embedding.")
@@ -39,14 +65,14 @@ void bind_embedding(nb::module_& m) {
           "evaluate",
           [](const Embedding& e, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles) {
             const int nv = e.robot().num_coordinates();
-            return evaluate(e, as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles);
+            return evaluate(e, as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv), obstacles);
           },
           nb::arg("q"), nb::arg("v"), nb::arg("obstacles"),
           "psi, dpsi/dq and d2psi/dt2 at q (nv,) [rad] and v (nv,) [rad/s], obstacle velocities included.")
       .def(
           "hessian",
           [](const Embedding& e, const ArrayLike& q, const Obstacles& obstacles) -> NumpyArray {
-            const auto all = hessians(e, as_vector(q, "q", e.robot().num_coordinates()), obstacles);
+            const auto all = hessians(e, as_finite_vector(q, "q", e.robot().num_coordinates()), obstacles);
             if (all.size() == 1) {
               return to_numpy_matrix(all.front());
             }
@@ -64,8 +90,13 @@ void bind_embedding(nb::module_& m) {
       "The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),\n"
       "    psi(q) = sum_points sum_links sum_k pi_k N(x | o_l + R_l mu_k, R_l Sigma_k R_l^T + r^2 I)  [1/m^3].\n"
       "`average` divides by the number of points. Links that no joint moves are left out.")
-      .def(nb::init<const Robot&, const Body&, bool>(), nb::arg("robot"), nb::arg("body"), nb::kw_only(),
-           nb::arg("average") = false);
+      .def(
+          "__init__",
+          [](CollisionDensity* self, const Robot& robot, const Body& body, bool average) {
+            check_fitted_to(robot, body);
+            new (self) CollisionDensity(robot, body, average);
+          },
+          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("average") = false);
 
   nb::class_<JointLimitPotential, Embedding>(
       m, "JointLimitPotential",
@@ -88,6 +119,7 @@ void bind_embedding(nb::module_& m) {
           "__init__",
           [](ClearanceBarrier* self, const Robot& robot, const Body& body, double activation, double strength,
              double power, double floor, double temperature, double reach) {
+            check_fitted_to(robot, body);
             new (self) ClearanceBarrier(robot, body, {activation, strength, power, floor}, temperature, reach);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("activation") = 0.10, nb::arg("strength") = 0.1,
@@ -127,6 +159,7 @@ void bind_embedding(nb::module_& m) {
           [](SelfCollisionBarrier* self, const Robot& robot, const Body& body,
              const std::vector<std::pair<std::string, std::string>>& pairs, double activation, double strength,
              double power, double floor, double temperature) {
+            check_fitted_to(robot, body);
             new (self)
                 SelfCollisionBarrier(robot, body, pairs, {activation, strength, power, floor}, temperature);
           },
@@ -143,6 +176,7 @@ void bind_embedding(nb::module_& m) {
           [](PlaneBarrier* self, const Robot& robot, const Body& body, const ArrayLike& point, const ArrayLike& normal,
              const std::vector<std::string>& links, double activation, double strength, double power, double floor,
              double temperature) {
+            check_fitted_to(robot, body);
             new (self) PlaneBarrier(robot, body, as_vector(point, "point", 3), as_vector(normal, "normal", 3), links,
                                     {activation, strength, power, floor}, temperature);
           },

@@ -14,13 +14,13 @@ Eigen::Isometry3d as_pose(nb::handle value, const char* name) {
   return X;
 }
 
-/// The kinematic state at (q, v); v may be None. Raises ValueError on wrong shapes.
+/// The kinematic state at (q, v); v may be None. Raises ValueError on wrong shapes and numbers that are not finite.
 KinematicState state_at(const Robot& robot, nb::handle q, nb::handle v = nb::handle()) {
   KinematicState state(robot);
-  const Eigen::VectorXd position = as_vector(q, "q", robot.num_coordinates());
+  const Eigen::VectorXd position = as_finite_vector(q, "q", robot.num_coordinates());
   Eigen::VectorXd velocity = Eigen::VectorXd::Zero(robot.num_coordinates());
   if (v.is_valid()) {
-    velocity = as_vector(v, "v", robot.num_coordinates());
+    velocity = as_finite_vector(v, "v", robot.num_coordinates());
   }
   state.update(robot, position, velocity);
   return state;

@@ -158,3 +158,45 @@ def test_shapes_of_q_and_v_are_checked() -> None:
         density.hessian(np.zeros(1), obstacles)
     with pytest.raises(TypeError, match="q must be an array of real numbers"):
         density.evaluate(["a", "b"], np.zeros(2), obstacles)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_values_that_are_not_finite_are_named(value: float) -> None:
+    """Outside the loop; inside it they are a status of `GeometricSystem.acceleration`."""
+    robot = ss.Robot.named("planar2")
+    density = ss.CollisionDensity(robot, ss.Body.fit(robot, components=1))
+    obstacles = ss.Obstacles([[0.5, 0.5, 0.0]])
+    bad, zero = [0.0, value], np.zeros(2)
+    with pytest.raises(ValueError, match=rf"q\[1\] is {value}, must be a finite number"):
+        density.evaluate(bad, zero, obstacles)
+    with pytest.raises(ValueError, match=r"v\[1\] is .*, must be a finite number"):
+        density.evaluate(zero, bad, obstacles)
+    with pytest.raises(ValueError, match=r"q\[1\] is"):
+        density.hessian(bad, obstacles)
+    with pytest.raises(ValueError, match=r"q\[1\] is"):
+        robot.pose(bad, "link1")
+    with pytest.raises(ValueError, match=r"v\[1\] is"):
+        robot.bias_acceleration(zero, bad, "link1")
+
+
+def test_a_body_of_another_robot_with_the_same_links_is_refused() -> None:
+    """The links of two sizes of one arm have the same names."""
+    short, long = ss.Robot.from_urdf(_arm(0.3)), ss.Robot.from_urdf(_arm(0.6))
+    body = ss.Body.fit(short, components=1, cache=False)
+    assert ss.CollisionDensity(short, body).num_coordinates == 1
+    message = r"fitted to robot 'arm' \(fingerprint \w{12}\) and cannot be used with robot 'arm'"
+    for make in (
+        lambda: ss.CollisionDensity(long, body),
+        lambda: ss.ClearanceBarrier(long, body),
+        lambda: ss.SelfCollisionBarrier(long, body, []),
+        lambda: ss.PlaneBarrier(long, body, point=[0, 0, 0], normal=[0, 0, 1], links=["b"]),
+    ):
+        with pytest.raises(ValueError, match=message):
+            make()
+
+
+def _arm(length: float) -> str:
+    return f"""<robot name="arm"><link name="a"/>
+      <link name="b"><collision><geometry><box size="{length} 0.1 0.1"/></geometry></collision></link>
+      <joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
