@@ -8,6 +8,7 @@ import trimesh
 
 from sidestep import ExactClearance, Robot, SceneObject
 from sidestep.pose import from_quaternion, pose_vector
+from sidestep.simulation import clearance
 from sidestep.simulation.clearance import travel_per_joint
 
 STRETCHED = np.zeros(2)  # planar2: link2 is a box from x = 0.5 to 1, y and z within half its width
@@ -157,6 +158,20 @@ def test_minimum_agrees_with_brute_force_on_the_fr3(seed: int) -> None:
     assert worst.lower_bound <= dense
     assert worst.clearance.distance >= dense - 1e-3
     assert worst.checks < 4001 * 7 * 3 / 5  # skips most of what dense sampling does
+
+
+def test_a_diverged_motion_ends_with_an_honest_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ball above the base is 0.71 m from link 1 at every angle, so that each check gains one tolerance only."""
+    monkeypatch.setattr(clearance, "FINE_CHECKS", 500)
+    exact = ExactClearance(Robot.named("planar2"), [SceneObject.ball("ball", [0.0, 0.0, 0.8], radius=0.05)])
+    still = exact.minimum_over(np.zeros((2, 2)))
+    for turns in (1e3, 1e12, 1e300):  # at 1e12 the finer steps are below the rounding of the travel
+        wild = exact.minimum_over(np.outer(np.linspace(0.0, 1.0, 50), [turns, -turns]))
+        assert wild.checks <= 2 * 500 + 16 * 3 + 3  # fine, coarse, the first look, and one per pair
+        assert wild.lower_bound == wild.clearance.distance - wild.tolerance
+        assert wild.lower_bound < still.clearance.distance
+        assert wild.tolerance > 1e-3
+    assert still.tolerance == 1e-3
 
 
 def test_series_is_the_distance_at_each_sample() -> None:

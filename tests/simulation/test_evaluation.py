@@ -176,6 +176,20 @@ def test_grazing_between_samples_is_no_contact_but_not_collision_free() -> None:
     assert not result.collision_free
 
 
+@pytest.mark.parametrize("gap", [3e-4, 2e-5])  # [m], both below the tolerance of the first look, 1 mm
+def test_a_narrow_gap_is_measured_until_it_is_sure(gap: float) -> None:
+    ball = SceneObject.ball(
+        "ball", [0.25, 0.0, 0.09 + gap], radius=0.05
+    )  # above link 1, 4 cm thick either way
+    poses = np.broadcast_to(pose_vector(ball.pose), (101, 1, 7))
+    result = evaluate(replace(_simulated(_line()), objects=(ball,), object_poses=poses))
+    assert result.min_clearance_m == pytest.approx(gap, abs=2e-9)  # Coal's point has a radius of 1e-9
+    assert result.clearance_tolerance_m < gap
+    assert result.collision_free
+    # what could have touched, as far as the measurement knows, is not called free of collision
+    assert not replace(result, clearance_tolerance_m=1e-3).collision_free
+
+
 @pytest.mark.parametrize("physics", [True, False])
 def test_json_has_the_figures_and_no_nan(physics: bool) -> None:
     run = _simulated(_line()) if physics else KinematicRun(**_columns(_line()))

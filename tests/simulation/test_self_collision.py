@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sidestep import Robot, SelfCollision
+from sidestep.simulation import self_collision
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +62,17 @@ def test_the_minimum_of_a_motion_is_that_of_dense_samples(fr3: SelfCollision) ->
         assert found.distance <= dense + 1e-3
         here = [np.interp(found.sample, range(3), path[:, j]) for j in range(7)]
         assert fr3.distance(np.array(here)).distance == pytest.approx(found.distance, abs=1e-9)
+
+
+def test_a_diverged_motion_ends(monkeypatch: pytest.MonkeyPatch, planar: SelfCollision) -> None:
+    monkeypatch.setattr(self_collision, "FINE_CHECKS", 300)
+    calls = []
+    apart = planar._balls_apart
+    monkeypatch.setattr(planar, "_balls_apart", lambda *given: calls.append(1) or apart(*given))
+    waving = np.zeros((10_000, 3))
+    waving[1::2, 2] = 2.0  # link 3 never comes to link 1
+    assert planar.minimum_over(waving).distance == planar.distance(waving[1]).distance > 0.1
+    assert len(calls) <= 2 * 300 + 16 + 2  # fine, coarse, the first look, one for the pair, one above
 
 
 def test_a_touch_between_samples_is_found(planar: SelfCollision) -> None:

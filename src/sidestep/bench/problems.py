@@ -12,7 +12,7 @@ import numpy.typing as npt
 from sidestep._core import Obstacles
 from sidestep.robot import Robot
 from sidestep.simulation import ExactClearance, SceneObject, SelfCollision
-from sidestep.simulation.clearance import mesh_model
+from sidestep.simulation.solid import mesh_model
 
 Array = npt.NDArray[np.float64]
 

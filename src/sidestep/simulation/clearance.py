@@ -20,11 +20,11 @@ from sidestep._core import JointType
 from sidestep.pose import from_quaternion, moved, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.scene import SceneObject, check_scene
+from sidestep.simulation.solid import POINT_RADIUS, Solid, contains, mesh_solid, object_solid, penetration
 
 Array = npt.NDArray[np.float64]
 
-POINT_RADIUS = 1e-9  # [m] Coal has no point; a sphere this small stands for the centre of a ball
-MAX_CONTACTS = 10_000  # contacts kept for a penetration depth: more than the triangles of any overlap
+FINE_CHECKS = 100_000  # distances at the tolerance asked for, some ten seconds; a thesis run takes a thousand
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,26 +53,14 @@ class PathClearance:
         sample: its position along the trajectory, in samples (4.25: a quarter of the way from 4 to 5).
         lower_bound: [m] no moment of the motion has a smaller clearance than this.
         checks: number of distance computations that this took.
+        tolerance: [m] the one asked for, or a larger one after `FINE_CHECKS` (a run that diverged).
     """
 
     clearance: Clearance
     sample: float
     lower_bound: float
     checks: int
-
-
-@dataclass(frozen=True, eq=False)
-class _Solid:
-    """A rigid shape for Coal. A ball is kept as its centre and `radius` is subtracted afterwards."""
-
-    name: str
-    shape: coal.CollisionGeometry
-    radius: float
-    surface: (
-        Array | None
-    )  # (F, 3, 3) triangles, hollow for Coal; None for primitives, which it takes as solid
-    reference: Array  # (3,) a point of the shape, in its frame
-    bounding_radius: float
+    tolerance: float
 
 
 class ExactClearance:
@@ -99,23 +87,23 @@ class ExactClearance:
         self.robot = robot
         self.objects = check_scene(objects)
         joint_of = {frame.name: frame.joint for frame in robot.frames}
-        self._links: list[_Solid] = []
+        self._links: list[Solid] = []
         self._travel: list[Array] = []
         for link in robot.links:
             mesh = robot.collision_mesh(link.name)
             if mesh is None or (joint_of[link.name] < 0 and not include_immobile):
                 continue
-            self._links.append(_mesh_solid(link.name, mesh))
+            self._links.append(mesh_solid(link.name, mesh))
             self._travel.append(travel_per_joint(robot, link.name, mesh))
         if not self._links:
             raise ValueError(f"robot {robot.name!r} has no moving link with a collision mesh to measure from")
-        self._objects = [_object_solid(item) for item in self.objects]
+        self._objects = [object_solid(item) for item in self.objects]
 
     def among(self, objects: Sequence[SceneObject]) -> ExactClearance:
         """The same robot among other objects; shares the links, which take long to prepare."""
         other = copy(self)
         other.objects = check_scene(objects)
-        other._objects = [_object_solid(item) for item in other.objects]
+        other._objects = [object_solid(item) for item in other.objects]
         return other
 
     def distance(self, q: Array, object_poses: Array | None = None) -> Clearance:
@@ -151,6 +139,10 @@ class ExactClearance:
         minimum lies in [reported - tolerance, reported]; where the reported one is above `tolerance`, nothing
         touched, however thin. (Below zero the lower end holds for balls only, see the class.)
 
+        The number of checks is bounded by the travel over the tolerance, which a diverging motion makes endless.
+        So after `FINE_CHECKS` of them the tolerance becomes at least the whole travel over `FINE_CHECKS`: no
+        motion takes more than twice that many checks and one per pair, and `lower_bound` says what is known.
+
         Args:
             trajectory: (T, nv) samples.
             object_poses: (T, num_objects, 7) as in `distance`; objects move linearly (and turn at a constant
@@ -172,7 +164,9 @@ class ExactClearance:
             if found.distance < best.distance:
                 best, where = found, float(sample)
 
-        for (i, j), so_far in self._travel_along(path, poses).items():
+        travel = self._travel_along(path, poses)
+        coarse = max(tolerance, sum(float(so_far[-1]) for so_far in travel.values()) / FINE_CHECKS)
+        for (i, j), so_far in travel.items():
             s = 0.0
             while True:
                 q, pose = _interpolate(path, s), _interpolate_pose(poses[:, j], s)
@@ -180,11 +174,13 @@ class ExactClearance:
                 checks += 1
                 if found.distance < best.distance:
                     best, where = found, s
+                if checks >= FINE_CHECKS:
+                    tolerance = coarse
                 following = _advance(so_far, s, found.distance - best.distance + tolerance)
                 if following is None:
                     break
                 s = following
-        return PathClearance(best, where, best.distance - tolerance, checks)
+        return PathClearance(best, where, best.distance - tolerance, checks, tolerance)
 
     def series(self, trajectory: Array, object_poses: Array | None = None) -> Array:
         """The clearance (T,) [m] at each sample of a trajectory, for plots; arguments as in `minimum_over`.
@@ -255,7 +251,7 @@ class ExactClearance:
         value = coal.distance(link.shape, X_link, item.shape, X_item, request, result)
         on_link, on_item = np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
         reference_L = X_WL[:3, :3].T @ (R @ item.reference + p - X_WL[:3, 3])
-        inside = link.surface is not None and _contains(link.surface, reference_L)
+        inside = link.surface is not None and contains(link.surface, reference_L)
         if item.radius > 0.0:  # a ball, measured from its centre
             depth = value + POINT_RADIUS
             value = (-depth if inside else depth) - item.radius
@@ -264,9 +260,9 @@ class ExactClearance:
             if length > 0.0:
                 on_item = p + (-1.0 if inside else 1.0) * outward / length * item.radius
         elif value <= 0.0:
-            value = min(value, -_penetration(link.shape, X_link, item.shape, X_item))
+            value = min(value, -penetration(link.shape, X_link, item.shape, X_item))
         elif inside or (
-            item.surface is not None and _contains(item.surface, R.T @ (_world(X_WL, link.reference) - p))
+            item.surface is not None and contains(item.surface, R.T @ (_world(X_WL, link.reference) - p))
         ):
             value = -value
         return Clearance(float(value), link.name, item.name, on_link, on_item)
@@ -317,58 +313,6 @@ def _nothing() -> Clearance:
 def _world(X: Array, point: Array) -> Array:
     moved: Array = X[:3, :3] @ point + X[:3, 3]
     return moved
-
-
-def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
-    """The triangles of a mesh for Coal: hollow, exact."""
-    model = coal.BVHModelOBBRSS()
-    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for vertex in np.asarray(mesh.vertices, dtype=float):
-        vertices.append(vertex)
-    for a, b, c in np.asarray(mesh.faces).tolist():
-        triangles.append(coal.Triangle(a, b, c))
-    model.beginModel(len(triangles), len(vertices))
-    model.addSubModel(vertices, triangles)
-    model.endModel()
-    return model
-
-
-def _mesh_solid(name: str, mesh: trimesh.Trimesh) -> _Solid:
-    radius = float(np.linalg.norm(mesh.vertices, axis=1).max())
-    triangles = np.array(mesh.triangles, dtype=float)
-    return _Solid(name, mesh_model(mesh), 0.0, triangles, triangles[0, 0], radius)
-
-
-def _object_solid(item: SceneObject) -> _Solid:
-    if item.mesh is not None:
-        return _mesh_solid(item.name, item.mesh)
-    origin, bound = np.zeros(3), item.bounding_radius
-    if item.kind == "sphere":
-        return _Solid(item.name, coal.Sphere(POINT_RADIUS), item.size[0], None, origin, bound)
-    shape = coal.Box(*item.size) if item.kind == "box" else coal.Cylinder(*item.size)
-    return _Solid(item.name, shape, 0.0, None, origin, bound)
-
-
-def _penetration(
-    a: coal.CollisionGeometry, X_a: coal.Transform3s, b: coal.CollisionGeometry, X_b: coal.Transform3s
-) -> float:
-    request, result = coal.CollisionRequest(coal.CONTACT, MAX_CONTACTS), coal.CollisionResult()
-    coal.collide(a, X_a, b, X_b, request, result)
-    depths = [abs(result.getContact(k).penetration_depth) for k in range(result.numContacts())]
-    return float(max(depths, default=0.0))
-
-
-def _contains(surface: Array, point: Array) -> bool:
-    """Whether a point is inside a surface: its winding number (van Oosterom, Strackee 1983) exceeds one
-    half."""
-    if np.any(point < surface.min(axis=(0, 1))) or np.any(point > surface.max(axis=(0, 1))):
-        return False
-    a, b, c = (surface[:, k] - point for k in range(3))
-    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = [np.einsum("ij,ij->i", u, w) for u, w in ((a, b), (b, c), (c, a))]
-    solid_angles = 2.0 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
-    return bool(abs(solid_angles.sum()) > 2.0 * np.pi)
 
 
 def _object_travel(poses: Array, radius: float) -> Array:

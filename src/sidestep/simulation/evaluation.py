@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.simulation.clearance import ExactClearance
+from sidestep.simulation.clearance import ExactClearance, PathClearance
 from sidestep.simulation.run import Run, SimulationRun
 
 Array = npt.NDArray[np.float64]
@@ -19,6 +19,7 @@ GOAL_TOLERANCE = 0.05  # [rad] the project's definition of arriving
 MOVED = (
     1e-4  # [m] a free object that nothing touches floats still to rounding; a tenth of a millimetre is a push
 )
+FINEST = 1e-6  # [m] clearance below which a run counts as touching, undecided or not
 LIMIT_SLACK = 1e-6  # relative (absolute below 1): the quadratic program's own tolerance
 
 
@@ -58,7 +59,8 @@ class Evaluation:
         contacts: criterion 3: arm-scene contact points that MuJoCo counted, over all steps; contact_pairs:
             which "link - obstacle" they were; max_contact_force_n.
         min_clearance_m: criterion 3: smallest exact clearance, between samples too (None: empty scene), found
-            to within clearance_tolerance_m; clearance_pair and clearance_time_s: where and when.
+            to within clearance_tolerance_m (the true one is smaller by at most that); clearance_pair and
+            clearance_time_s: where and when.
         moved_objects: criterion 3: name to largest displacement [m] of every free object that moved.
         max_tracking_error, rms_tracking_error: criterion 4: |achieved - wanted| acceleration, largest joint
             [rad/s^2] and root mean square over samples and joints.
@@ -95,8 +97,8 @@ class Evaluation:
 
     @property
     def collision_free(self) -> bool:
-        """No contact, nothing pushed, and nothing overlapping between samples."""
-        apart = self.min_clearance_m is None or self.min_clearance_m > 0.0
+        """No contact, nothing pushed, and surely nothing overlapping between samples either."""
+        apart = self.min_clearance_m is None or self.min_clearance_m > self.clearance_tolerance_m
         return not self.contacts and not self.moved_objects and apart
 
     def to_dict(self) -> dict[str, Any]:
@@ -120,16 +122,16 @@ def evaluate(
     Args:
         run: of `Simulation.run` or `run_kinematically`.
         goal_tolerance: largest joint error [rad | m] that counts as reached.
-        clearance_tolerance: accuracy [m] of the minimum clearance, see `ExactClearance.minimum_over`.
+        clearance_tolerance: accuracy [m] of the minimum clearance, see `ExactClearance.minimum_over`; where
+            the minimum is smaller than this, it is measured again, finer, until it is clear whether the arm
+            touched.
     """
     error = np.abs(run.q - run.goal).max(axis=1)
     deviation = np.abs(run.q - _on_segment(run.q, run.start, run.goal)).max(axis=0)
     physics = run if isinstance(run, SimulationRun) else None
-    pair, minimum, when = None, None, None
+    pair, minimum, when, worst = None, None, None, None
     if run.objects:
-        worst = ExactClearance(run.robot, run.objects).minimum_over(
-            run.q, run.object_poses, tolerance=clearance_tolerance
-        )
+        worst = _smallest_clearance(run, clearance_tolerance)
         minimum, when = worst.clearance.distance, worst.sample * run.timestep
         pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
     effort = run.robot.limits.effort
@@ -147,7 +149,7 @@ def evaluate(
         if physics is None
         else max((c.force for c in physics.contacts), default=0.0),
         min_clearance_m=minimum,
-        clearance_tolerance_m=clearance_tolerance,
+        clearance_tolerance_m=clearance_tolerance if worst is None else worst.tolerance,
         clearance_pair=pair,
         clearance_time_s=when,
         moved_objects=_moved(run),
@@ -162,6 +164,17 @@ def evaluate(
         controller_status=None if physics is None else _counts(physics.controller_status),
         duration_s=float(run.time[-1] + run.timestep),
     )
+
+
+def _smallest_clearance(run: Run, tolerance: float) -> PathClearance:
+    """To within the tolerance, or finer where the result is too close to say whether anything touched."""
+    exact = ExactClearance(run.robot, run.objects)
+    while True:
+        worst = exact.minimum_over(run.q, run.object_poses, tolerance=tolerance)
+        distance = worst.clearance.distance
+        if worst.tolerance > tolerance or not FINEST < distance <= tolerance:
+            return worst
+        tolerance = distance / 2.0
 
 
 def _on_segment(q: Array, start: Array, goal: Array) -> Array:

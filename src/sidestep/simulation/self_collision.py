@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.robot import Robot
-from sidestep.simulation.clearance import mesh_model, travel_per_joint
+from sidestep.simulation.clearance import FINE_CHECKS, travel_per_joint
+from sidestep.simulation.solid import mesh_model
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]
@@ -119,7 +120,9 @@ class SelfCollision:
 
         A pair comes closer by at most sum_j L_j |dq_j|, with L_j the lever arms of the joints between the two
         links, so after a distance d it is skipped until that sum has grown to d - (smallest so far) +
-        tolerance [m]: the true minimum lies in [reported - tolerance, reported]. Ends at the first touch.
+        tolerance [m]: the true minimum lies in [reported - tolerance, reported]. Ends at the first touch. After
+        `FINE_CHECKS` checks, which only a motion that diverged needs, the tolerance is at least the whole travel
+        over `FINE_CHECKS`.
 
         Raises:
             ValueError: wrong shape, values that are not finite, or a tolerance that is not positive.
@@ -137,6 +140,8 @@ class SelfCollision:
         for sample in np.unique(np.linspace(0, len(path) - 1, FIRST_LOOKS).astype(int)):
             best = self._closest(path[sample], best, float(sample))
         moved = np.abs(np.diff(path, axis=0))
+        coarse = max(tolerance, sum(float((moved @ p.travel).sum()) for p in self._pairs) / FINE_CHECKS)
+        checks = 0
         for pair in self._pairs:
             so_far = np.concatenate([[0.0], np.cumsum(moved @ pair.travel)])
             here = 0.0  # of so_far
@@ -151,6 +156,9 @@ class SelfCollision:
                     at_least = self._measure(pair, poses)
                     if at_least < best.distance:
                         best = SelfClearance(at_least, self._name(pair), k + share)
+                checks += 1
+                if checks == FINE_CHECKS:
+                    tolerance = coarse
                 here += at_least - best.distance + tolerance
         return best
 

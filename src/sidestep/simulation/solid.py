@@ -1,0 +1,81 @@
+"""Links and scene objects as Coal takes them: hollow triangle meshes, and solid primitives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from sidestep.simulation.scene import SceneObject
+
+Array = npt.NDArray[np.float64]
+
+POINT_RADIUS = 1e-9  # [m] Coal has no point; a sphere this small stands for the centre of a ball
+MAX_CONTACTS = 10_000  # contacts kept for a penetration depth: more than the triangles of any overlap
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A rigid shape for Coal. A ball is kept as its centre and `radius` is subtracted afterwards."""
+
+    name: str
+    shape: coal.CollisionGeometry
+    radius: float
+    surface: Array | None  # (F, 3, 3) triangles, hollow for Coal; None for primitives, which are solid
+    reference: Array  # (3,) a point of the shape, in its frame
+    bounding_radius: float
+
+
+def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
+    """The triangles of a mesh for Coal: hollow, exact."""
+    model = coal.BVHModelOBBRSS()
+    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for vertex in np.asarray(mesh.vertices, dtype=float):
+        vertices.append(vertex)
+    for a, b, c in np.asarray(mesh.faces).tolist():
+        triangles.append(coal.Triangle(a, b, c))
+    model.beginModel(len(triangles), len(vertices))
+    model.addSubModel(vertices, triangles)
+    model.endModel()
+    return model
+
+
+def mesh_solid(name: str, mesh: trimesh.Trimesh) -> Solid:
+    radius = float(np.linalg.norm(mesh.vertices, axis=1).max())
+    triangles = np.array(mesh.triangles, dtype=float)
+    return Solid(name, mesh_model(mesh), 0.0, triangles, triangles[0, 0], radius)
+
+
+def object_solid(item: SceneObject) -> Solid:
+    if item.mesh is not None:
+        return mesh_solid(item.name, item.mesh)
+    origin, bound = np.zeros(3), item.bounding_radius
+    if item.kind == "sphere":
+        return Solid(item.name, coal.Sphere(POINT_RADIUS), item.size[0], None, origin, bound)
+    shape = coal.Box(*item.size) if item.kind == "box" else coal.Cylinder(*item.size)
+    return Solid(item.name, shape, 0.0, None, origin, bound)
+
+
+def penetration(
+    a: coal.CollisionGeometry, X_a: coal.Transform3s, b: coal.CollisionGeometry, X_b: coal.Transform3s
+) -> float:
+    request, result = coal.CollisionRequest(coal.CONTACT, MAX_CONTACTS), coal.CollisionResult()
+    coal.collide(a, X_a, b, X_b, request, result)
+    depths = [abs(result.getContact(k).penetration_depth) for k in range(result.numContacts())]
+    return float(max(depths, default=0.0))
+
+
+def contains(surface: Array, point: Array) -> bool:
+    """Whether a point is inside a surface: its winding number (van Oosterom, Strackee 1983) exceeds one
+    half."""
+    if np.any(point < surface.min(axis=(0, 1))) or np.any(point > surface.max(axis=(0, 1))):
+        return False
+    a, b, c = (surface[:, k] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = [np.einsum("ij,ij->i", u, w) for u, w in ((a, b), (b, c), (c, a))]
+    solid_angles = 2.0 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
+    return bool(abs(solid_angles.sum()) > 2.0 * np.pi)
