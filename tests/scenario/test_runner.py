@@ -79,6 +79,18 @@ def test_a_run_that_ends_too_early_fails_and_says_so() -> None:
     assert "does not reach" in result.sentence()
 
 
+def test_a_run_that_diverges_is_judged_and_said_in_short() -> None:
+    """A spring far too stiff for the period: the joints turn more often than anyone can check for clearance."""
+    text = FREE.format(mode="kinematic", period=0.005).replace("12.0", "1.0")
+    text += "system: {stiffness: 1.0e+12, switch: {type: harmonic_only}}\n"
+    text += "obstacles: [{name: ball, shape: {type: sphere, radius: 0.03}, position: [0.0, 0.0, 0.8]}]\n"
+    result = run_scenario(Scenario.from_text(text))
+    assert not result.success
+    assert result.evaluation.position_error_rad > 1e6
+    assert not result.evaluation.collision_free  # 0.73 m apart at every angle, but no check can say so
+    assert len(result.sentence()) < 300
+
+
 def test_hitting_a_free_ball_is_seen_by_physics_and_by_exact_clearance() -> None:
     text = (
         FREE.format(mode="torque", period=0.002).replace("[0, 0.5]", "[0, 0]").replace("[1, 0.5]", "[1, 0]")

@@ -10,7 +10,7 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
     evaluation, choice = result.evaluation, result.scenario.simulation
     rows = [
         ("goal reached", _yes(evaluation.reached), f"error under {choice.tolerance:g} rad at the end"),
-        ("largest joint error", f"{evaluation.position_error_rad:.4f} rad", "at the end"),
+        ("largest joint error", f"{evaluation.position_error_rad:.4g} rad", "at the end"),
         (
             "time to goal",
             _number(evaluation.time_to_goal_s, "{:.2f} s"),
@@ -18,7 +18,7 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
         ),
         (
             "largest detour",
-            f"{evaluation.path_deviation_rad:.3f} rad",
+            f"{evaluation.path_deviation_rad:.4g} rad",
             f"by {evaluation.path_deviation_joint}",
         ),
     ]
