@@ -1,6 +1,8 @@
 #include "sidestep/embedding/body_ellipsoid.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -15,8 +17,10 @@ std::vector<BodyEllipsoid> body_ellipsoids(const Robot& robot, const Body& body,
     const auto i = static_cast<std::size_t>(k);
     const Frame& frame = robot.frames()[static_cast<std::size_t>(robot.frame_index(body.links[i]))];
     const Eigen::Matrix3d R = frame.X_JF.linear();
-    ellipsoids.push_back({frame.joint, k, frame.X_JF * body.means.col(k),
-                          body.levels[k] * R * body.covariances[i] * R.transpose()});
+    const Eigen::Matrix3d shape = body.levels[k] * R * body.covariances[i] * R.transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(shape, Eigen::EigenvaluesOnly);
+    ellipsoids.push_back({frame.joint, k, frame.X_JF * body.means.col(k), shape,
+                          std::sqrt(eigen.eigenvalues().maxCoeff())});
   }
   std::stable_sort(ellipsoids.begin(), ellipsoids.end(),
                    [](const BodyEllipsoid& a, const BodyEllipsoid& b) { return a.joint < b.joint; });

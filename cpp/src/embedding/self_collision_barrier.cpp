@@ -124,8 +124,7 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
       g.centre += e.mean / static_cast<double>(g.ellipsoids.size());
     }
     for (const BodyEllipsoid& e : g.ellipsoids) {
-      // The trace bounds the largest eigenvalue, hence the longest semi-axis.
-      g.radius = std::max(g.radius, (e.mean - g.centre).norm() + std::sqrt(e.shape.trace()));
+      g.radius = std::max(g.radius, (e.mean - g.centre).norm() + e.extent);
     }
     return g;
   };
@@ -159,6 +158,12 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     for (const BodyEllipsoid& ellipsoid_a : first.ellipsoids) {
       const Placed a(state, ellipsoid_a);
       for (const BodyEllipsoid& ellipsoid_b : second.ellipsoids) {
+        // Balls around the two are farther apart than anything that matters: most pairs end here.
+        const Eigen::Vector3d centre_b = link_b.p_WL + link_b.R_WL * ellipsoid_b.mean;
+        const double cut = ellipsoid_a.extent + ellipsoid_b.extent + std::min(horizon, mean.horizon());
+        if (cut <= 0.0 || (centre_b - a.centre).squaredNorm() >= cut * cut) {
+          continue;
+        }
         const ClearanceSample sample = between(a, Placed(state, ellipsoid_b));
         if (sample.value < horizon && mean.matters(sample.value) && mean.add(sample)) {
           nearest = ellipsoid_b.component;

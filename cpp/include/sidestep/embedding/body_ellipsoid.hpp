@@ -15,6 +15,7 @@ struct BodyEllipsoid {
   int component;  ///< of the body it came from
   Eigen::Vector3d mean;
   Eigen::Matrix3d shape;  ///< level · covariance [m²]
+  double extent;          ///< longest semi-axis [m]: the radius of a ball around it
 };
 
 /// The ellipsoids of a calibrated body, those of one joint together in the order of the joints.

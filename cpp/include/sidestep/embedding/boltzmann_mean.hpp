@@ -42,8 +42,9 @@ class BoltzmannMean {
 
   /// Samples this far beyond the smallest weigh less than exp(−30) = 1e-13: rounding.
   static constexpr double window = 30.0;
-  /// Whether a sample of this value would change the mean.
-  bool matters(double value) const noexcept { return (value - reference_) * inverse_T_ < window; }
+  /// Samples from this value on would not change the mean.
+  double horizon() const noexcept { return reference_ + window / inverse_T_; }
+  bool matters(double value) const noexcept { return value < horizon(); }
   bool empty() const noexcept { return !(reference_ < std::numeric_limits<double>::infinity()); }
 
   /// Returns whether the sample is the smallest so far.

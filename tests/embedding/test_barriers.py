@@ -1,0 +1,211 @@
+"""Barriers of clearances: derivatives, lower bounds, independence of sampling, and what is refused."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import sidestep as ss
+from sidestep import _core
+from support.finite_differences import derivative, second_derivative
+from support.random_scene import random_body
+
+ROBOTS = ["planar3", "ur5", "fr3_arm"]
+NUM_STATES = 60
+# Against differences of fourth order: rounding of values up to 1e2 over a step of 1e-4 rad.
+TOLERANCE = 1e-6
+# Second differences in time: rounding of values up to 1e2 over (1e-3 s)^2, and a truncation that the small radii of
+# curvature of the Boltzmann mean make visible.
+TIME_TOLERANCE = 1e-4
+
+
+def covering(robot: ss.Robot, seed: int) -> ss.Body:
+    """A random body with levels; nothing here needs it to cover the meshes."""
+    rng = np.random.default_rng(seed)
+    body = random_body(robot, rng)
+    return _core.Body(
+        links=body.links,
+        weights=body.weights,
+        means=body.means,
+        covariances=body.covariances,
+        levels=rng.uniform(0.3, 1.5, body.num_components),
+    )
+
+
+def pairs_of(robot: ss.Robot) -> list[tuple[str, str]]:
+    first = {frame.joint: frame.name for frame in robot.frames if frame.joint >= 0}
+    joints = sorted(first)
+    return [(first[joints[0]], first[joints[-1]]), (first[joints[1]], first[joints[-1]])]
+
+
+def barrier_cases() -> dict[str, Callable[[ss.Robot, ss.Body], ss.Embedding]]:
+    """Wide and soft, so that most states are within reach and differences resolve them."""
+    wide = {"activation": 0.8, "temperature": 0.02, "floor": 0.02}
+    return {
+        "obstacles": lambda robot, body: ss.ClearanceBarrier(robot, body, reach=0.8, **wide),
+        "self": lambda robot, body: ss.SelfCollisionBarrier(robot, body, pairs_of(robot), **wide),
+        "plane": lambda robot, body: ss.PlaneBarrier(
+            robot, body, point=[0, 0, -0.4], normal=[0.1, -0.2, 1.0], links=[pairs_of(robot)[0][1]], **wide
+        ),
+        "limits": lambda robot, body: ss.JointLimitBarrier(robot, activation=2.0, floor=0.02),
+    }
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("kind", ["obstacles", "self", "plane", "limits"])
+def test_derivatives(name: str, kind: str) -> None:
+    robot = ss.Robot.named(name)
+    barrier = barrier_cases()[kind](robot, covering(robot, 0))
+    rng = np.random.default_rng(1)
+    seen, errors = 0, []
+    for _ in range(NUM_STATES):
+        q = robot.random_configuration(rng)
+        v = rng.normal(size=q.size)
+        points, speeds = rng.uniform(-0.9, 0.9, (12, 3)), rng.normal(scale=0.3, size=(12, 3))
+        radii = rng.uniform(0.0, 0.05, 12)
+
+        def at(
+            t: float, q: np.ndarray = q, v: np.ndarray = v, points: np.ndarray = points,
+            radii: np.ndarray = radii, speeds: np.ndarray = speeds,
+        ) -> np.ndarray:  # fmt: skip
+            moved = ss.Obstacles(points + t * speeds, radii, speeds)
+            return barrier.evaluate(q + t * v, v, moved).values
+
+        obstacles = ss.Obstacles(points, radii, speeds)
+        e = barrier.evaluate(q, v, obstacles)
+        near = e.clearances < 0.1 if kind != "limits" else np.zeros(barrier.num_coordinates, bool)
+        good = ~near & (e.values < 1e2)  # steeper ones are beyond what differences resolve
+        seen += int(np.count_nonzero(good & (e.values > 0.0)))
+        numeric = derivative(lambda x, v=v, o=obstacles: barrier.evaluate(x, v, o).values, q)
+        scale = 1.0 + np.abs(numeric[good])
+        assert np.max(np.abs(e.jacobian - numeric)[good] / scale, initial=0.0) < TOLERANCE
+        curvature = np.array(
+            [second_derivative(lambda t, k=k, at=at: at(t)[k], 1e-3) for k in np.flatnonzero(good)]
+        )
+        errors.append(np.abs(e.curvatures[good] - curvature) / (1.0 + np.abs(curvature)))
+    # Where the motion crosses the activation distance within the step, d2psi/dt2 jumps (power 2): few do.
+    assert np.quantile(np.concatenate(errors), 0.99) < TIME_TOLERANCE
+    assert seen > NUM_STATES // 4  # the states do exercise the barrier
+
+
+def test_clearance_is_a_lower_bound_exact_on_the_axes() -> None:
+    robot = ss.Robot.named("planar2")
+    semi_axes = np.array([0.10, 0.05, 0.02])
+    R = Rotation.from_euler("xyz", [0.3, -0.5, 0.9]).as_matrix()
+    link = robot.frames[-1].name
+    body = _core.Body(
+        links=[link],
+        weights=[1.0],
+        means=[[0.0, 0.0, 0.0]],
+        covariances=[R @ np.diag(semi_axes**2) @ R.T],
+        levels=[1.0],
+    )
+    barrier = ss.ClearanceBarrier(robot, body, activation=0.2, reach=0.5)
+    q = np.zeros(2)
+    X = robot.pose(q, link)
+
+    def clearance(y: np.ndarray) -> float:
+        world = X[:3, :3] @ (R @ y) + X[:3, 3]
+        return float(barrier.evaluate(q, q, ss.Obstacles([world])).clearances[0])
+
+    for axis in range(3):
+        y = (semi_axes[axis] + 0.07) * np.eye(3)[axis]
+        assert clearance(y) == pytest.approx(0.07, abs=1e-12)  # rounding
+    sphere = trimesh.creation.icosphere(subdivisions=5).vertices
+    surface = sphere * semi_axes
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        y = rng.normal(size=3)
+        y *= rng.uniform(0.03, 0.25) / np.linalg.norm(y)
+        if np.sum((y / semi_axes) ** 2) > 1.0:
+            nearest = np.linalg.norm(
+                surface - y, axis=1
+            ).min()  # at most the sampling above the true distance
+            assert 0.0 < clearance(y) <= nearest
+        else:
+            assert clearance(y) <= 0.0
+
+
+def test_self_clearance_is_a_lower_bound_of_the_distance() -> None:
+    robot = ss.Robot.named("planar3")
+    body = covering(robot, 3)
+    pair = pairs_of(robot)[0]
+    barrier = ss.SelfCollisionBarrier(robot, body, [pair], activation=2.0, temperature=1e-5)
+    directions = trimesh.creation.icosphere(subdivisions=3).vertices
+
+    def surface(q: np.ndarray, link: str) -> np.ndarray:
+        X = robot.pose(q, link)
+        parts = []
+        for name, mean, covariance, level in zip(
+            body.links, body.means, body.covariances, body.levels, strict=True
+        ):
+            if name == link:
+                root = np.linalg.cholesky(level * covariance)
+                parts.append((directions @ root.T + mean) @ X[:3, :3].T + X[:3, 3])
+        return np.concatenate(parts)
+
+    rng = np.random.default_rng(4)
+    for _ in range(30):
+        q = robot.random_configuration(rng)
+        h = barrier.evaluate(q, np.zeros(3), ss.Obstacles.none()).clearances[0]
+        a, b = surface(q, pair[0]), surface(q, pair[1])
+        distance = np.sqrt(((a[:, None] - b[None]) ** 2).sum(-1)).min()
+        # The Boltzmann mean exceeds the smallest gap by a few temperatures (1e-5 m) at most.
+        assert h <= distance + 1e-4
+
+
+def wall(spacing: float) -> ss.Obstacles:
+    """A wall beside the arm, whose points cover it as a camera would see it."""
+    y, z = np.meshgrid(np.arange(-0.3, 0.3, spacing), np.arange(-0.06, 0.06, spacing))
+    x = np.full(y.size, 0.62)
+    return ss.Obstacles(np.stack([x, y.ravel(), z.ravel()], axis=1))
+
+
+def test_a_wall_sampled_finely_moves_the_arm_as_one_sampled_coarsely() -> None:
+    robot = ss.Robot.from_urdf(ss.planar_arm(2, link_length=0.35))
+    links = [frame.name for frame in robot.frames if frame.joint >= 0]
+    body = _core.Body(
+        links=links,
+        weights=np.ones(len(links)),
+        means=np.tile([0.175, 0.0, 0.0], (len(links), 1)),
+        covariances=np.tile(np.diag([0.2, 0.04, 0.04]) ** 2, (len(links), 1, 1)),
+        levels=np.ones(len(links)),
+    )
+    system = ss.GeometricSystem(
+        [ss.ClearanceBarrier(robot, body, activation=0.2, strength=0.05)], stiffness=2.0, damping=3.0
+    )
+    start, goal = np.array([-1.3, 0.2]), np.array([1.3, -0.2])
+    motions = [
+        ss.rollout(system, start, np.zeros(2), goal, wall(spacing), period=0.004, steps=750)
+        for spacing in (0.01, 0.002)
+    ]
+    straight = ss.rollout(system, start, np.zeros(2), goal, ss.Obstacles.none(), period=0.004, steps=750)
+    bent = np.abs(motions[0].q - straight.q).max()
+    assert bent > 0.1  # rad: the wall is in the way
+    # A soft minimum would be lower by T log 25 = 6.4 mm on the finer cloud; here the arms agree to what a spacing of
+    # 1 cm leaves open at 5 cm from the wall, (5 mm)^2 / (2 * 50 mm) = 0.25 mm, over a lever of about 0.1 m.
+    assert np.abs(motions[0].q - motions[1].q).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda r, b: ss.ClearanceBarrier(r, ss.Body.fit(r, components=1)), "the body is not calibrated"),
+        (lambda r, b: ss.ClearanceBarrier(r, b, activation=0.0), "activation is 0.0*, must be positive"),
+        (lambda r, b: ss.ClearanceBarrier(r, b, strength=-1.0), "strength is -1.0*, must be positive"),
+        (lambda r, b: ss.ClearanceBarrier(r, b, power=1.0), "power is 1.0*, must be at least 2"),
+        (lambda r, b: ss.ClearanceBarrier(r, b, floor=0.2), "floor is 0.2.*, must be positive and below"),
+        (lambda r, b: ss.ClearanceBarrier(r, b, temperature=np.nan), "temperature is nan"),
+        (lambda r, b: ss.SelfCollisionBarrier(r, b, []), "there is no pair of links"),
+        (lambda r, b: ss.SelfCollisionBarrier(r, b, [("link1", "link9")]), "has no link 'link9'"),
+        (lambda r, b: ss.SelfCollisionBarrier(r, b, [("link1", "link1")]), "rigidly connected"),
+        (lambda r, b: ss.PlaneBarrier(r, b, point=[0, 0, 0], normal=[0, 0, 0], links=["link1"]), "not zero"),
+        (lambda r, b: ss.PlaneBarrier(r, b, point=[0, 0, 0], normal=[0, 0, 1], links=[]), "there is no link"),
+    ],
+)
+def test_what_is_wrong_is_named(make: Callable[[ss.Robot, ss.Body], ss.Embedding], message: str) -> None:
+    robot = ss.Robot.named("planar2")
+    with pytest.raises(ValueError, match=message):
+        make(robot, covering(robot, 0))
