@@ -111,11 +111,14 @@ class Judge:
         clearance, pair, when = None, "", 0.0
         if problem.objects:
             exact = self._clearance.among(problem.objects)
-            worst = exact.minimum_over(q, motion.object_poses[:end], tolerance=TOLERANCE)
-            clearance = worst.clearance.distance
+            worst = exact.decided_minimum(q, motion.object_poses[:end], tolerance=TOLERANCE)
+            measured = worst.clearance.distance
+            clearance = measured if worst.lower_bound > 0.0 else min(measured, worst.lower_bound)
             pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
             when = worst.sample * settings.period
         own = self._self.minimum_over(q, tolerance=TOLERANCE)
+        if 0.0 < own.distance <= TOLERANCE:  # too close to say at this tolerance
+            own = self._self.minimum_over(q, tolerance=own.distance / 2.0)
         return Outcome(
             index=problem.index,
             arrived=motion.arrived,

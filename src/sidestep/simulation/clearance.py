@@ -24,6 +24,7 @@ from sidestep.simulation.solid import POINT_RADIUS, Solid, contains, mesh_solid,
 
 Array = npt.NDArray[np.float64]
 
+FINEST = 1e-6  # [m] clearance below which a motion counts as touching, undecided or not
 FINE_CHECKS = 100_000  # distances at the tolerance asked for, some ten seconds; a thesis run takes a thousand
 
 
@@ -181,6 +182,20 @@ class ExactClearance:
                     break
                 s = following
         return PathClearance(best, where, best.distance - tolerance, checks, tolerance)
+
+    def decided_minimum(
+        self, trajectory: Array, object_poses: Array | None = None, *, tolerance: float = 1e-3
+    ) -> PathClearance:
+        """As `minimum_over`, to within the tolerance, or finer where that does not say whether anything touched.
+
+        It ends undecided, with a lower bound below zero, only under `FINEST` or where the motion diverged.
+        """
+        while True:
+            worst = self.minimum_over(trajectory, object_poses, tolerance=tolerance)
+            distance = worst.clearance.distance
+            if worst.tolerance > tolerance or not FINEST < distance <= tolerance:
+                return worst
+            tolerance = distance / 2.0
 
     def series(self, trajectory: Array, object_poses: Array | None = None) -> Array:
         """The clearance (T,) [m] at each sample of a trajectory, for plots; arguments as in `minimum_over`.

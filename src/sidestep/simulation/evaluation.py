@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.simulation.clearance import ExactClearance, PathClearance
+from sidestep.simulation.clearance import ExactClearance
 from sidestep.simulation.run import Run, SimulationRun
 
 Array = npt.NDArray[np.float64]
@@ -19,7 +19,6 @@ GOAL_TOLERANCE = 0.05  # [rad] the project's definition of arriving
 MOVED = (
     1e-4  # [m] a free object that nothing touches floats still to rounding; a tenth of a millimetre is a push
 )
-FINEST = 1e-6  # [m] clearance below which a run counts as touching, undecided or not
 LIMIT_SLACK = 1e-6  # relative (absolute below 1): the quadratic program's own tolerance
 
 
@@ -131,7 +130,9 @@ def evaluate(
     physics = run if isinstance(run, SimulationRun) else None
     pair, minimum, when, worst = None, None, None, None
     if run.objects:
-        worst = _smallest_clearance(run, clearance_tolerance)
+        worst = ExactClearance(run.robot, run.objects).decided_minimum(
+            run.q, run.object_poses, tolerance=clearance_tolerance
+        )
         minimum, when = worst.clearance.distance, worst.sample * run.timestep
         pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
     effort = run.robot.limits.effort
@@ -164,17 +165,6 @@ def evaluate(
         controller_status=None if physics is None else _counts(physics.controller_status),
         duration_s=float(run.time[-1] + run.timestep),
     )
-
-
-def _smallest_clearance(run: Run, tolerance: float) -> PathClearance:
-    """To within the tolerance, or finer where the result is too close to say whether anything touched."""
-    exact = ExactClearance(run.robot, run.objects)
-    while True:
-        worst = exact.minimum_over(run.q, run.object_poses, tolerance=tolerance)
-        distance = worst.clearance.distance
-        if worst.tolerance > tolerance or not FINEST < distance <= tolerance:
-            return worst
-        tolerance = distance / 2.0
 
 
 def _on_segment(q: Array, start: Array, goal: Array) -> Array:
