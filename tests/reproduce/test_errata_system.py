@@ -50,10 +50,16 @@ def test_second_derivative_of_the_limit_potential():
     np.testing.assert_allclose(np.diag(zeta.hessian(q, Obstacles.none())), right, rtol=1e-10)
     E, F = np.exp(slope * (np.pi - q)), np.exp(slope * (q + np.pi))
     wrong_factor = np.exp(slope * (q - np.pi))  # q+ where q- belongs
-    printed = ((-(slope**2) * E * (1 + E) ** 2 + 2 * slope**2 * E**2 * (1 + E)) / (1 + E)) ** 4 - (
-        slope**2 * F * (1 + wrong_factor) ** 2 - 2 * slope**2 * F**2 * (1 + F)
-    ) / (1 + F) ** 4
-    assert np.abs(printed - right).max() > 1.0
+
+    def quotients(exponent, denominator, factor):
+        """Both quotients of T5.11: exponents of the first one's last factor and denominator, and q- or q+."""
+        first = -(slope**2) * E * (1 + E) ** 2 + 2 * slope**2 * E**2 * (1 + E) ** exponent
+        second = slope**2 * F * (1 + factor) ** 2 - 2 * slope**2 * F**2 * (1 + F)
+        return first / (1 + E) ** denominator - second / (1 + F) ** 4
+
+    np.testing.assert_allclose(quotients(1, 4, F), right, atol=1e-10)  # rounding, where terms cancel
+    for printed in (quotients(4, 1, F), quotients(1, 4, wrong_factor), quotients(4, 1, wrong_factor)):
+        assert np.abs(printed - right).max() > 1.0  # each slip by itself, and both together
 
 
 def test_equation_of_motion():

@@ -142,8 +142,9 @@ def test_ratios_of_table_6_1_are_in_order(report):
 def test_projections_have_a_stated_spread(report):
     found = data(report, "figure-A.1")
     assert found["mean_psi_per_m3"].shape == (21, 12, 12)
-    # The mean over cells of a pair is the mean of psi, whichever pair: all samples land in every map.
-    assert np.all(found["standard_error"] >= 0.0)
+    # Few samples a cell, yet every map has a spread to state; test_projections.py checks it by value.
+    assert np.all(np.isfinite(found["standard_error"]))
+    assert np.all(found["standard_error"].max(axis=(1, 2)) > 0.0)
     assert [tuple(pair) for pair in found["pairs"][:2]] == [(1, 2), (1, 3)]
 
 
@@ -153,4 +154,5 @@ def test_table_6_1_says_when_pytorch_is_missing():
     counts = {method: np.zeros(3, dtype=int) for method in performance.METHODS}
     table = performance.table(rates, counts)
     assert table.rows[0][:2] == ("torch.autograd", "PyTorch is not installed")
+    assert table.rows[0][5] == "133 / 57 / 4.5"  # the thesis's own figures need no PyTorch
     assert table.rows[1][4] == "1 / 1 / 1"

@@ -328,5 +328,5 @@ def _task_picture(ax: object, run: Rollout, title: str) -> None:
     style.mark_goal(ax, *planar.joints(planar.GOAL)[-1], label="tip at goal")
     style.mark_obstacle(ax, *planar.OBSTACLE[:2])
     planar.task_axes(ax, title=title)
-    ax.set(xlim=(-2.1, 2.1), ylim=(-0.9, 2.1))
-    ax.legend(loc="lower center", ncols=3, fontsize=6)
+    ax.set(xlim=(-2.1, 2.1), ylim=(-1.0, 2.1), yticks=[0.0, 1.0, 2.0])
+    ax.legend(loc="lower center", ncols=3, fontsize=5.5, columnspacing=0.7, handletextpad=0.1)

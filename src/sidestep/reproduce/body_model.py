@@ -81,7 +81,7 @@ def criteria(settings: Settings) -> Iterator[Item]:
         best.append((number, curve.best("aic"), curve.best("bic")))
         data["components"] = curve.components
         data[f"aic_link{number}"], data[f"bic_link{number}"] = curve.aic, curve.bic
-    words = "; ".join(f"link {n}: AIC takes {a}, BIC {b}" for n, a, b in best)
+    words = ". ".join(f"Link {n}: AIC takes {a}, BIC {b}" for n, a, b in best)
     yield Figure(
         key="3.2",
         title="How many Gaussians: AIC and BIC",
@@ -149,6 +149,7 @@ def task_space(settings: Settings) -> Iterator[Item]:
         )
         everything.append(points)
     style.mark_obstacle(ax, *OBSTACLE, label="")
+    ax.text(OBSTACLE[0] + 0.05, OBSTACLE[1], OBSTACLE[2], "obstacle", fontsize=7, va="center")
     _equal(ax, np.concatenate([*everything, OBSTACLE[None]]), unit="m", zoom=1.0)
     figure.legend(*ax.get_legend_handles_labels(), loc="outside right center", markerscale=3)
     ax.view_init(elev=16, azim=-60)
@@ -208,7 +209,7 @@ def gaussian_motion(settings: Settings) -> Iterator[Item]:
     axes[0].plot(*np.array(arc).T, color=style.BLACK, linewidth=0.9, zorder=8)
     everything = np.concatenate([*base, *clouds])
     for ax, title in zip(axes, ("(a) means", "(b) covariances"), strict=True):
-        _equal(ax, everything, unit="m", zoom=1.15)
+        _equal(ax, everything, unit="m", zoom=1.0)
         ax.set(yticks=[], ylabel="")
         ax.view_init(elev=0, azim=-90)
         ax.set_title(title)
@@ -251,7 +252,7 @@ def _ellipsoids(
         ax.plot_surface(*world, color=colours[number % len(colours)], alpha=0.4, linewidth=0)
 
 
-def _equal(ax: Any, points: Array, *, unit: str = "mm", zoom: float = 0.74) -> None:
+def _equal(ax: Any, points: Array, *, unit: str = "mm", zoom: float = 0.68) -> None:
     """Equal scales, few ticks, labels with the unit; the data stay in metres."""
     low, high = points.min(axis=0), points.max(axis=0)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
@@ -265,3 +266,5 @@ def _equal(ax: Any, points: Array, *, unit: str = "mm", zoom: float = 0.74) -> N
         axis.set_label_text(f"{name} [{unit}]", fontsize=7)
         axis.set_tick_params(labelsize=6, pad=-2)
         axis.labelpad = -3
+    ax.zaxis.set_tick_params(pad=1)  # its numbers stand beside the axis, not on it
+    ax.zaxis.labelpad = 1

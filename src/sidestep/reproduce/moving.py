@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sidestep import GeometricSystem, Obstacles, Rollout, rollout
+from sidestep import GeometricSystem, Obstacles, rollout
 from sidestep.reproduce import planar, style
 from sidestep.reproduce.item import Array, Caption, Figure, Item
 from sidestep.reproduce.registry import Settings
@@ -61,9 +61,9 @@ def dropping(settings: Settings) -> Iterator[Item]:
     axes[0, 0].legend(loc="lower left", fontsize=5.5)
     path = DROP_FROM + known.time[:, None] * velocity
     clearances = [
-        min(planar.clearance(run.q[k], path[k]) for k in range(0, steps + 1, 10)) for run in (known, ignored)
+        min(planar.clearance(q[k], path[k]) for k in range(0, steps + 1, 10)) for q in (known.q, ignored)
     ]
-    apart = float(np.abs(known.q - ignored.q).max())
+    apart = float(np.abs(known.q - ignored).max())
     yield Figure(
         key="5.7",
         title="An obstacle drops into the workspace",
@@ -85,7 +85,7 @@ def dropping(settings: Settings) -> Iterator[Item]:
         data={
             "time_s": known.time,
             "q_rad": known.q,
-            "q_velocity_ignored_rad": ignored.q,
+            "q_velocity_ignored_rad": ignored,
             "obstacle_m": path,
         },
     )
@@ -93,11 +93,8 @@ def dropping(settings: Settings) -> Iterator[Item]:
 
 def _without_velocity(
     system: GeometricSystem, start: Array, goal: Array, velocity: Array, steps: int
-) -> Rollout:
-    """The same motion with an obstacle that is seen at its place, but taken to stand still."""
-    from types import SimpleNamespace
-    from typing import cast
-
+) -> Array:
+    """The same motion (steps + 1, nv) with an obstacle seen at its place, but taken to stand still."""
     q, v = start.copy(), np.zeros(2)
     rows = [q.copy()]
     for k in range(steps):
@@ -105,7 +102,7 @@ def _without_velocity(
         v = v + PERIOD * system.acceleration(q, v, goal, Obstacles(position[None])).acceleration
         q = q + PERIOD * v
         rows.append(q.copy())
-    return cast(Rollout, SimpleNamespace(q=np.array(rows)))
+    return np.array(rows)
 
 
 def several(settings: Settings) -> Iterator[Item]:
@@ -134,14 +131,16 @@ def several(settings: Settings) -> Iterator[Item]:
     style.mark_goal(left, *goal)
     left.set(xlim=(-2.6, 2.6), ylim=(-2.6, 2.6))
     style.joint_axes(left, title="(a) joint space")
-    left.legend(loc="upper right", fontsize=6)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     for share in np.linspace(0.0, 1.0, 9):
         planar.draw_arm(right, joined[int(share * 20_000)], alpha=0.2 + 0.7 * share, width=1.6)
     for index, position in enumerate(positions):
         style.mark_obstacle(right, *position[:2], label="obstacles" if index == 0 else None)
-    right.legend(loc="upper left")
-    right.set(xlim=(-1.9, 1.9), ylim=(-0.3, 2.6))
-    planar.task_axes(right, title="(b) task space, by way of the via points")
+    style.mark_start(right, *planar.joints(start)[-1], label="tip at start")
+    style.mark_goal(right, *planar.joints(goal)[-1], label="tip at goal")
+    right.set(xlim=(-1.9, 1.9), ylim=(-0.3, 2.9))
+    right.legend(loc="upper center", ncols=3, fontsize=6, columnspacing=0.7, handletextpad=0.1)
+    planar.task_axes(right, title="(b) task space, by way of via points")
     distance = float(np.linalg.norm(run.q[-1] - goal))
     yield Figure(
         key="5.8",
@@ -150,7 +149,7 @@ def several(settings: Settings) -> Iterator[Item]:
             shows="ψ of two obstacle points has two ridges. The unswitched motion all but stops before the "
             f"first ({distance:.2f} rad from the goal after 40 s, clearance "
             f"{1000 * planar.least_clearance(run.q, positions):.0f} mm). By way of two via points below both "
-            f"it ends {np.linalg.norm(joined[-1] - goal):.3f} rad from the goal (clearance "
+            f"it ends {np.linalg.norm(joined[-1] - goal):.0e} rad from the goal (clearance "
             f"{1000 * planar.least_clearance(joined, positions):.0f} mm).",
             answers="Figure 5.8.",
             parameters=f"{_BODY}, obstacles (-0.5, 1.4) and (0.35, 1.45) m, start (-1.1, 0.5) rad, goal "
@@ -181,9 +180,8 @@ def merging(settings: Settings) -> Iterator[Item]:
     planar.task_axes(left, title="(a) task space")
     style.draw_field(figure, right, grid, values)
     style.mark_start(right, *pose, label="the pose in (a)")
-    right.legend(loc="upper right")
+    right.legend(loc="lower left")
     style.joint_axes(right, title="(b) configuration space")
-    # Between the ridges ψ has a saddle: the gradient of a sum can vanish where each term pushes.
     yield Figure(
         key="5.9",
         title="Merging of curvatures",

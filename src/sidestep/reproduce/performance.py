@@ -17,6 +17,7 @@ from sidestep.reproduce.serial_chain import SerialChain
 ROBOTS = {2: "planar2", 3: "planar3", 7: "fr3_arm"}
 POINTS = {2: (0.6, 0.3, 0.0), 3: (0.6, 0.3, 0.0), 7: (0.4, 0.2, 0.5)}  # [m] beside the arm
 STEPS, REPETITIONS = 1000, 10  # the thesis's
+BUDGET = 25.0  # [s] for each number of the slow rows: automatic differentiation of 7 joints would take half an hour
 THESIS = {
     "torch.autograd": (133.0, 57.0, 4.5),
     "analytic, dense": (3076.0, 1725.0, 214.0),
@@ -27,7 +28,7 @@ METHODS = ("torch.autograd", "analytic, dense", "core from Python", "core in C++
 def computation_frequency(settings: Settings) -> Iterator[Item]:
     """Steps a second for 2, 3 and 7 joints, one Gaussian per link, one obstacle."""
     steps, repetitions = (100, 3) if settings.quick else (STEPS, REPETITIONS)
-    budget = 0.7 if settings.quick else 25.0  # [s] for each number of the two slow rows
+    budget = 0.7 if settings.quick else BUDGET
     frequencies = {method: np.full(len(ROBOTS), np.nan) for method in METHODS}
     evaluations = {method: np.zeros(len(ROBOTS), dtype=int) for method in METHODS}
     for column, (joints, name) in enumerate(ROBOTS.items()):
@@ -68,7 +69,7 @@ def computation_frequency(settings: Settings) -> Iterator[Item]:
             times.append((clock.perf_counter() - begin) / many)
         frequencies["core in C++"][column] = 1.0 / np.median(times)
         evaluations["core in C++"][column] = many * repetitions
-    yield table(frequencies, evaluations)
+    yield table(frequencies, evaluations, steps=steps, repetitions=repetitions, budget=budget)
 
 
 def _frequency(
@@ -94,21 +95,32 @@ def _frequency(
     return float(np.median(rates)), count
 
 
-def table(frequencies: dict[str, Array], evaluations: dict[str, Array]) -> Table:
-    """The table of frequencies [Hz] (NaN: not measured) and of evaluations behind them, per method."""
+def table(
+    frequencies: dict[str, Array],
+    evaluations: dict[str, Array],
+    *,
+    steps: int = STEPS,
+    repetitions: int = REPETITIONS,
+    budget: float = BUDGET,
+) -> Table:
+    """The table of frequencies [Hz] (NaN: not measured) and of evaluations behind them, per method.
+
+    Args:
+        steps, repetitions, budget: states per repetition, repetitions, and most time for a cell [s].
+    """
     from sidestep.reproduce.runner import cpu_name
 
     rows: list[tuple[str, ...]] = []
     base = frequencies["analytic, dense"]
     for method in METHODS:
         found = frequencies[method]
+        theirs = " / ".join(f"{x:g}" for x in THESIS[method]) if method in THESIS else "-"
         if np.isnan(found).all():
-            rows.append((method, *("PyTorch is not installed",) * 3, "-", "-"))
+            rows.append((method, *("PyTorch is not installed",) * 3, "-", theirs))
             continue
         cells = [f"{x:,.0f} Hz" if x >= 100 else f"{x:.1f} Hz" for x in found]
         ratios = [f"{r:,.0f}" if r >= 100 else f"{r:.3g}" for r in found / base]
-        theirs = [f"{x:g}" for x in THESIS[method]] if method in THESIS else ["-"]
-        rows.append((method, *cells, " / ".join(ratios), " / ".join(theirs)))
+        rows.append((method, *cells, " / ".join(ratios), theirs))
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     return Table(
         key="6.1",
@@ -119,7 +131,8 @@ def table(frequencies: dict[str, Array], evaluations: dict[str, Array]) -> Table
             answers="Table 6.1.",
             parameters=f"{cpu_name()}, one thread, load {load:.1f} when it ended. Robots "
             f"{', '.join(ROBOTS.values())}; one Gaussian per link, one obstacle point, K = 0.5 /s², D = 1.5 "
-            f"/s; the same 1000 states for every row, 10 repetitions, median; a row stops after 25 s a cell "
+            f"/s; the same {steps} states for every row, {repetitions} repetitions, median; a row stops after "
+            f"{budget:g} s a cell "
             f"(evaluations for 7 joints: {', '.join(f'{m} {evaluations[m][2]:,}' for m in METHODS)}). The "
             "C++ row is one long rollout, with integration.",
             differs="The thesis's processor is an Intel i7-1360P; only ratios compare. Its rows are not "

@@ -14,7 +14,7 @@ class Settings:
     """How thorough a run is.
 
     Attributes:
-        quick: fewer samples and repetitions, and no physics: for tests and a first look.
+        quick: fewer samples and repetitions, and simulations under one switch only: for tests and a first look.
         seed: of everything that is drawn.
         notify: told in a few words what is being done.
     """

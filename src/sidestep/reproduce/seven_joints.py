@@ -113,6 +113,16 @@ def _verdict(motion: Motion) -> str:
     return f"The motion {arrival} and {touch} (least clearance {1000 * motion.clearance:.0f} mm)."
 
 
+def _limits_left(parts: Assembly, motion: Motion) -> str:
+    """A sentence on the joints that leave their limits, or nothing."""
+    limits = parts.robot.limits
+    outside = np.any((motion.run.q < limits.lower) | (motion.run.q > limits.upper), axis=0)
+    names = ", ".join(str(j + 1) for j in np.flatnonzero(outside))
+    return (
+        f" It leaves the limits of joint {names}, which ζ alone does not keep (errata 14)." if names else ""
+    )
+
+
 def _configurations(parts: Assembly, motions: Mapping[str, Motion]) -> Figure:
     figure = style.new_figure(7.4)
     path = tip_path(parts.robot, motions["unswitched"].run.q)
@@ -159,7 +169,7 @@ def _angles(
         ax.plot(
             0.0, parts.start[j], "o", color=style.GREEN, markeredgecolor="k", label="start", clip_on=False
         )
-        ax.set_ylim(-3.1, 3.1)
+        ax.set_ylim(min(-3.1, motion.run.q.min() - 0.2), max(3.1, motion.run.q.max() + 0.2))
         ax.set_title(f"joint {j + 1}")
         if j % 4 == 0:
             ax.set_ylabel("angle [rad]")
@@ -171,7 +181,7 @@ def _angles(
         key=key,
         title=title,
         caption=Caption(
-            shows=_verdict(motion),
+            shows=_verdict(motion) + _limits_left(parts, motion),
             answers=answers,
             parameters=f"{_SETTING}; {_switch_words(mode)}.",
             differs=_difference(mode, motion),
@@ -234,7 +244,7 @@ def _weights(key: str, mode: str, title: str, answers: str, motions: Mapping[str
         caption=Caption(
             shows="1: spring and damper act; 0: geodesic alone, which knows no goal and has no damping. "
             + (
-                f"The weight crosses one half {changes} times."
+                f"The weight crosses one half {'once' if changes == 1 else f'{changes} times'}."
                 if mode != "distance"
                 else f"The least weight is {run.switch.min():.2f}, at the end the weights are "
                 f"{', '.join(f'{s:.2f}' for s in run.switch[-1])}."
@@ -296,7 +306,7 @@ def _summary(motions: Mapping[str, Motion]) -> Table:
                 f"{motion.error:.3f}",
                 f"{1000 * motion.clearance:.0f}",
                 f"{values[2]:.2f}",
-                f"{values[3]:.3g}",
+                f"{values[3]:.0f}" if values[3] >= 100.0 else f"{values[3]:.2g}",
             )
         )
     return Table(
