@@ -110,7 +110,7 @@ def mixture(settings: Settings) -> Iterator[Item]:
         points = sample_link(robot, name, count=700, seed=settings.seed)
         ax.scatter(*points.T, s=0.8, color="0.55", linewidths=0, depthshade=False)
         _ellipsoids(ax, body, name, np.eye(4))
-        _equal(ax, points)
+        _equal(ax, points, zoom=0.6)
         ax.set_title(f"link {index + 1}", y=0.98)
     yield Figure(
         key="3.3",
@@ -266,5 +266,11 @@ def _equal(ax: Any, points: Array, *, unit: str = "mm", zoom: float = 0.68) -> N
         axis.set_label_text(f"{name} [{unit}]", fontsize=7)
         axis.set_tick_params(labelsize=6, pad=-2)
         axis.labelpad = -3
-    ax.zaxis.set_tick_params(pad=1)  # its numbers stand beside the axis, not on it
-    ax.zaxis.labelpad = 1
+    # At the near corner the numbers of y would meet those of x.
+    ticks = MaxNLocator(nbins=3).tick_values(low[1], high[1])
+    ax.set_yticks([y for y in ticks if low[1] + 0.2 * (high[1] - low[1]) < y <= high[1]])
+    ax.yaxis.labelpad = 1
+    # The numbers of z stand beside the axis, not on it; in a narrow box pads are seen shortened.
+    x_extent, _, z_extent = high - low
+    ax.zaxis.set_tick_params(pad=8 if x_extent < 0.75 * z_extent else 4)
+    ax.zaxis.labelpad = 17 if x_extent < 0.75 * z_extent else 5

@@ -132,13 +132,15 @@ def several(settings: Settings) -> Iterator[Item]:
     left.set(xlim=(-2.6, 2.6), ylim=(-2.6, 2.6))
     style.joint_axes(left, title="(a) joint space")
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    for share in np.linspace(0.0, 1.0, 9):
-        planar.draw_arm(right, joined[int(share * 20_000)], alpha=0.2 + 0.7 * share, width=1.6)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(joined, axis=0), axis=1))])
+    for share in np.linspace(0.0, 1.0, 12):
+        k = min(int(np.searchsorted(way, share * way[-1])), len(joined) - 1)
+        planar.draw_arm(right, joined[k], alpha=0.2 + 0.7 * share, width=1.6)
     for index, position in enumerate(positions):
         style.mark_obstacle(right, *position[:2], label="obstacles" if index == 0 else None)
     style.mark_start(right, *planar.joints(start)[-1], label="tip at start")
     style.mark_goal(right, *planar.joints(goal)[-1], label="tip at goal")
-    right.set(xlim=(-1.9, 1.9), ylim=(-0.3, 2.9))
+    right.set(xlim=(-2.2, 1.9), ylim=(-0.3, 2.9))
     right.legend(loc="upper center", ncols=3, fontsize=6, columnspacing=0.7, handletextpad=0.1)
     planar.task_axes(right, title="(b) task space, by way of via points")
     distance = float(np.linalg.norm(run.q[-1] - goal))

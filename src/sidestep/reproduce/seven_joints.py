@@ -306,7 +306,7 @@ def _summary(motions: Mapping[str, Motion]) -> Table:
                 f"{motion.error:.3f}",
                 f"{1000 * motion.clearance:.0f}",
                 f"{values[2]:.2f}",
-                f"{values[3]:.0f}" if values[3] >= 100.0 else f"{values[3]:.2g}",
+                f"{values[3]:.0f}" if values[3] >= 100.0 else f"{values[3]:.2f}",
             )
         )
     return Table(

@@ -116,7 +116,15 @@ def joint_space(settings: Settings) -> Iterator[Item]:
     figure = style.new_figure(7.2)
     left: Any = figure.add_subplot(1, 2, 1, projection="3d")
     right = figure.add_subplot(1, 2, 2)
-    left.plot_surface(*np.meshgrid(*grid), values, cmap=style.FIELD_MAP, linewidth=0, rcount=90, ccount=90)
+    left.plot_surface(
+        *np.meshgrid(*grid),
+        values,
+        cmap=style.FIELD_MAP,
+        edgecolor="0.6",
+        linewidth=0.15,
+        rcount=60,
+        ccount=60,
+    )
     left.set(xlabel="q₁ [rad]", ylabel="q₂ [rad]", zlabel="ψ [1/m³]", title="(a) surface")
     ticks = [-1.5, 0.0, 1.5]
     left.set(xticks=ticks, yticks=ticks)
