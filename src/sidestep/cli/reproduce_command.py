@@ -19,7 +19,7 @@ def reproduce(
         typer.Option(help="A figure, table, section or chapter: 5.1, table-6.1, A.1, 5. May be repeated."),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer samples, no physics: about a minute instead of many.")
+        bool, typer.Option("--quick", help="Fewer samples and runs: about a minute instead of several.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is drawn.")] = 0,
     json: Annotated[
