@@ -264,8 +264,8 @@ def kappa(settings: Settings) -> Iterator[Item]:
     runs = [move(BinarySwitch(k), duration=20.0, period=FINE) for k in KAPPAS]
     swept = np.geomspace(0.03, 8.0, 8 if settings.quick else 40)
     speeds, clearances = [], []
-    for k in swept:
-        run = move(BinarySwitch(float(k)), duration=10.0, period=FINE)
+    for threshold in swept:
+        run = move(BinarySwitch(float(threshold)), duration=10.0, period=FINE)
         speeds.append(float(np.abs(run.v).max()))
         clearances.append(planar.least_clearance(run.q, count=500))
     figure = style.new_figure(16.0)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 
 from sidestep import CollisionDensity
 from sidestep.reproduce import style
@@ -97,9 +98,10 @@ def projections(settings: Settings) -> Iterator[Item]:
 
 
 _SUB = "₁₂₃₄₅₆₇"
+Indices = npt.NDArray[np.int64]
 
 
-def _cells(column: Array, row: Array, values: Array) -> tuple[Array, Array, int]:
+def _cells(column: Indices, row: Indices, values: Array) -> tuple[Array, Array, int]:
     """Mean and standard error per cell (CELLS, CELLS), and the fewest samples in a cell."""
     flat = column * CELLS + row
     counts = np.bincount(flat, minlength=CELLS**2)
