@@ -15,7 +15,7 @@ from sidestep.body.cover_refine import OUTLINE, REPAIR, Ellipsoids, initial, ref
 from sidestep.body.cover_surface import Array, LinkSurface
 from sidestep.body.fitting import LinkFit, assess, mahalanobis_squared
 from sidestep.body.mixture import Mixture
-from sidestep.body.sampling import link_seed, links_with_geometry, sample_link
+from sidestep.body.sampling import check_components, link_seed, links_with_geometry, sample_link
 
 if TYPE_CHECKING:
     from sidestep.robot import Robot
@@ -70,18 +70,7 @@ class CoverSettings:
                     f"robot '{robot.name}' has that many links with geometry"
                 )
             return
-        if isinstance(self.components, Mapping):
-            unknown = sorted(set(self.components) - set(links))
-            absent = [link for link in links if link not in self.components]
-            if unknown or absent:
-                fault = f"names unknown links {unknown}" if unknown else f"has no number for links {absent}"
-                raise ValueError(f"components {fault}; the links with geometry are {', '.join(links)}")
-        for link in links:
-            number = self.components[link] if isinstance(self.components, Mapping) else self.components
-            if isinstance(number, bool) or not isinstance(number, int) or number < 1:
-                raise ValueError(
-                    f"components of link '{link}' is {number!r}, must be a whole number of at least 1"
-                )
+        check_components(self.components, links)
 
 
 @dataclass(frozen=True)

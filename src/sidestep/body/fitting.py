@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sidestep.body.mixture import CovarianceType, Mixture, check_covariance, fit_mixture
-from sidestep.body.sampling import link_seed, links_with_geometry, sample_link
+from sidestep.body.sampling import check_components, link_seed, links_with_geometry, sample_link
 from sidestep.body.selection import (
     CRITERIA,
     MAX_COMPONENTS,
@@ -70,21 +70,11 @@ class FitSettings:
                     f"choosing needs at least {NUM_FOLDS} samples per component"
                 )
             return
-        if isinstance(self.components, Mapping):
-            unknown = sorted(set(self.components) - set(links))
-            absent = [link for link in links if link not in self.components]
-            if unknown or absent:
-                fault = f"names unknown links {unknown}" if unknown else f"has no number for links {absent}"
-                raise ValueError(f"components {fault}; the links with geometry are {', '.join(links)}")
+        check_components(self.components, links)
         for link in links:
-            number = self.number_for(link)
-            if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+            if self.samples <= self.number_for(link):
                 raise ValueError(
-                    f"components of link '{link}' is {number!r}, must be a whole number of at least 1"
-                )
-            if self.samples <= number:
-                raise ValueError(
-                    f"samples is {self.samples}, must be above the {number} components of '{link}'"
+                    f"samples is {self.samples}, must be above the {self.number_for(link)} components of '{link}'"
                 )
 
     def number_for(self, link: str) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 from zlib import crc32
 
@@ -63,3 +64,23 @@ def link_seed(link: str, *, seed: int) -> int:
 def links_with_geometry(robot: Robot) -> tuple[str, ...]:
     """Names of the links that have geometry, in the order of the robot's links."""
     return tuple(link.name for link in robot.links if link.geometries)
+
+
+def check_components(components: int | Mapping[str, int], links: Sequence[str]) -> None:
+    """Checks a number of components for every link, or one for each of exactly these links.
+
+    Raises:
+        ValueError: naming the links or the number at fault.
+    """
+    if isinstance(components, Mapping):
+        unknown = sorted(set(components) - set(links))
+        absent = [link for link in links if link not in components]
+        if unknown or absent:
+            fault = f"names unknown links {unknown}" if unknown else f"has no number for links {absent}"
+            raise ValueError(f"components {fault}; the links with geometry are {', '.join(links)}")
+    for link in links:
+        number = components[link] if isinstance(components, Mapping) else components
+        if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+            raise ValueError(
+                f"components of link '{link}' is {number!r}, must be a whole number of at least 1"
+            )
