@@ -94,6 +94,27 @@ def test_wrong_lock(locked: dict[str, float], message: str) -> None:
         Robot.from_urdf(EVERY_JOINT, locked=LOCK | locked)
 
 
+def test_a_lock_beyond_the_limits_has_to_be_asked_for() -> None:
+    beyond = Robot.from_urdf(EVERY_JOINT, locked=LOCK | {"elbow": 2.0}, locked_beyond_limits=True)
+    assert "elbow" not in beyond.coordinate_names
+    with pytest.raises(ValueError, match=re.escape("'elbow' = inf is outside its limits")):
+        Robot.from_urdf(EVERY_JOINT, locked=LOCK | {"elbow": np.inf}, locked_beyond_limits=True)
+
+
+def test_the_fingers_of_a_named_robot_open_as_asked() -> None:
+    """Each finger's frame lies the opening away from the hand's middle, along the hand's y."""
+    robot = Robot.named("panda", locked={"panda_finger_joint1": 0.01, "panda_finger_joint2": 0.01})
+    at = {side: robot.pose(robot.neutral, f"panda_{side}finger") for side in ("left", "right")}
+    apart = at["left"][:3, 3] - at["right"][:3, 3]
+    np.testing.assert_allclose(np.linalg.norm(apart), 0.02, atol=1e-12)  # rounding
+    assert robot.num_coordinates == 7
+    assert robot.held == {"panda_finger_joint1": 0.01, "panda_finger_joint2": 0.01}
+    with pytest.raises(ValueError, match=re.escape("'panda_finger_joint1' = 0.065 is outside its limits")):
+        Robot.named("panda", locked={"panda_finger_joint1": 0.065})
+    with pytest.raises(ValueError, match=r"'panda_finger_joint2' = 0.02 mimics another .* puts it at 0.01"):
+        Robot.named("panda", locked={"panda_finger_joint1": 0.01, "panda_finger_joint2": 0.02})
+
+
 def test_wrong_tip_and_base_pose() -> None:
     with pytest.raises(ValueError, match=r"tip 'nose' is no link of .*; its links are: ground, pedestal"):
         Robot.from_urdf(EVERY_JOINT, tip="nose")

@@ -44,6 +44,7 @@ class Robot(_core.Robot):
             limits=tree.limits,
         )
         self._links = tree.links
+        self._held = dict(tree.held)
         self._link_by_name = {link.name: link for link in tree.links}
         self._meshes: dict[str, trimesh.Trimesh | None] = {}
 
@@ -56,6 +57,7 @@ class Robot(_core.Robot):
         base_pose: ArrayLike | None = None,
         tip: str | None = None,
         locked: Mapping[str, float] | None = None,
+        locked_beyond_limits: bool = False,
         acceleration_limits: ArrayLike | None = None,
         velocity_limits: ArrayLike | None = None,
         effort_limits: ArrayLike | None = None,
@@ -74,7 +76,8 @@ class Robot(_core.Robot):
             base_pose: pose (4, 4) of the root link in the world, identity by default.
             tip: a link; keeps the joints from the root to it, and links fixed rigidly to links before it.
                 What hangs on the tip itself, and every other branch that moves, is dropped.
-            locked: joints held at a value [rad | m]; joints that mimic them are held too.
+            locked: joints held at a value [rad | m]; joints that mimic them are held too, and may be named too.
+            locked_beyond_limits: accept values of `locked` outside the file's limits, as published data has.
             acceleration_limits: number or (nv,) [rad/s^2 | m/s^2]; 10 by default (URDF has none).
             velocity_limits: number or (nv,) [rad/s | m/s], in place of the file's.
             effort_limits: number or (nv,) [Nm | N], in place of the file's.
@@ -92,6 +95,7 @@ class Robot(_core.Robot):
             base_pose=base_pose,
             tip=tip,
             locked=locked,
+            locked_beyond_limits=locked_beyond_limits,
             acceleration_limits=acceleration_limits,
             velocity_limits=velocity_limits,
             effort_limits=effort_limits,
@@ -99,17 +103,25 @@ class Robot(_core.Robot):
         return cls(name or urdf.name, tree)
 
     @classmethod
-    def named(cls, name: str) -> Robot:
+    def named(
+        cls, name: str, *, locked: Mapping[str, float] | None = None, locked_beyond_limits: bool = False
+    ) -> Robot:
         """One of the robots listed by `sidestep.robots()`, such as "fr3", "fr3_arm", "panda" or "planar2".
 
+        Args:
+            name: of the list.
+            locked, locked_beyond_limits: as in `from_urdf`; values here replace those of the list.
+
         Raises:
-            ValueError: unknown name. FileNotFoundError: its package is not installed; says what to install.
+            ValueError: unknown name, wrong `locked`. FileNotFoundError: its package is not installed; says what
+                to install.
         """
         recipe = catalogue.recipe(name)
         return cls.from_urdf(
             recipe.source(),
             tip=recipe.tip,
-            locked=recipe.locked,
+            locked={**recipe.locked, **(locked or {})},
+            locked_beyond_limits=locked_beyond_limits,
             acceleration_limits=recipe.acceleration_limits,
             velocity_limits=recipe.velocity_limits,
             effort_limits=recipe.effort_limits,
@@ -140,13 +152,18 @@ class Robot(_core.Robot):
         Raises:
             ValueError: that names the argument and what is allowed. FileNotFoundError: there is no such mesh.
         """
-        tree = tree_with_tool(self, self._links, name, shape, link=link, pose=pose, mass=mass)
+        tree = tree_with_tool(self, self._links, self._held, name, shape, link=link, pose=pose, mass=mass)
         return Robot(self.name, tree)
 
     @property
     def links(self) -> tuple[Link, ...]:
         """Every link, in the order of `frames`."""
         return self._links
+
+    @property
+    def held(self) -> dict[str, float]:
+        """The joints that are locked, with those that mimic them: the position of each [rad | m]."""
+        return dict(self._held)
 
     def link(self, name: str) -> Link:
         """The link called `name`; raises ValueError that lists the links."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ _ROTATION_TOLERANCE = 1e-9  # on R^T R - I; poses are written with at least this
 def tree_with_tool(
     robot: _core.Robot,
     links: Sequence[Link],
+    held: Mapping[str, float],
     name: str,
     shape: Geometry | str | Path,
     *,
@@ -48,6 +49,7 @@ def tree_with_tool(
         coordinate_names=tuple(robot.coordinate_names),
         limits=robot.limits,
         links=(*links, tool),
+        held=held,
     )
 
 

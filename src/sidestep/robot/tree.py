@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from sidestep.robot.link import Array, Link
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
 CORE_TOLERANCE = 1e-9  # on R Rᵀ - 1, the core's own
+FOLLOWER_TOLERANCE = 1e-6  # [rad | m] of a locked mimic joint: values are written down with a few digits
 DEFAULT_ACCELERATION_LIMIT = 10.0
 """Acceleration limit where none is given, [rad/s^2] or [m/s^2], as URDF has none: the FR3's official value on
 every joint, that of the thesis's controller, and the order of what other arms of this size are rated for."""
@@ -22,13 +23,14 @@ every joint, that of the thesis's controller, and the order of what other arms o
 
 @dataclass(frozen=True, eq=False)
 class KinematicTree:
-    """What the core's robot is built from; `links` in the order of `frames`."""
+    """What the core's robot is built from; `links` in the order of `frames`, `held` as `Robot.held`."""
 
     joints: tuple[Joint, ...]
     frames: tuple[Frame, ...]
     coordinate_names: tuple[str, ...]
     limits: JointLimits
     links: tuple[Link, ...]
+    held: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,14 @@ def build_tree(
     base_pose: ArrayLike | None,
     tip: str | None,
     locked: Mapping[str, float] | None,
+    locked_beyond_limits: bool,
     acceleration_limits: ArrayLike | None,
     velocity_limits: ArrayLike | None,
     effort_limits: ArrayLike | None,
 ) -> KinematicTree:
     """Folds `urdf` into moving joints and frames; see `Robot.from_urdf` for the arguments and the rules."""
-    drives = _drives(urdf, _checked_locks(urdf, locked or {}))
+    drives = _drives(urdf, _checked_locks(urdf, locked or {}, beyond_limits=locked_beyond_limits))
+    _check_followers(urdf, locked or {}, drives)
     kept = _kept_joints(urdf, drives, tip)
     names = [joint.name for joint in kept if joint.moves and drives[joint.name].source == joint.name]
     if not names:
@@ -103,25 +107,54 @@ def build_tree(
     )
     frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
     return KinematicTree(
-        tuple(joints), frames, tuple(names), limits, tuple(urdf.links[link] for link in placed)
+        tuple(joints),
+        frames,
+        tuple(names),
+        limits,
+        tuple(urdf.links[link] for link in placed),
+        {joint.name: drives[joint.name].offset for joint in kept if joint.moves and _held(drives, joint)},
     )
 
 
-def _checked_locks(urdf: Urdf, locked: Mapping[str, float]) -> dict[str, float]:
-    movable = [joint.name for joint in urdf.joints.values() if joint.moves and joint.mimic is None]
+def _checked_locks(urdf: Urdf, locked: Mapping[str, float], *, beyond_limits: bool) -> dict[str, float]:
+    """The locks of joints that follow no other, after checking that they exist and may stand there."""
+    locks = {}
     for name, value in locked.items():
-        if name not in movable:
-            kind = "mimics another; lock that one" if name in urdf.joints else "does not exist"
-            if name in urdf.joints and not urdf.joints[name].moves:
-                kind = "is fixed already"
+        joint = urdf.joints.get(name)
+        if joint is None or not joint.moves:
+            kind = "does not exist" if joint is None else "is fixed already"
             raise ValueError(
-                f"locked: joint {name!r} {kind}; joints that can be locked: {', '.join(movable)}"
+                f"locked: joint {name!r} {kind}; joints that can be locked: {', '.join(_lockable(urdf))}"
             )
-        limit = urdf.joints[name].limit
+        limit = joint.limit
         lower, upper = (-math.inf, math.inf) if limit is None else (limit.lower, limit.upper)
-        if not math.isfinite(value) or not lower <= value <= upper:
+        if not math.isfinite(value) or not (beyond_limits or lower <= value <= upper):
             raise ValueError(f"locked: {name!r} = {value} is outside its limits [{lower}, {upper}]")
-    return {name: float(value) for name, value in locked.items()}
+        if joint.mimic is None:
+            locks[name] = float(value)
+    return locks
+
+
+def _check_followers(urdf: Urdf, locked: Mapping[str, float], drives: dict[str, _Drive]) -> None:
+    """A mimic joint may be named with the one that it follows, at the place where it then is."""
+    for name, value in locked.items():
+        if drives[name].source is not None:
+            raise ValueError(
+                f"locked: joint {name!r} mimics another; lock that one; joints that can be locked: "
+                f"{', '.join(_lockable(urdf))}"
+            )
+        if not math.isclose(drives[name].offset, value, abs_tol=FOLLOWER_TOLERANCE):
+            raise ValueError(
+                f"locked: {name!r} = {value} mimics another that is locked and puts it at {drives[name].offset}"
+            )
+
+
+def _lockable(urdf: Urdf) -> list[str]:
+    return [joint.name for joint in urdf.joints.values() if joint.moves and joint.mimic is None]
+
+
+def _held(drives: dict[str, _Drive], joint: UrdfJoint) -> bool:
+    return drives[joint.name].source is None
 
 
 def _drives(urdf: Urdf, locks: dict[str, float]) -> dict[str, _Drive]:
@@ -169,7 +202,7 @@ def _kept_joints(urdf: Urdf, drives: dict[str, _Drive], tip: str | None) -> list
         link = to_parent[link].parent
 
     def stays(joint: UrdfJoint) -> bool:
-        rigid = not joint.moves or drives[joint.name].source is None
+        rigid = not joint.moves or _held(drives, joint)
         return tip is None or joint.name in way or (rigid and joint.parent != tip)
 
     kept: list[UrdfJoint] = []
