@@ -57,6 +57,7 @@ from .robot import Inertial as Inertial
 from .robot import Link as Link
 from .robot import Robot as Robot
 from .robot import planar_arm as planar_arm
+from .robot import read_srdf as read_srdf
 from .robot import robots as robots
 from .scenario import Scenario as Scenario
 from .scenario import ScenarioError as ScenarioError

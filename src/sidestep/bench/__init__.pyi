@@ -3,8 +3,13 @@ from .methods import build_system as build_system
 from .motion import Motion as Motion
 from .motion import MotionSettings as MotionSettings
 from .motion import move as move
+from .motion_bench_maker import MotionBenchMakerProblem as MotionBenchMakerProblem
+from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_maker
 from .outcome import Judge as Judge
 from .outcome import Outcome as Outcome
+from .parallel import default_jobs as default_jobs
+from .problem import Problem as Problem
+from .problem import SceneProblem as SceneProblem
 from .problem_file import read_problems as read_problems
 from .problem_file import write_problems as write_problems
 from .problems import ProblemGenerator as ProblemGenerator
@@ -13,5 +18,4 @@ from .problems import ReachProblem as ReachProblem
 from .problems import Workspace as Workspace
 from .reach import BenchResult as BenchResult
 from .reach import BenchSettings as BenchSettings
-from .reach import default_jobs as default_jobs
 from .reach import run_bench as run_bench

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import AccelerationFilter, GeometricSystem, Obstacles, TorqueController, rollout
-from sidestep.bench.problems import ReachProblem
+from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot
 from sidestep.simulation import Arrival, Simulation
 
@@ -53,7 +53,7 @@ class Motion:
 
     Attributes:
         q, v, a: (T, nv); a is the change of v over the period, except in the last row.
-        object_poses: (T, N, 7) of the balls.
+        object_poses: (T, N, 7) of the solids.
         torque: (T, nv), or None where there was none.
         contacts: of MuJoCo, 0 without physics.
         arrived: within the duration.
@@ -70,15 +70,13 @@ class Motion:
     step_seconds: Array
 
 
-def move(robot: Robot, system: GeometricSystem, problem: ReachProblem, settings: MotionSettings) -> Motion:
+def move(robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings) -> Motion:
     """Runs one problem."""
     run = _under_torque if settings.torque else _integrated
     return run(robot, system, problem, settings)
 
 
-def _integrated(
-    robot: Robot, system: GeometricSystem, problem: ReachProblem, settings: MotionSettings
-) -> Motion:
+def _integrated(robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings) -> Motion:
     total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, CHUNK))
     q, v = problem.start, np.zeros_like(problem.start)
     guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
@@ -92,7 +90,7 @@ def _integrated(
             q,
             v,
             problem.goal,
-            _at(problem, done * settings.period),
+            problem.obstacles_at(done * settings.period),
             period=settings.period,
             steps=steps,
             time_steps=True,
@@ -109,15 +107,12 @@ def _integrated(
         q, v = part.q[steps], part.v[steps]
         done += keep
     q, v, a = (np.concatenate(columns) for columns in zip(*rows, strict=True))
-    at = settings.period * np.arange(len(q))
-    poses = np.zeros((len(q), len(problem.centers), 7))
-    poses[:, :, :3] = problem.centers + at[:, None, None] * problem.velocities
-    poses[:, :, 3] = 1.0
+    poses = poses_over(problem.objects, np.arange(len(q), dtype=np.float64) * settings.period)
     return Motion(q, v, a, poses, None, 0, arrived, np.concatenate(times))
 
 
 def _under_torque(
-    robot: Robot, system: GeometricSystem, problem: ReachProblem, settings: MotionSettings
+    robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings
 ) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period)
     timer = _Timer()
@@ -127,7 +122,7 @@ def _under_torque(
         problem.start,
         problem.goal,
         settings.duration,
-        lambda time: _at(problem, time),
+        problem.obstacles_at,
         arrival=Arrival(position=settings.tolerance, speed=float("inf"), hold=0.0),
     )
     return Motion(
@@ -140,12 +135,6 @@ def _under_torque(
         run.arrived,
         np.array(timer.steps),
     )
-
-
-def _at(problem: ReachProblem, time: float) -> Obstacles:
-    if len(problem.centers) == 0:
-        return Obstacles.none()
-    return Obstacles(problem.centers + time * problem.velocities, problem.radii, problem.velocities)
 
 
 class _Timer:

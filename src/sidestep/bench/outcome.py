@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.bench.motion import Motion, MotionSettings
-from sidestep.bench.problems import ReachProblem
+from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
 from sidestep.robot import Robot
 from sidestep.simulation import ExactClearance, SelfCollision
@@ -27,7 +27,7 @@ class Outcome:
         index: of the problem. arrived: within the time. time_s: of the motion. steps: of it.
         error_rad: largest joint error at its end.
         straight_line_blocked: of the problem.
-        min_clearance_m: exact, from any ball, between samples too; None without balls. Below 0: overlap.
+        min_clearance_m: exact, from any solid, between samples too; None without any. Below 0: overlap.
         clearance_pair, clearance_time_s: between what, and when.
         contacts: contact points that MuJoCo counted; 0 without physics.
         min_self_clearance_m: exact, between the links that may not touch; None without such. 0: touch.
@@ -53,7 +53,7 @@ class Outcome:
 
     @property
     def collision(self) -> bool:
-        """It touched a ball."""
+        """It touched a solid."""
         return self.contacts > 0 or (self.min_clearance_m is not None and self.min_clearance_m <= 0.0)
 
     @property
@@ -103,7 +103,7 @@ class Judge:
         self._self = self_collision or SelfCollision(robot)
         self._clearance = ExactClearance(robot, ())
 
-    def judge(self, problem: ReachProblem, motion: Motion, settings: MotionSettings) -> Outcome:
+    def judge(self, problem: Problem, motion: Motion, settings: MotionSettings) -> Outcome:
         """What came of a motion through a problem; see `Outcome`."""
         finite = np.isfinite(motion.q).all(axis=1) & np.isfinite(motion.v).all(axis=1)
         end = len(motion.q) if finite.all() else int(finite.argmin())

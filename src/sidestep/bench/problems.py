@@ -107,9 +107,13 @@ class ReachProblem:
     @property
     def obstacles(self) -> Obstacles:
         """The balls as the controller sees them at time 0: a point with a radius and a velocity each."""
+        return self.obstacles_at(0.0)
+
+    def obstacles_at(self, time: float) -> Obstacles:
+        """The same at a time [s]."""
         if len(self.centers) == 0:
             return Obstacles.none()
-        return Obstacles(self.centers, self.radii, self.velocities)
+        return Obstacles(self.centers + time * self.velocities, self.radii, self.velocities)
 
 
 @dataclass(frozen=True)

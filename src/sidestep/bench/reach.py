@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import platform
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,12 +14,11 @@ from sidestep.bench.method import Method
 from sidestep.bench.methods import build_system
 from sidestep.bench.motion import MotionSettings, move
 from sidestep.bench.outcome import Judge, Outcome, times_of
+from sidestep.bench.parallel import Progress, cpu_name, run_tasks
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
 from sidestep.bench.step_times import StepTimes
 from sidestep.robot import Robot
 from sidestep.simulation import SelfCollision
-
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -133,9 +130,10 @@ def run_bench(
     tasks: list[int | ReachProblem] = list(range(settings.count)) if problems is None else list(problems)
     if progress is not None:
         progress(0, len(tasks), "preparing the robot")
-    worker = _Worker(settings, robot)  # here first: bodies are made once, and the processes find them cached
+    make = partial(_Worker, settings, robot)
+    worker = make()  # here first: bodies are made once, and the processes find them cached
     drawn, outcomes, times = [], [], StepTimes()
-    for problem, outcome, steps in _results(worker, tasks):
+    for problem, outcome, steps in run_tasks(make, tasks, jobs=settings.jobs, worker=worker):
         drawn.append(problem)
         outcomes.append(outcome)
         times.merge(steps)
@@ -160,43 +158,3 @@ class _Worker:
         problem = self._generator.problem(task) if isinstance(task, int) else task
         motion = move(self._robot, self._system, problem, self.settings.motion)
         return problem, self._judge.judge(problem, motion, self.settings.motion), times_of(motion)
-
-
-_worker: _Worker | None = None  # of this process
-
-
-def _start(settings: BenchSettings, robot_name: str) -> None:
-    global _worker
-    _worker = _Worker(settings, robot_name)
-
-
-def _run(task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
-    assert _worker is not None
-    return _worker.run(task)
-
-
-def _results(
-    worker: _Worker, tasks: Sequence[int | ReachProblem]
-) -> Iterator[tuple[ReachProblem, Outcome, StepTimes]]:
-    jobs = min(worker.settings.jobs, len(tasks))
-    if jobs == 1:
-        yield from map(worker.run, tasks)
-        return
-    context = multiprocessing.get_context("spawn")
-    with context.Pool(jobs, initializer=_start, initargs=(worker.settings, worker.robot_name)) as pool:
-        yield from pool.imap_unordered(_run, tasks)
-
-
-def default_jobs() -> int:
-    """The processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def cpu_name() -> str:
-    """The model of the processor, or what the platform says of it."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    except OSError:
-        models = []
-    return models[0] if models else platform.processor() or platform.machine()

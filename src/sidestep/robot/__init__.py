@@ -4,5 +4,6 @@ from sidestep.robot.catalogue import RobotEntry, robots
 from sidestep.robot.link import Geometry, Inertial, Link
 from sidestep.robot.model import Robot
 from sidestep.robot.planar import planar_arm
+from sidestep.robot.srdf import read_srdf
 
-__all__ = ["Geometry", "Inertial", "Link", "Robot", "RobotEntry", "planar_arm", "robots"]
+__all__ = ["Geometry", "Inertial", "Link", "Robot", "RobotEntry", "planar_arm", "read_srdf", "robots"]

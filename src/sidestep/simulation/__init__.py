@@ -1,5 +1,6 @@
 """Physics, exact clearance, and what a run achieved."""
 
+from sidestep.simulation.body_clearance import BodyClearance
 from sidestep.simulation.clearance import Clearance, ExactClearance, PathClearance
 from sidestep.simulation.evaluation import Evaluation, LimitViolations, evaluate
 from sidestep.simulation.kinematic import run_kinematically
@@ -11,6 +12,7 @@ from sidestep.simulation.simulation import Simulation
 
 __all__ = [
     "Arrival",
+    "BodyClearance",
     "Clearance",
     "Contact",
     "Evaluation",

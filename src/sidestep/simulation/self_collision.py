@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import coal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.robot import Robot
+from sidestep.robot import Robot, read_srdf
 from sidestep.simulation.clearance import FINE_CHECKS, travel_per_joint
 from sidestep.simulation.solid import mesh_model
 
@@ -100,6 +101,18 @@ class SelfCollision:
                     travel += travel_per_joint(robot, name, mesh, beyond=shared)
                 self._pairs.append(_PairOfLinks(i, j, travel))
         self._leave_out_what_always_touches(samples, np.random.default_rng(seed))
+
+    @classmethod
+    def from_srdf(
+        cls, robot: Robot, source: str | Path, *, samples: int = SAMPLES, seed: int = 0
+    ) -> SelfCollision:
+        """With the pairs that an SRDF lets touch left out as well (a path, or the XML text).
+
+        Raises:
+            FileNotFoundError, ValueError: as `read_srdf`.
+        """
+        allowed = read_srdf(source, [link.name for link in robot.links])
+        return cls(robot, allowed=allowed, samples=samples, seed=seed)
 
     @property
     def pairs(self) -> tuple[Pair, ...]:

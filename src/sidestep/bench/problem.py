@@ -1,0 +1,78 @@
+"""What every benchmark problem has, whatever it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import Obstacles
+from sidestep.pose import pose_vector
+from sidestep.simulation import SceneObject
+
+Array = npt.NDArray[np.float64]
+
+
+class Problem(Protocol):
+    """Get from start to goal among solids, of which the controller sees points."""
+
+    @property
+    def index(self) -> int:
+        """Its number."""
+
+    @property
+    def start(self) -> Array:
+        """(nv,) [rad | m], at rest."""
+
+    @property
+    def goal(self) -> Array:
+        """(nv,) [rad | m]."""
+
+    @property
+    def objects(self) -> tuple[SceneObject, ...]:
+        """The solids, by which the motion is judged."""
+
+    @property
+    def straight_line_blocked(self) -> bool:
+        """The straight line in joint space touches a solid where it was at time 0."""
+
+    def obstacles_at(self, time: float) -> Obstacles:
+        """What the controller sees at a time [s]; until the next call it moves at its velocities."""
+
+
+def poses_over(objects: Sequence[SceneObject], times: Array) -> Array:
+    """Where solids that nothing touches are at times (T,) [s]: (T, N, 7) as `ExactClearance` takes them."""
+    poses = np.broadcast_to(
+        np.array([pose_vector(item.pose) for item in objects]).reshape(-1, 7), (len(times), len(objects), 7)
+    ).copy()
+    for k, item in enumerate(objects):
+        if item.motion == "moving":
+            begin, end = item.moves_during
+            since = np.clip(np.minimum(times, end) - begin, 0.0, None)
+            poses[:, k, :3] += since[:, None] * item.velocity
+    return poses
+
+
+@dataclass(frozen=True, eq=False)
+class SceneProblem:
+    """A problem among solids that stay where they are, seen as the same points all the time.
+
+    Attributes:
+        name: of its set. index: its number there. start, goal: (nv,) [rad | m]. objects: the solids.
+        obstacles: points that cover their surfaces. straight_line_blocked: see `Problem`.
+    """
+
+    name: str
+    index: int
+    start: Array
+    goal: Array
+    objects: tuple[SceneObject, ...]
+    obstacles: Obstacles
+    straight_line_blocked: bool
+
+    def obstacles_at(self, time: float) -> Obstacles:
+        """The points."""
+        return self.obstacles
