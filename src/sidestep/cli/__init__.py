@@ -9,7 +9,14 @@ from typing import Annotated
 import typer
 
 from sidestep._core import __version__
-from sidestep.cli import bench_command, fit_command, list_commands, reproduce_command, run_command
+from sidestep.cli import (
+    bench_command,
+    fit_command,
+    list_commands,
+    reproduce_command,
+    run_command,
+    studio_command,
+)
 
 app = typer.Typer(
     name="sidestep",
@@ -22,6 +29,7 @@ app = typer.Typer(
 )
 app.command("demo")(run_command.demo)
 app.command("run")(run_command.run)
+app.command("studio")(studio_command.studio)
 app.command("scenarios")(list_commands.scenarios)
 app.command("schema")(list_commands.schema)
 app.command("robots")(list_commands.robots)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.util
 import math
+import os
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
@@ -17,7 +20,7 @@ if TYPE_CHECKING:
     from sidestep.scenario.result import ScenarioResult
     from sidestep.scenario.scenario import SwitchChoice, SwitchType
 
-DEMO_SCENARIO = "thesis-6.2.3"
+DEMO_SCENARIO, DEMO_METHOD = "thesis-6.2.3", "thesis"
 
 
 class ModeChoice(StrEnum):
@@ -108,6 +111,13 @@ def run(
 
 
 def demo(
+    studio: Annotated[
+        bool | None,
+        typer.Option(
+            "--studio/--no-studio",
+            help="In the browser, or as a report [default: the browser where stdin and stdout are a terminal].",
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Report folder.")] = Path("sidestep-report-demo"),
     json: Annotated[
         str | None,
@@ -117,12 +127,26 @@ def demo(
 ) -> None:
     """Show what Sidestep does: a Franka Research 3 under torque control passes a cluster of balls.
 
-    Exit code: 0 when the goal was reached without contact and within every limit, 1 when not.
+    At a terminal it opens the studio, where the balls can be dragged. Without one (in a script, in CI), with --json, or
+    with --no-studio it runs once and writes a report; the exit code is then 0 when the goal was reached without contact
+    and within every limit, 1 when not.
     """
     from sidestep.scenario import Scenario
 
-    result = run_and_show(Scenario.load(DEMO_SCENARIO), folder=out, json=json, quiet=quiet)
+    scenario = Scenario.load(DEMO_SCENARIO)
+    if studio if studio is not None else json is None and _can_open_studio():
+        from sidestep.cli.studio_command import open_studio
+
+        open_studio(scenario, method=DEMO_METHOD)
+        return
+    result = run_and_show(scenario, folder=out, json=json, quiet=quiet)
     raise typer.Exit(0 if result.success else 1)
+
+
+def _can_open_studio() -> bool:
+    """Whether somebody sits at a terminal, outside of CI, and the studio is installed."""
+    at_terminal = sys.stdin.isatty() and sys.stdout.isatty() and not os.environ.get("CI")
+    return at_terminal and importlib.util.find_spec("viser") is not None
 
 
 def run_and_show(scenario: Scenario, *, folder: Path | None, json: str | None, quiet: bool) -> ScenarioResult:

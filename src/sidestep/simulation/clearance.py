@@ -128,6 +128,24 @@ class ExactClearance:
                     best = found
         return best
 
+    def of_links(self, q: Array, object_poses: Array | None = None) -> tuple[Clearance, ...]:
+        """What is nearest to each link; arguments as in `distance`. Nothing where the scene is empty."""
+        poses = self._start_poses() if object_poses is None else np.asarray(object_poses, dtype=float)
+        radii = np.array([item.bounding_radius for item in self._objects])
+        nearest = []
+        for i, link in enumerate(self._links):
+            X_WL = self.robot.pose(q, link.name)
+            at_least = np.linalg.norm(poses[:, :3] - X_WL[:3, 3], axis=1) - radii - link.bounding_radius
+            best = _nothing()
+            for j in np.argsort(at_least):
+                if at_least[j] >= best.distance:
+                    break
+                found = self._pair(i, int(j), X_WL, poses[j])
+                if found.distance < best.distance:
+                    best = found
+            nearest.append(best)
+        return tuple(best for best in nearest if best.link)
+
     def minimum_over(
         self, trajectory: Array, object_poses: Array | None = None, *, tolerance: float = 1e-3
     ) -> PathClearance:

@@ -90,6 +90,7 @@ def build_model(
     floor_height: float | None = None,
     joint_damping: float = 0.0,
     joint_friction: float = 0.0,
+    visuals: bool = True,
 ) -> SimulationModel:
     """Builds the MuJoCo model of a robot with torque motors among the objects of a scene.
 
@@ -111,6 +112,7 @@ def build_model(
         floor_height: z of a floor [m] that free objects can fall on; None: no floor.
         joint_damping: [Nm s/rad] on every joint.
         joint_friction: dry friction [Nm] on every joint.
+        visuals: with the visual meshes, which MuJoCo's own pictures show and which take most of the time.
 
     Raises:
         ValueError: a moving link without inertia, a mass or inertia that is not physical, a timestep that is
@@ -130,7 +132,7 @@ def build_model(
         name="overview", pos=[1.7, -1.4, 1.3], xyaxes=[0.64, 0.77, 0.0, -0.32, 0.27, 0.91]
     )
     owners: dict[str, tuple[str, str]] = {}
-    _add_robot(spec, robot, owners, damping=joint_damping, friction=joint_friction)
+    _add_robot(spec, robot, owners, damping=joint_damping, friction=joint_friction, visuals=visuals)
     for item in scene:
         _add_object(spec, item, owners)
     if floor_height is not None:
@@ -152,7 +154,13 @@ def build_model(
 
 
 def _add_robot(
-    spec: mujoco.MjSpec, robot: Robot, owners: dict[str, tuple[str, str]], *, damping: float, friction: float
+    spec: mujoco.MjSpec,
+    robot: Robot,
+    owners: dict[str, tuple[str, str]],
+    *,
+    damping: float,
+    friction: float,
+    visuals: bool,
 ) -> None:
     limits = robot.limits
     frames = {frame.name: frame for frame in robot.frames}
@@ -182,7 +190,7 @@ def _add_robot(
     for link in robot.links:
         frame = frames[link.name]
         body = bodies[frame.joint] if frame.joint >= 0 else base
-        _add_geoms(spec, body, robot, link.name, frame.placement, owners)
+        _add_geoms(spec, body, robot, link.name, frame.placement, owners, visuals=visuals)
     for coordinate, name in enumerate(robot.coordinate_names):
         leader = robot.joints[_leader(robot, coordinate)]
         effort = float(limits.effort[coordinate])
@@ -264,6 +272,8 @@ def _add_geoms(
     link: str,
     placement: Array,
     owners: dict[str, tuple[str, str]],
+    *,
+    visuals: bool,
 ) -> None:
     for i, geometry in enumerate(robot.link(link).geometries):
         for k, corners in enumerate(convex_parts(np.array(geometry.mesh().triangles, dtype=float))):
@@ -271,7 +281,7 @@ def _add_geoms(
             spec.add_mesh(name=name, uservert=corners.ravel())
             _add_geom(body, name, placement, touches=True)
             owners[name] = ("link", link)
-    for i, geometry in enumerate(robot.link(link).visuals):
+    for i, geometry in enumerate(robot.link(link).visuals if visuals else ()):
         name = f"visual:{link}:{i}"
         if _add_mesh(spec, name, geometry.mesh()):
             _add_geom(body, name, placement, touches=False)

@@ -1,0 +1,109 @@
+"""`sidestep studio`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sidestep.cli.output import console
+
+if TYPE_CHECKING:
+    from sidestep.scenario import Scenario
+    from sidestep.studio.studio import Studio
+
+
+def studio(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(help="A scenario file (YAML), or a name from `sidestep scenarios`; or use --robot."),
+    ] = None,
+    robot: Annotated[str | None, typer.Option(help="A name from `sidestep robots` [default: fr3].")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="URDF or xacro file of a robot.")] = None,
+    package_dir: Annotated[
+        list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
+    ] = None,
+    method: Annotated[
+        str, typer.Option(help="How the arm is moved at first; the page lists the methods.")
+    ] = "barrier",
+    ellipsoids: Annotated[
+        int | None,
+        typer.Option(min=1, help="Per link of the covering body [default: as many as it takes, but slower]."),
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Where to listen; anyone who can reach it can move the arm.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Where to listen; 0: any that is free.")] = 8890,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser.")] = True,
+    headless: Annotated[
+        bool, typer.Option("--headless", help="Take pictures in a hidden browser (Chromium), then end.")
+    ] = False,
+    screenshot: Annotated[
+        Path | None, typer.Option(help="With --headless: picture (.png) of the end.")
+    ] = None,
+    video: Annotated[
+        Path | None, typer.Option(help="With --headless: animation (.gif or .webp) of the way.")
+    ] = None,
+    duration: Annotated[
+        float, typer.Option(min=0.5, max=600.0, help="With --headless: for how long [s of simulated time].")
+    ] = 8.0,
+    size: Annotated[
+        str, typer.Option(metavar="WIDTHxHEIGHT", help="With --headless: of the window [px].")
+    ] = "1280x800",
+) -> None:
+    """Open the studio: the real loop in MuJoCo, in the browser, to see, push and tune.
+
+    Ends with Ctrl-C. The first run with a robot fits its body, which can take minutes; the page says how far it is.
+    """
+    from sidestep.studio.start import starting_scenario
+
+    chosen = starting_scenario(scenario, robot=robot, urdf=urdf, package_dirs=package_dir or ())
+    if not headless and (screenshot or video):
+        raise ValueError("--screenshot and --video go with --headless")
+    if headless:
+        from sidestep.studio.headless import Window, take_pictures
+
+        window = Window.from_text(size)
+        take_pictures(
+            chosen,
+            method=method,
+            ellipsoids=ellipsoids,
+            duration=duration,
+            screenshot=screenshot,
+            video=video,
+            window=window,
+        )
+        return
+    open_studio(chosen, method=method, ellipsoids=ellipsoids, host=host, port=port, browser=browser)
+
+
+def open_studio(
+    scenario: Scenario,
+    *,
+    method: str = "barrier",
+    ellipsoids: int | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8890,
+    browser: bool = True,
+) -> None:
+    """Runs a studio until it is interrupted."""
+    from sidestep.studio.studio import Studio
+
+    terminal = console()
+    with Studio(scenario, method=method, host=host, port=port, ellipsoids=ellipsoids) as running:
+        terminal.print(f"Studio: {running.address}   (Ctrl-C ends it)", highlight=False, soft_wrap=True)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(running.address)
+        _wait(running)
+
+
+def _wait(running: Studio) -> None:
+    try:
+        running.wait()
+    except KeyboardInterrupt:
+        return
+    if running.error:
+        raise RuntimeError(running.error)

@@ -1,0 +1,1 @@
+"""The studio: the real loop, seen and touched in a browser."""

@@ -1,0 +1,169 @@
+"""Pictures of the page, taken in a hidden browser: for documents and for machines without a display."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PIL import Image
+
+from sidestep.scenario import Scenario
+from sidestep.studio.studio import Studio
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (  # WebGL without a graphics card; a container has no sandbox of its own to offer
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+)
+LOAD_TIME = 90.0  # [s] at most until the page shows the scene
+BODY_TIME = 1800.0  # [s] at most until the body is made, the first time
+FRAME = 0.15  # [s] of simulated time between two pictures of an animation
+ANIMATION_WIDTH = 960  # [px]
+COLOURS = 128  # of a GIF
+
+
+@dataclass(frozen=True)
+class Window:
+    """Size of the hidden window [px]."""
+
+    width: int = 1280
+    height: int = 800
+
+    @classmethod
+    def from_text(cls, text: str) -> Window:
+        """From WIDTHxHEIGHT; raises ValueError that says what is allowed."""
+        width, _, height = text.partition("x")
+        if not (width.isdigit() and height.isdigit() and int(width) >= 640 and int(height) >= 480):
+            raise ValueError(f"--size is {text!r}; allowed: WIDTHxHEIGHT in pixels, at least 640x480")
+        return cls(int(width), int(height))
+
+
+def find_chromium() -> str | None:
+    """The path of a Chromium: SIDESTEP_CHROMIUM, or the first of the usual names; None where there is none."""
+    chosen = os.environ.get("SIDESTEP_CHROMIUM")
+    if chosen:
+        return chosen if Path(chosen).is_file() else None
+    return next((path for path in map(shutil.which, NAMES) if path), None)
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """A hidden Chromium, as Playwright's `Browser`.
+
+    Raises:
+        ModuleNotFoundError: Playwright is missing. FileNotFoundError: there is no Chromium.
+    """
+    try:
+        from playwright.sync_api import sync_playwright
+    except ModuleNotFoundError as error:
+        raise FileNotFoundError("--headless needs Playwright: pip install 'sidestep[headless]'") from error
+    path = find_chromium()
+    if path is None:
+        raise FileNotFoundError(
+            f"--headless needs Chromium; none of {', '.join(NAMES)} is on the PATH "
+            "(apt-get install chromium, or set SIDESTEP_CHROMIUM)"
+        )
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        try:
+            yield chromium
+        finally:
+            chromium.close()
+
+
+def open_page(chromium: Any, address: str, window: Window = Window()) -> Page:
+    """The page in a new window, with the scene shown and viser's notice about software rendering closed."""
+    page: Page = chromium.new_page(viewport={"width": window.width, "height": window.height})
+    page.goto(address)
+    page.wait_for_selector("canvas", timeout=1e3 * LOAD_TIME)
+    page.get_by_text("Sidestep", exact=True).first.wait_for(timeout=1e3 * LOAD_TIME)
+    notice = page.get_by_text("Software WebGL rendering")
+    try:
+        notice.wait_for(timeout=4e3)
+        notice.locator("xpath=ancestor::*[.//button][1]//button").first.click()
+    except Exception:  # Playwright's own timeout: with a graphics card there is no such notice
+        pass
+    return page
+
+
+def take_pictures(
+    scenario: Scenario,
+    *,
+    method: str,
+    ellipsoids: int | None,
+    duration: float,
+    screenshot: Path | None,
+    video: Path | None,
+    window: Window,
+) -> None:
+    """Runs a scenario from its start and writes what the page shows: a picture of the end, and an animation.
+
+    Raises:
+        ValueError: neither a picture nor an animation is asked for, or its suffix is another.
+        FileNotFoundError: no Playwright or no Chromium. RuntimeError: the loop failed.
+    """
+    from sidestep.studio import messages as m
+
+    check_files(screenshot, video)
+    with browser() as chromium, Studio(scenario, method=method, port=0, ellipsoids=ellipsoids) as studio:
+        studio.wait_ready(BODY_TIME)
+        studio.send(m.SetRunning(False))
+        page = open_page(chromium, studio.address, window)
+        clock.sleep(4.0)  # the client fades the scene in
+        studio.send(m.Restart())
+        frames: list[Image.Image] = []
+        wait_for_time(studio, 0.0, at_most=duration)
+        while (now := _time(studio)) < duration:
+            if video is not None:
+                frames.append(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+            wait_for_time(studio, min(now + FRAME, duration))
+        if screenshot is not None:
+            page.screenshot(path=str(screenshot))
+        if video is not None:
+            save_animation(frames, video)
+
+
+def check_files(screenshot: Path | None, video: Path | None) -> None:
+    """Raises ValueError when there is nothing to write, or in another format than those known."""
+    if screenshot is None and video is None:
+        raise ValueError("--headless needs --screenshot FILE or --video FILE")
+    if screenshot is not None and screenshot.suffix.lower() != ".png":
+        raise ValueError(f"--screenshot is {screenshot}; allowed: .png")
+    if video is not None and video.suffix.lower() not in (".gif", ".webp"):
+        raise ValueError(f"--video is {video}; allowed: .gif, .webp")
+
+
+def wait_for_time(studio: Studio, time: float, *, at_most: float = float("inf")) -> None:
+    """Returns when simulated time [s] is in [time, at_most]; raises RuntimeError when the loop ends before."""
+    while not time <= _time(studio) <= at_most:
+        if studio.error:
+            raise RuntimeError(studio.error)
+        clock.sleep(0.01)
+
+
+def save_animation(frames: list[Image.Image], path: Path) -> None:
+    """Writes pictures as an animation, `FRAME` apart."""
+    width = min(ANIMATION_WIDTH, frames[0].width)
+    height = round(frames[0].height * width / frames[0].width)
+    small = [frame.resize((width, height), Image.Resampling.LANCZOS) for frame in frames]
+    if path.suffix.lower() == ".gif":
+        palette = small[len(small) // 2].quantize(COLOURS)
+        small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
+    small[0].save(path, save_all=True, append_images=small[1:], duration=round(1e3 * FRAME), loop=0)
+
+
+def _time(studio: Studio) -> float:
+    return -1.0 if studio.snapshot is None else studio.snapshot.time

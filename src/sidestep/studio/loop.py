@@ -1,0 +1,256 @@
+"""The session in a process of its own, so that nothing the page does can hold the loop up.
+
+python -m sidestep.studio.loop ADDRESS      (started by `Loop`; the key comes on stdin)
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import secrets
+import subprocess
+import sys
+import threading
+import time as clock
+from collections.abc import Mapping
+from dataclasses import dataclass
+from multiprocessing.connection import Client, Connection, Listener
+from typing import Any
+
+from sidestep.body import Body
+from sidestep.robot import Robot
+from sidestep.scenario import Scenario
+from sidestep.studio import messages as m
+from sidestep.studio.methods import THESIS_COMPONENTS, Method
+from sidestep.studio.session import Session
+
+FRAME = 1.0 / 30.0  # [s] between two snapshots
+UNSEEN = 2  # snapshots on their way at most; further ones are dropped until the page has taken one
+BEHIND = (
+    0.1  # [s] of simulated time that is made up for; more is let go, and the loop runs slower than real time
+)
+LEAST_WAIT = 2e-4  # [s] shorter waits are not worth a system call
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """What a loop starts with: see `Session`; ellipsoids: of a covering body per link, None: as it finds best."""
+
+    scenario: Scenario
+    method: str
+    numbers: Mapping[str, Mapping[str, float]]
+    ellipsoids: int | None = None
+
+
+class Loop:
+    """The page's end: sends commands, has the latest snapshot.
+
+    Args:
+        beginning: what to run.
+
+    Raises:
+        RuntimeError: the process did not start.
+    """
+
+    def __init__(self, beginning: Beginning) -> None:
+        key = secrets.token_bytes(32)
+        listener = Listener(authkey=key)
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        address = listener.address
+        assert isinstance(address, str)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "sidestep.studio.loop", address], stdin=subprocess.PIPE, env=environment
+        )
+        assert self._process.stdin is not None
+        self._process.stdin.write(key.hex().encode() + b"\n")
+        self._process.stdin.flush()
+        self._connection = _accept(listener, self._process)
+        listener.close()
+        self._lock = threading.Lock()
+        self._fresh = threading.Condition()
+        self._snapshot: m.Snapshot | None = None
+        self._notes: list[m.Preparing | m.Failed] = []
+        self._rows: list[m.Row] = []
+        self.ended = False
+        self._connection.send(beginning)
+        self._thread = threading.Thread(target=self._receive, daemon=True)
+        self._thread.start()
+
+    def send(self, command: m.Command) -> None:
+        """Hands a command to the loop; of a loop that has ended nothing is heard."""
+        with self._lock, contextlib.suppress(OSError, ValueError):
+            self._connection.send(command)
+
+    def wait(self, timeout: float) -> m.Snapshot | None:
+        """The next snapshot, or None when there was none within `timeout` [s]."""
+        with self._fresh:
+            if self._snapshot is None and not self._notes and not self.ended:
+                self._fresh.wait(timeout)
+            snapshot, self._snapshot = self._snapshot, None
+        return snapshot
+
+    def take_notes(self) -> list[m.Preparing | m.Failed]:
+        """What the loop said since the last call."""
+        with self._fresh:
+            notes, self._notes = self._notes, []
+        return notes
+
+    def take_rows(self) -> list[m.Row]:
+        """What was recorded since the last call; nothing of it is dropped."""
+        with self._fresh:
+            rows, self._rows = self._rows, []
+        return rows
+
+    def stop(self) -> None:
+        """Ends the process."""
+        with contextlib.suppress(OSError):
+            self._connection.close()
+        try:
+            self._process.wait(timeout=2.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+
+    def _receive(self) -> None:
+        while True:
+            try:
+                message = self._connection.recv()
+            except (EOFError, OSError, TypeError):  # TypeError: closed while it waits
+                break
+            with self._fresh:
+                if isinstance(message, m.Snapshot):
+                    self._snapshot = message
+                    self._rows.extend(message.rows)
+                else:
+                    self._notes.append(message)
+                self._fresh.notify_all()
+            if isinstance(message, m.Snapshot):
+                self.send(m.Seen())
+        with self._fresh:
+            self.ended = True
+            self._fresh.notify_all()
+
+
+def _accept(listener: Listener, process: subprocess.Popen[bytes]) -> Connection[Any, Any]:
+    """The connection of the process; it is asked for in a thread, so that a process that dies is noticed."""
+    accepted: list[Connection[Any, Any]] = []
+
+    def accept() -> None:
+        with contextlib.suppress(OSError, EOFError):
+            accepted.append(listener.accept())
+
+    thread = threading.Thread(target=accept, daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(0.1)
+        if process.poll() is not None and not accepted:
+            raise RuntimeError(f"the process of the loop ended with exit code {process.returncode}")
+    if not accepted:
+        raise RuntimeError("the process of the loop did not connect")
+    return accepted[0]
+
+
+def serve(connection: Connection[Any, Any]) -> None:
+    """Runs a session in real time until the other end hangs up."""
+    beginning: Beginning = connection.recv()
+
+    def prepare(robot: Robot, method: Method) -> Body:
+        return prepare_body(robot, method, ellipsoids=beginning.ellipsoids, tell=connection.send)
+
+    connection.send(m.Preparing(f"loading {beginning.scenario.name}"))
+    try:
+        session = Session(
+            beginning.scenario, method=beginning.method, numbers=beginning.numbers, prepare=prepare
+        )
+    except (ValueError, OSError) as error:
+        connection.send(m.Failed(str(error), fatal=True))
+        return
+    gc.collect()
+    gc.freeze()  # what lives as long as the process is not looked through again
+    _Pacer(session, connection).run()
+
+
+class _Pacer:
+    """Keeps simulated time with the clock, answers commands between steps, and sends snapshots."""
+
+    def __init__(self, session: Session, connection: Connection[Any, Any]) -> None:
+        self._session, self._connection = session, connection
+        self._unseen = 0
+        self._zero = clock.perf_counter()
+        self._next_frame = 0.0
+        self._marks: list[tuple[float, float]] = []
+
+    def run(self) -> None:
+        session = self._session
+        due = clock.perf_counter()
+        while True:
+            while self._connection.poll():
+                self._answer()
+                due = max(due, clock.perf_counter() - BEHIND)
+            now = clock.perf_counter()
+            if session.running:
+                due = max(due, now - BEHIND)
+                until = now + FRAME / 2.0
+                while due <= now < until:
+                    self._step()
+                    due += session.period
+                    now = clock.perf_counter()
+                    if not session.running:
+                        break
+            else:
+                due = now
+            if now >= self._next_frame and self._unseen < UNSEEN:
+                self._send(now)
+            wait = min(due, self._next_frame) - clock.perf_counter() if session.running else FRAME
+            self._connection.poll(wait if wait > LEAST_WAIT else 0.0)
+
+    def _step(self) -> None:
+        try:
+            self._session.step()
+        except RuntimeError as error:
+            self._session.running = False
+            self._connection.send(m.Failed(str(error)))
+
+    def _answer(self) -> None:
+        command = self._connection.recv()
+        if isinstance(command, m.Seen):
+            self._unseen -= 1
+            return
+        try:
+            self._session.handle(command)
+        except (ValueError, OSError) as error:
+            self._connection.send(m.Failed(str(error)))
+
+    def _send(self, now: float) -> None:
+        self._marks.append((now, self._session.time))
+        self._marks = [mark for mark in self._marks if mark[0] > now - 1.0]
+        (t0, s0), (t1, s1) = self._marks[0], self._marks[-1]
+        ratio = (s1 - s0) / (t1 - t0) if t1 > t0 and s1 >= s0 else 0.0
+        self._connection.send(self._session.snapshot(real_time=ratio))
+        self._unseen += 1
+        self._next_frame = max(self._next_frame + FRAME, now)
+
+
+def prepare_body(robot: Robot, method: Method, *, ellipsoids: int | None, tell: Any) -> Body:
+    """The body that a method needs, from the cache or made now, telling how far it is."""
+
+    def progress(link: str, done: int, total: int) -> None:
+        tell(m.Preparing(f"{'covering' if method.covering else 'fitting'} {link} ({done} of {total})"))
+
+    if method.covering:
+        return Body.cover(robot, components=ellipsoids, progress=progress)
+    return Body.fit(robot, components=THESIS_COMPONENTS, progress=progress)
+
+
+def main() -> None:
+    """Entry point of the process."""
+    key = bytes.fromhex(sys.stdin.readline().strip())
+    with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
+        serve(Client(sys.argv[1], authkey=key))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,202 @@
+"""What the page and the loop tell each other: commands one way, snapshots the other. Plain values only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.scenario import Scenario
+from sidestep.studio.things import Thing
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SetJointGoal:
+    """The configuration (nv,) to go to."""
+
+    position: Array
+
+
+@dataclass(frozen=True)
+class SetPoseGoal:
+    """The pose (4, 4) of the tip in the world to go to."""
+
+    pose: Array
+
+
+@dataclass(frozen=True)
+class AddThing:
+    """A new obstacle."""
+
+    thing: Thing
+
+
+@dataclass(frozen=True)
+class RemoveThing:
+    """The obstacle called `name` goes away."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class DragThing:
+    """The obstacle called `name` is drawn to a pose (4, 4); None lets go."""
+
+    name: str
+    pose: Array | None
+
+
+@dataclass(frozen=True)
+class ThrowThing:
+    """The obstacle called `name` flies on with a velocity (3,) [m/s]."""
+
+    name: str
+    velocity: Array
+
+
+@dataclass(frozen=True)
+class SetMethod:
+    """Another method, with its own numbers."""
+
+    method: str
+
+
+@dataclass(frozen=True)
+class SetNumbers:
+    """Other numbers for a method, by name."""
+
+    method: str
+    numbers: dict[str, float]
+
+
+@dataclass(frozen=True)
+class SetRunning:
+    """Runs or pauses the loop."""
+
+    running: bool
+
+
+@dataclass(frozen=True)
+class SetRecording:
+    """Begins a recording, or ends it."""
+
+    recording: bool
+
+
+@dataclass(frozen=True)
+class Restart:
+    """Back to the start: arm, obstacles and time."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """Another scenario, perhaps with another robot."""
+
+    scenario: Scenario
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The page has taken a snapshot: it may have another."""
+
+
+Command: TypeAlias = (
+    SetJointGoal
+    | SetPoseGoal
+    | AddThing
+    | RemoveThing
+    | DragThing
+    | ThrowThing
+    | SetMethod
+    | SetNumbers
+    | SetRunning
+    | SetRecording
+    | Restart
+    | Load
+    | Seen
+)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Times of the steps of the last two seconds [us] and how fast simulated time passes."""
+
+    median: float = 0.0
+    p99: float = 0.0
+    worst: float = 0.0
+    real_time: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The state of the loop at one moment.
+
+    Attributes:
+        edition: grows when obstacles come or go, or a scenario is loaded; `things` then changed.
+        time: simulated [s]. q, v: (nv,). running: or paused.
+        goal: (nv,) of a joint goal, else None; goal_pose: (4, 4) of a pose goal, else None.
+        things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s].
+        method: its name; numbers: its parameters by method and name.
+        words: what the arm does; status: names of the step's and the torque program's status.
+        nearest: (name of link or "", clearance [m] that the controller measures; inf where it does not).
+        values: psi (m,). metric: (nv, nv).
+        torque_share, speed_share: largest of a joint over its limit.
+        contacts: links that touch, each "link - obstacle"; touched: steps with contact since the start.
+        timing: of the steps. rows: of a recording since the last snapshot. note: what is being prepared.
+    """
+
+    edition: int
+    time: float
+    running: bool
+    q: Array
+    v: Array
+    goal: Array | None
+    goal_pose: Array | None
+    things: tuple[Thing, ...]
+    poses: Array
+    velocities: Array
+    method: str
+    numbers: dict[str, dict[str, float]]
+    words: str
+    status: tuple[str, str]
+    nearest: tuple[str, float]
+    values: Array
+    metric: Array
+    torque_share: float
+    speed_share: float
+    contacts: tuple[str, ...]
+    touched: int
+    timing: Timing
+    recording: bool
+    rows: tuple[Row, ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One moment of a recording."""
+
+    time: float
+    q: Array
+    poses: Array
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class Preparing:
+    """The loop does not run yet, or prepares something beside running: what, in words."""
+
+    note: str
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A command was refused, or the loop ended: why, in a sentence."""
+
+    message: str
+    fatal: bool = False
+    details: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,220 @@
+"""The methods that the studio switches between, and their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from sidestep import presets
+from sidestep._core import (
+    BinarySwitch,
+    CollisionDensity,
+    DistanceSwitch,
+    GeometricSystem,
+    HarmonicOnly,
+    JointLimitPotential,
+    SigmoidSwitch,
+    Sum,
+)
+from sidestep.body import Body
+from sidestep.robot import Robot
+
+Numbers = dict[str, float]
+
+THESIS_COMPONENTS = presets.Thesis.components  # Gaussians per link
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a method.
+
+    Attributes:
+        name: of the argument. unit: "" without one. lower, upper, default: of the slider.
+        sentence: what it trades.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    default: float
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to move the arm.
+
+    Attributes:
+        name: on the command line. label: on the page. sentence: what it is.
+        parameters: its numbers. covering: needs a covering body, otherwise a fitted one.
+        safe: the torque program keeps clearances as well.
+    """
+
+    name: str
+    label: str
+    sentence: str
+    parameters: tuple[Parameter, ...]
+    covering: bool
+    safe: bool
+
+    @property
+    def defaults(self) -> Numbers:
+        """The numbers as they are recommended, or stated in the thesis."""
+        return {parameter.name: parameter.default for parameter in self.parameters}
+
+
+def _default(kind: type, name: str) -> float:
+    default: Any = next(field.default for field in fields(kind) if field.name == name)
+    return float(default)
+
+
+def _barrier(name: str, unit: str, lower: float, upper: float, sentence: str) -> Parameter:
+    return Parameter(name, unit, lower, upper, _default(presets.Barriers, name), sentence)
+
+
+def _thesis(name: str, unit: str, lower: float, upper: float, sentence: str) -> Parameter:
+    return Parameter(name, unit, lower, upper, _default(presets.Thesis, name), sentence)
+
+
+BARRIER_PARAMETERS = (
+    _barrier("stiffness", "1/s²", 0.1, 10.0, "Higher arrives sooner, with more speed near obstacles."),
+    _barrier("damping", "1/s", 0.5, 10.0, "Higher is calmer and slower; lower overshoots the goal."),
+    _barrier("activation", "m", 0.02, 0.3, "Higher reacts earlier and gentler, and closes narrow passages."),
+    _barrier("strength", "", 0.01, 1.0, "Higher turns away earlier within the activation distance."),
+    _barrier("power", "", 2.0, 4.0, "Higher stays flat for longer and rises steeper close by."),
+    _barrier("limit_activation", "rad", 0.02, 0.5, "Higher keeps joints farther from their limits."),
+    _barrier("limit_strength", "", 0.001, 0.2, "Higher turns away from joint limits earlier."),
+    _barrier("self_activation", "m", 0.01, 0.2, "Higher keeps links farther apart, and bars more poses."),
+    _barrier("self_strength", "", 0.001, 0.2, "Higher turns links away from each other earlier."),
+)
+_SPRING = (
+    _thesis("stiffness", "1/s²", 0.1, 10.0, "Higher arrives sooner, and climbs higher onto obstacles."),
+    _thesis("damping", "1/s", 0.5, 10.0, "Higher is calmer and slower; lower overshoots the goal."),
+)
+_THRESHOLD = Parameter(
+    "threshold", "psi", 0.01, 5.0, 0.5, "Lower lets go of the goal farther from obstacles."
+)
+
+METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        Method(
+            "barrier",
+            "barriers (recommended)",
+            "A barrier for each part of the body, each joint limit and each pair of links; clearances are also "
+            "kept by the torque program.",
+            BARRIER_PARAMETERS,
+            covering=True,
+            safe=True,
+        ),
+        Method(
+            "thesis",
+            "thesis: distance switch",
+            "One summed density; near obstacles a switch takes the pull to the goal away, joint by joint (T6.2).",
+            (
+                *_SPRING,
+                _thesis(
+                    "outer", "m", 0.02, 0.5, "Distance at which the first two joints and the last let go."
+                ),
+                _thesis("inner", "m", 0.02, 0.5, "Distance at which the joints between let go."),
+                _thesis("slope", "1/m", 1.0, 100.0, "Higher switches more abruptly."),
+            ),
+            covering=False,
+            safe=False,
+        ),
+        Method(
+            "unswitched",
+            "thesis: unswitched",
+            "One summed density, pull and bending added without a switch (T2.12).",
+            _SPRING,
+            covering=False,
+            safe=False,
+        ),
+        Method(
+            "sigmoid",
+            "thesis: sigmoid switch",
+            "One summed density; where psi is high the pull to the goal fades (thesis 6.1.1).",
+            (
+                *_SPRING,
+                _THRESHOLD,
+                Parameter("slope", "1/psi", 0.5, 50.0, 10.0, "Higher switches more abruptly."),
+            ),
+            covering=False,
+            safe=False,
+        ),
+        Method(
+            "binary",
+            "thesis: binary switch",
+            "One summed density; where psi is above the threshold there is no pull to the goal (T5.5).",
+            (*_SPRING, _THRESHOLD),
+            covering=False,
+            safe=False,
+        ),
+        Method(
+            "harmonic_only",
+            "spring alone: no avoidance",
+            "The damped spring on the curved space without the bending of paths, for comparison: it touches.",
+            _SPRING,
+            covering=False,
+            safe=False,
+        ),
+    )
+}
+
+
+def method_named(name: str) -> Method:
+    """The method called `name`; raises ValueError that lists the known ones."""
+    if name not in METHODS:
+        raise ValueError(f"no method is called {name!r}; known: {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+def check_numbers(method: Method, numbers: Mapping[str, float]) -> Numbers:
+    """All numbers of a method: the given ones, checked, and defaults for the rest.
+
+    Raises:
+        ValueError: an unknown name or a value out of its range, with what is allowed.
+    """
+    complete = method.defaults
+    ranges = {parameter.name: parameter for parameter in method.parameters}
+    for name, value in numbers.items():
+        if name not in ranges:
+            raise ValueError(f"{method.name} has no parameter {name!r}; it has {', '.join(ranges)}")
+        lower, upper = ranges[name].lower, ranges[name].upper
+        if not (np.isfinite(value) and lower <= value <= upper):
+            raise ValueError(f"{method.name}: {name} is {value}, allowed: [{lower:g}, {upper:g}]")
+        complete[name] = float(value)
+    return complete
+
+
+def build_system(method: Method, robot: Robot, body: Body, numbers: Mapping[str, float]) -> GeometricSystem:
+    """The dynamical system of a method.
+
+    Args:
+        method, numbers: see `check_numbers`. robot: the arm. body: covering or fitted, as the method says.
+    """
+    if method.name == "barrier":
+        return presets.barrier_system(robot, body, numbers=presets.Barriers(**numbers))
+    spring: dict[str, Any] = {"stiffness": numbers["stiffness"], "damping": numbers["damping"]}
+    psi = Sum([CollisionDensity(robot, body), JointLimitPotential(robot)])
+    return GeometricSystem([psi], **spring, switch=_switch(method, robot, numbers))
+
+
+def _switch(method: Method, robot: Robot, numbers: Mapping[str, float]) -> Any:
+    match method.name:
+        case "thesis":
+            nv = robot.num_coordinates
+            thresholds = np.full(nv, numbers["inner"])
+            thresholds[[*range(min(2, nv)), nv - 1]] = numbers["outer"]
+            return DistanceSwitch(thresholds=thresholds, slope=numbers["slope"])
+        case "sigmoid":
+            return SigmoidSwitch(threshold=numbers["threshold"], slope=numbers["slope"])
+        case "binary":
+            return BinarySwitch(threshold=numbers["threshold"])
+        case "harmonic_only":
+            return HarmonicOnly()
+    return None

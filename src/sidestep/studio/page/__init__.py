@@ -1,0 +1,1 @@
+"""What the browser shows, by viser: the scene and the controls. It never waits for the loop, nor the loop for it."""

@@ -1,0 +1,140 @@
+"""An arm in the scene: a frame for every link with its mesh, and the ellipsoids of its body."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from sidestep.mesh import simplified
+from sidestep.pose import pose_vector
+from sidestep.robot import Robot
+from sidestep.studio.page import colours
+
+if TYPE_CHECKING:
+    import viser
+
+    from sidestep.body import Body
+
+Array = npt.NDArray[np.float64]
+
+MOST_TRIANGLES = 60_000  # of an arm: a megabyte or two for each browser
+FIRST_CELL = 1e-3  # [m] detail that is given up first
+SHARP = 0.6  # [rad] edges sharper than this stay edges
+TWO_DEVIATIONS = 4.0  # level of the ellipsoids of a body that is not calibrated: two standard deviations
+
+
+class ArmView:
+    """An arm; `ghost` makes it see-through, in the colour of the goal."""
+
+    def __init__(self, server: viser.ViserServer, robot: Robot, name: str, *, ghost: bool = False) -> None:
+        self._robot, self._name = robot, name
+        self.root = server.scene.add_frame(name, show_axes=False)
+        self._frames: dict[str, Any] = {}
+        self._meshes: dict[str, Any] = {}
+        self._shades: dict[str, int] = {}
+        moving = {frame.name: frame.joint >= 0 for frame in robot.frames}
+        for link, mesh in link_meshes(robot).items():
+            self._frames[link] = server.scene.add_frame(f"{name}/{link}", show_axes=False)
+            colour = colours.GOAL if ghost else colours.LINK if moving[link] else colours.BASE
+            if ghost and not moving[link]:
+                continue  # the base stands where the arm's own does
+            self._meshes[link] = server.scene.add_mesh_simple(
+                f"{name}/{link}/mesh",
+                np.asarray(mesh.vertices, dtype=np.float32),
+                np.asarray(mesh.faces, dtype=np.uint32),
+                color=colours.rgb(colour),
+                opacity=0.22 if ghost else None,
+                side="double",
+                cast_shadow=not ghost,
+                receive_shadow=not ghost,
+            )
+        self._moving = [link for link in self._frames if moving[link]]
+        self.show(robot.neutral, every=True)
+
+    def show(self, q: Array, *, every: bool = False) -> None:
+        """Puts the links where they are at q (nv,)."""
+        for link in self._frames if every else self._moving:
+            vector = pose_vector(self._robot.pose(q, link))
+            frame = self._frames[link]
+            frame.position, frame.wxyz = vector[:3], vector[3:]
+
+    def colour(self, clearances: dict[str, float]) -> None:
+        """Colours the links by their clearance [m]."""
+        for link in self._moving:
+            shade = colours.shade(clearances.get(link, np.inf))
+            if link in self._meshes and self._shades.get(link, 0) != shade:
+                self._shades[link] = shade
+                self._meshes[link].color = colours.shade_colour(shade)
+
+    @property
+    def shades(self) -> dict[str, int]:
+        """The shade of each link that has one, see `colours.shade`."""
+        return dict(self._shades)
+
+    def remove(self) -> None:
+        """Takes it out of the scene."""
+        self.root.remove()
+
+
+class BodyView:
+    """The ellipsoids of a body, fixed to the frames of an `ArmView` called `arm`."""
+
+    def __init__(self, server: viser.ViserServer, body: Body, arm: str, *, visible: bool) -> None:
+        unit = trimesh.creation.icosphere(subdivisions=2)
+        links = np.asarray(body.links)
+        levels = np.full(len(links), TWO_DEVIATIONS) if body.levels is None else np.asarray(body.levels)
+        self._batches = []
+        for link in dict.fromkeys(body.links):
+            own = np.flatnonzero(links == link)
+            poses, scales = [], []
+            for k in own:
+                values, axes = np.linalg.eigh(body.covariances[k])
+                if np.linalg.det(axes) < 0.0:
+                    axes[:, 0] *= -1.0
+                X = np.eye(4)
+                X[:3, :3], X[:3, 3] = axes, body.means[k]
+                poses.append(pose_vector(X))
+                scales.append(np.sqrt(levels[k] * values))
+            vectors = np.array(poses)
+            self._batches.append(
+                server.scene.add_batched_meshes_simple(
+                    f"{arm}/{link}/body",
+                    unit.vertices.astype(np.float32),
+                    unit.faces.astype(np.uint32),
+                    batched_wxyzs=vectors[:, 3:],
+                    batched_positions=vectors[:, :3],
+                    batched_scales=np.array(scales),
+                    batched_colors=colours.rgb(colours.BODY),
+                    opacity=0.35,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                    visible=visible,
+                )
+            )
+
+    def set_visible(self, visible: bool) -> None:
+        for batch in self._batches:
+            batch.visible = visible
+
+    def remove(self) -> None:
+        """Takes it out of the scene."""
+        for batch in self._batches:
+            batch.remove()
+
+
+def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:
+    """What each link looks like, in its frame, together at most `MOST_TRIANGLES`."""
+    whole: dict[str, trimesh.Trimesh] = {}
+    for link in robot.links:
+        shapes = [geometry.mesh() for geometry in link.visuals or link.collisions]
+        if shapes:
+            merged: Any = trimesh.util.concatenate([trimesh.Trimesh(s.vertices, s.faces) for s in shapes])
+            whole[link.name] = merged
+    meshes, cell = dict(whole), FIRST_CELL
+    while sum(len(mesh.faces) for mesh in meshes.values()) > MOST_TRIANGLES:
+        meshes = {name: simplified(mesh, cell) for name, mesh in whole.items()}
+        cell *= 1.3
+    return {name: trimesh.graph.smooth_shade(mesh, angle=SHARP) for name, mesh in meshes.items()}

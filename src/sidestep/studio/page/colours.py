@@ -1,0 +1,67 @@
+"""What each colour of the page means; one thing each (Okabe and Ito's palette)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.colors import to_rgb
+
+from sidestep.drawing import palette
+
+Rgb = tuple[int, int, int]
+
+
+def rgb(colour: str) -> Rgb:
+    """A colour as whole numbers from 0 to 255."""
+    r, g, b = (round(255.0 * part) for part in to_rgb(colour))
+    return r, g, b
+
+
+OBSTACLE = palette.VERMILLION
+GOAL = palette.BLUE
+NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
+TRAIL = palette.GREEN
+BODY = palette.ORANGE
+METRIC = palette.SKY
+LINK, BASE = "#CBD3DE", "#9AA2AE"
+
+NEAR_FROM = 0.20  # [m] clearance at which a link begins to change its colour
+SHADES = 24  # steps of it: fewer messages, and nobody sees the difference
+
+LEGEND = (
+    (LINK, "link, far from obstacles"),
+    (
+        NEAR,
+        f"link near an obstacle (full colour: touching, fades out at {100 * NEAR_FROM:.0f} cm); nearest line",
+    ),
+    (OBSTACLE, "obstacle"),
+    (GOAL, "goal: ghost arm and gizmo"),
+    (TRAIL, "where the tip has been"),
+    (BODY, "body: the ellipsoids that the controller sees"),
+    (METRIC, "metric: how freely the tip can move in each direction"),
+)
+
+
+def shade(clearance: float) -> int:
+    """The shade of a link at a clearance [m], 0 (far) to `SHADES` (touching)."""
+    if not np.isfinite(clearance):
+        return 0
+    return round(SHADES * float(np.clip(1.0 - clearance / NEAR_FROM, 0.0, 1.0)))
+
+
+def shade_colour(index: int, base: str = LINK) -> Rgb:
+    """The colour of a shade."""
+    share = index / SHADES
+    mixed: npt.NDArray[np.float64] = (1.0 - share) * np.array(to_rgb(base)) + share * np.array(to_rgb(NEAR))
+    r, g, b = np.round(255.0 * mixed).astype(int).tolist()
+    return r, g, b
+
+
+def legend_html() -> str:
+    """The colours and what they mean."""
+    rows = "".join(
+        f'<div style="display:flex;gap:8px;align-items:baseline;margin:3px 0"><span style="flex:none;width:12px;'
+        f'height:12px;border-radius:3px;background:{colour}"></span><span>{meaning}</span></div>'
+        for colour, meaning in LEGEND
+    )
+    return f'<div style="font-size:13px;line-height:1.35;padding:2px 10px">{rows}</div>'

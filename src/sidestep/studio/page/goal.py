@@ -1,0 +1,134 @@
+"""The goal: a ghost arm, a gizmo at its tip, and a slider for each joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import GeometricSystem, JointType, Obstacles, PoseGoal, is_fallback, rollout
+from sidestep.pose import pose_vector
+from sidestep.robot import Robot
+from sidestep.studio import messages as m
+from sidestep.studio.page.arm import ArmView
+from sidestep.studio.page.obstacles import gizmo_pose
+
+if TYPE_CHECKING:
+    import viser
+
+Array = npt.NDArray[np.float64]
+
+GHOST_PERIOD, GHOST_STEPS = 0.02, 300  # [s] and number: how far the ghost follows a pose at a time
+GIZMO_SIZE = 0.22  # of the distance to the farthest link at rest
+
+
+class GoalControl:
+    """Where the arm is sent: by sliders to a configuration, by the gizmo to a pose of the tip.
+
+    A pose goes to the system's own pose goal. The ghost then shows where the same system, in flat space, would come
+    to rest at that pose.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, tip: str, send: Callable[[m.Command], None]
+    ) -> None:
+        self._robot, self._tip, self._send = robot, tip, send
+        self._flat = GeometricSystem([], robot=robot, stiffness=4.0, damping=4.0)
+        self.q = np.array(robot.neutral)
+        self.ghost = ArmView(server, robot, "/goal", ghost=True)
+        reach = max(
+            float(np.linalg.norm(robot.pose(robot.neutral, frame.name)[:3, 3])) for frame in robot.frames
+        )
+        self.gizmo = server.scene.add_transform_controls(
+            "/goal_gizmo", scale=GIZMO_SIZE * max(reach, 0.3), depth_test=False, line_width=3.0
+        )
+        self.kind = server.gui.add_markdown("")
+        self._sliders: list[Any] = []
+        revolute = {joint.coordinate for joint in robot.joints if joint.type == JointType.revolute}
+        lower, upper = robot._finite_interval()
+        for k, name in enumerate(robot.coordinate_names):
+            unit, factor = ("°", 180.0 / np.pi) if k in revolute else ("m", 1.0)
+            low, high = factor * lower[k], factor * upper[k]
+            slider = server.gui.add_slider(
+                f"{short(name)} [{unit}]",
+                min=float(np.ceil(10.0 * low) / 10.0) if unit == "°" else float(low),
+                max=float(np.floor(10.0 * high) / 10.0) if unit == "°" else float(high),
+                step=0.1 if unit == "°" else 0.001,
+                initial_value=float(np.round(factor * self.q[k], 1)),
+                hint=f"goal of {name}",
+            )
+            slider.on_update(self._moved)
+            self._sliders.append(slider)
+        self._factors = np.array([180.0 / np.pi if k in revolute else 1.0 for k in range(len(self.q))])
+        self._pose: Array | None = None
+        self.gizmo.on_update(self._dragged)
+        self._known: tuple[Array | None, Array | None] = (None, None)
+
+    def show(self, goal: Array | None, pose: Array | None) -> None:
+        """Shows the goal that the loop has, whoever set it; does nothing while it stays the same."""
+        if same(goal, self._known[0]) and same(pose, self._known[1]):
+            return
+        self._known = goal, pose
+        if goal is not None:
+            self.q = goal
+            self._place_gizmo(self._robot.pose(goal, self._tip))
+            self.kind.content = "**Goal: a configuration.** Move a slider, or drag the gizmo for a pose."
+        elif pose is not None:
+            self.q = self._follow(pose)
+            self._place_gizmo(pose)
+            self.kind.content = f"**Goal: a pose** of `{self._tip}`. Drag the gizmo, or move a slider."
+        self.ghost.show(self.q)
+        for slider, value in zip(self._sliders, self._factors * self.q, strict=True):
+            slider.value = float(np.clip(round(float(value), 4), slider.min, slider.max))
+
+    def set_visible(self, visible: bool) -> None:
+        self.ghost.root.visible = visible
+        self.gizmo.visible = visible
+
+    def remove(self) -> None:
+        for part in (self.ghost, self.gizmo, self.kind, *self._sliders):
+            part.remove()
+
+    def _follow(self, pose: Array) -> Array:
+        aim = PoseGoal(self._robot, self._tip, pose, rest=self.q, posture_stiffness=0.02)
+        motion = rollout(
+            self._flat,
+            self.q,
+            np.zeros_like(self.q),
+            aim,
+            Obstacles.none(),
+            period=GHOST_PERIOD,
+            steps=GHOST_STEPS,
+        )
+        limits = self._robot.limits
+        if is_fallback(motion.statuses[-1]) or not np.isfinite(motion.q[-1]).all():
+            return self.q
+        found: Array = np.clip(motion.q[-1], limits.lower, limits.upper)
+        return found
+
+    def _place_gizmo(self, pose: Array) -> None:
+        vector = pose_vector(pose)
+        if not np.allclose(gizmo_pose(self.gizmo), pose, atol=1e-6):
+            self.gizmo.position, self.gizmo.wxyz = vector[:3], vector[3:]
+
+    async def _dragged(self, _: Any) -> None:
+        self._send(m.SetPoseGoal(gizmo_pose(self.gizmo)))
+
+    async def _moved(self, event: Any) -> None:
+        if event.client is None:  # set by `show`
+            return
+        values = np.array([slider.value for slider in self._sliders]) / self._factors
+        limits = self._robot.limits
+        self._send(m.SetJointGoal(np.clip(values, limits.lower, limits.upper)))
+
+
+def same(a: Array | None, b: Array | None) -> bool:
+    """Whether both are None, or equal arrays."""
+    return a is b if a is None or b is None else np.array_equal(a, b)
+
+
+def short(name: str) -> str:
+    """A joint's name without what every joint of an arm has in front."""
+    return name.rsplit("_", 1)[-1] if "_" in name else name

@@ -1,0 +1,107 @@
+"""Lines and ellipsoids that explain the motion: the nearest line, the trail of the tip, the metric."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from sidestep.pose import pose_vector
+from sidestep.robot import Robot
+from sidestep.simulation.clearance import Clearance
+from sidestep.studio.page import colours
+
+if TYPE_CHECKING:
+    import viser
+
+Array = npt.NDArray[np.float64]
+
+TRAIL_POINTS = 150
+TRAIL_STEP = 0.01  # [m] of the tip between two points
+METRIC_SIZE = 0.15  # [m] half axis of the metric's ellipsoid where the tip moves as freely as in flat space
+THINNEST = 0.004  # [m] half axis that can still be seen
+
+
+class Marks:
+    """The nearest line, the trail and the metric of one arm."""
+
+    def __init__(self, server: viser.ViserServer, robot: Robot, tip: str) -> None:
+        self._robot, self._tip = robot, tip
+        self._trail_points: deque[Array] = deque(maxlen=TRAIL_POINTS)
+        none = np.zeros((1, 2, 3), dtype=np.float32)
+        self.nearest = server.scene.add_line_segments(
+            "/marks/nearest",
+            none,
+            colours.rgb(colours.NEAR),
+            thickness=4.0,
+            thickness_units="screen",
+            visible=False,
+        )
+        self.trail = server.scene.add_line_segments(
+            "/marks/trail", none, colours.rgb(colours.TRAIL), thickness=3.0, thickness_units="screen"
+        )
+        unit = trimesh.creation.icosphere(subdivisions=3)
+        self.metric = server.scene.add_mesh_simple(
+            "/marks/metric",
+            unit.vertices.astype(np.float32),
+            unit.faces.astype(np.uint32),
+            color=colours.rgb(colours.METRIC),
+            opacity=0.45,
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+
+    def show_nearest(self, found: tuple[Clearance, ...], *, visible: bool) -> None:
+        """The line between the closest points of the arm and the scene; `found` nearest first."""
+        self.nearest.visible = visible and bool(found)
+        if self.nearest.visible:
+            ends = np.array([[found[0].point_on_link, found[0].point_on_obstacle]])
+            self.nearest.points = ends.astype(np.float32)
+
+    def show_trail(self, q: Array, *, visible: bool) -> None:
+        """Adds where the tip is at q (nv,)."""
+        here = self._robot.pose(q, self._tip)[:3, 3]
+        points = self._trail_points
+        if not points or np.linalg.norm(here - points[-1]) > TRAIL_STEP:
+            points.append(here)
+            if len(points) > 1:
+                line = np.array(points)
+                self.trail.points = np.stack([line[:-1], line[1:]], axis=1).astype(np.float32)
+        self.trail.visible = visible and len(points) > 1
+
+    def clear_trail(self) -> None:
+        """Forgets where the tip has been."""
+        self._trail_points.clear()
+        self.trail.visible = False
+
+    def show_metric(self, q: Array, metric: Array, *, visible: bool) -> None:
+        """The velocities of the tip that a joint velocity of metric length 1 gives: J G^-1 J^T, scaled so that
+        the longest half axis in flat space (G = 1) is `METRIC_SIZE`."""
+        self.metric.visible = visible
+        if visible:
+            pose, half_axes = metric_ellipsoid(self._robot, self._tip, q, metric)
+            vector = pose_vector(pose)
+            self.metric.position, self.metric.wxyz = vector[:3], vector[3:]
+            x, y, z = (float(axis) for axis in half_axes)
+            self.metric.scale = (x, y, z)
+
+    def remove(self) -> None:
+        for mark in (self.nearest, self.trail, self.metric):
+            mark.remove()
+
+
+def metric_ellipsoid(robot: Robot, tip: str, q: Array, metric: Array) -> tuple[Array, Array]:
+    """Pose (4, 4) and half axes (3,) [m] of the ellipsoid at the tip, see `Marks.show_metric`."""
+    J = robot.jacobian(q, tip)[:3]
+    flat = float(np.linalg.norm(J, 2))
+    values, axes = np.linalg.eigh(J @ np.linalg.solve(metric, J.T))
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = axes, robot.pose(q, tip)[:3, 3]
+    lengths = np.sqrt(np.maximum(values, 0.0)) * (METRIC_SIZE / flat if flat > 0.0 else 0.0)
+    return pose, np.maximum(lengths, THINNEST)

@@ -1,0 +1,115 @@
+"""Controls of the obstacles: add, place, throw, remove."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sidestep.pose import pose_at
+from sidestep.studio import messages as m
+from sidestep.studio.things import ball, box
+
+if TYPE_CHECKING:
+    import viser
+
+    from sidestep.studio.page.view import View
+
+NONE = "(none)"
+
+
+class ObstaclePanel:
+    """One obstacle is chosen, by a click in the scene or in the list; the buttons act on it."""
+
+    def __init__(self, server: viser.ViserServer, view: View) -> None:
+        self._view = view
+        gui = server.gui
+        gui.add_markdown(
+            "Drag an obstacle in the scene to move it; with **shift** held, letting go throws it."
+        )
+        self._kind = gui.add_dropdown("new", ("ball", "box"))
+        self._size = gui.add_slider(
+            "size [cm]",
+            min=1.0,
+            max=30.0,
+            step=0.5,
+            initial_value=6.0,
+            hint="Radius of a ball, edge of a box.",
+        )
+        add = gui.add_button("Add", hint="Beside the goal; drag it where you want it.")
+        add.on_click(self._add)
+        gui.add_divider()
+        self._chosen: Any = gui.add_dropdown("obstacle", (NONE,))
+        self._place: Any = gui.add_vector3(
+            "position [m]", (0.0, 0.0, 0.0), step=0.01, hint="Where it is; change it to move it."
+        )
+        self._place.on_update(self._moved)
+        self._speed = gui.add_slider("speed [m/s]", min=0.1, max=2.0, step=0.1, initial_value=0.5)
+        throw = gui.add_button("Throw at the arm", hint="From where it is towards the tip.")
+        throw.on_click(self._throw)
+        remove = gui.add_button("Remove")
+        remove.on_click(self._remove)
+        self._chosen.on_update(self._chose)
+        self._count = 0
+
+    def select(self, name: str) -> None:
+        """Chooses an obstacle."""
+        if name in self._chosen.options:
+            self._chosen.value = name
+
+    def set_names(self, names: tuple[str, ...]) -> None:
+        """Which obstacles there are."""
+        before = self._chosen.value
+        self._chosen.options = names or (NONE,)
+        if before not in self._chosen.options:
+            self._chosen.value = self._chosen.options[0]
+        self._show_place()
+
+    def _index(self) -> int | None:
+        last = self._view.last
+        names = [] if last is None else [thing.name for thing in last.things]
+        return names.index(self._chosen.value) if self._chosen.value in names else None
+
+    def _show_place(self) -> None:
+        index, last = self._index(), self._view.last
+        if index is not None and last is not None:
+            x, y, z = (float(value) for value in last.poses[index][:3, 3].round(3))
+            self._place.value = (x, y, z)
+
+    def _chose(self, _: Any) -> None:
+        self._show_place()
+
+    def _moved(self, event: Any) -> None:
+        index, last = self._index(), self._view.last
+        if event.client is None or index is None or last is None:
+            return
+        self._view.send(
+            m.DragThing(self._chosen.value, pose_at(self._place.value, last.poses[index][:3, :3]))
+        )
+
+    def _add(self, _: Any) -> None:
+        last = self._view.last
+        if last is None:
+            return
+        taken = {thing.name for thing in last.things}
+        while f"{self._kind.value}{self._count}" in taken:
+            self._count += 1
+        name, size = f"{self._kind.value}{self._count}", self._size.value / 100.0
+        self._count += 1
+        goal = np.array(self._view.goal.gizmo.position)
+        place = goal + np.array([0.0, 0.0, size + 0.15])
+        made = ball(name, place, size) if self._kind.value == "ball" else box(name, place, np.full(3, size))
+        self._view.send(m.AddThing(made))
+
+    def _throw(self, _: Any) -> None:
+        index, last = self._index(), self._view.last
+        if index is None or last is None:
+            return
+        way = self._view.robot.pose(last.q, self._view.tip)[:3, 3] - last.poses[index][:3, 3]
+        length = float(np.linalg.norm(way))
+        if length > 0.0:
+            self._view.send(m.ThrowThing(self._chosen.value, self._speed.value * way / length))
+
+    def _remove(self, _: Any) -> None:
+        if self._index() is not None:
+            self._view.send(m.RemoveThing(self._chosen.value))

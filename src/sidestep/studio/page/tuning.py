@@ -1,0 +1,89 @@
+"""The method and its parameters, each with its unit, its range and what it trades."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+from sidestep.studio import messages as m
+from sidestep.studio.methods import METHODS, Method, Numbers, method_named
+
+if TYPE_CHECKING:
+    import viser
+
+    from sidestep.studio.page.view import View
+
+SETTLE = 0.25  # [s] without a further change of a slider before the system is made anew
+
+
+class TuningPanel:
+    """Chooses among `METHODS` and sets their numbers while the loop runs."""
+
+    def __init__(self, server: viser.ViserServer, view: View) -> None:
+        self._view, self._server = view, server
+        self._labels = {method.label: method.name for method in METHODS.values()}
+        gui = server.gui
+        self._choice: Any = gui.add_dropdown("method", tuple(self._labels))
+        self._choice.on_update(self._chose)
+        self._sentence = gui.add_markdown("")
+        self._folder = gui.add_folder("Parameters")
+        self._sliders: dict[str, Any] = {}
+        self._shown: Method | None = None
+        self._timer: threading.Timer | None = None
+        self._defaults = gui.add_button("Recommended values")
+        self._defaults.on_click(self._reset)
+
+    def show(self, snapshot: m.Snapshot) -> None:
+        """Shows the method and the numbers that the loop has."""
+        method = method_named(snapshot.method)
+        if method is not self._shown:
+            self._lay_out(method, snapshot.numbers[method.name])
+            self._numbers = dict(snapshot.numbers[method.name])
+        elif snapshot.numbers[method.name] != self._numbers:
+            self._numbers = dict(snapshot.numbers[method.name])
+            for name, value in self._numbers.items():
+                self._sliders[name].value = value
+
+    def _lay_out(self, method: Method, numbers: Numbers) -> None:
+        self._shown = method
+        self._choice.value = method.label
+        self._sentence.content = method.sentence
+        for slider in self._sliders.values():
+            slider.remove()
+        self._sliders = {}
+        with self._folder:
+            for parameter in method.parameters:
+                unit = f" [{parameter.unit}]" if parameter.unit else ""
+                slider = self._server.gui.add_slider(
+                    f"{parameter.name.replace('_', ' ')}{unit}",
+                    min=parameter.lower,
+                    max=parameter.upper,
+                    step=(parameter.upper - parameter.lower) / 1000.0,
+                    initial_value=numbers[parameter.name],
+                    hint=f"{parameter.sentence} From {parameter.lower:g} to {parameter.upper:g}, "
+                    f"recommended {parameter.default:g}.",
+                )
+                slider.on_update(self._moved)
+                self._sliders[parameter.name] = slider
+
+    def _chose(self, event: Any) -> None:
+        if event.client is not None:
+            self._view.send(m.SetMethod(self._labels[self._choice.value]))
+
+    def _moved(self, event: Any) -> None:
+        if event.client is None:
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = threading.Timer(SETTLE, self._send_numbers)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def _send_numbers(self) -> None:
+        if self._shown is not None:
+            values = {name: float(slider.value) for name, slider in self._sliders.items()}
+            self._view.send(m.SetNumbers(self._shown.name, values))
+
+    def _reset(self, _: Any) -> None:
+        if self._shown is not None:
+            self._view.send(m.SetNumbers(self._shown.name, self._shown.defaults))

@@ -1,0 +1,206 @@
+"""The page as a whole: it takes snapshots and shows them, and sends what people do as commands."""
+
+from __future__ import annotations
+
+import html
+import threading
+import time as clock
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sidestep.body import Body
+from sidestep.robot import Robot
+from sidestep.scenario import Scenario
+from sidestep.simulation.clearance import Clearance
+from sidestep.studio import messages as m
+from sidestep.studio.methods import THESIS_COMPONENTS, method_named
+from sidestep.studio.page import colours
+from sidestep.studio.page.arm import ArmView, BodyView
+from sidestep.studio.page.goal import GoalControl
+from sidestep.studio.page.marks import Marks
+from sidestep.studio.page.obstacle_panel import ObstaclePanel
+from sidestep.studio.page.obstacles import ObstacleViews
+from sidestep.studio.page.plots import Plots
+from sidestep.studio.page.tuning import TuningPanel
+from sidestep.studio.session import tip_of
+
+if TYPE_CHECKING:
+    import viser
+
+MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 330, 300, 122  # [px]
+
+
+class View:
+    """Scene and controls of one studio, the same for every browser that looks."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        scenario: Scenario,
+        robot: Robot,
+        send: Callable[[m.Command], None],
+        *,
+        ellipsoids: int | None,
+    ) -> None:
+        self._server, self._send, self._ellipsoids = server, send, ellipsoids
+        self._lock = threading.RLock()
+        self._clearances: tuple[Clearance, ...] = ()
+        self.least_clearance = np.inf
+        self.last: m.Snapshot | None = None
+        self._edition = -1
+        self._set_up_scene(scenario)
+        gui = server.gui
+        gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
+        panel = gui.add_panel()
+        with panel.add_tab("Now"):
+            self._words = gui.add_html(in_box("preparing …"))
+            self.plots = Plots(server)
+        panel.dock_left()
+        panel.set_width(PLOT_WIDTH)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(MAIN_WIDTH)
+        self._run = gui.add_button_group("Loop", ("Run", "Pause", "Restart"))
+        self._run.on_click(self._on_loop)
+        tabs = gui.add_tab_group()
+        self._goal_tab = tabs.add_tab("Goal")
+        with tabs.add_tab("Obstacles"):
+            self.obstacle_panel = ObstaclePanel(server, self)
+        with tabs.add_tab("Method"):
+            self.tuning = TuningPanel(server, self)
+        with tabs.add_tab("Show"):
+            self._add_switches()
+        self.obstacles = ObstacleViews(server, send, self.obstacle_panel.select)
+        self._set_robot(robot)
+
+    def send(self, command: m.Command) -> None:
+        """Hands a command to the loop."""
+        self._send(command)
+
+    def show(self, snapshot: m.Snapshot) -> None:
+        """Shows the state of the loop."""
+        with self._lock, self._server.atomic():
+            if len(snapshot.q) != self.robot.num_coordinates:
+                return  # of another robot, which is about to come
+            if snapshot.edition != self._edition:
+                self._edition = snapshot.edition
+                self.obstacles.set_things(snapshot.things)
+                self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
+                self.least_clearance = np.inf
+                self.marks.clear_trail()
+            if self.last is None or snapshot.method != self.last.method:
+                self._load_body(snapshot.method)
+            self.last = snapshot
+            self.arm.show(snapshot.q)
+            self.arm.colour({item.link: item.distance for item in self._clearances})
+            self.obstacles.show(snapshot.things, snapshot.poses)
+            self.goal.show(snapshot.goal, snapshot.goal_pose)
+            self.marks.show_nearest(self._clearances, visible=self._nearest.value)
+            self.marks.show_trail(snapshot.q, visible=self._trail.value)
+            self.marks.show_metric(snapshot.q, snapshot.metric, visible=self._metric.value)
+            self.tuning.show(snapshot)
+            self.plots.add(snapshot, self._clearances[0].distance if self._clearances else np.inf)
+            now = clock.monotonic()
+            self.plots.draw(now)
+            self._show_words(snapshot)
+
+    def take_clearances(self, found: tuple[Clearance, ...], time: float) -> None:
+        """What the exact meshes say, nearest first."""
+        with self._lock:
+            self._clearances = found
+            if found:
+                self.least_clearance = min(self.least_clearance, found[0].distance)
+
+    def take_rows(self, rows: list[m.Row]) -> None:
+        """Rows of a recording."""
+
+    def tell(self, note: m.Preparing | m.Failed) -> None:
+        """Shows what the loop has to say beside its state."""
+        with self._lock:
+            if isinstance(note, m.Preparing):
+                self._words.content = in_box(f"preparing: {html.escape(note.note)} …")
+                return
+            if note.fatal:
+                self._words.content = in_box(f"The loop ended: {html.escape(note.message)}")
+        for client in self._server.get_clients().values():
+            client.add_notification("Not possible", note.message, color="red", auto_close_seconds=8.0)
+
+    def _show_words(self, snapshot: m.Snapshot) -> None:
+        words = snapshot.words[:1].upper() + snapshot.words[1:] if snapshot.running else "Paused"
+        facts = []
+        if self._clearances:
+            first = self._clearances[0]
+            facts.append(
+                f"nearest {html.escape(first.link)} – {html.escape(first.obstacle)}: {1e3 * first.distance:.0f} mm, "
+                f"least so far {1e3 * self.least_clearance:.0f} mm"
+            )
+        touch = (
+            f"touches {html.escape(', '.join(snapshot.contacts))}" if snapshot.contacts else "touches nothing"
+        )
+        facts.append(f"{touch} · {snapshot.time:.1f} s · {snapshot.timing.real_time:.2f} × real time")
+        content = in_box(f"{html.escape(words)}.", "<br>".join(facts))
+        if content != self._words.content:
+            self._words.content = content
+
+    def _set_up_scene(self, scenario: Scenario) -> None:
+        scene = self._server.scene
+        scene.set_up_direction("+z")
+        scene.add_grid("/grid", width=3.0, height=3.0, cell_size=0.1, section_size=0.5, shadow_opacity=0.2)
+        self._server.initial_camera.position = (1.75, -1.45, 1.25)
+        self._server.initial_camera.look_at = (0.15, 0.1, 0.4)
+
+    def _add_switches(self) -> None:
+        gui = self._server.gui
+        self._ghost = gui.add_checkbox("goal", True, hint="The ghost arm and its gizmo.")
+        self._body_shown = gui.add_checkbox("body", False, hint="The ellipsoids that the controller sees.")
+        self._nearest = gui.add_checkbox("nearest line", True, hint="On the exact meshes.")
+        self._trail = gui.add_checkbox("trail", True, hint="Where the tip has been.")
+        self._metric = gui.add_checkbox(
+            "metric", False, hint="How freely the tip can move in each direction."
+        )
+        gui.add_html(colours.legend_html())
+        self._ghost.on_update(lambda _: self.goal.set_visible(self._ghost.value))
+        self._body_shown.on_update(lambda _: self._set_body_visible())
+
+    def _set_robot(self, robot: Robot) -> None:
+        self.robot, self.tip = robot, tip_of(robot)
+        self.arm = ArmView(self._server, robot, "/arm")
+        self.marks = Marks(self._server, robot, self.tip)
+        self._body: BodyView | None = None
+        with self._goal_tab:
+            self.goal = GoalControl(self._server, robot, self.tip, self._send)
+
+    def _load_body(self, name: str) -> None:
+        """The body of a method; the loop has made it, so it comes from the cache."""
+        method = method_named(name)
+        if self._body is not None:
+            self._body.remove()
+        body = (
+            Body.cover(self.robot, components=self._ellipsoids)
+            if method.covering
+            else Body.fit(self.robot, components=THESIS_COMPONENTS)
+        )
+        self._body = BodyView(self._server, body, "/arm", visible=self._body_shown.value)
+
+    def _set_body_visible(self) -> None:
+        if self._body is not None:
+            self._body.set_visible(self._body_shown.value)
+
+    def _on_loop(self, event: Any) -> None:
+        match event.target.value:
+            case "Run":
+                self._send(m.SetRunning(True))
+            case "Pause":
+                self._send(m.SetRunning(False))
+            case _:
+                self._send(m.Restart())
+
+
+def in_box(words: str, facts: str = "") -> str:
+    """Words about the state above smaller facts, always equally high, so that nothing below moves."""
+    return (
+        f'<div id="words" style="height:{WORDS_HEIGHT}px;overflow:hidden;padding:2px 10px;line-height:1.35">'
+        f'<div style="font-size:15px;font-weight:600">{words}</div>'
+        f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
+    )

@@ -1,0 +1,353 @@
+"""The simulation behind the page: the real loop in MuJoCo, one step at a time, driven by commands.
+
+It knows nothing of the page. `loop` runs it in a process of its own, tests call it directly.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import time as clock
+from collections import deque
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import (
+    GeometricSystem,
+    JointGoal,
+    Obstacles,
+    PoseGoal,
+    Step,
+    TorqueController,
+    TorqueSolution,
+)
+from sidestep.body import Body
+from sidestep.robot import Robot
+from sidestep.scenario import Scenario
+from sidestep.scenario.assembly import coordinates, load_robot
+from sidestep.simulation.run import status_name
+from sidestep.studio import messages as m
+from sidestep.studio.methods import METHODS, Method, build_system, check_numbers, method_named
+from sidestep.studio.stage import Actor, Stage
+from sidestep.studio.things import things_of
+
+Array = npt.NDArray[np.float64]
+Prepare = Callable[[Robot, Method], Body]
+
+TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
+RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
+POSITION_STIFFNESS, TURN_STIFFNESS = 8.0, 2.0  # of pose goals [1/(m s)^2], [1/s^2]: as quick as joint goals
+
+
+class Session:
+    """One arm, its obstacles, a goal and a method.
+
+    Args:
+        scenario: robot, start, goal, obstacles and control period.
+        method: one of `METHODS`. numbers: of methods, by name; defaults for the rest.
+        prepare: gives the body of a robot that a method needs; may take long.
+
+    Raises:
+        ValueError: that names what is wrong in the scenario, the method or its numbers.
+
+    Attributes:
+        robot, tip: the arm and the link whose pose is a goal. stage: the physics.
+        period: of control [s]. time: simulated [s]. running: or paused.
+    """
+
+    robot: Robot
+    tip: str
+    stage: Stage
+    period: float
+    time: float
+    running: bool
+    _bodies: dict[bool, Body]
+    _system: GeometricSystem
+    _controller: TorqueController
+    _start: Array
+    _goal: Array | None
+    _pose: Array | None
+    _aim: JointGoal | PoseGoal
+    _step: Step | None
+    _solution: TorqueSolution | None
+    _contacts: tuple[str, ...]
+    _times: deque[float]
+    _rows: list[m.Row]
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        method: str = "barrier",
+        numbers: Mapping[str, Mapping[str, float]] | None = None,
+        prepare: Prepare,
+    ) -> None:
+        self._prepare = prepare
+        self._numbers = {name: check_numbers(METHODS[name], {}) for name in METHODS}
+        for name, values in (numbers or {}).items():
+            self._numbers[name] = check_numbers(method_named(name), values)
+        self._method = method_named(method)
+        self._edition = 0
+        self._recording = False
+        self._load(scenario)
+
+    # --- what happens ---
+
+    def handle(self, command: m.Command) -> None:
+        """Does what a command says; raises ValueError or OSError, and stays as it was, where it cannot."""
+        match command:
+            case m.SetJointGoal(position):
+                self._set_joint_goal(self.robot.check_configuration(position, "goal"))
+            case m.SetPoseGoal(pose):
+                self._goal, self._pose = None, np.array(pose, dtype=float)
+                self._aim = PoseGoal(
+                    self.robot,
+                    self.tip,
+                    self._pose,
+                    position_stiffness=POSITION_STIFFNESS,
+                    orientation_stiffness=TURN_STIFFNESS,
+                )
+            case m.AddThing(thing):
+                self._set_actors([*self.stage.actors, Actor(thing)])
+            case m.RemoveThing(name):
+                gone = self.actor(name)
+                self._set_actors([actor for actor in self.stage.actors if actor is not gone])
+            case m.DragThing(name, target):
+                actor = self.actor(name)
+                actor.target = None if target is None else np.array(target, dtype=float)
+                actor.touched = True
+                if target is None:
+                    self.stage.throw(actor, np.zeros(3))
+            case m.ThrowThing(name, velocity):
+                self.stage.throw(self.actor(name), velocity)
+            case m.SetMethod(name):
+                self._use(method_named(name), self._numbers[name])
+            case m.SetNumbers(name, numbers):
+                method = method_named(name)
+                checked = check_numbers(method, numbers)
+                if method is self._method:
+                    self._use(method, checked)
+                self._numbers[name] = checked
+            case m.SetRunning(running):
+                self.running = running
+            case m.SetRecording(recording):
+                self._recording = recording
+                self._rows.clear()
+            case m.Restart():
+                self._begin()
+            case m.Load(scenario):
+                self._load(scenario)
+            case m.Seen():
+                pass
+
+    def step(self) -> None:
+        """One control period: obstacles, state, wanted acceleration, torque, physics.
+
+        Raises:
+            RuntimeError: the physics diverged.
+        """
+        stage, begin = self.stage, clock.perf_counter()
+        q, v = stage.begin(self.time)
+        step = self._system.acceleration(q, v, self._aim, self._obstacles())
+        mass, bias = stage.dynamics()
+        solution = self._controller.solve(
+            q, v, step.acceleration, mass, bias, clearances=step if self._method.safe else None
+        )
+        finite = stage.end(solution.torque)
+        self._times.append(clock.perf_counter() - begin)
+        if not finite:
+            raise RuntimeError(f"the physics diverged at {self.time:.3f} s; restart")
+        self.time += self.period
+        self._count += 1
+        self._step, self._solution = step, solution
+        if stage.data.ncon:
+            self._contacts = stage.contacts()
+            self._touched += bool(self._contacts)
+        else:
+            self._contacts = ()
+        if self._recording and self._count % RECORD_EVERY == 0:
+            self._rows.append(m.Row(self.time, q, self._poses()))
+
+    def snapshot(self, *, real_time: float = 0.0, note: str = "") -> m.Snapshot:
+        """The state now, and the rows recorded since the last snapshot."""
+        q, v = self.stage.state()
+        limits = self.robot.limits
+        rows, self._rows = tuple(self._rows), []
+        words, status = "paused", ("", "")
+        nearest, values, metric, torque = ("", np.inf), np.zeros(0), np.eye(len(q)), 0.0
+        if self._step is not None and self._solution is not None:
+            step = self._step
+            diagnosis = step.diagnosis
+            words = self._in_words(diagnosis.describe())
+            status = status_name(step.status), status_name(self._solution.status)
+            values, metric = np.array(step.values), np.array(step.metric)
+            clearances = np.asarray(step.clearances.values)
+            if len(clearances) and np.isfinite(clearances).any():
+                nearest = (diagnosis.name, float(clearances.min()))
+            torque = float((np.abs(self._solution.torque) / limits.effort).max())
+        return m.Snapshot(
+            edition=self._edition,
+            time=self.time,
+            running=self.running,
+            q=q.copy(),
+            v=v.copy(),
+            goal=self._goal,
+            goal_pose=self._pose,
+            things=tuple(actor.thing for actor in self.stage.actors),
+            poses=self._poses(),
+            velocities=np.array([actor.velocity for actor in self.stage.actors]).reshape(-1, 3),
+            method=self._method.name,
+            numbers={name: dict(numbers) for name, numbers in self._numbers.items()},
+            words=words,
+            status=status,
+            nearest=nearest,
+            values=values,
+            metric=metric,
+            torque_share=torque,
+            speed_share=float((np.abs(v) / limits.velocity).max()),
+            contacts=self._contacts,
+            touched=self._touched,
+            timing=self._timing(real_time),
+            recording=self._recording,
+            rows=rows,
+            note=note,
+        )
+
+    @property
+    def step_seconds(self) -> Array:
+        """Wall time [s] of each of the last steps."""
+        return np.array(self._times)
+
+    def actor(self, name: str) -> Actor:
+        """The obstacle called `name`; raises ValueError that lists them."""
+        for actor in self.stage.actors:
+            if actor.thing.name == name:
+                return actor
+        known = ", ".join(actor.thing.name for actor in self.stage.actors) or "none"
+        raise ValueError(f"there is no obstacle {name!r}; there are: {known}")
+
+    # --- parts ---
+
+    def _load(self, scenario: Scenario) -> None:
+        robot = load_robot(scenario)
+        if not self._edition or robot.fingerprint != self.robot.fingerprint:
+            bodies: dict[bool, Body] = {}
+            system = None
+        else:
+            robot, bodies, system = self.robot, self._bodies, self._system
+        start = coordinates(scenario.start, robot, "start.position")
+        goal = coordinates(scenario.goal, robot, "goal.position")
+        stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
+        if system is None:
+            system = self._system_for(robot, bodies, self._method, self._numbers[self._method.name])
+        self.robot, self._bodies, self._system = robot, bodies, system
+        self.tip = tip_of(robot)
+        self.scenario, self.stage = scenario, stage
+        self.period = scenario.simulation.period
+        self._controller = TorqueController(robot, period=self.period)
+        self._start = start
+        self._set_joint_goal(goal)
+        self._begin()
+
+    def _begin(self) -> None:
+        self.time, self._count, self._touched = 0.0, 0, 0
+        self.running = True
+        self._step = self._solution = None
+        self._contacts = ()
+        self._times = deque(maxlen=TIMED_STEPS)
+        self._rows = []
+        self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
+        self.stage.set_state(self._start, np.zeros_like(self._start))
+
+    def _set_joint_goal(self, goal: Array) -> None:
+        self._goal, self._pose, self._aim = goal, None, JointGoal(goal)
+
+    def _set_actors(self, actors: list[Actor]) -> None:
+        self.stage.set_things(actors)
+        self._edition += 1
+        self._look()
+
+    def _use(self, method: Method, numbers: Mapping[str, float]) -> None:
+        self._system = self._system_for(self.robot, self._bodies, method, numbers)
+        self._method = method
+        self._look()
+
+    def _system_for(
+        self, robot: Robot, bodies: dict[bool, Body], method: Method, numbers: Mapping[str, float]
+    ) -> GeometricSystem:
+        if method.covering not in bodies:
+            bodies[method.covering] = self._prepare(robot, method)
+        return build_system(method, robot, bodies[method.covering], numbers)
+
+    def _look(self) -> None:
+        """Lays out what is seen: points of each obstacle in its frame, and whose each point is."""
+        views = [actor.thing.seen(bare=not self._method.safe) for actor in self.stage.actors]
+        self._views = [points for points, _ in views]
+        self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in views)])
+        counts = [len(points) for points in self._views]
+        self._owners = np.repeat(np.arange(len(counts)), counts)
+
+    def _obstacles(self) -> Obstacles:
+        actors = self.stage.actors
+        if not actors:
+            return Obstacles.none()
+        points = [
+            view @ actor.pose[:3, :3].T + actor.pose[:3, 3]
+            for view, actor in zip(self._views, actors, strict=True)
+        ]
+        velocities = np.array([actor.velocity for actor in actors])
+        return Obstacles(np.concatenate(points), self._radii, velocities[self._owners])
+
+    def _poses(self) -> Array:
+        return np.array([actor.pose for actor in self.stage.actors]).reshape(-1, 4, 4)
+
+    def _in_words(self, sentence: str) -> str:
+        """The diagnosis with the names of obstacles in place of the numbers of their points."""
+
+        def name(match: re.Match[str]) -> str:
+            point = int(match[1])
+            known = 0 <= point < len(self._owners)
+            return self.stage.actors[self._owners[point]].thing.name if known else match[0]
+
+        named = re.sub(r"obstacle point (-?\d+)", name, sentence)
+        return re.sub(r"\blink (?=\S*link)", "", named)
+
+    def _timing(self, real_time: float) -> m.Timing:
+        if not self._times:
+            return m.Timing(real_time=real_time)
+        median, p99, worst = 1e6 * np.percentile(np.array(self._times), [50.0, 99.0, 100.0])
+        return m.Timing(float(median), float(p99), float(worst), real_time)
+
+
+def tip_of(robot: Robot) -> str:
+    """The link whose pose is a goal: of those that the last joint of the arm carries, the last named."""
+    depth = {-1: 0}
+    for index, joint in enumerate(robot.joints):
+        depth[index] = depth[joint.parent] + 1
+    return max(enumerate(robot.frames), key=lambda item: (depth[item[1].joint], item[0]))[1].name
+
+
+def scenario_now(session_scenario: Scenario, snapshot: m.Snapshot, *, name: str) -> Scenario:
+    """The scenario as it stands: arm, goal and obstacles where they are now.
+
+    Raises:
+        ValueError: the goal is a pose, which scenario files do not have.
+    """
+    from sidestep.scenario.scenario import JointState
+
+    if snapshot.goal is None:
+        raise ValueError(
+            "a scenario file has a configuration as its goal; move a joint slider of the goal first"
+        )
+    return dataclasses.replace(
+        session_scenario,
+        name=name,
+        start=JointState("rad", tuple(float(x) for x in snapshot.q.round(6))),
+        goal=JointState("rad", tuple(float(x) for x in snapshot.goal.round(6))),
+        obstacles=tuple(
+            dataclasses.replace(thing.at(pose).obstacle, name=thing.name)
+            for thing, pose in zip(snapshot.things, snapshot.poses, strict=True)
+        ),
+    )

@@ -1,0 +1,85 @@
+"""What is on the stage when the studio opens."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.robot import Robot
+from sidestep.scenario import Scenario
+from sidestep.scenario.assembly import load_robot
+from sidestep.scenario.scenario import JointState, Obstacle, RobotChoice, Shape
+from sidestep.studio.session import tip_of
+
+Array = npt.NDArray[np.float64]
+
+DEFAULT_ROBOT = "fr3"
+TURN = 1.6  # [rad] of the first joint between start and goal
+BEND = 0.6  # [rad] of the second joint: a stretched arm cannot tell which way to fold
+BALL = 0.06  # [m] radius of the ball beside the way
+BESIDE = 0.18  # [m] between the ball and the way of the tip
+
+
+def starting_scenario(
+    scenario: str | None = None,
+    *,
+    robot: str | None = None,
+    urdf: Path | None = None,
+    package_dirs: Sequence[Path] = (),
+) -> Scenario:
+    """A scenario by file or name, or one ball beside the way of a robot that turns its first joint.
+
+    Raises:
+        ValueError: more than one of scenario, robot and urdf. FileNotFoundError: see `Scenario.load`.
+    """
+    if sum(choice is not None for choice in (scenario, robot, urdf)) > 1:
+        raise ValueError("give one of a scenario, --robot and --urdf")
+    if scenario is not None:
+        return Scenario.load(scenario)
+    choice = (
+        RobotChoice(name=robot or DEFAULT_ROBOT)
+        if urdf is None
+        else RobotChoice(urdf=str(urdf), package_dirs=tuple(str(folder) for folder in package_dirs))
+    )
+    return scenario_of(choice)
+
+
+def scenario_of(choice: RobotChoice) -> Scenario:
+    """A robot that turns its first joint past a ball."""
+    empty = JointState("rad", ())
+    arm = load_robot(Scenario("studio", choice, empty, empty))
+    start, goal = ends(arm)
+    position = beside_the_way(arm, start, goal)
+    return Scenario(
+        name="studio",
+        robot=choice,
+        start=_state(start),
+        goal=_state(goal),
+        obstacles=(Obstacle(Shape("sphere", radius=BALL), position, name="ball", points="ball"),),
+    )
+
+
+def ends(robot: Robot) -> tuple[Array, Array]:
+    """Start and goal (nv,): the middle of the joints, the second one bent, the first one turned to either side."""
+    limits, middle = robot.limits, np.array(robot.neutral)
+    if len(middle) > 1:
+        middle[1] = min(middle[1] + BEND, limits.upper[1])
+    start, goal = middle.copy(), middle.copy()
+    start[0] = max(start[0] - 0.5 * TURN, limits.lower[0])
+    goal[0] = min(goal[0] + 0.5 * TURN, limits.upper[0])
+    return start, goal
+
+
+def beside_the_way(robot: Robot, start: Array, goal: Array) -> tuple[float, float, float]:
+    """A place for the ball: just outside of where the tip passes half way."""
+    middle = robot.pose(0.5 * (start + goal), tip_of(robot))[:3, 3]
+    outward = middle / max(float(np.linalg.norm(middle)), 1e-9)
+    x, y, z = (float(value) for value in (middle + (BALL + BESIDE) * outward).round(3))
+    return x, y, z
+
+
+def _state(q: Array) -> JointState:
+    return JointState("rad", tuple(float(value) for value in q.round(6)))

@@ -1,0 +1,171 @@
+"""The studio: a server with the page, the process of the loop, and the thread that draws."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import socket
+import threading
+import time as clock
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from sidestep.scenario import Scenario
+from sidestep.scenario.assembly import load_robot
+from sidestep.simulation.clearance import Clearance
+from sidestep.studio import messages as m
+from sidestep.studio.loop import Beginning, Loop
+from sidestep.studio.truth import Truth
+
+if TYPE_CHECKING:
+    from sidestep.studio.page.view import View
+
+HOST, PORT = "127.0.0.1", 8890
+STEP_OF_TRUTH = 0.05  # [s] between two measurements on the exact meshes, at least
+
+
+class Studio:
+    """The page and the loop behind it; stop it with `stop`, or use it as a context.
+
+    Args:
+        scenario: what is on the stage at first.
+        method: one of `sidestep.studio.methods.METHODS`. numbers: parameters of methods, by method and name.
+        host, port: where to listen; by default this machine alone can connect.
+        ellipsoids: per link of a covering body; None: as `Body.cover` finds best, which takes longer.
+
+    Raises:
+        OSError: the port is taken, or the address is not one of this machine.
+        ValueError: that names what is wrong with the scenario or the method.
+        ModuleNotFoundError: viser is not installed; says what to install.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        method: str = "barrier",
+        numbers: Mapping[str, Mapping[str, float]] | None = None,
+        host: str = HOST,
+        port: int = PORT,
+        ellipsoids: int | None = None,
+    ) -> None:
+        from sidestep.studio.methods import method_named
+
+        method_named(method)
+        check_port(host, port)
+        robot = load_robot(scenario)
+        server = _server(host, port)
+        from sidestep.studio.page.view import View
+
+        self.server, self.host, self.port = server, host, server.get_port()
+        self._stopping = threading.Event()
+        self._clearances: tuple[Clearance, ...] = ()
+        self.snapshot: m.Snapshot | None = None
+        self.error = ""
+        self._loop = Loop(Beginning(scenario, method, dict(numbers or {}), ellipsoids))
+        self.view: View = View(server, scenario, robot, self.send, ellipsoids=ellipsoids)
+        self._truth = Truth(self._take_truth)
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    @property
+    def address(self) -> str:
+        """What to open in a browser."""
+        return f"http://{'localhost' if self.host in ('0.0.0.0', '127.0.0.1') else self.host}:{self.port}"
+
+    def send(self, command: m.Command) -> None:
+        """Hands a command to the loop."""
+        self._loop.send(command)
+
+    def wait_ready(self, timeout: float) -> m.Snapshot:
+        """The first snapshot of the running loop.
+
+        Raises:
+            RuntimeError: the loop failed. TimeoutError: it takes longer than `timeout` [s].
+        """
+        end = clock.monotonic() + timeout
+        while self.snapshot is None:
+            if self._loop.ended:
+                raise RuntimeError(self.error or "the process of the loop ended")
+            if clock.monotonic() > end:
+                raise TimeoutError(f"the loop is not ready after {timeout:.0f} s")
+            clock.sleep(0.02)
+        return self.snapshot
+
+    def wait(self) -> None:
+        """Returns when the loop ends or the studio is stopped."""
+        while not self._stopping.wait(0.2) and not self._loop.ended:
+            pass
+
+    def stop(self) -> None:
+        """Ends loop, threads and server."""
+        self._stopping.set()
+        self._loop.stop()
+        self._truth.stop()
+        self._thread.join(timeout=2.0)
+        self.server.stop()
+
+    def _take_truth(self, found: tuple[Clearance, ...], time: float) -> None:
+        self._clearances = found
+        self.view.take_clearances(found, time)
+
+    def _run(self) -> None:
+        last_truth = 0.0
+        while not self._stopping.is_set():
+            snapshot = self._loop.wait(0.1)
+            for note in self._loop.take_notes():
+                if isinstance(note, m.Failed):
+                    self.error = note.message
+                self.view.tell(note)
+            if snapshot is not None:
+                self.snapshot = snapshot
+                self.view.take_rows(self._loop.take_rows())
+                self.view.show(snapshot)
+                now = clock.monotonic()
+                if now - last_truth > STEP_OF_TRUTH and self.view.robot.num_coordinates == len(snapshot.q):
+                    last_truth = now
+                    self._truth.look(
+                        self.view.robot, snapshot.things, snapshot.q, snapshot.poses, snapshot.time
+                    )
+            if self._loop.ended:
+                self.view.tell(m.Failed(self.error or "the process of the loop ended", fatal=True))
+                return
+
+
+def check_port(host: str, port: int) -> None:
+    """Raises OSError with what to do when nothing can listen at this address."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except socket.gaierror as error:
+        raise OSError(f"--host {host}: {error.strerror or error}") from error
+    with contextlib.closing(socket.socket(family, kind, protocol)) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind(address)
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                raise OSError(
+                    f"port {port} is taken, perhaps by another studio; choose another with --port"
+                ) from error
+            raise OSError(f"cannot listen at {host}:{port}: {error.strerror}") from error
+
+
+def _server(host: str, port: int):  # type: ignore[no-untyped-def]
+    try:
+        import viser
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError("the studio needs viser: pip install 'sidestep[studio]'") from error
+    import rich
+
+    quiet = rich.get_console().quiet
+    rich.get_console().quiet = True  # viser prints a banner of its own
+    try:
+        return viser.ViserServer(host=host, port=port, label="Sidestep", verbose=False)
+    finally:
+        rich.get_console().quiet = quiet

@@ -1,0 +1,168 @@
+"""Obstacles of the studio: a scenario's obstacle with the solids of it and the points that are seen."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.obstacles import load_point_cloud
+from sidestep.obstacles.covering import box as box_points
+from sidestep.obstacles.covering import cylinder as cylinder_points
+from sidestep.obstacles.covering import triangles as mesh_points
+from sidestep.pose import from_roll_pitch_yaw, pose_at
+from sidestep.scenario import Scenario
+from sidestep.scenario.assembly import solids
+from sidestep.scenario.scenario import Obstacle, Shape
+from sidestep.simulation import SceneObject
+
+Array = npt.NDArray[np.float64]
+
+CLOUD_LIMIT = 400  # points: each is a ball for the physics, and the scene is built again with every change
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An obstacle on the stage.
+
+    Args:
+        name: unique on the stage.
+        obstacle: what it is and where it starts; its `points` and `spacing` say what is seen of it.
+        folder: what the file names of its shape refer to.
+
+    Raises:
+        ValueError, OSError: a file that is missing or malformed; a cloud of too many points.
+    """
+
+    name: str
+    obstacle: Obstacle
+    folder: Path
+
+    def __reduce__(self) -> tuple[type[Thing], tuple[str, Obstacle, Path]]:
+        return Thing, (self.name, self.obstacle, self.folder)  # without what can be made again
+
+    @cached_property
+    def start(self) -> Array:
+        """Pose (4, 4) in the world at the start."""
+        return pose_at(
+            self.obstacle.position, from_roll_pitch_yaw(np.deg2rad(self.obstacle.rotation_deg).tolist())
+        )
+
+    @cached_property
+    def cloud(self) -> Array | None:
+        """Points (n, 3) of a point cloud in its frame [m], None of another shape."""
+        shape = self.obstacle.shape
+        if shape.type != "points" or shape.file is None:
+            return None
+        points: Array = load_point_cloud((self.folder / shape.file).resolve()).points
+        if len(points) > CLOUD_LIMIT:
+            raise ValueError(
+                f"{self.name}: the cloud has {len(points)} points; the studio takes at most {CLOUD_LIMIT}: "
+                "thin it with sidestep.merge_in_voxels"
+            )
+        return points
+
+    @cached_property
+    def solids(self) -> tuple[SceneObject, ...]:
+        """What it is made of, at the start: one solid, or a ball for each point of a cloud."""
+        if self.cloud is not None:
+            radius = float(self.obstacle.shape.radius or 0.0)
+            return tuple(
+                SceneObject(
+                    f"{self.name}.{k}",
+                    "sphere",
+                    size=(radius,),
+                    pose=self.start @ pose_at(p),
+                    motion="moving",
+                )
+                for k, p in enumerate(self.cloud)
+            )
+        bare = dataclasses.replace(self.obstacle, velocity=(0.0, 0.0, 0.0), motion=None)
+        scenario = Scenario(name=self.name, robot=None, start=None, goal=None, folder=self.folder)  # type: ignore[arg-type]
+        (solid,) = solids(scenario, bare, self.name)
+        return (dataclasses.replace(solid, motion="free" if self.obstacle.free else "moving"),)
+
+    @cached_property
+    def offsets(self) -> Array:
+        """Positions (n, 3) of the solids in the frame of the thing [m]."""
+        return np.zeros((1, 3)) if self.cloud is None else self.cloud
+
+    def seen(self, *, bare: bool) -> tuple[Array, Array]:
+        """Points (n, 3) in its frame [m] and radii (n,) [m] that the controller is told of.
+
+        Balls are told as they are; other shapes as balls on the surface that leave no gap. With `bare`, what the
+        scenario file asks for: a centre without radius, where its `points` is "centre".
+        """
+        shape = self.obstacle.shape
+        if bare and self.obstacle.points == "centre":
+            return self.offsets, np.zeros(len(self.offsets))
+        if shape.type in ("sphere", "points"):
+            return self.offsets, np.full(len(self.offsets), float(shape.radius or 0.0))
+        return self._surface
+
+    @cached_property
+    def _surface(self) -> tuple[Array, Array]:
+        shape, spacing = self.obstacle.shape, self.obstacle.spacing
+        if shape.type == "box" and shape.size is not None:
+            points = box_points(shape.size, spacing)
+        elif shape.type == "cylinder":
+            points = cylinder_points(float(shape.radius or 0.0), float(shape.length or 0.0), spacing)
+        else:
+            points = mesh_points(self.solids[0].surface(), spacing)
+        return points, np.full(len(points), spacing)
+
+    @cached_property
+    def size(self) -> float:
+        """Largest distance [m] of a point of it from its origin."""
+        solid = self.solids[0]
+        return float(np.linalg.norm(self.offsets, axis=1).max()) + solid.bounding_radius
+
+    def at(self, pose: Array) -> Thing:
+        """The same thing, starting at another pose (4, 4), at rest."""
+        from scipy.spatial.transform import Rotation
+
+        roll, pitch, yaw = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz", degrees=True).round(3)
+        x, y, z = (float(value) for value in np.round(pose[:3, 3], 6))
+        item = dataclasses.replace(
+            self.obstacle,
+            position=(x, y, z),
+            rotation_deg=(float(roll), float(pitch), float(yaw)),
+            velocity=(0.0, 0.0, 0.0),
+            motion=None,
+        )
+        return Thing(self.name, item, self.folder)
+
+
+def things_of(scenario: Scenario) -> tuple[Thing, ...]:
+    """The obstacles of a scenario."""
+    return tuple(
+        Thing(item.name or f"obstacle{index}", item, scenario.folder)
+        for index, item in enumerate(scenario.obstacles)
+    )
+
+
+def ball(name: str, position: Array, radius: float) -> Thing:
+    """A ball at a position (3,) [m] in the world."""
+    return Thing(name, Obstacle(Shape("sphere", radius=radius), _vector(position), points="ball"), Path.cwd())
+
+
+def box(name: str, position: Array, size: Array) -> Thing:
+    """A box with edge lengths (3,) [m] around a position (3,) [m]."""
+    return Thing(
+        name, Obstacle(Shape("box", size=_vector(size)), _vector(position), points="surface"), Path.cwd()
+    )
+
+
+def cloud(name: str, position: Array, file: Path, radius: float) -> Thing:
+    """The points of a file (.ply, .pcd or .npy) around a position, each a ball [m]."""
+    shape = Shape("points", file=str(file.resolve()), radius=radius)
+    return Thing(name, Obstacle(shape, _vector(position), points="ball"), Path.cwd())
+
+
+def _vector(values: Array) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

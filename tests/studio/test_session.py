@@ -1,0 +1,176 @@
+"""The simulation behind the page, without a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sidestep import ExactClearance, Scenario
+from sidestep.pose import pose_at
+from sidestep.scenario.scenario import RobotChoice
+from sidestep.studio import messages as m
+from sidestep.studio.session import Session, scenario_now, tip_of
+from sidestep.studio.start import scenario_of
+from sidestep.studio.things import ball, box
+from sidestep.studio.truth import solid_poses
+
+MakeSession = Callable[..., Session]
+
+
+def run(session: Session, seconds: float) -> m.Snapshot:
+    for _ in range(round(seconds / session.period)):
+        session.step()
+    return session.snapshot()
+
+
+def record(session: Session, seconds: float) -> tuple[m.Snapshot, float]:
+    """Runs and measures the smallest exact clearance on the way."""
+    session.handle(m.SetRecording(True))
+    last = run(session, seconds)
+    things = last.things
+    exact = ExactClearance(session.robot, [solid for thing in things for solid in thing.solids])
+    poses = np.array([solid_poses(things, row.poses) for row in last.rows])
+    worst = exact.decided_minimum(np.array([row.q for row in last.rows]), poses)
+    return last, worst.clearance.distance
+
+
+def test_the_arm_arrives_past_the_ball(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario)
+    last, clearance = record(session, 12.0)
+    assert last.goal is not None
+    assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
+    assert clearance > 0.0
+    assert last.touched == 0
+    assert "goal" in last.words
+    assert last.status == ("ok", "ok")
+    assert last.time == pytest.approx(12.0, abs=1e-9)
+
+
+def test_a_ball_drawn_into_the_arm_at_rest_does_not_touch_it(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario)
+    run(session, 0.2)
+    here = session.stage.state()[0]
+    session.handle(m.SetJointGoal(here))
+    tip = session.robot.pose(here, session.tip)[:3, 3]
+    session.handle(m.DragThing("ball", pose_at(tip)))
+    last, clearance = record(session, 3.0)
+    moved = np.abs(last.q - here).max()
+    assert clearance > 0.0
+    assert moved > 0.1  # [rad] it yields: the ball of 6 cm takes the place of the tip, one metre out
+    assert last.touched == 0
+    np.testing.assert_allclose(
+        last.poses[0][:3, 3], tip, atol=1e-3
+    )  # where it was drawn to, within a millimetre
+
+
+def test_a_thrown_ball_flies_straight_and_is_told_to_the_controller(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario)
+    start = session.snapshot().poses[0][:3, 3].copy()
+    velocity = np.array([0.5, 0.2, 0.1])
+    session.handle(m.ThrowThing("ball", velocity))
+    last = run(session, 0.4)
+    np.testing.assert_allclose(last.poses[0][:3, 3], start + 0.4 * velocity, atol=1e-9)  # sums of 400 steps
+    np.testing.assert_array_equal(last.velocities[0], velocity)
+    np.testing.assert_array_equal(session._obstacles().velocities[0], velocity)
+
+
+def test_things_come_and_go_while_the_arm_moves(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario)
+    before = run(session, 0.5)
+    session.handle(m.AddThing(box("crate", np.array([-0.8, 0.0, 0.0]), np.array([0.1, 0.2, 0.3]))))
+    session.handle(m.AddThing(ball("second", np.array([0.0, -0.9, 0.0]), 0.05)))
+    after = session.snapshot()
+    np.testing.assert_array_equal(after.q, before.q)
+    np.testing.assert_array_equal(after.v, before.v)
+    assert [thing.name for thing in after.things] == ["ball", "crate", "second"]
+    assert after.edition == before.edition + 2
+    with pytest.raises(ValueError, match="two objects of the scene are named 'second'"):
+        session.handle(m.AddThing(ball("second", np.zeros(3), 0.05)))
+    session.handle(m.RemoveThing("crate"))
+    assert [thing.name for thing in run(session, 0.1).things] == ["ball", "second"]
+    with pytest.raises(ValueError, match="no obstacle 'crate'; there are: ball, second"):
+        session.handle(m.RemoveThing("crate"))
+
+
+def test_a_pose_goal_is_reached(make_session: MakeSession) -> None:
+    session = make_session(replace(scenario_of(RobotChoice(name="planar3")), obstacles=()))
+    aim = session.robot.pose(np.array([0.3, 0.5, -0.4]), session.tip)
+    session.handle(m.SetPoseGoal(aim))
+    last = run(session, 15.0)
+    assert last.goal is None
+    # position within 3 cm: along a nearly stretched arm the pull of a pose goal is weak, and the motion slow
+    np.testing.assert_allclose(session.robot.pose(last.q, session.tip), aim, atol=0.03)
+
+
+def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario)
+    assert len(run(session, 0.1).values) > 1  # one coordinate per barrier
+    session.handle(m.SetMethod("unswitched"))
+    assert len(run(session, 0.1).values) == 1  # one density
+    session.handle(m.SetNumbers("unswitched", {"stiffness": 4.0}))
+    assert session._system.stiffness[0, 0] == 4.0
+    session.handle(m.SetMethod("barrier"))
+    assert session._system.stiffness[0, 0] == session.snapshot().numbers["barrier"]["stiffness"]
+    assert session.snapshot().numbers["unswitched"]["stiffness"] == 4.0
+    with pytest.raises(ValueError, match=r"barrier: activation is 9.0, allowed: \[0.02, 0.3\]"):
+        session.handle(m.SetNumbers("barrier", {"activation": 9.0}))
+    with pytest.raises(ValueError, match="no method is called 'magic'; known: barrier, "):
+        session.handle(m.SetMethod("magic"))
+
+
+def test_a_goal_outside_the_limits_is_refused(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario)
+    goal = session.snapshot().goal
+    with pytest.raises(ValueError, match=r"goal: joint 'joint1' is 9\.0, allowed"):
+        session.handle(m.SetJointGoal(np.array([9.0, 0.0])))
+    np.testing.assert_array_equal(session.snapshot().goal, goal)
+
+
+def test_restart_puts_everything_back(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario)
+    first = session.snapshot()
+    session.handle(m.ThrowThing("ball", np.array([0.0, 0.0, 1.0])))
+    run(session, 0.3)
+    session.handle(m.Restart())
+    again = session.snapshot()
+    assert again.time == 0.0
+    np.testing.assert_array_equal(again.q, first.q)
+    np.testing.assert_array_equal(again.poses, first.poses)
+    np.testing.assert_array_equal(again.velocities, np.zeros((1, 3)))
+
+
+def test_what_is_saved_is_what_is_there(
+    make_session: MakeSession, scenario: Scenario, tmp_path: object
+) -> None:
+    session = make_session(scenario)
+    session.handle(m.AddThing(box("crate", np.array([-0.8, 0.1, 0.2]), np.array([0.1, 0.2, 0.3]))))
+    session.handle(m.ThrowThing("ball", np.array([0.1, 0.0, 0.3])))
+    last = run(session, 0.5)
+    now = scenario_now(session.scenario, last, name="kept")
+    file = tmp_path / "kept.yaml"  # type: ignore[operator]
+    now.save(file)
+    again = make_session(Scenario.load(file)).snapshot()
+    np.testing.assert_allclose(again.q, last.q, atol=1e-6)  # the file's digits
+    np.testing.assert_allclose(again.goal, last.goal, atol=1e-6)
+    np.testing.assert_allclose(again.poses, last.poses, atol=1e-6)
+    assert [thing.obstacle.shape for thing in again.things] == [thing.obstacle.shape for thing in last.things]
+
+
+def test_the_thesis_is_told_of_centres_and_barriers_of_balls(make_session: MakeSession) -> None:
+    scenario = Scenario.load("planar-one-obstacle")
+    bare = replace(scenario, obstacles=tuple(replace(item, points="centre") for item in scenario.obstacles))
+    session = make_session(bare, method="unswitched")
+    assert session._obstacles().radii[0] == 0.0
+    session.handle(m.SetMethod("barrier"))
+    assert session._obstacles().radii[0] == bare.obstacles[0].shape.radius
+
+
+def test_the_tip_is_the_last_link_of_the_last_joint(make_session: MakeSession, scenario: Scenario) -> None:
+    assert tip_of(make_session(scenario).robot) == "tip"
