@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from PIL import Image
 
 from sidestep.scenario import Scenario
@@ -30,6 +31,9 @@ FLAGS = (  # WebGL without a graphics card; a container has no sandbox of its ow
 )
 LOAD_TIME = 90.0  # [s] at most until the page shows the scene
 BODY_TIME = 1800.0  # [s] at most until the body is made, the first time
+PICTURE_TIME = 180.0  # [s] at most for one picture: without a graphics card each takes seconds
+SEND_TIME = 0.3  # [s] in which a state is on the page
+PLOT_TIME = 1.0  # [s] in which the plots have caught up
 FRAME = 0.15  # [s] of simulated time between two pictures of an animation
 ANIMATION_WIDTH = 960  # [px]
 COLOURS = 128  # of a GIF
@@ -120,20 +124,38 @@ def take_pictures(
     check_files(screenshot, video)
     with browser() as chromium, Studio(scenario, method=method, port=0, ellipsoids=ellipsoids) as studio:
         studio.wait_ready(BODY_TIME)
-        studio.send(m.SetRunning(False))
         page = open_page(chromium, studio.address, window)
-        clock.sleep(4.0)  # the client fades the scene in
         studio.send(m.Restart())
+        studio.send(m.SetRunning(False))
         frames: list[Image.Image] = []
-        wait_for_time(studio, 0.0, at_most=duration)
-        while (now := _time(studio)) < duration:
-            if video is not None:
-                frames.append(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
-            wait_for_time(studio, min(now + FRAME, duration))
+        for time in np.arange(0.0, duration if video is not None else 0.0, FRAME):
+            run_until(studio, float(time))
+            frames.append(Image.open(io.BytesIO(picture(page))).convert("RGB"))
+        run_until(studio, duration)
         if screenshot is not None:
-            page.screenshot(path=str(screenshot))
+            clock.sleep(PLOT_TIME)
+            screenshot.write_bytes(picture(page))
         if video is not None:
             save_animation(frames, video)
+
+
+def run_until(studio: Studio, time: float) -> None:
+    """Lets the loop run to a simulated time [s] and pauses it there; raises RuntimeError when it ends before."""
+    from sidestep.studio import messages as m
+
+    studio.send(m.SetRunning(time > 0.0, until=time))
+    while studio.snapshot is None or studio.snapshot.running or abs(studio.snapshot.time - time) > 0.01:
+        if studio.error:
+            raise RuntimeError(studio.error)
+        clock.sleep(0.01)
+
+
+def picture(page: Page) -> bytes:
+    """What the page shows, as PNG, once it has drawn what it was last sent."""
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    clock.sleep(SEND_TIME)
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return page.screenshot(timeout=1e3 * PICTURE_TIME)
 
 
 def check_files(screenshot: Path | None, video: Path | None) -> None:
@@ -146,14 +168,6 @@ def check_files(screenshot: Path | None, video: Path | None) -> None:
         raise ValueError(f"--video is {video}; allowed: .gif, .webp")
 
 
-def wait_for_time(studio: Studio, time: float, *, at_most: float = float("inf")) -> None:
-    """Returns when simulated time [s] is in [time, at_most]; raises RuntimeError when the loop ends before."""
-    while not time <= _time(studio) <= at_most:
-        if studio.error:
-            raise RuntimeError(studio.error)
-        clock.sleep(0.01)
-
-
 def save_animation(frames: list[Image.Image], path: Path) -> None:
     """Writes pictures as an animation, `FRAME` apart."""
     width = min(ANIMATION_WIDTH, frames[0].width)
@@ -163,7 +177,3 @@ def save_animation(frames: list[Image.Image], path: Path) -> None:
         palette = small[len(small) // 2].quantize(COLOURS)
         small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
     small[0].save(path, save_all=True, append_images=small[1:], duration=round(1e3 * FRAME), loop=0)
-
-
-def _time(studio: Studio) -> float:
-    return -1.0 if studio.snapshot is None else studio.snapshot.time

@@ -26,6 +26,7 @@ from sidestep.studio.methods import THESIS_COMPONENTS, Method
 from sidestep.studio.session import Session
 
 FRAME = 1.0 / 30.0  # [s] between two snapshots
+IDLE_FRAME = 0.2  # [s] the same while the loop is paused
 UNSEEN = 2  # snapshots on their way at most; further ones are dropped until the page has taken one
 BEHIND = (
     0.1  # [s] of simulated time that is made up for; more is let go, and the loop runs slower than real time
@@ -188,7 +189,8 @@ class _Pacer:
         due = clock.perf_counter()
         while True:
             while self._connection.poll():
-                self._answer()
+                if self._answer():
+                    self._next_frame = 0.0  # shown at once
                 due = max(due, clock.perf_counter() - BEHIND)
             now = clock.perf_counter()
             if session.running:
@@ -204,7 +206,9 @@ class _Pacer:
                 due = now
             if now >= self._next_frame and self._unseen < UNSEEN:
                 self._send(now)
-            wait = min(due, self._next_frame) - clock.perf_counter() if session.running else FRAME
+            wait = (
+                min(due, self._next_frame) if session.running else self._next_frame
+            ) - clock.perf_counter()
             self._connection.poll(wait if wait > LEAST_WAIT else 0.0)
 
     def _step(self) -> None:
@@ -214,15 +218,17 @@ class _Pacer:
             self._session.running = False
             self._connection.send(m.Failed(str(error)))
 
-    def _answer(self) -> None:
+    def _answer(self) -> bool:
+        """Does one command; whether there is something new to show."""
         command = self._connection.recv()
         if isinstance(command, m.Seen):
             self._unseen -= 1
-            return
+            return False
         try:
             self._session.handle(command)
         except (ValueError, OSError) as error:
             self._connection.send(m.Failed(str(error)))
+        return True
 
     def _send(self, now: float) -> None:
         self._marks.append((now, self._session.time))
@@ -231,7 +237,9 @@ class _Pacer:
         ratio = (s1 - s0) / (t1 - t0) if t1 > t0 and s1 >= s0 else 0.0
         self._connection.send(self._session.snapshot(real_time=ratio))
         self._unseen += 1
-        self._next_frame = max(self._next_frame + FRAME, now)
+        self._next_frame = max(self._next_frame, now - FRAME) + (
+            FRAME if self._session.running else IDLE_FRAME
+        )
 
 
 def prepare_body(robot: Robot, method: Method, *, ellipsoids: int | None, tell: Any) -> Body:

@@ -75,9 +75,10 @@ class SetNumbers:
 
 @dataclass(frozen=True)
 class SetRunning:
-    """Runs or pauses the loop."""
+    """Runs or pauses the loop; it pauses by itself at simulated time `until` [s]."""
 
     running: bool
+    until: float = float("inf")
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,7 @@ class Session:
     period: float
     time: float
     running: bool
+    _until: float
     _bodies: dict[bool, Body]
     _system: GeometricSystem
     _controller: TorqueController
@@ -130,8 +131,8 @@ class Session:
                 if method is self._method:
                     self._use(method, checked)
                 self._numbers[name] = checked
-            case m.SetRunning(running):
-                self.running = running
+            case m.SetRunning(running, until):
+                self.running, self._until = running, until
             case m.SetRecording(recording):
                 self._recording = recording
                 self._rows.clear()
@@ -161,6 +162,8 @@ class Session:
             raise RuntimeError(f"the physics diverged at {self.time:.3f} s; restart")
         self.time += self.period
         self._count += 1
+        if self.time >= self._until - 0.5 * self.period:
+            self.running = False
         self._step, self._solution = step, solution
         if stage.data.ncon:
             self._contacts = stage.contacts()
@@ -253,7 +256,7 @@ class Session:
 
     def _begin(self) -> None:
         self.time, self._count, self._touched = 0.0, 0, 0
-        self.running = True
+        self.running, self._until = True, float("inf")
         self._step = self._solution = None
         self._contacts = ()
         self._times = deque(maxlen=TIMED_STEPS)

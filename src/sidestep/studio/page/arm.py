@@ -52,10 +52,14 @@ class ArmView:
                 receive_shadow=not ghost,
             )
         self._moving = [link for link in self._frames if moving[link]]
+        self._q = np.zeros(0)
         self.show(robot.neutral, every=True)
 
     def show(self, q: Array, *, every: bool = False) -> None:
         """Puts the links where they are at q (nv,)."""
+        if not every and np.array_equal(q, self._q):
+            return
+        self._q = np.array(q)
         for link in self._frames if every else self._moving:
             vector = pose_vector(self._robot.pose(q, link))
             frame = self._frames[link]

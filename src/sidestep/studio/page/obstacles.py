@@ -66,7 +66,7 @@ class _View:
     ) -> None:
         self.thing = thing
         self._send, self._on_select = send, on_select
-        self._pose = thing.start
+        self._pose = np.zeros((4, 4))
         self._grip = np.zeros(3)
         self._path: deque[tuple[float, Array]] = deque()
         name, colour = f"/obstacles/{thing.name}", colours.rgb(colours.OBSTACLE)
@@ -101,8 +101,9 @@ class _View:
         self.handle.on_click(self._clicked)
 
     def show(self, pose: Array) -> None:
-        if not np.array_equal(pose, self._pose):
-            self._pose = pose
+        if np.array_equal(pose, self._pose):
+            return
+        self._pose = pose
         vector = pose_vector(pose)
         self.handle.position, self.handle.wxyz = vector[:3], vector[3:]
 
