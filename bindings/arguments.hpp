@@ -7,6 +7,11 @@
 #include <memory>
 #include <string>
 
+namespace sidestep {
+class Robot;
+struct Body;
+}  // namespace sidestep
+
 namespace sidestep::python {
 
 namespace nb = nanobind;
@@ -33,6 +38,10 @@ Eigen::Matrix3Xd as_points(nb::handle value, const char* name);
 
 /// A matrix argument of exactly this shape.
 Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols);
+
+/// Throws std::invalid_argument if the body was fitted to another robot than this. A body made by hand, and a robot
+/// of the core without geometry, have no fingerprint and are taken as they are.
+void check_fitted_to(const Robot& robot, const Body& body);
 
 inline bool is_object(nb::handle) { return true; }
 

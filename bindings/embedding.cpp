@@ -16,10 +16,6 @@
 #include "sidestep/embedding/sum.hpp"
 
 namespace sidestep::python {
-namespace {
-
-/// Throws std::invalid_argument if the body was fitted to another robot than this. A body made by hand, and a robot
-/// of the core without geometry, have no fingerprint and are taken as they are.
 void check_fitted_to(const Robot& robot, const Body& body) {
   const auto text = [](const nb::object& owner, const char* name) {
     return nb::hasattr(owner, name) ? nb::cast<std::string>(owner.attr(name)) : std::string();
@@ -37,8 +33,6 @@ void check_fitted_to(const Robot& robot, const Body& body) {
                                 "); their kinematic structure or geometry differs");
   }
 }
-
-}  // namespace
 
 void bind_embedding(nb::module_& m) {
   nb::class_<EmbeddingEvaluation>(m, "EmbeddingEvaluation", "Values, Jacobian and curvatures of an embedding.")

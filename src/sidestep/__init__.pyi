@@ -15,7 +15,11 @@ from ._core import JointGoal as JointGoal
 from ._core import JointLimitBarrier as JointLimitBarrier
 from ._core import JointLimitPotential as JointLimitPotential
 from ._core import MotionState as MotionState
+from ._core import Obstruction as Obstruction
+from ._core import PathPlanner as PathPlanner
+from ._core import Plan as Plan
 from ._core import PlaneBarrier as PlaneBarrier
+from ._core import PlanStatus as PlanStatus
 from ._core import PoseGoal as PoseGoal
 from ._core import ProgressMonitor as ProgressMonitor
 from ._core import Recovery as Recovery

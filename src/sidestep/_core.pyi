@@ -1129,4 +1129,141 @@ class AccelerationFilter:
     def count(self, status: TorqueStatus) -> int:
         """Number of calls that ended with this status."""
 
+class PlanStatus(enum.Enum):
+    """What a search says about its result."""
+
+    found = 0
+    """There is a path."""
+
+    no_path = 1
+    """None within the budget of nodes."""
+
+    timeout = 2
+    """None within the budget of time."""
+
+    start_in_collision = 3
+    """See Plan.obstruction."""
+
+    goal_in_collision = 4
+    """See Plan.obstruction."""
+
+    invalid = 5
+    """Start or goal is outside the position limits."""
+
+class Obstruction:
+    """
+    What is in the way at an end of a motion: link, the other link of a pair, or which obstacle
+    point (-1: none), and depth [m], how far the covering ellipsoids reach into it.
+    """
+
+    @property
+    def kind(self) -> CoordinateKind: ...
+
+    @property
+    def link(self) -> str: ...
+
+    @property
+    def other(self) -> str: ...
+
+    @property
+    def point(self) -> int: ...
+
+    @property
+    def depth(self) -> float: ...
+
+    def __str__(self) -> str: ...
+
+class Plan:
+    """A path, or why there is none."""
+
+    @property
+    def status(self) -> PlanStatus: ...
+
+    @property
+    def path(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (W, nv) waypoints from start to goal, straight between them; empty unless found.
+        """
+
+    @property
+    def length(self) -> float:
+        """Sum of |dq| [rad | m]."""
+
+    @property
+    def margin(self) -> float:
+        """[m] that the path keeps, but for its ends."""
+
+    @property
+    def obstruction(self) -> Obstruction:
+        """What is in the way at a start or goal in collision."""
+
+    @property
+    def nodes(self) -> int:
+        """Of both trees."""
+
+    @property
+    def iterations(self) -> int: ...
+
+    @property
+    def search_seconds(self) -> float:
+        """[s] until a path was found, or given up."""
+
+    @property
+    def smoothing_seconds(self) -> float:
+        """[s] to make it short."""
+
+class BodyClearance:
+    """The smallest clearance of a body, and of what."""
+
+    @property
+    def clearance(self) -> float:
+        """[m], a lower bound of the distance; not above the cap."""
+
+    @property
+    def kind(self) -> CoordinateKind: ...
+
+    @property
+    def link(self) -> str:
+        """Empty where nothing is nearer than the cap."""
+
+    @property
+    def other(self) -> str:
+        """The other link of a pair."""
+
+    @property
+    def point(self) -> int:
+        """Which obstacle point; -1: none."""
+
+class PathPlanner:
+    """
+    Plans a path of a covering body among obstacle points: the straight edge if it is free, else RRT-Connect
+    (Kuffner and LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless time runs out.
+    Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.
+    robot; body: calibrated (Body.cover); pairs: names of links that must not touch, see presets.barrier_pairs.
+    margin [m]: clearance asked for at first; floor [m]: where there is no path with it. allowance [m]: how deep
+    ellipsoids, larger than links, may be in something at start and goal; fade [m]: motion within which an end's
+    smaller margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.
+    shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
+    """
+
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], margin: float = 0.02, floor: float = 0.005, allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
+
+    def plan(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, seed: int = 0) -> Plan:
+        """
+        A path from start (nv,) to goal (nv,) [rad] among the obstacles where they are now.
+        """
+
+    def clearance(self, q: numpy.typing.ArrayLike, obstacles: Obstacles, *, cap: float = 1.0) -> BodyClearance:
+        """The smallest clearance at q (nv,), not above cap [m], and of what."""
+
+    def is_free(self, q: numpy.typing.ArrayLike, obstacles: Obstacles, *, margin: float | None = None) -> bool:
+        """
+        Whether everything keeps the margin [m] (by default the planner's) at q (nv,).
+        """
+
+    def is_edge_free(self, a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, obstacles: Obstacles, *, margin: float | None = None) -> bool:
+        """
+        Whether everything keeps the margin [m], less the slack, everywhere on the straight edge from a to b (nv,).
+        """
+
 __version__: str

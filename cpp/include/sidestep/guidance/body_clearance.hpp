@@ -1,0 +1,173 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sidestep/body/body.hpp"
+#include "sidestep/embedding/embedding.hpp"
+#include "sidestep/embedding/body_ellipsoid.hpp"
+#include "sidestep/kinematics/robot.hpp"
+#include "sidestep/obstacles/point_index.hpp"
+
+namespace sidestep {
+
+/// A plane that links must not cross: `normal` points to the free side, in the world.
+struct KeptPlane {
+  Eigen::Vector3d point;
+  Eigen::Vector3d normal;
+  std::vector<std::string> links;
+};
+
+/// How far every item (see BodyClearance) must keep off at a configuration.
+///
+/// The margin is asked for at every configuration that is looked at, margin − slack is kept everywhere between them.
+/// Near an end of the motion where an item is nearer than the margin, by the deficit δ, it may be as near:
+///
+///     margin(q) = margin − max over ends of δ_end · max(0, 1 − motion(q − q_end) / fade),
+///
+/// with motion() the bound of how far the item moves, see BodyClearance::motions().
+struct Margins {
+  struct End {
+    Eigen::VectorXd q;         ///< (nv)
+    Eigen::VectorXd deficits;  ///< δ of every item [m], zero where the margin holds
+  };
+
+  double margin = 0.02;   ///< [m]
+  double slack = 0.002;   ///< [m], positive: smaller costs more
+  double fade = 0.3;      ///< [m], positive
+  std::vector<End> ends;  ///< those with a deficit
+};
+
+/// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no derivative.
+///
+/// What must keep apart are items: a link and the obstacles, a link and a plane, two links. The clearances are those of
+/// ClearanceBarrier, PlaneBarrier and SelfCollisionBarrier, without the mean over points: lower bounds of the distances.
+///
+/// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): no point of an item moves farther than
+///
+///     motion(Δq) = Σ_i |Δq_i| R_i,
+///
+/// R_i the largest distance that the item can have from the axis of joint i. An interval of an edge is free if the clearance
+/// in its middle exceeds the motion to its ends, and is halved where that is not so.
+class BodyClearance {
+ public:
+  /// `pairs` name links as for SelfCollisionBarrier. Throws std::invalid_argument if the body is not calibrated or no
+  /// joint moves it, a name is unknown, a prismatic joint has no limits, or there are more than `max_items` items.
+  BodyClearance(Robot robot, const Body& body, const std::vector<std::pair<std::string, std::string>>& pairs = {},
+                const std::vector<KeptPlane>& planes = {});
+
+  static constexpr int max_items = 256;
+
+  const Robot& robot() const noexcept { return robot_; }
+  int num_items() const noexcept { return static_cast<int>(items_.size()); }
+  /// What an item is: kind, link, and the other link.
+  const CoordinateLabel& label(int item) const noexcept { return items_[static_cast<std::size_t>(item)].label; }
+
+  /// What changes in a query; one per thread.
+  class Workspace {
+   public:
+    explicit Workspace(const BodyClearance& body);
+
+   private:
+    friend class BodyClearance;
+    struct Pose {
+      Eigen::Matrix3d R;
+      Eigen::Vector3d p;
+    };
+    struct Interval {
+      double middle, half;
+      std::array<std::uint64_t, max_items / 64> open;  // items that are not decided on it
+    };
+    std::vector<Pose> poses_;
+    std::vector<Interval> intervals_;
+    std::vector<double> motions_;
+    Eigen::VectorXd q_, difference_;
+    int last_ = 0;  // the item that was in the way last: it is looked at first
+  };
+
+  /// The smallest clearance of all items, not above `cap` [m].
+  struct Nearest {
+    double clearance;
+    int item = -1;   ///< -1: all are as far as `cap`
+    int point = -1;  ///< which obstacle point, for an item of obstacles
+  };
+  Nearest nearest(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w) const noexcept;
+
+  /// The clearance of every item, not above `cap` [m], into out (num_items).
+  void clearances(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w,
+                  Eigen::Ref<Eigen::VectorXd> out) const noexcept;
+
+  /// Whether every item keeps its margin at q. Ends at the first that does not.
+  bool free(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, const Margins& margins,
+            Workspace& w) const noexcept;
+
+  /// Whether every item keeps its margin, less the slack, everywhere on the straight edge from a to b.
+  bool edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b, const PointIndex& points,
+                 const Margins& margins, Workspace& w) const noexcept;
+
+  /// How far a point of `item` can move, relative to what it keeps off, for a displacement of the joints [m].
+  double motion(int item, Eigen::Ref<const Eigen::VectorXd> displacement) const noexcept {
+    return items_[static_cast<std::size_t>(item)].reach.dot(displacement.cwiseAbs());
+  }
+
+  /// R of every coordinate, of the item that moves most: (nv) [m], or 1 for a prismatic joint.
+  const Eigen::VectorXd& reach() const noexcept { return reach_; }
+
+ private:
+  struct Ellipsoid {
+    Eigen::Vector3d mean;
+    Eigen::Matrix3d axes_T;      // rotates into the principal axes, of the joint's child
+    Eigen::Vector3d precisions;  // 1 / semi-axis²
+    Eigen::Matrix3d shape;
+    double extent;
+  };
+  struct Link {
+    std::string name;
+    int joint;
+    std::vector<Ellipsoid> ellipsoids;
+    Eigen::Vector3d centre;  // of a ball around them
+    double radius;
+  };
+  struct Item {
+    CoordinateLabel label;
+    int link, other = -1;    // links_; other: of a pair
+    int plane = -1;          // planes_
+    Eigen::VectorXd reach;   // R of every coordinate
+  };
+  struct Plane {
+    Eigen::Vector3d normal;
+    double offset;
+  };
+  struct Found {
+    double clearance;
+    int point;
+  };
+
+  int add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name);
+  void add_reach(Eigen::VectorXd& reach, const Link& link, int end) const;
+  void place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept;
+  const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
+  // The clearance of an item, not above `cap`; ends early, with what it found, below `stop`.
+  Found look(const Item& item, const PointIndex& points, double cap, double stop, const Workspace& w) const noexcept;
+  Found look_at_points(const Link& link, const PointIndex& points, double cap, double stop,
+                       const Workspace& w) const noexcept;
+  double look_at_pair(const Link& a, const Link& b, double cap, double stop, const Workspace& w) const noexcept;
+  double look_at_plane(const Link& link, const Plane& plane, double cap, const Workspace& w) const noexcept;
+  double margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, const Margins& margins, double& slope) const noexcept;
+
+  Robot robot_;
+  std::vector<Link> links_;
+  std::vector<Plane> planes_;
+  std::vector<Item> items_;
+  Eigen::VectorXd reach_;
+  struct Rotation {
+    Eigen::Matrix3d fixed, cosine, sine;  // as in KinematicState
+  };
+  std::vector<Rotation> rotations_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+
+#include "sidestep/guidance/body_clearance.hpp"
+#include "sidestep/guidance/plan.hpp"
+#include "sidestep/guidance/random_stream.hpp"
+#include "sidestep/guidance/search_tree.hpp"
+
+namespace sidestep {
+
+struct PlannerSettings {
+  double margin = 0.02;     ///< clearance asked for at first [m]
+  double floor = 0.005;     ///< clearance asked for where there is no path with the margin [m]
+  double allowance = 0.02;  ///< how deep the ellipsoids may be in something at start or goal, as they are larger than links [m]
+  double slack = 0.002;     ///< see Margins [m]
+  double fade = 0.3;        ///< see Margins [m]
+  double range = 1.5;       ///< longest edge of the trees [rad | m]
+  int max_nodes = 10000;    ///< of both trees
+  int max_iterations = 40000;
+  double max_seconds = std::numeric_limits<double>::infinity();
+  int shortcuts = 40;       ///< attempts to shorten a path
+
+  /// Throws std::invalid_argument that names the setting at fault.
+  void validate() const;
+};
+
+/// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
+/// LaValle 2000), shortened. Deterministic in (start, goal, points, seed) unless the time runs out.
+///
+/// Margins shrink in two ways, both stated in the plan: where no path keeps `margin`, one that keeps `floor` is searched
+/// for; and near start and goal every link may be as near to things as it is there, see Margins. A link deeper than
+/// `allowance` inside something at an end is refused as in collision.
+class RrtConnect {
+ public:
+  /// The body must outlive the planner, which is mutable: one per thread.
+  RrtConnect(const BodyClearance& body, const PlannerSettings& settings);
+
+  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points, std::uint64_t seed);
+
+  const PlannerSettings& settings() const noexcept { return settings_; }
+  const BodyClearance& body() const noexcept { return *body_; }
+  BodyClearance::Workspace& workspace() noexcept { return workspace_; }
+
+  /// The margins between two ends: of this distance, and less where an end asks for less.
+  Margins margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points);
+
+ private:
+  enum class Growth { trapped, advanced, reached };
+
+  bool obstructed(const Eigen::VectorXd& q, const PointIndex& points, Obstruction& obstruction);
+  void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
+              const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
+  Growth grow(SearchTree& tree, const Eigen::VectorXd& target, const PointIndex& points, const Margins& margins);
+
+  const BodyClearance* body_;
+  PlannerSettings settings_;
+  BodyClearance::Workspace workspace_;
+  SearchTree from_start_, from_goal_;
+  Eigen::VectorXd sample_, next_, near_;
+};
+
+}  // namespace sidestep

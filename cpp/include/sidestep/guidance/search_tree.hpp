@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace sidestep {
+
+/// A tree of configurations with the nearest of them found by a scan, which at some thousands of nodes is as fast as an
+/// index. Room is taken once.
+class SearchTree {
+ public:
+  SearchTree(int num_coordinates, int capacity);
+
+  void clear() noexcept { size_ = 0; }
+  int size() const noexcept { return size_; }
+  bool full() const noexcept { return size_ == capacity_; }
+
+  /// Adds a node below `parent` (−1: the root) and returns its number. The tree must not be full.
+  int add(const Eigen::VectorXd& q, int parent) noexcept;
+
+  /// The node with the least |q − node|. The tree must not be empty.
+  int nearest(const Eigen::VectorXd& q) noexcept;
+
+  auto node(int k) const noexcept { return nodes_.col(k); }
+  int parent(int k) const noexcept { return parents_[static_cast<std::size_t>(k)]; }
+
+ private:
+  int size_ = 0, capacity_;
+  Eigen::MatrixXd nodes_;                                              // (nv × capacity)
+  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> coordinates_;    // (capacity × nv): a run per coordinate, for the scan
+  Eigen::ArrayXf distances_;
+  std::vector<int> parents_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,200 @@
+#include "sidestep/guidance/rrt_connect.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "sidestep/guidance/path_smoothing.hpp"
+#include "sidestep/guidance/random_stream.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
+constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
+
+double seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::vector<Eigen::VectorXd> to_root(const SearchTree& tree, int node) {
+  std::vector<Eigen::VectorXd> way;
+  for (; node >= 0; node = tree.parent(node)) {
+    way.emplace_back(tree.node(node));
+  }
+  return way;
+}
+
+}  // namespace
+
+void PlannerSettings::validate() const {
+  const auto positive = [](double value, const char* what) {
+    if (!(value > 0.0)) {
+      throw std::invalid_argument(std::string("planner: ") + what + " is " + std::to_string(value) + ", must be positive");
+    }
+  };
+  positive(slack, "slack");
+  positive(fade, "fade");
+  positive(range, "range");
+  positive(max_seconds, "max_seconds");
+  positive(max_nodes - 1.0, "max_nodes less one");
+  positive(max_iterations, "max_iterations");
+  if (!(floor >= 0.0) || !(margin >= floor) || !std::isfinite(margin)) {
+    throw std::invalid_argument("planner: floor is " + std::to_string(floor) + " m and margin " + std::to_string(margin) +
+                                " m; 0 <= floor <= margin is needed");
+  }
+  if (!(allowance >= 0.0) || !std::isfinite(allowance)) {
+    throw std::invalid_argument("planner: allowance is " + std::to_string(allowance) + " m, must be finite and >= 0");
+  }
+  if (shortcuts < 0) {
+    throw std::invalid_argument("planner: shortcuts is " + std::to_string(shortcuts) + ", must not be negative");
+  }
+}
+
+RrtConnect::RrtConnect(const BodyClearance& body, const PlannerSettings& settings)
+    : body_(&body),
+      settings_(settings),
+      workspace_(body),
+      from_start_(body.robot().num_coordinates(), settings.max_nodes),
+      from_goal_(body.robot().num_coordinates(), settings.max_nodes),
+      sample_(body.robot().num_coordinates()),
+      next_(body.robot().num_coordinates()),
+      near_(body.robot().num_coordinates()) {
+  settings_.validate();
+}
+
+bool RrtConnect::obstructed(const Eigen::VectorXd& q, const PointIndex& points, Obstruction& obstruction) {
+  const BodyClearance::Nearest nearest = body_->nearest(q, points, -settings_.allowance, workspace_);
+  if (nearest.item < 0) {
+    return false;
+  }
+  obstruction = {body_->label(nearest.item), nearest.point, -nearest.clearance};
+  return true;
+}
+
+Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
+                            const PointIndex& points) {
+  Margins margins{distance, settings_.slack, settings_.fade, {}};
+  for (const Eigen::VectorXd* q : {&start, &goal}) {
+    Eigen::VectorXd clearances(body_->num_items());
+    body_->clearances(*q, points, distance, workspace_, clearances);
+    const Eigen::VectorXd deficits =
+        (clearances.array() < distance).select(distance + touching - clearances.array(), 0.0);
+    if (deficits.maxCoeff() > 0.0) {
+      margins.ends.push_back({*q, deficits});
+    }
+  }
+  return margins;
+}
+
+Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
+                      std::uint64_t seed) {
+  const double begin = seconds(), deadline = begin + settings_.max_seconds;
+  Plan plan;
+  const JointLimits& limits = body_->robot().limits();
+  for (const Eigen::VectorXd* q : {&start, &goal}) {
+    if (q->size() != body_->robot().num_coordinates() || !q->allFinite() ||
+        ((*q - limits.lower).array() < -limit_rounding).any() || ((limits.upper - *q).array() < -limit_rounding).any()) {
+      return plan;
+    }
+  }
+  if (obstructed(start, points, plan.obstruction)) {
+    plan.status = PlanStatus::start_in_collision;
+    return plan;
+  }
+  if (obstructed(goal, points, plan.obstruction)) {
+    plan.status = PlanStatus::goal_in_collision;
+    return plan;
+  }
+
+  RandomStream random(seed);
+  plan.status = PlanStatus::no_path;
+  Margins kept;
+  // The margin may cost the path: a quarter of the budget is spent on it, the rest on what the floor allows.
+  const bool twice = settings_.floor < settings_.margin;
+  for (int attempt = 0; attempt < (twice ? 2 : 1) && plan.status == PlanStatus::no_path; ++attempt) {
+    plan.margin = attempt == 0 ? settings_.margin : settings_.floor;
+    kept = margins(plan.margin, start, goal, points);
+    if (body_->edge_free(start, goal, points, kept, workspace_)) {
+      plan.path.resize(start.size(), 2);
+      plan.path << start, goal;
+      plan.status = PlanStatus::found;
+    } else {
+      const int budget = twice && attempt == 0 ? settings_.max_iterations / 4 : settings_.max_iterations;
+      search(start, goal, points, kept, budget, deadline, random, plan);
+    }
+  }
+  plan.search_seconds = seconds() - begin;
+  if (plan.status == PlanStatus::found && plan.path.cols() > 2) {
+    plan.path = shorten(plan.path, *body_, points, kept, settings_.shortcuts, random, workspace_);
+    plan.smoothing_seconds = seconds() - begin - plan.search_seconds;
+  }
+  return plan;
+}
+
+void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
+                        const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan) {
+  from_start_.clear();
+  from_goal_.clear();
+  from_start_.add(start, -1);
+  from_goal_.add(goal, -1);
+  const JointLimits& limits = body_->robot().limits();
+  // A joint without limits is searched a turn to either side of the two ends.
+  const Eigen::VectorXd low = limits.lower.cwiseMax((start.cwiseMin(goal).array() - 2.0 * pi).matrix());
+  const Eigen::VectorXd high = limits.upper.cwiseMin((start.cwiseMax(goal).array() + 2.0 * pi).matrix());
+  SearchTree *one = &from_start_, *other = &from_goal_;
+  const int nodes_before = plan.nodes;
+  for (int i = 0; i < iterations && !one->full() && !other->full(); ++i) {
+    ++plan.iterations;
+    plan.nodes = nodes_before + one->size() + other->size();
+    if (seconds() > deadline) {
+      plan.status = PlanStatus::timeout;
+      return;
+    }
+    for (Eigen::Index k = 0; k < sample_.size(); ++k) {
+      sample_[k] = random.uniform(low[k], high[k]);
+    }
+    if (grow(*one, sample_, points, margins) != Growth::trapped) {
+      const Eigen::VectorXd target = one->node(one->size() - 1);
+      Growth growth = Growth::advanced;
+      while (growth == Growth::advanced && !other->full()) {
+        growth = grow(*other, target, points, margins);
+      }
+      if (growth == Growth::reached) {
+        std::vector<Eigen::VectorXd> way = to_root(from_start_, from_start_.size() - 1);
+        std::reverse(way.begin(), way.end());
+        const std::vector<Eigen::VectorXd> rest = to_root(from_goal_, from_goal_.size() - 1);
+        way.insert(way.end(), rest.begin() + 1, rest.end());  // the two trees share the node where they met
+        plan.path.resize(start.size(), static_cast<Eigen::Index>(way.size()));
+        for (std::size_t k = 0; k < way.size(); ++k) {
+          plan.path.col(static_cast<Eigen::Index>(k)) = way[k];
+        }
+        plan.nodes = nodes_before + one->size() + other->size();
+        plan.status = PlanStatus::found;
+        return;
+      }
+    }
+    std::swap(one, other);
+  }
+}
+
+RrtConnect::Growth RrtConnect::grow(SearchTree& tree, const Eigen::VectorXd& target, const PointIndex& points,
+                                    const Margins& margins) {
+  const int nearest = tree.nearest(target);
+  near_ = tree.node(nearest);
+  const double distance = (target - near_).norm();
+  const bool whole = distance <= settings_.range;
+  next_ = whole ? target : near_ + settings_.range / distance * (target - near_);
+  if (!body_->free(next_, points, margins, workspace_) ||
+      !body_->edge_free(near_, next_, points, margins, workspace_)) {
+    return Growth::trapped;
+  }
+  tree.add(next_, nearest);
+  return whole ? Growth::reached : Growth::advanced;
+}
+
+}  // namespace sidestep

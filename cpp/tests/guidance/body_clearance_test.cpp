@@ -1,0 +1,184 @@
+// Clearances against those of the barriers' field, and edges against a dense scan.
+#include "sidestep/guidance/body_clearance.hpp"
+
+#include <boost/test/unit_test.hpp>
+#include <limits>
+
+#include "sidestep/embedding/clearance_barrier.hpp"
+#include "sidestep/embedding/self_collision_barrier.hpp"
+#include "support/allocations.hpp"
+#include "support/random_scene.hpp"
+
+using namespace sidestep;
+using test::Random;
+
+namespace {
+
+Body calibrated(Random& random, const Robot& robot, double size) {
+  Body body = test::random_body(random, robot);
+  for (Eigen::Matrix3d& covariance : body.covariances) {
+    covariance *= size;
+  }
+  return Body(body.links, body.weights, body.means, body.covariances, Eigen::VectorXd::Ones(body.num_components()));
+}
+
+const Margins none{0.0, 0.002, 0.3, {}};
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(agrees_with_the_barriers_clearances) {
+  Random random(1);
+  for (int trial = 0; trial < 60; ++trial) {
+    const Robot robot = test::random_tree(random, 6);
+    const Body body = calibrated(random, robot, 0.05);
+    const std::vector<std::pair<std::string, std::string>> pairs{{"link0", "link5"}, {"link1", "link4"}};
+    const KeptPlane plane{Eigen::Vector3d(0.0, 0.0, -1.0), Eigen::Vector3d(0.1, 0.2, 1.0), {"link3", "link5"}};
+    const BodyClearance checked(robot, body, pairs, {plane});
+    BodyClearance::Workspace w(checked);
+    const Obstacles obstacles(2.0 * random.matrix(3, 40), Eigen::VectorXd::Constant(40, 0.01), Eigen::Matrix3Xd::Zero(3, 40));
+    const PointIndex points(obstacles);
+    const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
+    Eigen::VectorXd found(checked.num_items());
+    constexpr double cap = 5.0;
+    checked.clearances(q, points, cap, w, found);
+
+    // A temperature so low that the mean over points is their least, but for rounding of exponentials.
+    constexpr double cold = 1e-6;
+    const BarrierFunction f{cap, 1.0, 2.0, 0.002};
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(robot.num_coordinates());
+    const auto by_link = [&](const Embedding& e, CoordinateLabel::Kind kind, bool tight) {
+      const EmbeddingEvaluation values = evaluate(e, q, rest, obstacles);
+      for (int i = 0; i < checked.num_items(); ++i) {
+        if (checked.label(i).kind != kind) {
+          continue;
+        }
+        double least = cap;
+        for (int k = 0; k < e.num_coordinates(); ++k) {
+          if (e.label(k).name == checked.label(i).name && e.label(k).other == checked.label(i).other) {
+            least = std::min(least, values.clearances.values[k]);
+          }
+        }
+        BOOST_TEST(found[i] >= least - 1e-6);  // the mean lies above the least by less than the temperature
+        if (tight || least < 0.0) {
+          BOOST_TEST(std::abs(found[i] - least) < 1e-5);
+        }
+      }
+    };
+    by_link(SelfCollisionBarrier(robot, body, pairs, f, cold), CoordinateLabel::Kind::self, true);
+    by_link(PlaneBarrier(robot, body, plane.point, plane.normal, plane.links, f, cold), CoordinateLabel::Kind::plane, true);
+    // Of points the better of two lower bounds counts: never less than the field's.
+    by_link(ClearanceBarrier(robot, body, f, cold), CoordinateLabel::Kind::obstacle, false);
+    BOOST_TEST(std::abs(checked.nearest(q, points, cap, w).clearance - found.minCoeff()) < 1e-12);  // rounding
+    BOOST_TEST(checked.free(q, points, none, w) == (found.minCoeff() >= 0.0));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(no_point_moves_farther_than_the_bound) {
+  Random random(2);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Robot robot = test::random_tree(random, 6);
+    const Body body = calibrated(random, robot, 0.05);
+    const BodyClearance checked(robot, body);
+    BodyClearance::Workspace w(checked);
+    const int nv = robot.num_coordinates();
+    const Eigen::VectorXd a = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
+    const Eigen::VectorXd b = (a + 0.2 * random.vector(nv)).cwiseMax(-3.0).cwiseMin(3.0);
+    const Obstacles obstacles(2.0 * random.matrix(3, 3), Eigen::VectorXd::Zero(3), Eigen::Matrix3Xd::Zero(3, 3));
+    const PointIndex points(obstacles);
+    Eigen::VectorXd at_a(checked.num_items()), at_b(checked.num_items());
+    checked.clearances(a, points, 10.0, w, at_a);
+    checked.clearances(b, points, 10.0, w, at_b);
+    for (int i = 0; i < checked.num_items(); ++i) {
+      if (at_a[i] > 0.0 && at_b[i] > 0.0) {  // a signed lower bound may change faster inside
+        // the clearance is a lower bound of a distance, off by no more than a part of it
+        BOOST_TEST(at_b[i] <= 1e-9 + checked.motion(i, b - a) + 10.0 * at_a[i]);
+      }
+    }
+    // The bound itself, by the frames' origins, which lie within the links' balls for a body around them.
+    KinematicState state_a(robot), state_b(robot);
+    state_a.update(robot, a, Eigen::VectorXd::Zero(nv));
+    state_b.update(robot, b, Eigen::VectorXd::Zero(nv));
+    for (int i = 0; i < checked.num_items(); ++i) {
+      const int frame = robot.frame_index(checked.label(i).name);
+      for (int k = 0; k < body.num_components(); ++k) {
+        if (body.links[static_cast<std::size_t>(k)] == checked.label(i).name) {
+          const Eigen::Vector3d moved = frame_pose(robot, state_b, frame) * Eigen::Vector3d(body.means.col(k)) -
+                                        frame_pose(robot, state_a, frame) * Eigen::Vector3d(body.means.col(k));
+          BOOST_TEST(moved.norm() <= checked.motion(i, b - a) + 1e-12);  // rounding
+        }
+      }
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
+  Random random(3);
+  int free = 0, blocked = 0, thin = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const Robot robot = test::random_tree(random, 5);
+    const BodyClearance checked(robot, calibrated(random, robot, 0.01), {{"link0", "link4"}});
+    BodyClearance::Workspace w(checked);
+    const int nv = robot.num_coordinates();
+    const Eigen::VectorXd a = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
+    const Eigen::VectorXd b = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
+    const int num = random.integer(1, 12);
+    const PointIndex points(
+        Obstacles(0.7 * random.matrix(3, num), Eigen::VectorXd::Zero(num), Eigen::Matrix3Xd::Zero(3, num)));
+    const Margins margins{0.01, 0.002, 0.3, {}};
+    double least = std::numeric_limits<double>::infinity();
+    int below = 0;
+    constexpr int samples = 2000;
+    for (int k = 0; k <= samples; ++k) {
+      const Eigen::VectorXd q = a + (b - a) * k / samples;
+      const double clearance = checked.nearest(q, points, 1.0, w).clearance;
+      below += clearance < margins.margin - margins.slack;
+      least = std::min(least, clearance);
+    }
+    const bool said = checked.edge_free(a, b, points, margins, w);
+    if (said) {
+      ++free;
+      BOOST_TEST(least >= margins.margin - margins.slack);
+    } else {
+      ++blocked;
+      thin += below > 0 && below < samples / 50;
+      // what is refused comes nearer than the margin somewhere, and a scan this fine comes as near within its step
+      BOOST_TEST(least < margins.margin + checked.reach().dot((b - a).cwiseAbs()) / samples);
+    }
+  }
+  BOOST_TEST(free > 30);
+  BOOST_TEST(blocked > 30);
+  BOOST_TEST(thin > 3);  // obstacles that samples 50 times coarser would have stepped over
+}
+
+BOOST_AUTO_TEST_CASE(margins_ease_at_an_end_and_only_there) {
+  Random random(4);
+  const Robot robot = test::random_tree(random, 4);
+  const BodyClearance checked(robot, calibrated(random, robot, 0.02));
+  BodyClearance::Workspace w(checked);
+  const Eigen::VectorXd q = Eigen::VectorXd::Constant(robot.num_coordinates(), 0.3);
+  const Obstacles obstacles(random.matrix(3, 1), Eigen::VectorXd::Zero(1), Eigen::Matrix3Xd::Zero(3, 1));
+  const PointIndex points(obstacles);
+  const double clearance = checked.nearest(q, points, 10.0, w).clearance;
+  Margins margins{clearance + 0.01, 0.002, 0.3, {}};
+  BOOST_TEST(!checked.free(q, points, margins, w));
+  margins.ends = {{q, Eigen::VectorXd::Constant(checked.num_items(), 0.0101)}};
+  BOOST_TEST(checked.free(q, points, margins, w));
+  margins.ends[0].q.array() += 1.0;  // far away: nothing is eased
+  BOOST_TEST(!checked.free(q, points, margins, w));
+}
+
+BOOST_AUTO_TEST_CASE(queries_allocate_nothing) {
+  Random random(5);
+  const Robot robot = test::random_tree(random, 6);
+  const BodyClearance checked(robot, calibrated(random, robot, 0.02), {{"link0", "link5"}});
+  BodyClearance::Workspace w(checked);
+  const PointIndex points(test::random_obstacles(random, 50));
+  const Eigen::VectorXd a = random.vector(robot.num_coordinates()), b = -a;
+  int answers = 0;
+  const std::size_t allocations = test::allocations_of([&] {
+    answers += checked.free(a, points, none, w) + checked.edge_free(a, b, points, none, w);
+    answers += checked.nearest(a, points, 1.0, w).item >= 0;
+  });
+  BOOST_TEST(answers >= 0);
+  BOOST_TEST(allocations == 0);
+}
