@@ -251,3 +251,15 @@ def test_a_cache_that_cannot_be_written_is_no_failure(
     monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path / "file"))
     with pytest.warns(RuntimeWarning):
         assert Body.fit(planar, components=1, samples=SAMPLES).num_components >= 2
+
+
+def test_a_body_serves_a_robot_whose_joints_are_locked_elsewhere() -> None:
+    closed, opened = (Robot.named("panda", locked={"panda_finger_joint1": at}) for at in (0.0, 0.03))
+    body = Body.fit(closed, components=1, samples=SAMPLES, cache=False)
+    moved = body.for_robot(opened, source=closed)
+    assert equal(moved, body)
+    assert moved.fingerprint == opened.fingerprint != body.fingerprint
+    with pytest.raises(ValueError, match="not to 'panda' as it is"):
+        body.for_robot(closed, source=opened)
+    with pytest.raises(ValueError, match="has no link 'panda_link0'"):
+        body.for_robot(Robot.named("planar2"), source=closed)

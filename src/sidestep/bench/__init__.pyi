@@ -19,3 +19,7 @@ from .problems import Workspace as Workspace
 from .reach import BenchResult as BenchResult
 from .reach import BenchSettings as BenchSettings
 from .reach import run_bench as run_bench
+from .scenes import SceneOutcome as SceneOutcome
+from .scenes import SceneResult as SceneResult
+from .scenes import SceneSettings as SceneSettings
+from .scenes import run_scenes as run_scenes

@@ -5,15 +5,24 @@ from __future__ import annotations
 from sidestep import presets
 from sidestep._core import GeometricSystem
 from sidestep.bench.method import Method
+from sidestep.body import Body
 from sidestep.robot import Robot
 
 
-def build_system(method: Method, robot: Robot) -> GeometricSystem:
-    """The system of a method for a robot; bodies come from the user's cache or are made now."""
+def build_body(method: Method, robot: Robot) -> Body:
+    """The body that a method needs, from the user's cache or made now."""
+    if method.safe:
+        return Body.cover(robot)
+    return Body.fit(robot, components=presets.Thesis().components)
+
+
+def build_system(method: Method, robot: Robot, body: Body | None = None) -> GeometricSystem:
+    """The system of a method for a robot; by default with the body of `build_body`."""
+    body = build_body(method, robot) if body is None else body
     match method:
         case Method.thesis:
-            return presets.thesis_system(robot)
+            return presets.thesis_system(robot, body)
         case Method.unswitched:
-            return presets.thesis_system(robot, switched=False)
+            return presets.thesis_system(robot, body, switched=False)
         case Method.barrier:
-            return presets.barrier_system(robot)
+            return presets.barrier_system(robot, body)

@@ -58,6 +58,7 @@ class Motion:
         contacts: of MuJoCo, 0 without physics.
         arrived: within the duration.
         step_seconds: wall time [s] of steps: of the system alone, or with torque control of both from Python.
+        planning_seconds: wall time [s] until the first path, None for a method that plans none.
     """
 
     q: Array
@@ -68,6 +69,17 @@ class Motion:
     contacts: int
     arrived: bool
     step_seconds: Array
+    planning_seconds: float | None = None
+
+    @property
+    def first_motion_seconds(self) -> float:
+        """Wall time [s] from the request to the first command."""
+        return float(self.step_seconds[0])
+
+    @property
+    def path_length(self) -> float:
+        """Sum of |dq| [rad | m], Euclidean, up to the end."""
+        return float(np.linalg.norm(np.diff(self.q, axis=0), axis=1).sum())
 
 
 def move(robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings) -> Motion:

@@ -206,6 +206,35 @@ class Body(_core.Body):
         """
         return cls._from_contents(body_file.read(path, robot))
 
+    def for_robot(self, robot: Robot, *, source: Robot) -> Body:
+        """This body for a robot with the same links in other places: fingers that are locked more open, say.
+
+        Args:
+            robot: what it is for. source: what it was fitted to.
+
+        Raises:
+            ValueError: it was fitted to something else than `source`, or a link's geometry differs.
+        """
+        if self.fingerprint != source.fingerprint:
+            raise ValueError(
+                f"the body was fitted to robot '{self.robot_name}', not to '{source.name}' as it is"
+            )
+        for name in dict.fromkeys(self.links):
+            if not robot.link(name).same_geometry(source.link(name)):
+                raise ValueError(f"link {name!r} has another geometry in robot '{robot.name}'")
+        return Body(
+            links=self.links,
+            weights=self.weights,
+            means=self.means,
+            covariances=self.covariances,
+            levels=self.levels,
+            robot_name=robot.name,
+            fingerprint=robot.fingerprint,
+            settings=self.settings,
+            link_fits=self.link_fits,
+            link_covers=self.link_covers,
+        )
+
     @classmethod
     def _from_contents(cls, contents: body_file.BodyContents) -> Body:
         return cls(

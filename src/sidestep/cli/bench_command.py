@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from sidestep.bench.method import Method
+from sidestep.cli.bench_scenes_command import motion_bench_maker
 from sidestep.cli.output import console, write_json
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from sidestep.bench import BenchResult, BenchSettings, ReachProblem
-
-app = typer.Typer(help="Benchmarks on random problems.", no_args_is_help=True)
-
-
-@app.callback()
-def _bench() -> None:
-    pass  # keeps `reach` a command of its own
+app = typer.Typer(help="Benchmarks on random and on published problems.", no_args_is_help=True)
+app.command("motionbenchmaker")(motion_bench_maker)
 
 
 @app.command("reach")
@@ -64,8 +56,10 @@ def reach(
         ProblemSettings,
         default_jobs,
         read_problems,
+        run_bench,
         write_problems,
     )
+    from sidestep.cli.bench_progress import with_bar
 
     given = None if problems_file is None else read_problems(problems_file)
     settings = BenchSettings(
@@ -78,7 +72,8 @@ def reach(
         jobs=jobs or default_jobs(),
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    result = _run_and_show(settings, given, terminal)
+    title = f"{settings.problems.robot} {method.value}"
+    result = with_bar(terminal, title, lambda show: run_bench(settings, problems=given, progress=show))
     document = result.to_document(failures=failures)
     if export is not None:
         write_problems(export, result.problems)
@@ -90,31 +85,6 @@ def reach(
         write_json(document, json)
     clean = not (document["collision"] or document["self_collision"] or document["limit_violations"])
     raise typer.Exit(0 if clean else 1)
-
-
-def _run_and_show(
-    settings: BenchSettings, given: tuple[ReachProblem, ...] | None, terminal: Console
-) -> BenchResult:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from sidestep.bench import run_bench
-
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=24),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("[dim]{task.fields[last]}"),
-        console=terminal,
-        transient=True,
-    )
-    with bar:
-        task = bar.add_task(f"{settings.problems.robot} {settings.method.value}", total=None, last="")
-
-        def show(done: int, in_all: int, last: str) -> None:
-            bar.update(task, completed=done, total=in_all, last=last)
-
-        return run_bench(settings, problems=given, progress=show)
 
 
 def _table(document: dict[str, Any]) -> object:

@@ -95,6 +95,15 @@ class Link:
         """The link's collision geometry or, where it has none, its visual geometry."""
         return self.collisions or self.visuals
 
+    def same_geometry(self, other: Link) -> bool:
+        """Whether another link has the same shapes at the same places."""
+        return len(self.geometries) == len(other.geometries) and all(
+            (a.kind, a.size, a.path) == (b.kind, b.size, b.path)
+            and np.array_equal(a.placement, b.placement)
+            and np.array_equal(a.scale, b.scale)
+            for a, b in zip(self.geometries, other.geometries, strict=True)
+        )
+
 
 @lru_cache(maxsize=256)
 def _file_mesh(path: Path) -> trimesh.Trimesh:

@@ -1,7 +1,7 @@
 """Physics, exact clearance, and what a run achieved."""
 
-from sidestep.simulation.body_clearance import BodyClearance
 from sidestep.simulation.clearance import Clearance, ExactClearance, PathClearance
+from sidestep.simulation.ellipsoid_clearance import EllipsoidClearance
 from sidestep.simulation.evaluation import Evaluation, LimitViolations, evaluate
 from sidestep.simulation.kinematic import run_kinematically
 from sidestep.simulation.model import SimulationModel, build_model
@@ -12,9 +12,9 @@ from sidestep.simulation.simulation import Simulation
 
 __all__ = [
     "Arrival",
-    "BodyClearance",
     "Clearance",
     "Contact",
+    "EllipsoidClearance",
     "Evaluation",
     "ExactClearance",
     "KinematicRun",

@@ -18,7 +18,7 @@ from sidestep.simulation.solid import object_solid
 Array = npt.NDArray[np.float64]
 
 
-class BodyClearance:
+class EllipsoidClearance:
     """Signed distance between the ellipsoids of a calibrated body and solids, by Coal.
 
     Beside `ExactClearance` it says what the cover costs: their difference is its overshoot towards the scene.

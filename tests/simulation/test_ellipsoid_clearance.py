@@ -7,7 +7,7 @@ import pytest
 
 from sidestep import Body, Robot, SceneObject, planar_arm
 from sidestep.pose import pose_at
-from sidestep.simulation import BodyClearance
+from sidestep.simulation import EllipsoidClearance
 
 SEMI_AXES = np.array([0.3, 0.05, 0.02])
 
@@ -37,7 +37,7 @@ def test_distance_along_an_axis(arm: tuple[Robot, Body], turn: float, height: fl
     box = SceneObject("box", "box", size=(0.1, 0.1, 0.1), pose=pose_at([side, 0.0, height]))
     ball = SceneObject.ball("ball", [side, 0.0, -height], radius=0.05)
     for item in (box, ball):
-        found = BodyClearance(robot, body, [item]).distance(np.array([turn]))
+        found = EllipsoidClearance(robot, body, [item]).distance(np.array([turn]))
         # 1e-5 m: Coal's iteration on curved shapes ends at 1e-6 of its size
         assert found.distance == pytest.approx(expected, abs=1e-5)
         assert (found.link, found.obstacle) == ("link1", item.name)
@@ -47,4 +47,4 @@ def test_what_cannot_be_measured_is_refused(arm: tuple[Robot, Body]) -> None:
     robot, body = arm
     bare = Body(links=["link1"], weights=[1.0], means=body.means, covariances=body.covariances)
     with pytest.raises(ValueError, match="has no levels"):
-        BodyClearance(robot, bare, [])
+        EllipsoidClearance(robot, bare, [])

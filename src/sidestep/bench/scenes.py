@@ -1,0 +1,272 @@
+"""Runs published problems over processes, and reports on each set of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sidestep._core import __version__
+from sidestep.bench.arm import Arm, Arms, load_robot
+from sidestep.bench.method import Method
+from sidestep.bench.methods import build_body
+from sidestep.bench.motion import Motion, MotionSettings, move
+from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
+from sidestep.bench.outcome import Outcome, times_of
+from sidestep.bench.parallel import Progress, cpu_name, run_tasks
+from sidestep.bench.problem import SceneProblem
+from sidestep.bench.step_times import StepTimes
+from sidestep.simulation import Clearance, EllipsoidClearance
+
+SPACING = 0.005  # [m] between points, as of a depth camera at arm's length
+POINT_RADIUS = 0.001  # [m] of a point: what a blunt ellipsoid needs not to sink between points that far apart
+
+
+@dataclass(frozen=True)
+class SceneSettings:
+    """What is run.
+
+    Attributes:
+        robot: name for `Robot.named`, or the path of a URDF. method: how the arm is moved.
+        motion: how problems are run. jobs: processes.
+        spacing: no point of a surface is farther than this from one that the controller sees [m].
+        point_radius: of those points [m].
+        only_clearances: measure start and goal and move nothing.
+
+    Raises:
+        ValueError: jobs below 1, a length that is not positive.
+    """
+
+    robot: str
+    method: Method = Method.barrier
+    motion: MotionSettings = field(default_factory=MotionSettings)
+    jobs: int = 1
+    spacing: float = SPACING
+    point_radius: float = POINT_RADIUS
+    only_clearances: bool = False
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1:
+            raise ValueError(f"jobs is {self.jobs}, must be at least 1")
+        if not (np.isfinite(self.spacing) and self.spacing > 0.0):
+            raise ValueError(f"spacing is {self.spacing}, must be positive and finite [m]")
+        if not (np.isfinite(self.point_radius) and self.point_radius >= 0.0):
+            raise ValueError(f"point_radius is {self.point_radius}, must be >= 0 and finite [m]")
+
+
+@dataclass(frozen=True, eq=False)
+class EndClearances:
+    """How near an end of a problem is to its solids: exactly, and for the covering body.
+
+    Attributes:
+        exact: of the meshes. covered: of the ellipsoids, None for a body without; below 0 it is inside.
+    """
+
+    exact: Clearance
+    covered: Clearance | None
+
+    @classmethod
+    def at(cls, q: np.ndarray[Any, Any], arm: Arm, problem: SceneProblem) -> EndClearances:
+        """Measured at q (nv,)."""
+        covered = None
+        if arm.body.levels is not None:
+            covered = EllipsoidClearance(arm.robot, arm.body, problem.objects).distance(q)
+        return cls(arm.clearance.among(problem.objects).distance(q), covered)
+
+
+@dataclass(frozen=True, eq=False)
+class SceneOutcome:
+    """What came of one published problem.
+
+    Attributes:
+        set, index: which one. start, goal: clearances there.
+        goal_beyond_limits: [rad | m] by which the published goal is outside the position limits; the arm is
+            sent to the nearest configuration within.
+        outcome: of the motion, None if there was none. path_length: sum of |dq| [rad | m].
+        planning_s: until the first path; None where none is planned. first_motion_s: until the first command.
+        num_points: that the controller saw. unknown_joints: held joints that the robot does not have.
+    """
+
+    set: str
+    index: int
+    start: EndClearances
+    goal: EndClearances
+    goal_beyond_limits: float
+    outcome: Outcome | None
+    path_length: float
+    planning_s: float | None
+    first_motion_s: float
+    num_points: int
+    unknown_joints: tuple[str, ...]
+    tolerance: float
+
+    @property
+    def solved(self) -> bool:
+        """Arrived at the published goal, touched nothing, broke no limit."""
+        return not self.reasons()
+
+    def reasons(self) -> list[str]:
+        """What went wrong, a sentence each; empty when the problem is solved."""
+        if self.outcome is None:
+            return ["nothing was moved"]
+        found = self.outcome.reasons()
+        if self.goal_beyond_limits > self.tolerance:
+            found.append(f"the goal is {self.goal_beyond_limits:.3f} rad beyond the position limits")
+        covered = self.goal.covered
+        if found and covered is not None and covered.distance <= 0.0:
+            found.append(
+                f"the goal has the covering body in collision: {covered.link} is {-1e3 * covered.distance:.1f} "
+                f"mm deep in {covered.obstacle}, its mesh is {1e3 * self.goal.exact.distance:.1f} mm away"
+            )
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class SceneResult:
+    """What came of all problems, in order, and the times of all steps."""
+
+    settings: SceneSettings
+    outcomes: tuple[SceneOutcome, ...]
+    times: StepTimes
+
+    def to_document(self, *, failures: bool = False) -> dict[str, Any]:
+        """The figures for JSON: per set and of all; with `failures` also which problems failed, and why.
+
+        Each quantile is over the solved problems, those of clearances at the ends over all of them.
+        """
+        sets = list(dict.fromkeys(item.set for item in self.outcomes))
+        document: dict[str, Any] = {
+            "robot": self.settings.robot,
+            "method": self.settings.method.value,
+            "torque": self.settings.motion.torque,
+            "all": _figures(self.outcomes),
+            "sets": {name: _figures([item for item in self.outcomes if item.set == name]) for name in sets},
+            "step_us": self.times.microseconds(),
+            "settings": {
+                "spacing_m": self.settings.spacing,
+                "point_radius_m": self.settings.point_radius,
+                **{key: value for key, value in asdict(self.settings.motion).items() if key != "torque"},
+            },
+            "unknown_joints": sorted({name for item in self.outcomes for name in item.unknown_joints}),
+            "jobs": self.settings.jobs,
+            "cpu": cpu_name(),
+            "version": __version__,
+        }
+        if failures:
+            document["failures"] = [
+                {"set": item.set, "index": item.index, "reasons": item.reasons()}
+                for item in self.outcomes
+                if item.reasons()
+            ]
+        return document
+
+
+def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
+    moved = [item.outcome for item in items if item.outcome is not None]
+    solved = [(item, item.outcome) for item in items if item.solved and item.outcome is not None]
+    clearances = [o.min_clearance_m for _, o in solved if o.min_clearance_m is not None]
+    figures: dict[str, Any] = {"problems": len(items)}
+    if moved:
+        figures |= {
+            "solved": len(solved),
+            "arrived": sum(item.arrived for item in moved),
+            "collision": sum(item.collision for item in moved),
+            "self_collision": sum(item.self_collision for item in moved),
+            "limit_violations": sum(bool(item.limits) for item in moved),
+            "straight_line_blocked": sum(item.straight_line_blocked for item in moved),
+            "planning_ms": _upper([i.planning_s for i, _ in solved if i.planning_s is not None], 1e3),
+            "first_motion_ms": _upper([i.first_motion_s for i, _ in solved], 1e3),
+            "path_length_rad": _upper([i.path_length for i, _ in solved]),
+            "motion_s": _upper([o.time_s for _, o in solved]),
+            "min_clearance_mm": _lower(clearances, 1e3),
+        }
+    figures["goal_beyond_limits"] = sum(item.goal_beyond_limits > 0.0 for item in items)
+    figures["points"] = int(np.median([item.num_points for item in items]))
+    for end in ("start", "goal"):
+        ends: list[EndClearances] = [getattr(item, end) for item in items]
+        covered = [item.covered.distance for item in ends if item.covered is not None]
+        figures[f"{end}_clearance_mm"] = _lower([item.exact.distance for item in ends], 1e3)
+        figures[f"{end}_clearance_of_body_mm"] = _lower(covered, 1e3)
+        figures[f"{end}_inside_body"] = sum(value <= 0.0 for value in covered)
+    return figures
+
+
+def _upper(values: Sequence[float], scale: float = 1.0) -> dict[str, float] | None:
+    """Median and the quantiles that matter where less is better."""
+    return _quantiles(values, {"median": 50.0, "p95": 95.0, "p99": 99.0, "max": 100.0}, scale)
+
+
+def _lower(values: Sequence[float], scale: float = 1.0) -> dict[str, float] | None:
+    """Median and the quantiles that matter where more is better."""
+    return _quantiles(values, {"min": 0.0, "p1": 1.0, "p5": 5.0, "median": 50.0}, scale)
+
+
+def _quantiles(values: Sequence[float], wanted: dict[str, float], scale: float) -> dict[str, float] | None:
+    finite = [value for value in values if np.isfinite(value)]
+    if not finite:
+        return None
+    return {name: round(scale * float(np.percentile(finite, share)), 3) for name, share in wanted.items()}
+
+
+def run_scenes(
+    settings: SceneSettings, problems: Sequence[MotionBenchMakerProblem], *, progress: Progress | None = None
+) -> SceneResult:
+    """Runs problems and judges them; any number of processes gives the same outcomes.
+
+    Args:
+        settings: how. problems: at least one.
+        progress: told of how many are done, of all, and a word about the last one.
+
+    Raises:
+        ValueError: no problem, or one that the robot's joints do not fit.
+    """
+    if not problems:
+        raise ValueError("there is no problem to run")
+    if progress is not None:
+        progress(0, len(problems), "preparing the robot")
+    make = partial(_Worker, settings)
+    worker = make()  # here first: bodies are made once, and the processes find them cached
+    outcomes, times = [], StepTimes()
+    for outcome, steps in run_tasks(make, list(problems), jobs=settings.jobs, worker=worker):
+        outcomes.append(outcome)
+        times.merge(steps)
+        if progress is not None:
+            word = f"{outcome.set} {outcome.index}: {(outcome.reasons() or ['solved'])[0]}"
+            progress(len(outcomes), len(problems), word)
+    outcomes.sort(key=lambda item: (item.set, item.index))
+    return SceneResult(settings, tuple(outcomes), times)
+
+
+class _Worker:
+    """What a process needs for any problem."""
+
+    def __init__(self, settings: SceneSettings) -> None:
+        self.settings = settings
+        body = build_body(settings.method, load_robot(settings.robot))
+        self._arms = Arms(settings.robot, settings.method, body)
+
+    def run(self, task: MotionBenchMakerProblem) -> tuple[SceneOutcome, StepTimes]:
+        settings = self.settings
+        arm = self._arms.of(task)
+        problem, beyond = arm.problem(task, spacing=settings.spacing, point_radius=settings.point_radius)
+        motion: Motion | None = None
+        if not settings.only_clearances:
+            motion = move(arm.robot, arm.system, problem, settings.motion)
+        outcome = SceneOutcome(
+            set=task.set,
+            index=task.index,
+            start=EndClearances.at(problem.start, arm, problem),
+            goal=EndClearances.at(problem.goal, arm, problem),
+            goal_beyond_limits=beyond,
+            outcome=None if motion is None else arm.judge.judge(problem, motion, settings.motion),
+            path_length=0.0 if motion is None else motion.path_length,
+            planning_s=None if motion is None else motion.planning_seconds,
+            first_motion_s=0.0 if motion is None else motion.first_motion_seconds,
+            num_points=len(problem.obstacles),
+            unknown_joints=arm.unknown,
+            tolerance=settings.motion.tolerance,
+        )
+        return outcome, StepTimes() if motion is None else times_of(motion)
