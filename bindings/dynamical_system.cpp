@@ -4,9 +4,9 @@
 #include <nanobind/stl/vector.h>
 
 #include "arguments.hpp"
+#include "dynamical_system.hpp"
 #include "module.hpp"
-#include "sidestep/dynamical_system/progress_monitor.hpp"
-#include "sidestep/dynamical_system/rollout.hpp"
+#include "sidestep/dynamical_system/geometric_system.hpp"
 
 namespace sidestep::python {
 namespace {
@@ -28,56 +28,7 @@ struct Step {
   Explanation explanation;
 };
 
-/// An enumerator, or its name; raises ValueError that lists the allowed names.
-template <class Enum>
-Enum as_enum(nb::handle value, const char* name) {
-  Enum result{};
-  if (nb::try_cast<Enum>(value, result)) {
-    return result;
-  }
-  const nb::object members = nb::type<Enum>().attr("__members__");
-  if (nb::isinstance<nb::str>(value) && nb::cast<bool>(members.attr("__contains__")(value))) {
-    return nb::cast<Enum>(members[value]);
-  }
-  const std::string allowed = nb::cast<std::string>(nb::str(", ").attr("join")(members));
-  throw nb::value_error((std::string(name) + " is " + nb::repr(value).c_str() + ", must be one of: " + allowed).c_str());
-}
-
-/// A goal, or a configuration as an array.
-Goal as_goal(nb::handle value, Eigen::Index nv) {
-  if (nb::isinstance<PoseGoal>(value)) {
-    return nb::cast<const PoseGoal&>(value);
-  }
-  if (nb::isinstance<JointGoal>(value)) {
-    const auto& goal = nb::cast<const JointGoal&>(value);
-    if (goal.position.size() != nv) {
-      throw nb::value_error(("goal has " + std::to_string(goal.position.size()) + " entries, expected " +
-                             std::to_string(nv)).c_str());
-    }
-    return goal;
-  }
-  return JointGoal(as_vector(value, "goal", nv));
-}
-
-Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
-  const Array array = as_array(value, "pose");
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  if (position_only && array.ndim() == 1) {
-    pose.translation() = as_vector(value, "pose", 3);
-    return pose;
-  }
-  const Eigen::MatrixXd matrix = as_matrix(value, "pose", 4, 4);
-  pose.linear() = matrix.topLeftCorner<3, 3>();
-  pose.translation() = matrix.topRightCorner<3, 1>();
-  return pose;
-}
-
 Switch as_switch(nb::handle value) { return value.is_none() ? Switch{Unswitched{}} : nb::cast<Switch>(value); }
-
-template <class Class, class Member>
-void matrix_property(nb::class_<Class>& c, const char* name, Member member, const char* doc) {
-  c.def_prop_ro(name, [member](const Class& r) { return to_numpy_matrix(r.*member); }, doc);
-}
 
 void bind_switches(nb::module_& m) {
   nb::class_<Unswitched>(m, "Unswitched", "a = h + g (T2.12).").def(nb::init<>());
@@ -104,58 +55,6 @@ void bind_switches(nb::module_& m) {
           nb::arg("thresholds"), nb::arg("slope"))
       .def_prop_ro("thresholds", [](const DistanceSwitch& s) { return to_numpy(s.thresholds); })
       .def_ro("slope", &DistanceSwitch::slope);
-}
-
-void bind_goals(nb::module_& m) {
-  nb::class_<JointGoal>(m, "JointGoal",
-                        "A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.\n"
-                        "position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] of a goal that moves, zero by default.")
-      .def(
-          "__init__",
-          [](JointGoal* self, const ArrayLike& position, nb::handle velocity) {
-            Eigen::VectorXd q = as_vector(position, "position");
-            const Eigen::Index nv = q.size();
-            new (self) JointGoal(std::move(q), velocity.is_none() ? Eigen::VectorXd(Eigen::VectorXd::Zero(nv))
-                                                                  : as_vector(velocity, "velocity", nv));
-          },
-          nb::arg("position"), nb::arg("velocity") = nb::none(),
-          nb::sig("def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None) "
-                  "-> None"))
-      .def_prop_ro("position", [](const JointGoal& g) { return to_numpy(g.position); })
-      .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); });
-
-  nb::class_<PoseGoal>(
-      m, "PoseGoal",
-      "A pose of a frame as a goal,\n"
-      "    U = k_p |p - p*|^2 / 2 + k_R |log(R*^T R)|^2 / 2.\n"
-      "pose (4, 4) in the world, or (3,) where position_only. position_stiffness k_p [1/(m s)^2],\n"
-      "orientation_stiffness k_R [1/s^2]. rest (nv,) with posture_stiffness [1/s^2]: a configuration that the joints are\n"
-      "drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin\n"
-      "[m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.\n"
-      "Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is\n"
-      "none, a stiffness out of range. A pose that is not finite or out of reach gives a status in the step.")
-      .def(
-          "__init__",
-          [](PoseGoal* self, const Robot& robot, const std::string& frame, const ArrayLike& pose, bool position_only,
-             double position_stiffness, double orientation_stiffness, nb::handle rest, double posture_stiffness,
-             nb::handle twist) {
-            const int nv = robot.num_coordinates();
-            new (self) PoseGoal(robot, frame, as_pose(pose, position_only),
-                                {position_only, position_stiffness, orientation_stiffness,
-                                 rest.is_none() ? Eigen::VectorXd() : as_vector(rest, "rest", nv), posture_stiffness},
-                                twist.is_none() ? Vector6d(Vector6d::Zero()) : Vector6d(as_vector(twist, "twist", 6)));
-          },
-          nb::arg("robot"), nb::arg("frame"), nb::arg("pose"), nb::kw_only(), nb::arg("position_only") = false,
-          nb::arg("position_stiffness") = PoseGoalSettings().position_stiffness,
-          nb::arg("orientation_stiffness") = PoseGoalSettings().orientation_stiffness, nb::arg("rest") = nb::none(),
-          nb::arg("posture_stiffness") = 0.0, nb::arg("twist") = nb::none(),
-          nb::sig("def __init__(self, robot: Robot, frame: str, pose: numpy.typing.ArrayLike, *, position_only: bool = "
-                  "False, position_stiffness: float = 4.0, orientation_stiffness: float = 0.5, rest: "
-                  "numpy.typing.ArrayLike | None = None, posture_stiffness: float = 0.0, twist: "
-                  "numpy.typing.ArrayLike | None = None) -> None"))
-      .def_prop_ro("frame", [](const PoseGoal& g) { return g.frame().name; })
-      .def_prop_ro("pose", [](const PoseGoal& g) { return to_numpy_matrix(g.pose.matrix()); }, "(4, 4) in the world.")
-      .def_prop_ro("position_only", [](const PoseGoal& g) { return g.settings.position_only; });
 }
 
 void bind_diagnosis(nb::module_& m) {
@@ -194,14 +93,6 @@ void bind_diagnosis(nb::module_& m) {
       .def_prop_ro("rotation_error", [](const E& e) { return e.diagnosis.rotation_error; }, "[rad]; nan if not wanted.")
       .def("describe", [](const E& e) { return e.diagnosis.describe(e.label); }, "In one English sentence.")
       .def("__str__", [](const E& e) { return e.diagnosis.describe(e.label); });
-
-  nb::class_<ProgressMonitor>(m, "ProgressMonitor",
-                              "Says when a motion has come no nearer to its goal for `patience` [s]: when the goal's\n"
-                              "potential has not fallen by `fraction` of its least value.")
-      .def(nb::init<double, double>(), nb::kw_only(), nb::arg("patience") = 2.0, nb::arg("fraction") = 0.02)
-      .def("update", &ProgressMonitor::update, nb::arg("time"), nb::arg("potential"),
-           "Takes `Step.goal_potential` at a time [s]; whether patience has run out.")
-      .def("reset", &ProgressMonitor::reset, "For a new goal.");
 
   nb::class_<Recovery>(m, "Recovery",
                        "What is done with an arm inside a barrier. speed [m/s] with which it leaves, rate [1/s] at which it\n"
@@ -292,60 +183,16 @@ void bind_step(nb::module_& m) {
       .def_ro("diagnosis", &Step::explanation, "Why the motion is what it is.");
 }
 
-void bind_rollout(nb::module_& m) {
-  nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
-      .value("semi_implicit_euler", Integrator::semi_implicit_euler, "v += a dt; q += v dt.")
-      .value("second_order", Integrator::second_order, "q += v dt + a dt^2/2; v += a dt (thesis 6.2.1).")
-      .value("runge_kutta_4", Integrator::runge_kutta_4, "The classical scheme, with the obstacles moved along.");
-
-  nb::class_<Rollout> result(m, "Rollout", "A kinematic motion: row k is at time k dt, steps + 1 rows.");
-  result.def_prop_ro("time", [](const Rollout& r) { return to_numpy(r.time); }, "[s]")
-      .def_ro("statuses", &Rollout::statuses, "One StepStatus per row.")
-      .def_prop_ro("step_seconds", [](const Rollout& r) { return to_numpy(r.step_seconds); },
-                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.")
-      .def_ro("filter_statuses", &Rollout::filter_statuses, "One TorqueStatus per row; empty without a filter.")
-      .def_prop_ro("safety_slack", [](const Rollout& r) { return to_numpy(r.safety_slack); },
-                   "(steps + 1,) largest shortfall of a clearance's constraint [m/s^2]; empty without a filter.");
-  matrix_property(result, "q", &Rollout::q, "(steps + 1, nv) [rad]");
-  matrix_property(result, "v", &Rollout::v, "(steps + 1, nv) [rad/s]");
-  matrix_property(result, "acceleration", &Rollout::acceleration, "(steps + 1, nv) [rad/s^2]");
-  matrix_property(result, "values", &Rollout::values, "psi (steps + 1, m)");
-  matrix_property(result, "switch", &Rollout::switch_weights, "Weights of the harmonic part (steps + 1, nv)");
-
-  m.def(
-      "rollout",
-      [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal, const Obstacles& obstacles,
-         double period, int steps, nb::handle integrator, bool time_steps, const AccelerationFilter* filter) {
-        const int nv = system.robot().num_coordinates();
-        const Eigen::VectorXd start = as_vector(q, "q", nv);
-        const Eigen::VectorXd velocity = as_vector(v, "v", nv);
-        const Goal target = as_goal(goal, nv);
-        RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"), time_steps};
-        if (filter != nullptr) {
-          settings.filter = *filter;
-        }
-        nb::gil_scoped_release release;
-        return rollout(system, start, velocity, target, obstacles, settings);
-      },
-      nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
-      nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
-      nb::arg("time_steps") = false, nb::arg("filter") = nb::none(),
-      nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
-              "goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, "
-              "steps: int, "
-              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, "
-              "filter: AccelerationFilter | None = None) -> Rollout"),
-      "Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.\n"
-      "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
-      "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4.");
-}
-
 }  // namespace
 
 void bind_dynamical_system(nb::module_& m) {
   nb::enum_<DampingForm>(m, "DampingForm", "Where damping acts.")
       .value("plain", DampingForm::plain, "h = -G^-1 K (q - q*) - D v (T5.4).")
       .value("metric", DampingForm::metric, "h = -G^-1 (K (q - q*) + D v) (T2.12).");
+  nb::enum_<PullForm>(m, "PullForm", "How the goal pulls.")
+      .value("metric", PullForm::metric, "-G^-1 dU (T5.4): all that changes a psi is held back.")
+      .value("one_sided", PullForm::one_sided,
+             "argmin_a |a + dU|^2 / 2 + sum_k max(0, J_k a)^2 / 2: only what makes a psi rise is held back.");
   bind_switches(m);
   bind_goals(m);
   bind_speed_regulator(m);
@@ -359,7 +206,7 @@ void bind_dynamical_system(nb::module_& m) {
       "Embeddings in the list are stacked, each with its own coordinates; an empty list and robot=... give flat\n"
       "space.\n"
       "stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive\n"
-      "semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.\n"
+      "semi-definite. damping_form, pull_form: a DampingForm, a PullForm, or their names. switch: None (unswitched) or one of the switches.\n"
       "speed: a SpeedRegulator, which adds beta v to the acceleration.\n"
       "recovery: what a barrier does with an arm inside it, by default Recovery().\n"
       "Raises ValueError that names the setting at fault.");
@@ -368,7 +215,7 @@ void bind_dynamical_system(nb::module_& m) {
           "__init__",
           [](GeometricSystem* self, std::vector<std::shared_ptr<const Embedding>> embeddings, const ArrayLike& stiffness,
              const ArrayLike& damping, nb::handle damping_form, nb::handle combination, nb::handle flat,
-             const Recovery* recovery, const SpeedRegulator* speed) {
+             nb::handle pull_form, const Recovery* recovery, const SpeedRegulator* speed) {
             if (embeddings.empty() == flat.is_none()) {
               throw nb::value_error(
                   "give either embeddings, which know their robot, or an empty list and robot=... for flat space");
@@ -378,6 +225,7 @@ void bind_dynamical_system(nb::module_& m) {
             GeometricSystemSettings settings{as_square_matrix(stiffness, "stiffness", nv),
                                              as_square_matrix(damping, "damping", nv),
                                              as_enum<DampingForm>(damping_form, "damping_form"),
+                                             as_enum<PullForm>(pull_form, "pull_form"),
                                              as_switch(combination)};
             if (recovery != nullptr) {
               settings.recovery = *recovery;
@@ -389,15 +237,24 @@ void bind_dynamical_system(nb::module_& m) {
           },
           nb::arg("embeddings"), nb::kw_only(), nb::arg("stiffness") = 0.5, nb::arg("damping") = 1.5,
           nb::arg("damping_form") = "plain", nb::arg("switch") = nb::none(), nb::arg("robot") = nb::none(),
-          nb::arg("recovery") = nb::none(), nb::arg("speed") = nb::none(),
+          nb::arg("pull_form") = "metric", nb::arg("recovery") = nb::none(), nb::arg("speed") = nb::none(),
           nb::sig("def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, "
                   "damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', "
                   "switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch "
-                  "| None = None, robot: Robot | None = None, recovery: Recovery | None = None, "
+                  "| None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None, "
                   "speed: SpeedRegulator | None = None) -> None"))
+      .def(
+          "relaxed_at",
+          [](const GeometricSystem& system, const ArrayLike& goal, const Obstacles& obstacles) {
+            return system.relaxed_at(as_finite_vector(goal, "goal", system.robot().num_coordinates()), obstacles);
+          },
+          nb::arg("goal"), nb::arg("obstacles"),
+          "This system with barriers that leave a goal (nv,) [rad] free: the activation distance of every coordinate is at\n"
+          "most 0.9 of its clearance there, and at least two floors. To be made when the goal or the obstacles change.")
       .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
       .def_prop_ro("stiffness", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().stiffness); })
       .def_prop_ro("damping", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().damping); })
+      .def_prop_ro("pull_form", [](const GeometricSystem& s) { return s.settings().pull_form; })
       .def_prop_ro("damping_form", [](const GeometricSystem& s) { return s.settings().damping_form; })
       .def_prop_ro("switch", [](const GeometricSystem& s) { return s.settings().combination; })
       .def(

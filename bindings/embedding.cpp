@@ -119,7 +119,7 @@ void bind_embedding(nb::module_& m) {
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("activation") = 0.10, nb::arg("strength") = 0.1,
           nb::arg("power") = 2.0, nb::arg("floor") = 0.002, nb::arg("temperature") = 0.002,
           nb::arg("reach") = 0.3)
-      .def_prop_ro("activation", [](const ClearanceBarrier& b) { return b.barrier().activation; })
+      .def_prop_ro("activation", [](const ClearanceBarrier& b) { return b.function().activation; })
       .def_prop_ro("reach", &ClearanceBarrier::reach)
       .def_prop_ro("components",
                    [](const ClearanceBarrier& b) {

@@ -7,6 +7,7 @@ from ._core import Diagnosis as Diagnosis
 from ._core import DistanceSwitch as DistanceSwitch
 from ._core import Embedding as Embedding
 from ._core import EmbeddingEvaluation as EmbeddingEvaluation
+from ._core import Escape as Escape
 from ._core import GeodesicOnly as GeodesicOnly
 from ._core import GeometricSystem as GeometricSystem
 from ._core import HarmonicOnly as HarmonicOnly
@@ -22,6 +23,7 @@ from ._core import PlaneBarrier as PlaneBarrier
 from ._core import PlanStatus as PlanStatus
 from ._core import PoseGoal as PoseGoal
 from ._core import ProgressMonitor as ProgressMonitor
+from ._core import PullForm as PullForm
 from ._core import Recovery as Recovery
 from ._core import Rollout as Rollout
 from ._core import SelfCollisionBarrier as SelfCollisionBarrier

@@ -581,22 +581,6 @@ class Diagnosis:
 
     def __str__(self) -> str: ...
 
-class ProgressMonitor:
-    """
-    Says when a motion has come no nearer to its goal for `patience` [s]: when the goal's
-    potential has not fallen by `fraction` of its least value.
-    """
-
-    def __init__(self, *, patience: float = 2.0, fraction: float = 0.02) -> None: ...
-
-    def update(self, time: float, potential: float) -> bool:
-        """
-        Takes `Step.goal_potential` at a time [s]; whether patience has run out.
-        """
-
-    def reset(self) -> None:
-        """For a new goal."""
-
 class Recovery:
     """
     What is done with an arm inside a barrier. speed [m/s] with which it leaves, rate [1/s] at which it
@@ -712,6 +696,12 @@ class GeometricSystem:
 
     def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, recovery: Recovery | None = None, speed: SpeedRegulator | None = None) -> None: ...
 
+    def relaxed_at(self, goal: numpy.typing.ArrayLike, obstacles: Obstacles) -> GeometricSystem:
+        """
+        This system with barriers that leave a goal (nv,) [rad] free: the activation distance of every coordinate is at
+        most 0.9 of its clearance there, and at least two floors. To be made when the goal or the obstacles change.
+        """
+
     @property
     def num_embedding_coordinates(self) -> int: ...
 
@@ -742,6 +732,46 @@ class GeometricSystem:
         """
         The smallest clearance of any barrier at a goal configuration; inf beyond their reach.
         """
+
+class ProgressMonitor:
+    """
+    Says when a motion has come no nearer to its goal for `patience` [s]: when the goal's
+    potential has not fallen by `fraction` of its least value.
+    """
+
+    def __init__(self, *, patience: float = 2.0, fraction: float = 0.02) -> None: ...
+
+    def update(self, time: float, potential: float) -> bool:
+        """
+        Takes `Step.goal_potential` at a time [s]; whether patience has run out.
+        """
+
+    def reset(self) -> None:
+        """For a new goal."""
+
+class Escape:
+    """
+    Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],
+    it follows a random configuration within the limits for at most `leg` [s], then its goal again
+    (Barraquand and Latombe 1991). fraction: of its potential that counts as nearer; seed: of the random
+    configurations. Raises ValueError that names the setting at fault.
+    """
+
+    def __init__(self, robot: Robot, *, patience: float = 1.0, fraction: float = 0.05, leg: float = 3.0, seed: int = 0) -> None: ...
+
+    def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, potential: float, period: float) -> JointGoal | PoseGoal:
+        """
+        The goal to follow in a step of `period` [s]: the goal given, or a sub-goal. potential: `Step.goal_potential`
+        of the step before; in the first call any number.
+        """
+
+    @property
+    def escaping(self) -> bool:
+        """Whether the last step followed a sub-goal."""
+
+    @property
+    def count(self) -> int:
+        """How many sub-goals there have been."""
 
 class Integrator(enum.Enum):
     """How a step of length dt is taken."""
@@ -802,11 +832,12 @@ class Rollout:
     def switch(self) -> numpy.typing.NDArray[numpy.float64]:
         """Weights of the harmonic part (steps + 1, nv)"""
 
-def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None) -> Rollout:
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None, escape: Escape | None = None) -> Rollout:
     """
     Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.
     period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
-    filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4.
+    filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;
+    escape: sub-goals where the motion is stuck; it keeps its state from one call to the next.
     """
 
 class QuadraticProgramStatus(enum.Enum):

@@ -101,7 +101,9 @@ def barrier_system(
                 power=numbers.power,
             )
         )
-    return GeometricSystem(parts, stiffness=numbers.stiffness, damping=numbers.damping)
+    return GeometricSystem(
+        parts, stiffness=numbers.stiffness, damping=numbers.damping, pull_form="one_sided"
+    )
 
 
 def thesis_system(

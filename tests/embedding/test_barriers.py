@@ -209,3 +209,28 @@ def test_what_is_wrong_is_named(make: Callable[[ss.Robot, ss.Body], ss.Embedding
     robot = ss.Robot.named("planar2")
     with pytest.raises(ValueError, match=message):
         make(robot, covering(robot, 0))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_relaxed_barriers_leave_the_goal_flat_and_keep_what_is_far(name: str) -> None:
+    robot = ss.Robot.named(name)
+    body, rng = covering(robot, 1), np.random.default_rng(1)
+    wide = {"activation": 0.5, "floor": 0.01}
+    parts = [ss.ClearanceBarrier(robot, body, reach=0.5, **wide), ss.JointLimitBarrier(robot, activation=0.5)]
+    system = ss.GeometricSystem(parts)
+    goal, rest = robot.random_configuration(rng), np.zeros(robot.num_coordinates)
+    obstacles = ss.Obstacles(rng.uniform(-1.0, 1.0, (10, 3)), radii=0.02)
+    before = system.acceleration(goal, rest, goal, obstacles)
+    relaxed = system.relaxed_at(goal, obstacles)
+    after = relaxed.acceleration(goal, rest, goal, obstacles)
+    clearances = np.concatenate([part.evaluate(goal, rest, obstacles).clearances for part in parts])
+    floors = np.repeat([0.01, 0.002], [part.num_coordinates for part in parts])
+    # 0.9 of a clearance of more than two floors / 0.9 is below it, so the barrier is not active there.
+    free = clearances > 2.0 * floors / 0.9
+    assert np.any(free & (before.values > 0.0))
+    np.testing.assert_array_equal(after.values[free], 0.0)
+    # Where nothing is within reach of the goal the activation distance is what it was: elsewhere nothing changes.
+    other = robot.random_configuration(rng)
+    unchanged = ~np.isfinite(clearances)
+    values = [s.acceleration(other, rest, goal, obstacles).values for s in (system, relaxed)]
+    np.testing.assert_array_equal(values[0][unchanged], values[1][unchanged])

@@ -116,7 +116,7 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
   d.position_error = w.pull.position_error;
   d.rotation_error = w.pull.rotation_error;
 
-  // b_k·b with b = ∂U − G⁻¹ ∂U and w.attraction = −G⁻¹ ∂U.
+  // b_k·b with b = ∂U − G⁻¹ ∂U and w.attraction = −G⁻¹ ∂U; G_S in place of G if the pull is one-sided.
   const double pull = w.pull.gradient.norm();
   const double passed = w.attraction.norm();
   const double held_back = (w.pull.gradient + w.attraction).squaredNorm();
@@ -127,6 +127,9 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
       continue;
     }
     const auto J = w.jacobian_transposed.col(k);
+    if (settings_.pull_form == PullForm::one_sided && J.dot(w.attraction) <= 0.0) {
+      continue;  // it holds nothing back
+    }
     const double part = -J.dot(w.attraction) * (J.dot(w.pull.gradient) + J.dot(w.attraction));
     if (part > largest) {
       largest = part;

@@ -95,6 +95,16 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
              settings_.combination);
 }
 
+GeometricSystem GeometricSystem::relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const {
+  GeometricSystem relaxed = *this;
+  for (auto& embedding : relaxed.embeddings_) {
+    if (auto other = embedding->relaxed_at(goal, obstacles)) {
+      embedding = std::move(other);
+    }
+  }
+  return relaxed;
+}
+
 GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
     : acceleration(Eigen::VectorXd::Zero(system.robot().num_coordinates())),
       harmonic(acceleration),
@@ -112,6 +122,7 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
       relative_velocity_(acceleration),
       distances_(acceleration),
       rest_(acceleration),
+      one_sided_(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       recovery_(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       joint_goal_(JointGoal(acceleration)) {}
 
@@ -141,9 +152,13 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
   w.metric.update(w.jacobian_transposed);
   w.pull.update(goal, w.state_, settings_.stiffness);
 
-  // h = −G⁻¹ ∂U − D (v − v*), or with D (v − v*) under G⁻¹ too.
+  // h = −G⁻¹ ∂U − D (v − v*), its first term perhaps one-sided, or with D (v − v*) under G⁻¹ too.
   w.attraction = -w.pull.gradient;
-  w.metric.solve_in_place(w.attraction);
+  if (settings_.pull_form == PullForm::one_sided) {
+    w.one_sided_.solve_in_place(w.jacobian_transposed, w.attraction);
+  } else {
+    w.metric.solve_in_place(w.attraction);
+  }
   w.relative_velocity_ = v - w.pull.velocity;
   w.harmonic = settings_.damping.lazyProduct(w.relative_velocity_);
   if (settings_.damping_form == DampingForm::metric) {

@@ -11,9 +11,6 @@ namespace {
 // ε: a clearance that the joints change by less than 5 cm/rad is pushed less than it asks for [(m/rad)²].
 constexpr double least_gradient_squared = 0.05 * 0.05;
 
-// S has settled after two or three.
-constexpr int most_passes = 4;
-
 double smoothstep(double x) noexcept {
   x = std::clamp(x, 0.0, 1.0);
   return x * x * (3.0 - 2.0 * x);
@@ -37,8 +34,8 @@ void Recovery::validate() const {
 
 RecoveryWorkspace::RecoveryWorkspace(int nv, int m)
     : metric_(nv, m),
+      one_sided_(nv, m),
       jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m)),
-      bent_(Eigen::VectorXd::Zero(nv)),
       fades_(Eigen::VectorXd::Ones(m)),
       curvatures_(Eigen::VectorXd::Zero(m)) {}
 
@@ -69,7 +66,8 @@ int RecoveryWorkspace::update(const Recovery& settings, const Eigen::VectorXd& f
   }
   if (deepest >= 0) {
     push /= std::max(total, 1.0);
-    bend(jacobian_transposed, push);
+    jacobian_transposed_ = jacobian_transposed * fades_.asDiagonal();
+    one_sided_.solve_in_place(jacobian_transposed_, push);
   }
   return deepest;
 }
@@ -103,27 +101,6 @@ void RecoveryWorkspace::solve_pullback(const Recovery& settings, const Clearance
   } else {
     metric.solve_pullback(curvatures, result);
   }
-}
-
-void RecoveryWorkspace::bend(const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept {
-  jacobian_transposed_.setZero();
-  bent_ = push;
-  for (int pass = 0; pass < most_passes; ++pass) {
-    bool grown = false;
-    for (Eigen::Index j = 0; j < jacobian_transposed.cols(); ++j) {
-      if (fades_[j] > 0.0 && jacobian_transposed_.col(j).isZero(0.0) && jacobian_transposed.col(j).dot(bent_) > 0.0) {
-        jacobian_transposed_.col(j) = fades_[j] * jacobian_transposed.col(j);
-        grown = true;
-      }
-    }
-    if (!grown) {
-      break;
-    }
-    metric_.update(jacobian_transposed_);
-    bent_ = push;
-    metric_.solve_in_place(bent_);
-  }
-  push = bent_;
 }
 
 }  // namespace sidestep

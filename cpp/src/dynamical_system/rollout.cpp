@@ -33,6 +33,16 @@ void check_filter(const AccelerationFilter& filter, int nv, const RolloutSetting
   }
 }
 
+void check_escape(const Escape& escape, int nv, const RolloutSettings& settings) {
+  if (escape.num_coordinates() != nv) {
+    throw std::invalid_argument("the escape is for " + std::to_string(escape.num_coordinates()) +
+                                " coordinates, the system has " + std::to_string(nv));
+  }
+  if (settings.integrator == Integrator::runge_kutta_4) {
+    throw std::invalid_argument("an escape holds its goal for a period: use semi_implicit_euler or second_order");
+  }
+}
+
 /// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t + dt.
 /// A stage that falls back brakes; the status that is recorded is that of the step's own state.
 void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, Goal& goal,
@@ -78,6 +88,9 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   if (filter) {
     check_filter(*filter, nv, settings);
   }
+  if (settings.escape != nullptr) {
+    check_escape(*settings.escape, nv, settings);
+  }
   const Eigen::Index rows = settings.steps + 1;
   const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, nv);
   Rollout result{Eigen::VectorXd::LinSpaced(rows, 0.0, dt * settings.steps),
@@ -97,7 +110,9 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   Eigen::VectorXd v = start_velocity;
   for (Eigen::Index k = 0; k < rows; ++k) {
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
-    const StepStatus status = system.acceleration(q, v, goal, obstacles, w);
+    const Goal& followed =
+        settings.escape == nullptr ? goal : settings.escape->pursue(goal, q, w.pull.potential, dt);
+    const StepStatus status = system.acceleration(q, v, followed, obstacles, w);
     Eigen::VectorXd a = w.acceleration;
     if (filter) {
       // After a fallback the workspace holds no clearances of this state.

@@ -4,6 +4,11 @@ namespace sidestep {
 
 CoordinateLabel Embedding::label(int /*k*/) const { return {}; }
 
+std::shared_ptr<const Embedding> Embedding::relaxed_at(const Eigen::VectorXd& /*goal*/,
+                                                       const Obstacles& /*obstacles*/) const {
+  return nullptr;
+}
+
 void Embedding::lower_distances(Eigen::Ref<Eigen::VectorXd> /*distances*/, const KinematicState& /*state*/,
                                 const Obstacles& /*obstacles*/) const noexcept {}
 

@@ -6,8 +6,7 @@
 namespace sidestep {
 
 JointLimitBarrier::JointLimitBarrier(const Robot& robot, BarrierFunction barrier)
-    : Embedding(robot), barrier_(barrier) {
-  barrier_.validate("joint limit barrier");
+    : Barrier(robot, barrier, "joint limit barrier") {
   for (int j = 0; j < robot.num_coordinates(); ++j) {
     for (const double sign : {1.0, -1.0}) {
       const double position = sign > 0.0 ? robot.limits().lower[j] : robot.limits().upper[j];
@@ -19,6 +18,7 @@ JointLimitBarrier::JointLimitBarrier(const Robot& robot, BarrierFunction barrier
   if (limits_.empty()) {
     throw std::invalid_argument("joint limit barrier: robot '" + robot.name() + "' has no finite position limit");
   }
+  set_num_coordinates(static_cast<int>(limits_.size()));
 }
 
 void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
@@ -28,7 +28,7 @@ void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
     const PositionLimit& limit = limits_[i];
     const double v = state.v()[limit.joint_coordinate];
     const double h = limit.sign * (state.q()[limit.joint_coordinate] - limit.position);
-    if (!(h < barrier_.activation)) {
+    if (!(h < function().activation)) {
       continue;
     }
     out.clearances.values[k] = h;
@@ -36,18 +36,15 @@ void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
     out.clearances.curvatures[k] = 0.0;
     out.clearances.gradients.col(k).setZero();
     out.clearances.gradients(limit.joint_coordinate, k) = limit.sign;
-    const auto f = barrier_(h);
-    out.values[k] += f.value;
-    out.jacobian_transposed(limit.joint_coordinate, k) += limit.sign * f.first;
-    out.curvatures[k] += f.second * v * v;
   }
+  add_barriers(out);
 }
 
 CoordinateLabel JointLimitBarrier::label(int k) const {
   const PositionLimit& limit = limits_[static_cast<std::size_t>(k)];
   return {CoordinateLabel::Kind::joint_limit,
           robot().coordinate_names()[static_cast<std::size_t>(limit.joint_coordinate)],
-          limit.sign > 0.0 ? "lower" : "upper", barrier_.floor};
+          limit.sign > 0.0 ? "lower" : "upper", function().floor};
 }
 
 }  // namespace sidestep

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "sidestep/embedding/clearance_barrier.hpp"
-
 namespace sidestep {
 namespace {
+
+constexpr const char* self_owner = "self-collision barrier";
+constexpr const char* plane_owner = "plane barrier";
 
 /// An ellipsoid in the world, with the motion of its centre.
 struct Placed {
@@ -109,17 +110,15 @@ std::vector<BodyEllipsoid> of_link(const std::vector<BodyEllipsoid>& all, const 
 SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
                                            const std::vector<std::pair<std::string, std::string>>& pairs,
                                            BarrierFunction barrier, double temperature)
-    : Embedding(robot), barrier_(barrier), temperature_(temperature) {
-  constexpr const char* owner = "self-collision barrier";
-  barrier_.validate(owner);
-  check_temperature(temperature, owner);
+    : Barrier(robot, barrier, self_owner), temperature_(temperature) {
+  check_temperature(temperature, self_owner);
   if (pairs.empty()) {
-    throw std::invalid_argument(std::string(owner) + ": there is no pair of links");
+    throw std::invalid_argument(std::string(self_owner) + ": there is no pair of links");
   }
-  const std::vector<BodyEllipsoid> all = body_ellipsoids(robot, body, owner);
+  const std::vector<BodyEllipsoid> all = body_ellipsoids(robot, body, self_owner);
   const auto group = [&](const std::string& link) {
     Group g{link, robot.frames()[static_cast<std::size_t>(robot.frame_index(link))].joint,
-            of_link(all, body, link, owner), Eigen::Vector3d::Zero(), 0.0};
+            of_link(all, body, link, self_owner), Eigen::Vector3d::Zero(), 0.0};
     for (const BodyEllipsoid& e : g.ellipsoids) {
       g.centre += e.mean / static_cast<double>(g.ellipsoids.size());
     }
@@ -131,16 +130,17 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
   for (const auto& [a, b] : pairs) {
     Pair pair{group(a), group(b)};
     if (pair.first.joint == pair.second.joint) {
-      throw std::invalid_argument(std::string(owner) + ": links '" + a + "' and '" + b +
+      throw std::invalid_argument(std::string(self_owner) + ": links '" + a + "' and '" + b +
                                   "' are rigidly connected, so nothing could keep them apart");
     }
     pairs_.push_back(std::move(pair));
   }
+  set_num_coordinates(static_cast<int>(pairs_.size()));
 }
 
 void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state,
                                   const Obstacles& /*obstacles*/) const noexcept {
-  const double reach = barrier_.activation;
+  const double reach = function().activation;
   const double horizon = reach + BoltzmannMean::window * temperature_;
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
@@ -177,43 +177,41 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
       }
     }
   }
-  add_barriers(barrier_, out);
+  add_barriers(out);
 }
 
 CoordinateLabel SelfCollisionBarrier::label(int k) const {
   const Pair& pair = pairs_[static_cast<std::size_t>(k)];
-  return {CoordinateLabel::Kind::self, pair.first.link, pair.second.link, barrier_.floor};
+  return {CoordinateLabel::Kind::self, pair.first.link, pair.second.link, function().floor};
 }
 
 PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point,
                            const Eigen::Vector3d& normal, const std::vector<std::string>& links,
                            BarrierFunction barrier, double temperature)
-    : Embedding(robot),
+    : Barrier(robot, barrier, plane_owner),
       normal_(normal.normalized()),
       offset_(normal_.dot(point)),
-      barrier_(barrier),
       temperature_(temperature),
       names_(links) {
-  constexpr const char* owner = "plane barrier";
-  barrier_.validate(owner);
-  check_temperature(temperature, owner);
+  check_temperature(temperature, plane_owner);
   if (!point.allFinite() || !normal.allFinite() || !(normal.norm() > 0.0)) {
-    throw std::invalid_argument(std::string(owner) + ": point and normal must be finite, and normal not zero");
+    throw std::invalid_argument(std::string(plane_owner) + ": point and normal must be finite, and normal not zero");
   }
   if (links.empty()) {
-    throw std::invalid_argument(std::string(owner) + ": there is no link to keep off the plane");
+    throw std::invalid_argument(std::string(plane_owner) + ": there is no link to keep off the plane");
   }
-  const std::vector<BodyEllipsoid> all = body_ellipsoids(robot, body, owner);
+  const std::vector<BodyEllipsoid> all = body_ellipsoids(robot, body, plane_owner);
   for (const std::string& link : links) {
-    links_.push_back(of_link(all, body, link, owner));
+    links_.push_back(of_link(all, body, link, plane_owner));
     if (links_.back().front().joint < 0) {
-      throw std::invalid_argument(std::string(owner) + ": no joint moves link '" + link + "'");
+      throw std::invalid_argument(std::string(plane_owner) + ": no joint moves link '" + link + "'");
     }
   }
+  set_num_coordinates(static_cast<int>(links_.size()));
 }
 
 CoordinateLabel PlaneBarrier::label(int k) const {
-  return {CoordinateLabel::Kind::plane, names_[static_cast<std::size_t>(k)], {}, barrier_.floor};
+  return {CoordinateLabel::Kind::plane, names_[static_cast<std::size_t>(k)], {}, function().floor};
 }
 
 void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
@@ -227,7 +225,7 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
       const Placed placed(state, ellipsoid);
       const HalfWidth s = half_width(placed, normal_, zero, zero);
       const double value = normal_.dot(placed.centre) - offset_ - s.value;
-      if (!(value < barrier_.activation + BoltzmannMean::window * temperature_) || !mean.matters(value)) {
+      if (!(value < function().activation + BoltzmannMean::window * temperature_) || !mean.matters(value)) {
         continue;
       }
       // δh = normal·δp + δθ·(normal × slope).
@@ -239,12 +237,12 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
     }
     if (!mean.empty()) {
       const ClearanceSample result = mean.result();
-      if (result.value < barrier_.activation) {
+      if (result.value < function().activation) {
         write(result, nearest, state, links_[i].front().joint, -1, k, out.clearances);
       }
     }
   }
-  add_barriers(barrier_, out);
+  add_barriers(out);
 }
 
 }  // namespace sidestep

@@ -18,10 +18,14 @@ namespace sidestep {
 /// Where damping acts: h = −G⁻¹ ∂U − D (v − v*) (plain, T5.4), or h = −G⁻¹ (∂U + D (v − v*)) (metric, T2.12).
 enum class DampingForm { plain, metric };
 
+/// How the goal pulls: −G⁻¹ ∂U (metric, T5.4), or held back only where a ψ rises (one_sided, see one_sided_metric.hpp).
+enum class PullForm { metric, one_sided };
+
 struct GeometricSystemSettings {
   Eigen::MatrixXd stiffness;                      ///< K (nv × nv) [1/s²], symmetric positive semi-definite
   Eigen::MatrixXd damping;                        ///< D (nv × nv) [1/s], the same
   DampingForm damping_form = DampingForm::plain;
+  PullForm pull_form = PullForm::metric;
   Switch combination = Unswitched{};
   double fallback_rate = 10.0;                    ///< [1/s] the damped stop of the fallback is q̈ = −rate v
   Recovery recovery = {};                         ///< what a barrier does with an arm inside it
@@ -84,6 +88,7 @@ class GeometricSystem {
     KinematicState state_;
     Eigen::VectorXd relative_velocity_, distances_;
     Eigen::VectorXd rest_;
+    OneSidedMetric one_sided_;
     RecoveryWorkspace recovery_;
     Goal joint_goal_;
     StepStatus status_ = StepStatus::ok;
@@ -107,6 +112,10 @@ class GeometricSystem {
   /// step of a loop. A pose may be reached in many configurations and is not examined.
   Diagnosis diagnose(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v, const Goal& goal,
                      const Obstacles& obstacles, Workspace& workspace) const noexcept;
+
+  /// This system with barriers that leave a goal (nv) [rad | m] free, see Barrier. Allocates: to be made when the goal or
+  /// the obstacles change, not in the loop.
+  GeometricSystem relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const;
 
   /// What every embedding coordinate stands for (m).
   const std::vector<CoordinateLabel>& labels() const noexcept { return labels_; }

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "sidestep/embedding/clearances.hpp"
-#include "sidestep/geometry/graph_metric.hpp"
+#include "sidestep/geometry/one_sided_metric.hpp"
 
 namespace sidestep {
 
@@ -19,8 +19,7 @@ namespace sidestep {
 //        u_k ∇h_k / (|∇h_k|² + ε),        ε > 0: bounded where the joints can hardly change h,
 //    is averaged over the clearances inside when there are several (the ellipsoids of one link push the same way, and
 //    their pushes must not add up). It is bent by the barriers that it would drive the arm into, and by no other: it goes
-//    through G_S = I + Σ_S J_jᵀ J_j with S grown, a few times over, by the coordinates with J_j · push > 0, whose ψ rises.
-//    The barriers it leads out of are left out, or they would hold it back as they hold back the goal.
+//    through the one-sided metric (one_sided_metric.hpp).
 //
 // 2. No rebound. A geodesic keeps its energy ½ (|v|² + |dψ/dt|²). Leaving a barrier of slope ψ' = 1e5 at 1 cm/s that is
 //    an energy of 5e5, which becomes joint speed as the slope falls. An arm that moves by itself has no such dψ/dt, but
@@ -30,7 +29,7 @@ namespace sidestep {
 //    step, as s grows while the arm leaves). A motion slower than that among obstacles at rest does not change.
 //
 // 3. Fading. Several barriers that the arm is inside of would each keep their dh/dt: rigid constraints, too many for the
-//    joints. Both in the geodesic term and in S, J_k of one inside is shortened to (1 − w_k)/w_k at most.
+//    joints. Both in the geodesic term and in what bends the push, J_k of one inside is shortened to (1 − w_k)/w_k at most.
 struct Recovery {
   double speed = 0.1;    ///< with which an arm leaves a barrier [m/s | rad/s]
   double rate = 20.0;    ///< with which it takes up that speed [1/s]; 0: no push
@@ -58,11 +57,9 @@ class RecoveryWorkspace {
                       GraphMetric& metric, Eigen::VectorXd& result) noexcept;
 
  private:
-  void bend(const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept;
-
   GraphMetric metric_;
-  Eigen::MatrixXd jacobian_transposed_;  // of the coordinates in S
-  Eigen::VectorXd bent_;
+  OneSidedMetric one_sided_;
+  Eigen::MatrixXd jacobian_transposed_;  // scaled
   Eigen::VectorXd fades_;                // to what J_k is shortened inside, else 1 (m)
   Eigen::VectorXd curvatures_;           // scaled (m)
 };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
+#include "sidestep/dynamical_system/escape.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
 
 namespace sidestep {
@@ -25,6 +26,8 @@ struct RolloutSettings {
   /// What the acceleration passes before it is applied; none if empty. Of the same period, and not with runge_kutta_4,
   /// whose stages are not held.
   std::optional<AccelerationFilter> filter = {};
+  /// Sub-goals where the motion is stuck; none if null. It keeps its state, so that a rollout can go on in a next one.
+  Escape* escape = nullptr;
 };
 
 /// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.

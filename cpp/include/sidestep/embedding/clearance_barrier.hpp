@@ -3,9 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "sidestep/embedding/barrier_function.hpp"
+#include "sidestep/embedding/barrier.hpp"
 #include "sidestep/embedding/clearance_field.hpp"
-#include "sidestep/embedding/embedding.hpp"
 
 namespace sidestep {
 
@@ -15,7 +14,7 @@ namespace sidestep {
 ///
 /// The metric I + JᵀJ is then complete on the free set: kinetic energy bounds dψ/dt, so in continuous time ψ cannot
 /// become infinite and the ellipsoids cannot touch. Moving obstacles enter dψ/dt and d²ψ/dt² exactly.
-class ClearanceBarrier final : public Embedding {
+class ClearanceBarrier final : public Barrier {
  public:
   /// The body must be calibrated. Clearances are measured up to `reach` [m], at least to the activation distance: what
   /// keeps them (TorqueController, AccelerationFilter) must see an obstacle from as far as the arm needs to stop.
@@ -23,23 +22,19 @@ class ClearanceBarrier final : public Embedding {
   ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature = 0.002,
                    double reach = 0.3);
 
-  int num_coordinates() const noexcept override { return field_.size(); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
 
   CoordinateLabel label(int k) const override;
 
   const ClearanceField& field() const noexcept { return field_; }
-  const BarrierFunction& barrier() const noexcept { return barrier_; }
   double reach() const noexcept { return reach_; }
 
  private:
+  std::shared_ptr<Barrier> clone() const override { return std::make_shared<ClearanceBarrier>(*this); }
+
   ClearanceField field_;
-  BarrierFunction barrier_;
   double reach_;
   std::vector<std::string> links_;  // of the body's components
 };
-
-/// Adds ψ_k = f(h_k) with its derivatives, for every clearance within reach that `out.clearances` holds.
-void add_barriers(const BarrierFunction& barrier, EmbeddingView out) noexcept;
 
 }  // namespace sidestep

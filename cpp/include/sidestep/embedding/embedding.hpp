@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -61,6 +62,10 @@ class Embedding {
 
   /// Whether `lower_distances` does anything.
   virtual bool measures_distances() const noexcept { return false; }
+
+  /// The same embedding with activation distances that leave the goal (nv) [rad | m] free, see Barrier; null where
+  /// there is nothing to relax. Allocates: to be asked when the goal or the obstacles change, not in the loop.
+  virtual std::shared_ptr<const Embedding> relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const;
 
   /// The robot the embedding was made for.
   const Robot& robot() const noexcept { return robot_; }

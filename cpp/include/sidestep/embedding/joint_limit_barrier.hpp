@@ -2,8 +2,7 @@
 
 #include <vector>
 
-#include "sidestep/embedding/barrier_function.hpp"
-#include "sidestep/embedding/embedding.hpp"
+#include "sidestep/embedding/barrier.hpp"
 
 namespace sidestep {
 
@@ -13,22 +12,22 @@ namespace sidestep {
 ///
 /// of the same kind as the clearance barriers. The acceleration bounds of the controller hold the limits; this one
 /// makes the motion bend before it comes to that.
-class JointLimitBarrier final : public Embedding {
+class JointLimitBarrier final : public Barrier {
  public:
   /// Throws std::invalid_argument that names the setting, or if the robot has no finite position limit.
   JointLimitBarrier(const Robot& robot, BarrierFunction barrier);
 
-  int num_coordinates() const noexcept override { return static_cast<int>(limits_.size()); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
 
  private:
+  std::shared_ptr<Barrier> clone() const override { return std::make_shared<JointLimitBarrier>(*this); }
+
   struct PositionLimit {
     int joint_coordinate;
     double sign;      // +1: lower limit, −1: upper limit
     double position;
   };
-  BarrierFunction barrier_;
   std::vector<PositionLimit> limits_;
 };
 

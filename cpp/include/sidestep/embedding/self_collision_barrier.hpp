@@ -4,10 +4,9 @@
 #include <utility>
 #include <vector>
 
-#include "sidestep/embedding/barrier_function.hpp"
+#include "sidestep/embedding/barrier.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
-#include "sidestep/embedding/embedding.hpp"
 
 namespace sidestep {
 
@@ -19,18 +18,19 @@ namespace sidestep {
 ///
 /// the gap between their extents along the line of centres: a lower bound of their distance, exact for spheres. The
 /// pairs of ellipsoids of two links are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp).
-class SelfCollisionBarrier final : public Embedding {
+class SelfCollisionBarrier final : public Barrier {
  public:
   /// `pairs` name links. Throws std::invalid_argument if there is none, a link is unknown or has no ellipsoid, or the
   /// two are rigidly connected; or names the setting at fault.
   SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<std::pair<std::string, std::string>>& pairs,
                        BarrierFunction barrier, double temperature = 0.002);
 
-  int num_coordinates() const noexcept override { return static_cast<int>(pairs_.size()); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
 
  private:
+  std::shared_ptr<Barrier> clone() const override { return std::make_shared<SelfCollisionBarrier>(*this); }
+
   struct Group {
     std::string link;
     int joint;
@@ -42,28 +42,27 @@ class SelfCollisionBarrier final : public Embedding {
     Group first, second;
   };
 
-  BarrierFunction barrier_;
   double temperature_;
   std::vector<Pair> pairs_;
 };
 
 /// One coordinate per given link, a barrier of its clearance to a plane that must not be crossed (a floor, a table,
 /// a wall): h = normal · (p − point) − s(normal) over the link's ellipsoids, which is exact.
-class PlaneBarrier final : public Embedding {
+class PlaneBarrier final : public Barrier {
  public:
   /// point (3) [m] on the plane and normal (3) pointing to the free side, in the world; `links` to keep off it, each
   /// moved by a joint. Throws std::invalid_argument that names what is wrong.
   PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                const std::vector<std::string>& links, BarrierFunction barrier, double temperature = 0.002);
 
-  int num_coordinates() const noexcept override { return static_cast<int>(links_.size()); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
 
  private:
+  std::shared_ptr<Barrier> clone() const override { return std::make_shared<PlaneBarrier>(*this); }
+
   Eigen::Vector3d normal_;
   double offset_;
-  BarrierFunction barrier_;
   double temperature_;
   std::vector<std::vector<BodyEllipsoid>> links_;
   std::vector<std::string> names_;  // of the links

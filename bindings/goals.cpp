@@ -1,0 +1,92 @@
+#include <nanobind/stl/string.h>
+
+#include "dynamical_system.hpp"
+#include "sidestep/dynamical_system/goal.hpp"
+
+namespace sidestep::python {
+
+Goal as_goal(nb::handle value, Eigen::Index nv) {
+  if (nb::isinstance<PoseGoal>(value)) {
+    return nb::cast<const PoseGoal&>(value);
+  }
+  if (nb::isinstance<JointGoal>(value)) {
+    const auto& goal = nb::cast<const JointGoal&>(value);
+    if (goal.position.size() != nv) {
+      throw nb::value_error(("goal has " + std::to_string(goal.position.size()) + " entries, expected " +
+                             std::to_string(nv)).c_str());
+    }
+    return goal;
+  }
+  return JointGoal(as_vector(value, "goal", nv));
+}
+
+namespace {
+
+Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
+  const Array array = as_array(value, "pose");
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  if (position_only && array.ndim() == 1) {
+    pose.translation() = as_vector(value, "pose", 3);
+    return pose;
+  }
+  const Eigen::MatrixXd matrix = as_matrix(value, "pose", 4, 4);
+  pose.linear() = matrix.topLeftCorner<3, 3>();
+  pose.translation() = matrix.topRightCorner<3, 1>();
+  return pose;
+}
+
+}  // namespace
+
+void bind_goals(nb::module_& m) {
+  nb::class_<JointGoal>(m, "JointGoal",
+                        "A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.\n"
+                        "position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] of a goal that moves, zero by default.")
+      .def(
+          "__init__",
+          [](JointGoal* self, const ArrayLike& position, nb::handle velocity) {
+            Eigen::VectorXd q = as_vector(position, "position");
+            const Eigen::Index nv = q.size();
+            new (self) JointGoal(std::move(q), velocity.is_none() ? Eigen::VectorXd(Eigen::VectorXd::Zero(nv))
+                                                                  : as_vector(velocity, "velocity", nv));
+          },
+          nb::arg("position"), nb::arg("velocity") = nb::none(),
+          nb::sig("def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None) "
+                  "-> None"))
+      .def_prop_ro("position", [](const JointGoal& g) { return to_numpy(g.position); })
+      .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); });
+
+  nb::class_<PoseGoal>(
+      m, "PoseGoal",
+      "A pose of a frame as a goal,\n"
+      "    U = k_p |p - p*|^2 / 2 + k_R |log(R*^T R)|^2 / 2.\n"
+      "pose (4, 4) in the world, or (3,) where position_only. position_stiffness k_p [1/(m s)^2],\n"
+      "orientation_stiffness k_R [1/s^2]. rest (nv,) with posture_stiffness [1/s^2]: a configuration that the joints are\n"
+      "drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin\n"
+      "[m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.\n"
+      "Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is\n"
+      "none, a stiffness out of range. A pose that is not finite or out of reach gives a status in the step.")
+      .def(
+          "__init__",
+          [](PoseGoal* self, const Robot& robot, const std::string& frame, const ArrayLike& pose, bool position_only,
+             double position_stiffness, double orientation_stiffness, nb::handle rest, double posture_stiffness,
+             nb::handle twist) {
+            const int nv = robot.num_coordinates();
+            new (self) PoseGoal(robot, frame, as_pose(pose, position_only),
+                                {position_only, position_stiffness, orientation_stiffness,
+                                 rest.is_none() ? Eigen::VectorXd() : as_vector(rest, "rest", nv), posture_stiffness},
+                                twist.is_none() ? Vector6d(Vector6d::Zero()) : Vector6d(as_vector(twist, "twist", 6)));
+          },
+          nb::arg("robot"), nb::arg("frame"), nb::arg("pose"), nb::kw_only(), nb::arg("position_only") = false,
+          nb::arg("position_stiffness") = PoseGoalSettings().position_stiffness,
+          nb::arg("orientation_stiffness") = PoseGoalSettings().orientation_stiffness, nb::arg("rest") = nb::none(),
+          nb::arg("posture_stiffness") = 0.0, nb::arg("twist") = nb::none(),
+          nb::sig("def __init__(self, robot: Robot, frame: str, pose: numpy.typing.ArrayLike, *, position_only: bool = "
+                  "False, position_stiffness: float = 4.0, orientation_stiffness: float = 0.5, rest: "
+                  "numpy.typing.ArrayLike | None = None, posture_stiffness: float = 0.0, twist: "
+                  "numpy.typing.ArrayLike | None = None) -> None"))
+      .def_prop_ro("frame", [](const PoseGoal& g) { return g.frame().name; })
+      .def_prop_ro("pose", [](const PoseGoal& g) { return to_numpy_matrix(g.pose.matrix()); }, "(4, 4) in the world.")
+      .def_prop_ro("position_only", [](const PoseGoal& g) { return g.settings.position_only; });
+}
+
+}  // namespace sidestep::python

@@ -1,0 +1,98 @@
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+
+#include "dynamical_system.hpp"
+#include "module.hpp"
+#include "sidestep/dynamical_system/progress_monitor.hpp"
+#include "sidestep/dynamical_system/rollout.hpp"
+
+namespace sidestep::python {
+
+void bind_rollout(nb::module_& m) {
+  nb::class_<ProgressMonitor>(m, "ProgressMonitor",
+                              "Says when a motion has come no nearer to its goal for `patience` [s]: when the goal's\n"
+                              "potential has not fallen by `fraction` of its least value.")
+      .def(nb::init<double, double>(), nb::kw_only(), nb::arg("patience") = 2.0, nb::arg("fraction") = 0.02)
+      .def("update", &ProgressMonitor::update, nb::arg("time"), nb::arg("potential"),
+           "Takes `Step.goal_potential` at a time [s]; whether patience has run out.")
+      .def("reset", &ProgressMonitor::reset, "For a new goal.");
+
+  nb::class_<Escape>(m, "Escape",
+                     "Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],\n"
+                     "it follows a random configuration within the limits for at most `leg` [s], then its goal again\n"
+                     "(Barraquand and Latombe 1991). fraction: of its potential that counts as nearer; seed: of the random\n"
+                     "configurations. Raises ValueError that names the setting at fault.")
+      .def(
+          "__init__",
+          [](Escape* self, const Robot& robot, double patience, double fraction, double leg, std::uint64_t seed) {
+            new (self) Escape(robot, {patience, fraction, leg, seed});
+          },
+          nb::arg("robot"), nb::kw_only(), nb::arg("patience") = EscapeSettings().patience,
+          nb::arg("fraction") = EscapeSettings().fraction, nb::arg("leg") = EscapeSettings().leg,
+          nb::arg("seed") = EscapeSettings().seed)
+      .def(
+          "pursue",
+          [](Escape& self, nb::handle goal, const ArrayLike& q, double potential, double period) {
+            const Goal target = as_goal(goal, self.num_coordinates());
+            return self.pursue(target, as_vector(q, "q", self.num_coordinates()), potential, period);
+          },
+          nb::arg("goal"), nb::arg("q"), nb::arg("potential"), nb::arg("period"),
+          nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
+                  "potential: float, period: float) -> JointGoal | PoseGoal"),
+          "The goal to follow in a step of `period` [s]: the goal given, or a sub-goal. potential: `Step.goal_potential`\n"
+          "of the step before; in the first call any number.")
+      .def_prop_ro("escaping", &Escape::escaping, "Whether the last step followed a sub-goal.")
+      .def_prop_ro("count", &Escape::count, "How many sub-goals there have been.");
+
+  nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
+      .value("semi_implicit_euler", Integrator::semi_implicit_euler, "v += a dt; q += v dt.")
+      .value("second_order", Integrator::second_order, "q += v dt + a dt^2/2; v += a dt (thesis 6.2.1).")
+      .value("runge_kutta_4", Integrator::runge_kutta_4, "The classical scheme, with the obstacles moved along.");
+
+  nb::class_<Rollout> result(m, "Rollout", "A kinematic motion: row k is at time k dt, steps + 1 rows.");
+  result.def_prop_ro("time", [](const Rollout& r) { return to_numpy(r.time); }, "[s]")
+      .def_ro("statuses", &Rollout::statuses, "One StepStatus per row.")
+      .def_prop_ro("step_seconds", [](const Rollout& r) { return to_numpy(r.step_seconds); },
+                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.")
+      .def_ro("filter_statuses", &Rollout::filter_statuses, "One TorqueStatus per row; empty without a filter.")
+      .def_prop_ro("safety_slack", [](const Rollout& r) { return to_numpy(r.safety_slack); },
+                   "(steps + 1,) largest shortfall of a clearance's constraint [m/s^2]; empty without a filter.");
+  matrix_property(result, "q", &Rollout::q, "(steps + 1, nv) [rad]");
+  matrix_property(result, "v", &Rollout::v, "(steps + 1, nv) [rad/s]");
+  matrix_property(result, "acceleration", &Rollout::acceleration, "(steps + 1, nv) [rad/s^2]");
+  matrix_property(result, "values", &Rollout::values, "psi (steps + 1, m)");
+  matrix_property(result, "switch", &Rollout::switch_weights, "Weights of the harmonic part (steps + 1, nv)");
+
+  m.def(
+      "rollout",
+      [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal, const Obstacles& obstacles,
+         double period, int steps, nb::handle integrator, bool time_steps, const AccelerationFilter* filter, Escape* escape) {
+        const int nv = system.robot().num_coordinates();
+        const Eigen::VectorXd start = as_vector(q, "q", nv);
+        const Eigen::VectorXd velocity = as_vector(v, "v", nv);
+        const Goal target = as_goal(goal, nv);
+        RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"), time_steps};
+        if (filter != nullptr) {
+          settings.filter = *filter;
+        }
+        settings.escape = escape;
+        nb::gil_scoped_release release;
+        return rollout(system, start, velocity, target, obstacles, settings);
+      },
+      nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
+      nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
+      nb::arg("time_steps") = false, nb::arg("filter") = nb::none(),
+      nb::arg("escape") = nb::none(),
+      nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
+              "goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, "
+              "steps: int, "
+              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, "
+              "filter: AccelerationFilter | None = None, escape: Escape | None = None) -> Rollout"),
+      "Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.\n"
+      "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
+      "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;\n"
+      "escape: sub-goals where the motion is stuck; it keeps its state from one call to the next.");
+}
+
+}  // namespace sidestep::python

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <random>
+
+#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/dynamical_system/progress_monitor.hpp"
+#include "sidestep/kinematics/robot.hpp"
+
+namespace sidestep {
+
+struct EscapeSettings {
+  double patience = 1.0;   ///< [s] without progress after which the arm counts as stuck
+  double fraction = 0.05;  ///< progress is a goal potential that falls by this fraction
+  double leg = 3.0;        ///< [s] the longest way towards a sub-goal
+  std::uint64_t seed = 0;
+
+  /// Throws std::invalid_argument that names the setting, its value and what is allowed.
+  void validate() const;
+};
+
+/// Leads an arm out of local minima without a map: when it is stuck, it follows a random configuration for a while,
+/// then its goal again, as the random walks of Barraquand and Latombe (1991) do for potential fields.
+///
+/// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so that whether it
+/// arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system, so
+/// nothing about safety changes. Sub-goals are drawn uniformly between the position limits (within ±π of zero where there are none).
+class Escape {
+ public:
+  explicit Escape(const Robot& robot, EscapeSettings settings = {});
+
+  /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. `potential` is that of the goal followed in
+  /// the step before (GoalPull::potential), q (nv) [rad | m] the state. No allocation.
+  const Goal& pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential, double period) noexcept;
+
+  /// Whether the last step followed a sub-goal.
+  bool escaping() const noexcept { return escaping_; }
+  /// How many sub-goals there have been.
+  int count() const noexcept { return count_; }
+  const EscapeSettings& settings() const noexcept { return settings_; }
+  int num_coordinates() const noexcept { return static_cast<int>(lower_.size()); }
+
+ private:
+  void turn(bool escape) noexcept;
+
+  EscapeSettings settings_;
+  Eigen::VectorXd lower_, upper_;
+  std::mt19937_64 random_;
+  ProgressMonitor stuck_, halted_;  // on the way to the goal, and to a sub-goal
+  Goal sub_goal_;
+  double time_ = 0.0, since_ = 0.0;
+  bool escaping_ = false;
+  bool turned_ = true;  // the potential at hand is that of another goal
+  int count_ = 0;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+
+#include "sidestep/embedding/barrier_function.hpp"
+#include "sidestep/embedding/embedding.hpp"
+
+namespace sidestep {
+
+/// An embedding whose coordinates are barriers of clearances, ψ_k = f(h_k).
+///
+/// Every coordinate has an activation distance of its own, at first the barrier function's. Where the arm has to come
+/// close, at its goal, it is made shorter (`relaxed_at`): else the metric there is so steep that the pull to the goal
+/// is all but lost, and the arm creeps.
+class Barrier : public Embedding {
+ public:
+  int num_coordinates() const noexcept final { return static_cast<int>(activations_.size()); }
+
+  const BarrierFunction& function() const noexcept { return function_; }
+
+  /// The activation distance of every coordinate (m) [m | rad].
+  const Eigen::VectorXd& activations() const noexcept { return activations_; }
+
+  std::shared_ptr<const Embedding> relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const final;
+
+  /// Share of a clearance at the goal that remains of the activation distance there.
+  static constexpr double relaxed_share = 0.9;
+  /// No activation distance is made shorter than this many floors of the barrier function.
+  static constexpr double relaxed_floors = 2.0;
+
+ protected:
+  /// Throws std::invalid_argument that names `owner`, the setting at fault, its value and what is allowed.
+  Barrier(Robot robot, const BarrierFunction& function, const char* owner);
+
+  void set_num_coordinates(int num) { activations_.setConstant(num, function_.activation); }
+
+  /// Adds ψ_k = f(h_k) with its derivatives, for every clearance that `out.clearances` holds.
+  void add_barriers(EmbeddingView out) const noexcept;
+
+  virtual std::shared_ptr<Barrier> clone() const = 0;
+
+ private:
+  BarrierFunction function_;
+  Eigen::VectorXd activations_;
+};
+
+}  // namespace sidestep
