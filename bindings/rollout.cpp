@@ -20,17 +20,18 @@ void bind_rollout(nb::module_& m) {
 
   nb::class_<Escape>(m, "Escape",
                      "Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],\n"
-                     "it follows a random configuration within the limits for at most `leg` [s], then its goal again\n"
-                     "(Barraquand and Latombe 1991). fraction: of its potential that counts as nearer; seed: of the random\n"
+                     "it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):\n"
+                     "one uniform within `spread` [rad] of every joint's position and within the limits. fraction: of its potential that counts as nearer; seed: of the random\n"
                      "configurations. Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
-          [](Escape* self, const Robot& robot, double patience, double fraction, double leg, std::uint64_t seed) {
-            new (self) Escape(robot, {patience, fraction, leg, seed});
+          [](Escape* self, const Robot& robot, double patience, double fraction, double leg, double spread,
+             std::uint64_t seed) {
+            new (self) Escape(robot, {patience, fraction, leg, spread, seed});
           },
           nb::arg("robot"), nb::kw_only(), nb::arg("patience") = EscapeSettings().patience,
           nb::arg("fraction") = EscapeSettings().fraction, nb::arg("leg") = EscapeSettings().leg,
-          nb::arg("seed") = EscapeSettings().seed)
+          nb::arg("spread") = EscapeSettings().spread, nb::arg("seed") = EscapeSettings().seed)
       .def(
           "pursue",
           [](Escape& self, nb::handle goal, const ArrayLike& q, double potential, double period) {
@@ -41,7 +42,7 @@ void bind_rollout(nb::module_& m) {
           nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
                   "potential: float, period: float) -> JointGoal | PoseGoal"),
           "The goal to follow in a step of `period` [s]: the goal given, or a sub-goal. potential: `Step.goal_potential`\n"
-          "of the step before; in the first call any number.")
+          "of the step before; NaN where there was none.")
       .def_prop_ro("escaping", &Escape::escaping, "Whether the last step followed a sub-goal.")
       .def_prop_ro("count", &Escape::count, "How many sub-goals there have been.");
 

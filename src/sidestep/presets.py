@@ -41,8 +41,8 @@ class Barriers:
         self_activation [m], self_strength: of self-collision.
     """
 
-    stiffness: float = 2.0
-    damping: float = 3.0
+    stiffness: float = 4.0
+    damping: float = 4.0
     activation: float = 0.1
     strength: float = 0.1
     power: float = 2.0
@@ -101,9 +101,7 @@ def barrier_system(
                 power=numbers.power,
             )
         )
-    return GeometricSystem(
-        parts, stiffness=numbers.stiffness, damping=numbers.damping, pull_form="one_sided"
-    )
+    return GeometricSystem(parts, stiffness=numbers.stiffness, damping=numbers.damping, pull_form="one_sided")
 
 
 def thesis_system(

@@ -1,8 +1,7 @@
 #include "sidestep/dynamical_system/escape.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -30,6 +29,7 @@ void EscapeSettings::validate() const {
   };
   require(patience > 0.0 && std::isfinite(patience), "patience", patience, "positive and finite");
   require(leg > 0.0 && std::isfinite(leg), "leg", leg, "positive and finite");
+  require(spread > 0.0 && std::isfinite(spread), "spread", spread, "positive and finite");
   require(fraction > 0.0 && fraction < 1.0, "fraction", fraction, "between 0 and 1");
 }
 
@@ -40,34 +40,29 @@ Escape::Escape(const Robot& robot, EscapeSettings settings)
       random_(settings.seed),
       stuck_(settings.patience, settings.fraction),
       halted_(half_patience * settings.patience, settings.fraction),
-      sub_goal_(JointGoal(Eigen::VectorXd::Zero(robot.num_coordinates()))) {
-  for (Eigen::Index j = 0; j < lower_.size(); ++j) {
-    lower_[j] = std::isfinite(lower_[j]) ? lower_[j] : -std::numbers::pi;
-    upper_[j] = std::isfinite(upper_[j]) ? upper_[j] : std::numbers::pi;
-  }
-}
+      sub_goal_(JointGoal(Eigen::VectorXd::Zero(robot.num_coordinates()))) {}
 
 const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential,
                            double period) noexcept {
   time_ += period;
-  if (turned_) {
+  if (turned_ || std::isnan(potential)) {
     turned_ = false;
     return escaping_ ? sub_goal_ : goal;
   }
   if (!escaping_) {
     if (stuck_.update(time_, potential)) {
-      turn(true);
+      turn(true, q);
     }
   } else {
     const double way = (q - std::get<JointGoal>(sub_goal_).position).cwiseAbs().maxCoeff();
     if (halted_.update(time_, potential) || way < near_sub_goal || time_ - since_ >= settings_.leg) {
-      turn(false);
+      turn(false, q);
     }
   }
   return escaping_ ? sub_goal_ : goal;
 }
 
-void Escape::turn(bool escape) noexcept {
+void Escape::turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept {
   escaping_ = escape;
   turned_ = true;
   since_ = time_;
@@ -77,7 +72,9 @@ void Escape::turn(bool escape) noexcept {
     ++count_;
     Eigen::VectorXd& position = std::get<JointGoal>(sub_goal_).position;
     for (Eigen::Index j = 0; j < position.size(); ++j) {
-      position[j] = lower_[j] + uniform(random_) * (upper_[j] - lower_[j]);
+      const double low = std::max(lower_[j], q[j] - settings_.spread);
+      const double high = std::min(upper_[j], q[j] + settings_.spread);
+      position[j] = std::clamp(low + uniform(random_) * (high - low), lower_[j], upper_[j]);
     }
   }
 }

@@ -104,6 +104,7 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
                  {},
                  Eigen::VectorXd::Zero(filter ? rows : 0)};
   result.statuses.reserve(static_cast<std::size_t>(rows));
+  constexpr double no_potential = std::numeric_limits<double>::quiet_NaN();  // before the first step
   TorqueSolution filtered(nv);
   GeometricSystem::Workspace w(system);
   Eigen::VectorXd q = start;
@@ -111,7 +112,7 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   for (Eigen::Index k = 0; k < rows; ++k) {
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
     const Goal& followed =
-        settings.escape == nullptr ? goal : settings.escape->pursue(goal, q, w.pull.potential, dt);
+        settings.escape == nullptr ? goal : settings.escape->pursue(goal, q, k == 0 ? no_potential : w.pull.potential, dt);
     const StepStatus status = system.acceleration(q, v, followed, obstacles, w);
     Eigen::VectorXd a = w.acceleration;
     if (filter) {

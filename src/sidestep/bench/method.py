@@ -14,3 +14,8 @@ class Method(StrEnum):
     def safe(self) -> bool:
         """Whether clearances and limits bound the acceleration as well: part of the method, not of the thesis's."""
         return self is Method.barrier
+
+    @property
+    def escapes(self) -> bool:
+        """Whether it takes sub-goals where it is stuck."""
+        return self is Method.barrier

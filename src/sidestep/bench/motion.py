@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import AccelerationFilter, GeometricSystem, Obstacles, TorqueController, rollout
+from sidestep._core import (
+    AccelerationFilter,
+    Escape,
+    GeometricSystem,
+    JointGoal,
+    Obstacles,
+    PoseGoal,
+    TorqueController,
+    rollout,
+)
 from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot
 from sidestep.simulation import Arrival, Simulation
@@ -29,6 +38,8 @@ class MotionSettings:
         torque: under torque control in MuJoCo, with the real masses, instead of integrated.
         safe: clearances and limits bound the acceleration as well (`AccelerationFilter`, or the rows of the
             torque controller); for systems of barriers, as others have no clearances.
+        escape: sub-goals where the arm is stuck (`Escape`), and barriers that leave a goal free among obstacles at rest
+            (`GeometricSystem.relaxed_at`).
 
     Raises:
         ValueError: a number that is not positive.
@@ -39,6 +50,7 @@ class MotionSettings:
     tolerance: float = 0.05
     torque: bool = False
     safe: bool = False
+    escape: bool = False
 
     def __post_init__(self) -> None:
         for name in ("period", "duration", "tolerance"):
@@ -91,6 +103,7 @@ def move(robot: Robot, system: GeometricSystem, problem: Problem, settings: Moti
 def _integrated(robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings) -> Motion:
     total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, CHUNK))
     q, v = problem.start, np.zeros_like(problem.start)
+    system, escape = _prepared(robot, system, problem, settings)
     guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
     rows: list[tuple[Array, Array, Array]] = []
     times: list[Array] = []
@@ -107,6 +120,7 @@ def _integrated(robot: Robot, system: GeometricSystem, problem: Problem, setting
             steps=steps,
             time_steps=True,
             filter=guard,
+            escape=escape,
         )
         near = np.abs(part.q - problem.goal).max(axis=1) < settings.tolerance
         keep = steps
@@ -127,9 +141,10 @@ def _under_torque(
     robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings
 ) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period)
+    system, escape = _prepared(robot, system, problem, settings)
     timer = _Timer()
     run = simulation.run(
-        _TimedSystem(system, timer),
+        _TimedSystem(system, timer, escape, settings.period),
         _TimedController(TorqueController(robot, period=settings.period), timer, safe=settings.safe),
         problem.start,
         problem.goal,
@@ -149,6 +164,17 @@ def _under_torque(
     )
 
 
+def _prepared(
+    robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings
+) -> tuple[GeometricSystem, Escape | None]:
+    if not settings.escape:
+        return system, None
+    obstacles = problem.obstacles_at(0.0)
+    if not np.any(obstacles.velocities):
+        system = system.relaxed_at(problem.goal, obstacles)
+    return system, Escape(robot, seed=problem.index)
+
+
 class _Timer:
     """Adds the time of a step's two calls, and hands the step of the first to the second."""
 
@@ -158,12 +184,17 @@ class _Timer:
 
 
 class _TimedSystem:
-    def __init__(self, system: GeometricSystem, timer: _Timer) -> None:
-        self._system, self._timer = system, timer
+    def __init__(self, system: GeometricSystem, timer: _Timer, escape: Escape | None, period: float) -> None:
+        self._system, self._timer, self._escape, self._period = system, timer, escape, period
+        self._potential = float("nan")
 
     def acceleration(self, q: Array, v: Array, goal: Array, obstacles: Obstacles) -> Any:
         begin = time.perf_counter()
-        step = self._system.acceleration(q, v, goal, obstacles)
+        followed: Array | JointGoal | PoseGoal = goal
+        if self._escape is not None:
+            followed = self._escape.pursue(goal, q, self._potential, self._period)
+        step = self._system.acceleration(q, v, followed, obstacles)
+        self._potential = step.goal_potential
         self._timer.steps.append(time.perf_counter() - begin)
         self._timer.step = step
         return step

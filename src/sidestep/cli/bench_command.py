@@ -68,7 +68,9 @@ def reach(
         ),
         count=problems,
         method=method,
-        motion=MotionSettings(period=period, duration=duration, torque=torque, safe=method.safe),
+        motion=MotionSettings(
+            period=period, duration=duration, torque=torque, safe=method.safe, escape=method.escapes
+        ),
         jobs=jobs or default_jobs(),
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")

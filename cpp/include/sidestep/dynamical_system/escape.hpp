@@ -11,9 +11,10 @@
 namespace sidestep {
 
 struct EscapeSettings {
-  double patience = 1.0;   ///< [s] without progress after which the arm counts as stuck
+  double patience = 0.6;   ///< [s] without progress after which the arm counts as stuck
   double fraction = 0.05;  ///< progress is a goal potential that falls by this fraction
-  double leg = 3.0;        ///< [s] the longest way towards a sub-goal
+  double leg = 2.0;        ///< [s] the longest way towards a sub-goal
+  double spread = 1.7;     ///< [rad | m] how far each joint of a sub-goal is at most from where the arm is
   std::uint64_t seed = 0;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
@@ -25,13 +26,13 @@ struct EscapeSettings {
 ///
 /// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so that whether it
 /// arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system, so
-/// nothing about safety changes. Sub-goals are drawn uniformly between the position limits (within ±π of zero where there are none).
+/// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits.
 class Escape {
  public:
   explicit Escape(const Robot& robot, EscapeSettings settings = {});
 
   /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. `potential` is that of the goal followed in
-  /// the step before (GoalPull::potential), q (nv) [rad | m] the state. No allocation.
+  /// the step before (GoalPull::potential; NaN where there was none), q (nv) [rad | m] the state. No allocation.
   const Goal& pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential, double period) noexcept;
 
   /// Whether the last step followed a sub-goal.
@@ -42,7 +43,7 @@ class Escape {
   int num_coordinates() const noexcept { return static_cast<int>(lower_.size()); }
 
  private:
-  void turn(bool escape) noexcept;
+  void turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept;
 
   EscapeSettings settings_;
   Eigen::VectorXd lower_, upper_;
