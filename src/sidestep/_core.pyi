@@ -333,6 +333,17 @@ class DampingForm(enum.Enum):
     metric = 1
     """h = -G^-1 (K (q - q*) + D v) (T2.12)."""
 
+class PullForm(enum.Enum):
+    """How the goal pulls."""
+
+    metric = 0
+    """-G^-1 dU (T5.4): all that changes a psi is held back."""
+
+    one_sided = 1
+    """
+    argmin_a |a + dU|^2 / 2 + sum_k max(0, J_k a)^2 / 2: only what makes a psi rise is held back.
+    """
+
 class Unswitched:
     """a = h + g (T2.12)."""
 
@@ -688,13 +699,13 @@ class GeometricSystem:
     Embeddings in the list are stacked, each with its own coordinates; an empty list and robot=... give flat
     space.
     stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive
-    semi-definite. damping_form: a DampingForm or its name. switch: None (unswitched) or one of the switches.
+    semi-definite. damping_form, pull_form: a DampingForm, a PullForm, or their names. switch: None (unswitched) or one of the switches.
     speed: a SpeedRegulator, which adds beta v to the acceleration.
     recovery: what a barrier does with an arm inside it, by default Recovery().
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, recovery: Recovery | None = None, speed: SpeedRegulator | None = None) -> None: ...
+    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None, speed: SpeedRegulator | None = None) -> None: ...
 
     def relaxed_at(self, goal: numpy.typing.ArrayLike, obstacles: Obstacles) -> GeometricSystem:
         """
@@ -710,6 +721,9 @@ class GeometricSystem:
 
     @property
     def damping(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def pull_form(self) -> PullForm: ...
 
     @property
     def damping_form(self) -> DampingForm: ...
@@ -752,17 +766,17 @@ class ProgressMonitor:
 class Escape:
     """
     Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],
-    it follows a random configuration within the limits for at most `leg` [s], then its goal again
-    (Barraquand and Latombe 1991). fraction: of its potential that counts as nearer; seed: of the random
+    it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):
+    one uniform within `spread` [rad] of every joint's position and within the limits. fraction: of its potential that counts as nearer; seed: of the random
     configurations. Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, robot: Robot, *, patience: float = 1.0, fraction: float = 0.05, leg: float = 3.0, seed: int = 0) -> None: ...
+    def __init__(self, robot: Robot, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 2.0, spread: float = 1.7, seed: int = 0) -> None: ...
 
     def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, potential: float, period: float) -> JointGoal | PoseGoal:
         """
         The goal to follow in a step of `period` [s]: the goal given, or a sub-goal. potential: `Step.goal_potential`
-        of the step before; in the first call any number.
+        of the step before; NaN where there was none.
         """
 
     @property

@@ -84,7 +84,8 @@ def test_escape_leads_an_arm_out_of_a_local_minimum():
     obstacles = ss.Obstacles([[0.8, 0.0, 0.0]], radii=0.05)
     start, goal = np.array([0.9, 0.0]), np.array([-0.9, 0.0])
     stuck = ss.rollout(system, start, np.zeros(2), goal, obstacles, steps=20000)
-    escape = ss.Escape(robot, seed=0)
+    # An arm of two joints has to fold and turn at once, so its sub-goals have to be far.
+    escape = ss.Escape(robot, patience=1.0, leg=3.0, spread=4.0)
     freed = ss.rollout(system, start, np.zeros(2), goal, obstacles, steps=60000, escape=escape)
     assert np.abs(stuck.q[-1] - goal).max() > 0.5
     assert np.abs(freed.q - goal).max(axis=1).min() < 0.05
