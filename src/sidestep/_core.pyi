@@ -157,6 +157,13 @@ class Body:
     @property
     def covariances(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
+def refine_cover(*, origin: numpy.typing.ArrayLike, spacing: float, values: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike, multipliers: numpy.typing.ArrayLike, directions: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: numpy.typing.ArrayLike, steps: int, first_rate: float, last_rate: float, stiffness: float, multiplier_steps: int, margin: float, unit: float, area: float, slimness: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Moves ellipsoids until they hold points (N, 3) [m] and overshoot a surface little: centres (K, 3),
+    shapes (K, 3, 3) and multipliers (N,) afterwards. The surface is the zero of signed distances values
+    (nx, ny, nz) [m] on a grid from origin (3,); directions (R, J, 3) are R sets of unit vectors, used in turn.
+    """
+
 class Obstacles:
     """
     Obstacle points in the world, each a ball with a radius, moving with a constant velocity.

@@ -155,8 +155,9 @@ class Body(_core.Body):
 
         Args:
             robot: the robot, with geometry.
-            components: ellipsoids per link: a number or {link: number} for every link with geometry; None shares
-                max_components so that overshoot, relative to the size of the link, is even.
+            components: ellipsoids per link: one number for all, or {link: number}, such as more for a gripper
+                that works close to things. Links that are not named share what is left of max_components so that
+                overshoot, relative to the size of the link, is even; all links do if it is None.
             max_components: ellipsoids in all; fewer are used if every link overshoots little enough.
             seed: seed of the starts.
             progress: called as progress(link, done, in_all); not called when the cache answers.

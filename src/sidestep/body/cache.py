@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import platformdirs
 
 from sidestep.body import file as body_file
-from sidestep.body.cover import CoverSettings
+from sidestep.body.cover import ALGORITHM_VERSION, CoverSettings
 from sidestep.body.fitting import FitSettings
 
 if TYPE_CHECKING:
@@ -38,6 +38,8 @@ def cache_path(robot: Robot, settings: FitSettings | CoverSettings) -> Path:
         "settings": asdict(settings),
         "format_version": body_file.FORMAT_VERSION,
     }
+    if isinstance(settings, CoverSettings):
+        content["algorithm_version"] = ALGORITHM_VERSION
     key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     return cache_directory() / f"{key}.json"
 

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
-from sidestep.body.cover_certificate import certify, complete
-from sidestep.body.cover_overshoot import interior_coverage, overshoot, union_volume
-from sidestep.body.cover_refine import OUTLINE, REPAIR, Ellipsoids, initial, refine
+from sidestep.body.cover_certificate import complete, grow
+from sidestep.body.cover_overshoot import Overshoot, interior_coverage, overshoot, union_volume
+from sidestep.body.cover_refine import (
+    OUTLINE,
+    POLISH,
+    Ellipsoids,
+    initial,
+    refine,
+)
 from sidestep.body.cover_surface import Array, LinkSurface
 from sidestep.body.fitting import LinkFit, assess, mahalanobis_squared
 from sidestep.body.mixture import Mixture
@@ -20,22 +27,23 @@ from sidestep.body.sampling import check_components, link_seed, links_with_geome
 if TYPE_CHECKING:
     from sidestep.robot import Robot
 
+ALGORITHM_VERSION = 2  # part of the cache's key: a cover of another algorithm is made again
 MAX_COMPONENTS = 80
-MAX_SHARE = (
-    0.08  # of a link's size: the largest overshoot aimed at, 15 mm on an arm's links, 2 mm on a finger
-)
-MEAN_SHARE = 0.03  # of a link's size: the mean overshoot aimed at, 4 mm on an arm's links, 0.7 mm on a finger
+MEAN_AIM, MAX_AIM = 4e-3, 15e-3  # mean and largest overshoot aimed at on a link of AIM_SIZE [m]
+AIM_SIZE = 0.15  # a link of an arm [m]
+AIM_POWER = 0.8  # of the size, with which the aims go: 1 mm and 3.6 mm on a finger of 25 mm
 FIXED_ALLOWANCE = (
     2.0  # links that no joint moves may overshoot by this factor more: only self-collision sees them
 )
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
 GROWTH = 1.3  # numbers of ellipsoids tried on a link grow by this factor
 CERTIFICATE_TOLERANCE = 1 / 400  # of a link's size: longest edge of a triangle that is not cut further
-NUM_REPAIRS = 3  # rounds after the outline; each takes off a few per cent, later ones nothing
-BARE_TOLERANCE = 1 / 150  # of a link's size: how finely bare spots are located for a repair
-NUM_BARE = 600  # corners of bare triangles added per repair
+TRIAL_STARTS = 2  # outlines tried while numbers of ellipsoids are compared
+FINAL_STARTS = 10  # more of them with the final number: the best of them overshoots 5 to 15 % less
+NUM_COARSE = 1_000  # surface points that an outline must hold, besides the triangles' corners
+NUM_FINE = 30_000  # surface points that the final refinement must hold; the proof itself needs no points
 TRIAL_DIRECTIONS = 400  # boundary points per ellipsoid while covers are compared
-NUM_SAMPLES = 4000  # surface points that steer the refinement; coverage itself is proven without samples
+NUM_SAMPLES = 4000  # surface points by which the density of the cover is assessed
 SOLID_LEVEL = 5.0  # (y - mu)^T Sigma^-1 (y - mu) on the boundary of a solid ellipsoid of covariance Sigma
 LEVEL_ROUNDING = 1e-9  # levels are larger by this share: rounding of the covariances cannot bare a corner
 
@@ -47,8 +55,9 @@ class CoverSettings:
     """What a cover was asked for: equal settings on an equal robot give an equal body.
 
     Attributes:
-        components: ellipsoids per link (a number, or {link: number}), or None to share `max_components`.
-        max_components: ellipsoids in all, when they are shared.
+        components: ellipsoids per link: one number for all, or {link: number}; links not named share what is
+            left of `max_components`, and all links do if it is None.
+        max_components: ellipsoids in all, when some are shared.
         seed: seed of the starts.
     """
 
@@ -63,14 +72,26 @@ class CoverSettings:
             raise ValueError(f"robot '{robot.name}' has no link with geometry to cover")
         if self.seed < 0:
             raise ValueError(f"seed is {self.seed}, must be >= 0")
-        if self.components is None:
-            if self.max_components < len(links):
-                raise ValueError(
-                    f"max_components is {self.max_components}, must be at least {len(links)}: "
-                    f"robot '{robot.name}' has that many links with geometry"
-                )
+        if isinstance(self.components, int):
+            check_components(self.components, links)
             return
-        check_components(self.components, links)
+        check_components({**dict.fromkeys(links, 1), **(self.components or {})}, links)
+        least = sum((self.components or {}).get(link, 1) for link in links)
+        if self.max_components < least and self.num_shared(links) > 0:
+            raise ValueError(
+                f"max_components is {self.max_components}, must be at least {least}: "
+                f"robot '{robot.name}' has {len(links)} links with geometry" + self._named()
+            )
+
+    def num_shared(self, links: Sequence[str]) -> int:
+        """How many of these links share ellipsoids."""
+        if isinstance(self.components, int):
+            return 0
+        return sum(link not in (self.components or {}) for link in links)
+
+    def _named(self) -> str:
+        asked = self.components
+        return f", and components asks for {dict(asked)}" if isinstance(asked, Mapping) else ""
 
 
 @dataclass(frozen=True)
@@ -124,44 +145,54 @@ class _LinkProblem:
     def __init__(self, triangles: Array, *, seed: int) -> None:
         self.surface = LinkSurface(triangles)
         self.seed = seed
-        self.samples = self.surface.steering_points(NUM_SAMPLES, np.random.default_rng(seed))
+        self.coarse = self.surface.points(NUM_COARSE)
+        self.fine = self.surface.points(NUM_FINE)
+        self._nearest_fine = cKDTree(self.fine).query(self.coarse)[1]
         self.solutions: dict[int, _Solution] = {}
 
     def solve(self, number: int) -> _Solution:
-        """The best cover found: an outline, then rounds that refine it where the proof found it bare."""
-        if number in self.solutions:
-            return self.solutions[number]
-        rng = np.random.default_rng(self.seed)
-        surface, samples = self.surface, self.samples
+        """A proven cover, good enough to compare numbers of ellipsoids by."""
+        if number not in self.solutions:
+            self.solutions[number] = self._search(number, range(TRIAL_STARTS))
+        return self.solutions[number]
+
+    def finish(self, number: int) -> _Solution:
+        """The best cover found with more starts."""
+        starts = range(TRIAL_STARTS, TRIAL_STARTS + FINAL_STARTS)
+        found = [self.solve(number), self._search(number, starts)]
+        self.solutions[number] = min(found, key=self._excess)
+        return self.solutions[number]
+
+    def _search(self, number: int, starts: range) -> _Solution:
+        """The best of several outlines, refined with finer points and completed."""
+        surface = self.surface
+        outlines = []
+        for start in starts:
+            first = initial(surface, self.coarse, number, self.seed + start)
+            outline, multipliers = refine(surface, self.coarse, first, OUTLINE)
+            grown = grow(outline, self.coarse[:, None])
+            measured = overshoot(surface, grown, directions=OUTLINE.directions)
+            outlines.append((self._excess(measured), start, outline, multipliers))
+        _, _, outline, multipliers = min(outlines, key=lambda entry: entry[:2])
+        pushing = np.flatnonzero(multipliers)
+        fine = np.zeros(len(self.fine))
+        fine[self._nearest_fine[pushing]] = multipliers[pushing]
+        return self._proven(refine(surface, self.fine, outline, POLISH, fine)[0])
+
+    def _proven(self, ellipsoids: Ellipsoids) -> _Solution:
+        surface = self.surface
         tolerance = CERTIFICATE_TOLERANCE * surface.size
-        outline = refine(surface, samples, initial(surface, samples, number, self.seed), OUTLINE)
-        best: _Solution | None = None
-        for repair in range(NUM_REPAIRS + 1):
-            if repair > 0:
-                bare = certify(surface.triangles, outline, tolerance=BARE_TOLERANCE * surface.size).remaining
-                corners = bare.reshape(-1, 3)
-                if len(corners) > NUM_BARE:
-                    corners = corners[rng.choice(len(corners), NUM_BARE, replace=False)]
-                samples = np.concatenate([samples, corners])
-                outline = refine(surface, samples, outline, REPAIR)
-            covering, _ = complete(
-                surface.triangles, outline, tolerance=tolerance, points=surface.pieces.reshape(-1, 3)
-            )
-            measured = overshoot(surface, covering, directions=TRIAL_DIRECTIONS)
-            solution = _Solution(covering, measured.mean, measured.maximum)
-            if best is None or self._excess(solution) < self._excess(best):
-                best = solution
-        assert best is not None
-        self.solutions[number] = best
-        return best
+        covering, _ = complete(surface.triangles, ellipsoids, tolerance=tolerance, points=self.fine)
+        measured = overshoot(surface, covering, directions=TRIAL_DIRECTIONS)
+        return _Solution(covering, measured.mean, measured.maximum)
 
     def excess(self, number: int) -> float:
         """Overshoot over what is aimed at: the mean of its two measures."""
         return self._excess(self.solve(number))
 
-    def _excess(self, solution: _Solution) -> float:
-        size = self.surface.size
-        return 0.5 * (solution.maximum / (MAX_SHARE * size) + solution.mean / (MEAN_SHARE * size))
+    def _excess(self, solution: _Solution | Overshoot) -> float:
+        scale = (self.surface.size / AIM_SIZE) ** AIM_POWER
+        return float(0.5 * (solution.mean / MEAN_AIM + solution.maximum / MAX_AIM) / scale)
 
     def trade_off(self) -> tuple[TradeOff, ...]:
         return tuple(TradeOff(k, s.mean, s.maximum) for k, s in sorted(self.solutions.items()))
@@ -187,7 +218,15 @@ def cover_links(
     moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
     allowances = {link: 1.0 if moves[link] else FIXED_ALLOWANCE for link in problems}
     numbers = _numbers(problems, allowances, settings, progress)
-    return tuple(_assess(robot, link, problem, numbers[link]) for link, problem in problems.items())
+    total = sum(numbers.values())
+    covers: list[tuple[LinkCover, Ellipsoids]] = []
+    for link, problem in problems.items():
+        if progress is not None:
+            progress(link, total + sum(cover.num_components for cover, _ in covers), 2 * total)
+        covers.append(_assess(robot, link, problem, numbers[link]))
+    if progress is not None:
+        progress(link, 2 * total, 2 * total)
+    return tuple(covers)
 
 
 def _triangles(robot: Robot, link: str) -> Array:
@@ -202,25 +241,16 @@ def _numbers(
     settings: CoverSettings,
     progress: CoverProgress | None,
 ) -> dict[str, int]:
-    total = settings.max_components
-
-    def report(link: str, done: int, of: int) -> None:
-        if progress is not None:
-            progress(link, done, of)
-
-    if settings.components is not None:
-        asked = settings.components
-        numbers = {link: asked[link] if isinstance(asked, Mapping) else asked for link in problems}
-        for done, link in enumerate(problems):
-            report(link, done, len(problems))
-            problems[link].solve(numbers[link])
-        report(link, len(problems), len(problems))
-        return numbers
-    best = dict.fromkeys(problems, 1)
-    while True:
-        spare = total - sum(best.values())
+    asked = settings.components
+    if isinstance(asked, int):
+        asked = dict.fromkeys(problems, asked)
+    best = {link: 1 if asked is None else asked.get(link, 1) for link in problems}
+    shared = [link for link in problems if asked is None or link not in asked]
+    while shared:
+        spare = settings.max_components - sum(best.values())
         gains: list[tuple[float, str, int]] = []
-        for link, problem in problems.items():
+        for link in shared:
+            problem = problems[link]
             now = problem.excess(best[link]) / allowances[link]
             if now <= 1.0:
                 continue
@@ -229,7 +259,8 @@ def _numbers(
                 following = max(following + 1, round(GROWTH * following))
                 if following - best[link] > spare:
                     break
-                report(link, total - spare, total)
+                if progress is not None:
+                    progress(link, sum(best.values()), 2 * settings.max_components)
                 gain = now**2 - (problem.excess(following) / allowances[link]) ** 2
                 if gain > 0.0:
                     gains.append((gain / (following - best[link]), link, following))
@@ -237,7 +268,6 @@ def _numbers(
             break
         _, link, number = max(gains)
         best[link] = number
-    report(link, total, total)
     return best
 
 
@@ -246,7 +276,7 @@ def _assess(robot: Robot, link: str, problem: _LinkProblem, number: int) -> tupl
     triangles = _triangles(robot, link)
     tolerance = CERTIFICATE_TOLERANCE * surface.size
     ellipsoids, certificate = complete(
-        triangles, problem.solve(number).ellipsoids, tolerance=tolerance, points=triangles.reshape(-1, 3)
+        triangles, problem.finish(number).ellipsoids, tolerance=tolerance, points=triangles.reshape(-1, 3)
     )
     measured = overshoot(surface, ellipsoids)
     mesh = robot.collision_mesh(link)

@@ -70,15 +70,15 @@ def complete(
         tolerance: longest edge of a triangle that is not cut further [m].
         points: of the surface (N, 3); covered first, so that few triangles are left to be cut.
     """
-    ellipsoids = _grown(ellipsoids, points[:, None])
+    ellipsoids = grow(ellipsoids, points[:, None])
     certificate = certify(triangles, ellipsoids, tolerance=tolerance)
     while not certificate.complete:
-        ellipsoids = _grown(ellipsoids, certificate.remaining)
+        ellipsoids = grow(ellipsoids, certificate.remaining)
         certificate = certify(triangles, ellipsoids, tolerance=tolerance)
     return ellipsoids, certificate
 
 
-def _grown(ellipsoids: Ellipsoids, pieces: Array) -> Ellipsoids:
+def grow(ellipsoids: Ellipsoids, pieces: Array) -> Ellipsoids:
     """Grows ellipsoids until each piece (P, corners, 3) lies in one of them."""
     count = len(ellipsoids)
     radii = ellipsoids.radii(pieces.reshape(-1, 3)).reshape(len(pieces), -1, count).max(axis=1)

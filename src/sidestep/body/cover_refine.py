@@ -1,11 +1,13 @@
-"""Ellipsoids moved and bent until they cover a link's surface and overshoot it little."""
+"""Ellipsoids that cover a link's surface: their starts and their refinement."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from sidestep import _core
 from sidestep.body.cover_surface import Array, LinkSurface
 
 
@@ -51,104 +53,65 @@ class RefineSettings:
     """How the refinement descends; the values were chosen by trial on links and fingers of the FR3.
 
     Attributes:
-        steps: of the descent (Adam).
-        rate: length of the first steps, as a share of the link's size.
-        weight_start, weight_end: of bare samples against overshoot, growing from one to the other.
-        power: of the overshoot: 2 minimises its mean square, more flattens its peaks.
-        margin: bare samples are pulled in by this more [m].
+        steps: of the descent.
+        first_rate, last_rate: length of the first and of the last steps, as shares of the link's size.
+        stiffness: of the augmented Lagrangian that keeps points covered.
+        multiplier_steps: steps between two updates of its multipliers.
+        margin: points are held inside by this share of the link's size, so that little growth is left to do.
         slimness: least ratio of the shortest to the longest semi-axis; clearances to slimmer ellipsoids are poor.
         directions: boundary points per ellipsoid at which overshoot is felt.
     """
 
-    steps: int = 300
-    rate: float = 0.02
-    weight_start: float = 0.3
-    weight_end: float = 30.0
-    power: int = 4
-    margin: float = 2e-4
+    steps: int = 800
+    first_rate: float = 0.01
+    last_rate: float = 0.002
+    stiffness: float = 30.0
+    multiplier_steps: int = 4
+    margin: float = 1e-3
     slimness: float = 0.2
-    directions: int = 160
+    directions: int = 80
 
 
 OUTLINE = RefineSettings()
-REPAIR = RefineSettings(steps=50, rate=0.002, weight_start=100.0, weight_end=100.0)
+POLISH = RefineSettings(
+    steps=150, first_rate=0.002, last_rate=1e-4, stiffness=100.0, multiplier_steps=5, directions=160
+)
+NUM_TURNS = 8  # the directions are turned about from step to step, so that no peak stays between them
+OVERSHOOT_UNIT = 0.03  # of a link's size: below, the overshoot's mean counts most, above its peaks
 
 
-def refine(surface: LinkSurface, samples: Array, start: Ellipsoids, settings: RefineSettings) -> Ellipsoids:
-    """Minimises overshoot^p over the ellipsoids' boundaries plus a growing penalty on samples left bare."""
-    centres, shapes = start.centres.copy(), start.shapes.copy()
-    unit = 0.03 * surface.size  # overshoot is measured in this
-    directions = sphere_directions(settings.directions)
-    m = [np.zeros_like(centres), np.zeros_like(shapes)]
-    v = [np.zeros(len(centres)), np.zeros(len(shapes))]
-    beta1, beta2 = 0.9, 0.98
-    rows = np.arange(len(samples))
-    for step in range(settings.steps):
-        share = step / settings.steps
-        weight = settings.weight_start * (settings.weight_end / settings.weight_start) ** min(
-            1.0, share / 0.8
-        )
-        now = Ellipsoids(centres, shapes)
-        inverse = np.linalg.inv(shapes)
-        # samples left bare
-        z = (inverse.reshape(-1, 3) @ samples.T).reshape(-1, 3, len(samples)) - np.einsum(
-            "kij,kj->ki", inverse, centres
-        )[:, :, None]
-        d = np.sqrt(np.square(z).sum(axis=1))  # (K, N)
-        length = np.linalg.norm(samples[None] - centres[:, None], axis=2)
-        scale = length / np.maximum(d, 1e-12)
-        gap = length - scale
-        owner = gap.argmin(axis=0)
-        bare = gap[owner, rows] + settings.margin
-        bare_rows = np.flatnonzero(bare > 0.0)
-        k = owner[bare_rows]
-        amount = 2.0 * weight * bare[bare_rows] / unit**2 * scale[k, bare_rows] / len(samples) * 100.0
-        direction = z[k, :, bare_rows] / d[k, bare_rows, None]  # ∂d/∂z
-        pull = np.einsum("nji,nj->ni", inverse[k], direction) * amount[:, None]  # -∂L/∂centre
-        g_centres = np.zeros_like(centres)
-        g_shapes = np.zeros_like(shapes)
-        np.add.at(g_centres, k, -pull)
-        np.add.at(g_shapes, k, -pull[:, :, None] * z[k, :, bare_rows][:, None, :])
-        # boundary that overshoots
-        points, areas = now.boundary(directions)
-        flat = points.reshape(-1, 3)
-        height, slope = surface.field(flat)
-        over = np.flatnonzero(height > 0.0)
-        if len(over):
-            own = over // len(directions)
-            others = (inverse.reshape(-1, 3) @ flat[over].T).reshape(-1, 3, len(over)) - np.einsum(
-                "kij,kj->ki", inverse, centres
-            )[:, :, None]
-            r = np.square(others).sum(axis=1)
-            r[own, np.arange(len(over))] = np.inf
-            free = r.min(axis=0) > 1.0 if len(centres) > 1 else np.ones(len(over), dtype=bool)
-            over, own = over[free], own[free]
-            o = height[over] / unit
-            force = (
-                (areas.reshape(-1)[over] / surface.area)[:, None]
-                * ((2.0 * o + settings.power * o ** (settings.power - 1)) / unit)[:, None]
-                * slope[over]
-            )
-            np.add.at(g_centres, own, force)
-            np.add.at(g_shapes, own, force[:, :, None] * directions[over % len(directions)][:, None, :])
-        lr = settings.rate * surface.size * (1.0 if share < 0.3 else (1.0 - share) / 0.7 + 0.02)
-        for i, (p, g) in enumerate(((centres, g_centres), (shapes, g_shapes))):
-            m[i] = beta1 * m[i] + (1 - beta1) * g
-            axes = tuple(range(1, g.ndim))
-            v[i] = beta2 * v[i] + (1 - beta2) * np.square(g).mean(axis=axes)
-            mh = m[i] / (1 - beta1 ** (step + 1))
-            vh = np.sqrt(v[i] / (1 - beta2 ** (step + 1))) + 1e-12
-            p -= lr * mh / vh.reshape((-1,) + (1,) * (g.ndim - 1))
-        if step % 10 == 9 or step == settings.steps - 1:
-            shapes[:] = rounded(shapes, settings.slimness)
-    return Ellipsoids(centres, shapes)
+def refine(
+    surface: LinkSurface,
+    points: Array,
+    start: Ellipsoids,
+    settings: RefineSettings,
+    multipliers: Array | None = None,
+) -> tuple[Ellipsoids, Array]:
+    """Ellipsoids that overshoot little and hold points (N, 3), and the multipliers (N,) of the points.
 
-
-def rounded(shapes: Array, slimness: float) -> Array:
-    """Symmetric shapes of the same ellipsoids, the shortest semi-axis at least `slimness` of the longest."""
-    u, s, _ = np.linalg.svd(shapes)
-    s = np.maximum(s, slimness * s[:, :1])
-    return np.asarray(np.einsum("kij,kj,klj->kil", u, s, u))
+    The descent itself is `refine_cover` in the core.
+    """
+    turns = Rotation.random(NUM_TURNS, random_state=0).as_matrix()
+    centres, shapes, multipliers = _core.refine_cover(
+        origin=surface.field.origin,
+        spacing=surface.field.spacing,
+        values=surface.field.values,
+        points=points,
+        multipliers=np.zeros(len(points)) if multipliers is None else multipliers,
+        directions=sphere_directions(settings.directions) @ turns.transpose(0, 2, 1),
+        centres=start.centres,
+        shapes=start.shapes,
+        steps=settings.steps,
+        first_rate=settings.first_rate * surface.size,
+        last_rate=settings.last_rate * surface.size,
+        stiffness=settings.stiffness,
+        multiplier_steps=settings.multiplier_steps,
+        margin=settings.margin * surface.size,
+        unit=OVERSHOOT_UNIT * surface.size,
+        area=surface.area,
+        slimness=settings.slimness,
+    )
+    return Ellipsoids(centres, shapes), multipliers
 
 
 def initial(surface: LinkSurface, samples: Array, number: int, seed: int) -> Ellipsoids:

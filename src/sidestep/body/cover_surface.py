@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
@@ -13,6 +14,7 @@ Flags = NDArray[np.bool_]
 
 NUM_NODES = 120_000  # of the distance field: cells of 2 to 4 mm on the links of an arm, 0.7 mm on a finger
 PIECES_PER_LINK = 6_000  # pieces of equal size on a link's surface: 4 to 7 mm on an arm, 1 mm on a finger
+NEAR_OUTSIDE, NEAR_INSIDE = 5, 2  # in cells: how far from the surface the field is exact to a piece's size
 MARGIN = 0.15  # of `size`: how far around the link the field reaches, above any overshoot worth keeping
 CANDIDATES = 12  # pieces examined for the distance of a point
 _JITTER = np.array([0.3819660, 0.2360680])  # of a cell: keeps rays off vertices and edges of round size
@@ -168,13 +170,9 @@ class LinkSurface:
         result[outside] = self.distance(points[outside])
         return result
 
-    def steering_points(self, limit: int, rng: np.random.Generator) -> Array:
-        """Corners of pieces of half the size, at most `limit` (N, 3); those of the triangles come first."""
-        corners = _distinct(self.triangles)
-        fine = _distinct(bisect_to_size(self.pieces, 0.5 * self.piece_size))
-        if len(fine) > limit:
-            fine = fine[rng.choice(len(fine), limit, replace=False)]
-        return np.concatenate([corners[: limit // 2], fine])
+    def points(self, number: int) -> Array:
+        """About `number` points (N, 3) spread evenly over the surface, the corners of its triangles among them."""
+        return _distinct(bisect_to_size(self.triangles, float(np.sqrt(2.0 * self.area / number))))
 
     def sample(self, count: int, rng: np.random.Generator) -> Array:
         """Points (count, 3) uniform on the surface."""
@@ -195,11 +193,13 @@ class LinkSurface:
         origin = low - margin - 0.5 * spacing
         field = DistanceField(origin, spacing, np.zeros(tuple(shape)))
         inside = _inside_nodes(self.triangles, origin, spacing, shape)
-        nearest = cKDTree(
-            np.concatenate([self.pieces.mean(axis=1), np.unique(self.pieces.reshape(-1, 3), axis=0)])
-        )
-        distances, _ = nearest.query(field.nodes)
-        values = distances.reshape(tuple(shape))
+        marks = np.concatenate([self.pieces.mean(axis=1), _distinct(self.pieces)])
+        free = np.ones(tuple(shape), dtype=bool)
+        free[tuple(np.rint((marks - origin) / spacing).astype(np.intp).T)] = False
+        cells = distance_transform_edt(free)
+        values = cells * spacing
+        near = (cells <= np.where(inside, NEAR_INSIDE, NEAR_OUTSIDE)).reshape(-1)
+        values.reshape(-1)[near] = cKDTree(marks).query(field.nodes[near])[0]
         return DistanceField(origin, spacing, np.where(inside, -values, values))
 
 
@@ -238,7 +238,12 @@ def _winding_along_rays(triangles: Array, shape: NDArray[np.intp]) -> NDArray[np
 
 
 def _distinct(triangles: Array) -> Array:
-    return np.asarray(np.unique(triangles.reshape(-1, 3).round(7), axis=0))  # 0.1 um: the same corner
+    """Corners (N, 3) of triangles, those within a millionth of the whole's extent taken for one."""
+    corners = triangles.reshape(-1, 3)
+    low = corners.min(axis=0)
+    steps = np.rint((corners - low) * (2**20 / np.ptp(corners, axis=0).max())).astype(np.int64)
+    _, first = np.unique((steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_index=True)
+    return np.asarray(corners[first])
 
 
 def _cross(a: Array, b: Array) -> Array:

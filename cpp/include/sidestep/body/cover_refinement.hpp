@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace sidestep {
+
+/// Signed distances to a surface at the nodes of a grid [m], positive outside; trilinear in between.
+struct DistanceGrid {
+  Eigen::Vector3d origin;      ///< position of node (0, 0, 0) [m]
+  double spacing;              ///< between nodes [m]
+  std::array<int, 3> shape;    ///< numbers of nodes, each >= 2
+  std::vector<double> values;  ///< node (i, j, k) at (i shape[1] + j) shape[2] + k
+
+  /// The distance at a point and its gradient; a point off the grid sees the grid's border.
+  double operator()(const Eigen::Vector3d& point, Eigen::Vector3d& gradient) const noexcept;
+};
+
+/// Solid ellipsoids {centre + shape u : |u| <= 1} [m].
+struct SolidEllipsoids {
+  std::vector<Eigen::Vector3d> centres;
+  std::vector<Eigen::Matrix3d> shapes;
+
+  int size() const noexcept { return static_cast<int>(centres.size()); }
+};
+
+/// How `refine_cover` descends.
+struct CoverRefinement {
+  int steps;               ///< of the descent (Adam)
+  double first_rate;       ///< length of the first steps [m]
+  double last_rate;        ///< of the last; geometric in between [m]
+  double stiffness;        ///< of the augmented Lagrangian, per squared depth in `unit`
+  int multiplier_steps;    ///< steps between two updates of the multipliers
+  double margin;           ///< by which points should lie inside [m]
+  double unit;             ///< overshoot at which its mean and its peaks count alike [m]
+  double area;             ///< of the surface [m^2]: overshoot is counted per area
+  double slimness;         ///< least shortest over longest semi-axis
+};
+
+/// Moves and bends ellipsoids so that their union holds points of a surface and overshoots the surface little.
+///
+/// Minimises  sum over the union's boundary of (area / settings.area) (o + o^2 + o^6),  o = distance outside / unit,
+/// subject to  g_i = min_k (|y_i - c_k| - r_k(y_i)) <= -margin  for every point y_i, where r_k(y) is the distance from
+/// the centre c_k to the ellipsoid's boundary in the direction of y. Method: augmented Lagrangian with Adam, whose
+/// steps have one length per ellipsoid, so that the descent does not depend on the frame.
+///
+/// points (3 × N) [m]; directions: sets of unit vectors, used in turn, at which the boundary is felt; multipliers (N,)
+/// of the points, updated. The proof of the cover is made elsewhere: nothing here is a guarantee.
+void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points,
+                  const std::vector<Eigen::Matrix3Xd>& directions, const CoverRefinement& settings,
+                  SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers);
+
+}  // namespace sidestep
