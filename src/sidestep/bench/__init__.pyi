@@ -1,3 +1,6 @@
+from .dynamic import DynamicProblem as DynamicProblem
+from .dynamic import Kind as Kind
+from .dynamic import run_dynamic as run_dynamic
 from .method import Method as Method
 from .methods import build_system as build_system
 from .motion import Motion as Motion

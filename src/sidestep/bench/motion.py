@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -109,7 +110,8 @@ def _integrated(robot: Robot, system: GeometricSystem, problem: Problem, setting
     times: list[Array] = []
     done, arrived = 0, False
     while done < total and not arrived:
-        steps = min(chunk, total - done)
+        changes = (math.ceil(at / settings.period) - done for at in problem.changes)
+        steps = min(chunk, total - done, *(steps for steps in changes if steps > 0))
         part = rollout(
             system,
             q,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from sidestep.simulation.evaluation import excess_over
 
 Array = npt.NDArray[np.float64]
 
+JUMP = 1.0  # [m] between two samples: what moves so far came or went
 TOLERANCE = 1e-3  # [m] of minimum clearances: the true one is at most this much smaller than the one reported
 
 
@@ -71,8 +73,8 @@ class Outcome:
         """It touched nothing and did not arrive."""
         return not self.arrived and not self.collision and not self.self_collision
 
-    def reasons(self) -> list[str]:
-        """What went wrong, a sentence each; empty when nothing did."""
+    def reasons(self, *, arrives: bool = True) -> list[str]:
+        """What went wrong, a sentence each; empty when nothing did. `arrives`: it should."""
         found = []
         if self.diverged:
             found.append(f"the motion diverged after {self.time_s:.3f} s")
@@ -85,7 +87,9 @@ class Outcome:
             )
         if self.self_collision:
             found.append(f"self-collision: {self.self_pair}")
-        if self.stuck:
+        if not arrives and self.arrived:
+            found.append("it arrived at a goal that is blocked")
+        if arrives and self.stuck:
             found.append(f"stuck: {self.error_rad:.2f} rad from the goal after {self.time_s:.1f} s")
         found += [f"{name} limit exceeded by {value:.3g}" for name, value in self.limits.items()]
         return found
@@ -111,11 +115,16 @@ class Judge:
         clearance, pair, when = None, "", 0.0
         if problem.objects:
             exact = self._clearance.among(problem.objects)
-            worst = exact.decided_minimum(q, motion.object_poses[:end], tolerance=TOLERANCE)
-            measured = worst.clearance.distance
-            clearance = measured if worst.lower_bound > 0.0 else min(measured, worst.lower_bound)
-            pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
-            when = worst.sample * settings.period
+            for first, last in _between_jumps(motion.object_poses[:end]):
+                worst = exact.decided_minimum(
+                    q[first:last], motion.object_poses[first:last], tolerance=TOLERANCE
+                )
+                measured = worst.clearance.distance
+                measured = measured if worst.lower_bound > 0.0 else min(measured, worst.lower_bound)
+                if clearance is None or measured < clearance:
+                    clearance = measured
+                    pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
+                    when = (first + worst.sample) * settings.period
         own = self._self.minimum_over(q, tolerance=TOLERANCE)
         if 0.0 < own.distance <= TOLERANCE:  # too close to say at this tolerance
             own = self._self.minimum_over(q, tolerance=own.distance / 2.0)
@@ -147,6 +156,13 @@ class Judge:
         if motion.torque is not None:
             beyond["torque"] = excess_over(np.abs(motion.torque[:end]), limits.effort)
         return {name: worst for name, (count, worst) in beyond.items() if count > 0}
+
+
+def _between_jumps(poses: Array) -> list[tuple[int, int]]:
+    """The stretches [first, last) of poses (T, N, 7) in which no solid comes or goes: no path leads there."""
+    shifts = np.abs(np.diff(poses[:, :, :3], axis=0)).max(axis=(1, 2), initial=0.0)
+    cuts = [0, *(np.flatnonzero(shifts > JUMP) + 1).tolist(), len(poses)]
+    return list(itertools.pairwise(cuts))
 
 
 def times_of(motion: Motion) -> StepTimes:

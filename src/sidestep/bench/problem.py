@@ -12,6 +12,7 @@ import numpy.typing as npt
 from sidestep._core import Obstacles
 from sidestep.pose import pose_vector
 from sidestep.simulation import SceneObject
+from sidestep.simulation.scene import AWAY
 
 Array = npt.NDArray[np.float64]
 
@@ -39,8 +40,12 @@ class Problem(Protocol):
     def straight_line_blocked(self) -> bool:
         """The straight line in joint space touches a solid where it was at time 0."""
 
+    @property
+    def changes(self) -> tuple[float, ...]:
+        """Times [s], rising, at which something comes or goes; between them points move at their velocities."""
+
     def obstacles_at(self, time: float) -> Obstacles:
-        """What the controller sees at a time [s]; until the next call it moves at its velocities."""
+        """What the controller sees at a time [s]."""
 
 
 def poses_over(objects: Sequence[SceneObject], times: Array) -> Array:
@@ -53,6 +58,7 @@ def poses_over(objects: Sequence[SceneObject], times: Array) -> Array:
             begin, end = item.moves_during
             since = np.clip(np.minimum(times, end) - begin, 0.0, None)
             poses[:, k, :3] += since[:, None] * item.velocity
+            poses[:, k, 2] -= AWAY * ((times < item.present[0]) | (times >= item.present[1]))
     return poses
 
 
@@ -72,6 +78,7 @@ class SceneProblem:
     objects: tuple[SceneObject, ...]
     obstacles: Obstacles
     straight_line_blocked: bool
+    changes: tuple[float, ...] = ()
 
     def obstacles_at(self, time: float) -> Obstacles:
         """The points."""

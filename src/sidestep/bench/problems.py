@@ -105,6 +105,11 @@ class ReachProblem:
         return balls(self.centers, self.radii, self.velocities)
 
     @property
+    def changes(self) -> tuple[float, ...]:
+        """Nothing comes or goes."""
+        return ()
+
+    @property
     def obstacles(self) -> Obstacles:
         """The balls as the controller sees them at time 0: a point with a radius and a velocity each."""
         return self.obstacles_at(0.0)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,16 +13,16 @@ from sidestep._core import __version__
 from sidestep.bench.arm import Arm, Arms, load_robot
 from sidestep.bench.method import Method
 from sidestep.bench.methods import build_body
-from sidestep.bench.motion import Motion, MotionSettings, move
+from sidestep.bench.motion import MotionSettings, move
 from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.outcome import Outcome, times_of
-from sidestep.bench.parallel import Progress, cpu_name, run_tasks
-from sidestep.bench.problem import SceneProblem
+from sidestep.bench.parallel import Progress, Worker, cpu_name, run_tasks
+from sidestep.bench.points import POINT_RADIUS, SPACING
+from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
 from sidestep.simulation import Clearance, EllipsoidClearance
 
-SPACING = 0.005  # [m] between points, as of a depth camera at arm's length
-POINT_RADIUS = 0.001  # [m] of a point: what a blunt ellipsoid needs not to sink between points that far apart
+Task = TypeVar("Task")
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class EndClearances:
     covered: Clearance | None
 
     @classmethod
-    def at(cls, q: np.ndarray[Any, Any], arm: Arm, problem: SceneProblem) -> EndClearances:
+    def at(cls, q: np.ndarray[Any, Any], arm: Arm, problem: Problem) -> EndClearances:
         """Measured at q (nv,)."""
         covered = None
         if arm.body.levels is not None:
@@ -87,7 +87,8 @@ class SceneOutcome:
             sent to the nearest configuration within.
         outcome: of the motion, None if there was none. path_length: sum of |dq| [rad | m].
         planning_s: until the first path; None where none is planned. first_motion_s: until the first command.
-        num_points: that the controller saw. unknown_joints: held joints that the robot does not have.
+        num_points: that the controller saw at first. unknown_joints: held joints that the robot does not have.
+        tolerance: of arriving [rad | m]. arrives: it should arrive; False where the goal stays blocked.
     """
 
     set: str
@@ -102,17 +103,18 @@ class SceneOutcome:
     num_points: int
     unknown_joints: tuple[str, ...]
     tolerance: float
+    arrives: bool = True
 
     @property
     def solved(self) -> bool:
-        """Arrived at the published goal, touched nothing, broke no limit."""
+        """Arrived where it should, touched nothing, broke no limit."""
         return not self.reasons()
 
     def reasons(self) -> list[str]:
         """What went wrong, a sentence each; empty when the problem is solved."""
         if self.outcome is None:
             return ["nothing was moved"]
-        found = self.outcome.reasons()
+        found = self.outcome.reasons(arrives=self.arrives)
         if self.goal_beyond_limits > self.tolerance:
             found.append(f"the goal is {self.goal_beyond_limits:.3f} rad beyond the position limits")
         covered = self.goal.covered
@@ -225,17 +227,26 @@ def run_scenes(
     """
     if not problems:
         raise ValueError("there is no problem to run")
+    return collect(settings, partial(_Worker, settings), list(problems), progress)
+
+
+def collect(
+    settings: SceneSettings,
+    make: Callable[[], Worker[Task, tuple[SceneOutcome, StepTimes]]],
+    tasks: Sequence[Task],
+    progress: Progress | None,
+) -> SceneResult:
+    """Runs tasks over processes and puts their outcomes in order; see `run_tasks`."""
     if progress is not None:
-        progress(0, len(problems), "preparing the robot")
-    make = partial(_Worker, settings)
+        progress(0, len(tasks), "preparing the robot")
     worker = make()  # here first: bodies are made once, and the processes find them cached
     outcomes, times = [], StepTimes()
-    for outcome, steps in run_tasks(make, list(problems), jobs=settings.jobs, worker=worker):
+    for outcome, steps in run_tasks(make, tasks, jobs=settings.jobs, worker=worker):
         outcomes.append(outcome)
         times.merge(steps)
         if progress is not None:
             word = f"{outcome.set} {outcome.index}: {(outcome.reasons() or ['solved'])[0]}"
-            progress(len(outcomes), len(problems), word)
+            progress(len(outcomes), len(tasks), word)
     outcomes.sort(key=lambda item: (item.set, item.index))
     return SceneResult(settings, tuple(outcomes), times)
 
@@ -252,21 +263,33 @@ class _Worker:
         settings = self.settings
         arm = self._arms.of(task)
         problem, beyond = arm.problem(task, spacing=settings.spacing, point_radius=settings.point_radius)
-        motion: Motion | None = None
-        if not settings.only_clearances:
-            motion = move(arm.robot, arm.system, problem, settings.motion)
-        outcome = SceneOutcome(
-            set=task.set,
-            index=task.index,
-            start=EndClearances.at(problem.start, arm, problem),
-            goal=EndClearances.at(problem.goal, arm, problem),
-            goal_beyond_limits=beyond,
-            outcome=None if motion is None else arm.judge.judge(problem, motion, settings.motion),
-            path_length=0.0 if motion is None else motion.path_length,
-            planning_s=None if motion is None else motion.planning_seconds,
-            first_motion_s=0.0 if motion is None else motion.first_motion_seconds,
-            num_points=len(problem.obstacles),
-            unknown_joints=arm.unknown,
-            tolerance=settings.motion.tolerance,
-        )
-        return outcome, StepTimes() if motion is None else times_of(motion)
+        return judged(arm, problem, settings, set=task.set, beyond=beyond)
+
+
+def judged(
+    arm: Arm,
+    problem: Problem,
+    settings: SceneSettings,
+    *,
+    set: str,
+    beyond: float = 0.0,
+    arrives: bool = True,
+) -> tuple[SceneOutcome, StepTimes]:
+    """Moves the arm through a problem, unless only ends are asked for, and says what came of it."""
+    motion = None if settings.only_clearances else move(arm.robot, arm.system, problem, settings.motion)
+    outcome = SceneOutcome(
+        set=set,
+        index=problem.index,
+        start=EndClearances.at(problem.start, arm, problem),
+        goal=EndClearances.at(problem.goal, arm, problem),
+        goal_beyond_limits=beyond,
+        outcome=None if motion is None else arm.judge.judge(problem, motion, settings.motion),
+        path_length=0.0 if motion is None else motion.path_length,
+        planning_s=None if motion is None else motion.planning_seconds,
+        first_motion_s=0.0 if motion is None else motion.first_motion_seconds,
+        num_points=len(problem.obstacles_at(0.0)),
+        unknown_joints=arm.unknown,
+        tolerance=settings.motion.tolerance,
+        arrives=arrives,
+    )
+    return outcome, StepTimes() if motion is None else times_of(motion)

@@ -1,14 +1,19 @@
-"""`sidestep bench motionbenchmaker`."""
+"""`sidestep bench motionbenchmaker` and `sidestep bench dynamic`."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 from sidestep.bench.method import Method
+from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.cli.output import console, write_json
+
+if TYPE_CHECKING:
+    from sidestep.bench import MotionSettings, SceneResult, SceneSettings
 
 COLUMNS = (  # title, key of the figures, decimals, which quantiles
     ("planning [ms]", "planning_ms", 2, ("median", "p95", "p99")),
@@ -35,8 +40,8 @@ def motion_bench_maker(
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Measure starts and goals only, move nothing.")
     ] = False,
-    spacing: Annotated[float, typer.Option(min=1e-4, help="Of the points on surfaces [m].")] = 0.005,
-    point_radius: Annotated[float, typer.Option(min=0.0, help="Of those points [m].")] = 0.001,
+    spacing: Annotated[float, typer.Option(min=1e-4, help="Of the points on surfaces [m].")] = SPACING,
+    point_radius: Annotated[float, typer.Option(min=0.0, help="Of those points [m].")] = POINT_RADIUS,
     duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 30.0,
     tolerance: Annotated[
         float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad].")
@@ -58,13 +63,11 @@ def motion_bench_maker(
     the request puts them. Exit code: 0 when nothing was touched and no limit broken, 1 when not, 2 on bad input.
     """
     from sidestep.bench import (
-        MotionSettings,
         SceneSettings,
         default_jobs,
         read_motion_bench_maker,
         run_scenes,
     )
-    from sidestep.cli.bench_progress import with_bar
 
     found = read_motion_bench_maker(folder)
     sets = list(dict.fromkeys(item.set for item in found))
@@ -79,22 +82,118 @@ def motion_bench_maker(
     settings = SceneSettings(
         robot=robot,
         method=method,
-        motion=MotionSettings(
-            period=period, duration=duration, tolerance=tolerance, torque=torque, safe=method.safe
-        ),
+        motion=_motion_settings(method, period, duration, tolerance, torque=torque),
         jobs=jobs or default_jobs(),
         spacing=spacing,
         point_radius=point_radius,
         only_clearances=clearances,
     )
-    terminal = console(quiet=quiet, to_stderr=json == "-")
-    result = with_bar(
-        terminal, f"{robot} {method.value}", lambda show: run_scenes(settings, chosen, progress=show)
+    run_and_report(
+        settings,
+        lambda show: run_scenes(settings, chosen, progress=show),
+        failures=failures,
+        json=json,
+        quiet=quiet,
     )
+
+
+def dynamic(
+    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    problems: Annotated[int, typer.Option(min=0, help="Random problems of each kind.")] = 10,
+    obstacles: Annotated[int, typer.Option(min=0, help="Balls at rest in each of them.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the problems and of what moves.")] = 0,
+    scenes: Annotated[
+        Path | None, typer.Option(help="A folder of MotionBenchMaker: also in its scenes.")
+    ] = None,
+    scene_problems: Annotated[int, typer.Option(min=1, help="How many of each of its sets.")] = 1,
+    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.barrier,
+    torque: Annotated[
+        bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
+    ] = False,
+    spacing: Annotated[float, typer.Option(min=1e-4, help="Of the points on surfaces [m].")] = SPACING,
+    point_radius: Annotated[float, typer.Option(min=0.0, help="Of those points [m].")] = POINT_RADIUS,
+    duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 20.0,
+    tolerance: Annotated[
+        float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad].")
+    ] = 0.05,
+    period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
+    failures: Annotated[
+        bool, typer.Option("--failures", help="List the problems that went wrong, and why.")
+    ] = False,
+    json: Annotated[
+        str | None, typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """A ball that comes or goes while the arm moves: suddenly there, drifting through, in the goal, leaving it.
+
+    The same seed gives the same problems. Solved: nothing touched, no limit broken, and arrived where the goal is
+    or becomes free; where it stays blocked, not arrived. Exit code as for motionbenchmaker.
+    """
+    from sidestep.bench import SceneSettings, default_jobs, read_motion_bench_maker, run_dynamic
+
+    published = () if scenes is None else read_motion_bench_maker(scenes)
+    sets = dict.fromkeys(item.set for item in published)
+    chosen = [
+        item
+        for name in sets
+        for item in [problem for problem in published if problem.set == name][:scene_problems]
+    ]
+    settings = SceneSettings(
+        robot=robot,
+        method=method,
+        motion=_motion_settings(method, period, duration, tolerance, torque=torque),
+        jobs=jobs or default_jobs(),
+        spacing=spacing,
+        point_radius=point_radius,
+    )
+    run_and_report(
+        settings,
+        lambda show: run_dynamic(
+            settings, count=problems, seed=seed, obstacles=obstacles, scenes=chosen, progress=show
+        ),
+        failures=failures,
+        json=json,
+        quiet=quiet,
+        extra={"seed": seed, "obstacles": obstacles},
+    )
+
+
+def _motion_settings(
+    method: Method, period: float, duration: float, tolerance: float, *, torque: bool
+) -> MotionSettings:
+    from sidestep.bench import MotionSettings
+
+    return MotionSettings(
+        period=period,
+        duration=duration,
+        tolerance=tolerance,
+        torque=torque,
+        safe=method.safe,
+        escape=method.escapes,
+    )
+
+
+def run_and_report(
+    settings: SceneSettings,
+    run: Callable[[Callable[[int, int, str], None]], SceneResult],
+    *,
+    failures: bool,
+    json: str | None,
+    quiet: bool,
+    extra: dict[str, Any] | None = None,
+) -> NoReturn:
+    """Runs with a bar, prints the tables, writes the JSON, and ends the command with its exit code."""
+    from sidestep.cli.bench_progress import with_bar
+
+    terminal = console(quiet=quiet, to_stderr=json == "-")
+    result = with_bar(terminal, f"{settings.robot} {settings.method.value}", run)
     document = result.to_document(failures=failures)
+    document["settings"] |= extra or {}
     if not quiet:
         terminal.print(_ends(document))
-        if not clearances:
+        if not settings.only_clearances:
             terminal.print(_motions(document))
         for item in document.get("failures", ()):
             line = f"{item['set']} {item['index']}  {'; '.join(item['reasons'])}"

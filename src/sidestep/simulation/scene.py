@@ -18,6 +18,8 @@ Array = npt.NDArray[np.float64]
 Kind = Literal["sphere", "box", "cylinder", "mesh"]
 Motion = Literal["fixed", "free", "moving"]
 
+AWAY = 100.0  # [m] below its place, where an object waits that is not there: farther than any arm reaches
+
 _SIZE_MEANING: dict[str, tuple[int, str]] = {
     "sphere": (1, "(radius,)"),
     "box": (3, "the three side lengths"),
@@ -40,6 +42,7 @@ class SceneObject:
         mass: [kg], used when free.
         velocity: (3,) [m/s], used when moving.
         moves_during: (from, until) [s] in which a moving object moves; it rests before and after.
+        present: (from, until) [s] in which a moving object is there; else it waits far below everything.
         mesh: the surface in the object frame, for kind "mesh".
 
     Raises:
@@ -54,6 +57,7 @@ class SceneObject:
     mass: float = 0.1
     velocity: Array = field(default_factory=lambda: np.zeros(3))
     moves_during: tuple[float, float] = (0.0, float("inf"))
+    present: tuple[float, float] = (0.0, float("inf"))
     mesh: trimesh.Trimesh | None = None
 
     def __post_init__(self) -> None:
@@ -80,6 +84,10 @@ class SceneObject:
             raise ValueError(
                 f"object {self.name!r}: moves_during must be 0 <= from <= until, got {self.moves_during}"
             )
+        if not 0.0 <= self.present[0] <= self.present[1]:
+            raise ValueError(f"object {self.name!r}: present must be 0 <= from <= until, got {self.present}")
+        if self.motion != "moving" and self.present != (0.0, float("inf")):
+            raise ValueError(f"object {self.name!r}: only a moving object can come and go")
         if (self.kind == "mesh") != (self.mesh is not None):
             raise ValueError(f"object {self.name!r}: a mesh object needs `mesh`, and only it")
         for name, value in (("size", size), ("pose", pose), ("velocity", velocity)):
@@ -96,6 +104,7 @@ class SceneObject:
         mass: float = 0.1,
         velocity: Sequence[float] = (0.0, 0.0, 0.0),
         moves_during: tuple[float, float] = (0.0, float("inf")),
+        present: tuple[float, float] = (0.0, float("inf")),
     ) -> SceneObject:
         """A sphere at `center` (3,) [m] in the world."""
         return cls(
@@ -107,6 +116,7 @@ class SceneObject:
             mass=mass,
             velocity=np.asarray(velocity, dtype=float),
             moves_during=moves_during,
+            present=present,
         )
 
     @classmethod
@@ -181,7 +191,13 @@ class SceneObject:
         if self.motion == "moving":
             start, end = self.moves_during
             pose[:3, 3] += self.velocity * max(0.0, min(time, end) - start)
+            if not self.is_present(time):
+                pose[2, 3] -= AWAY
         return pose
+
+    def is_present(self, time: float) -> bool:
+        """Whether it is there at `time` [s]."""
+        return self.present[0] <= time < self.present[1]
 
     def surface(self, *, subdivisions: int = 2) -> trimesh.Trimesh:
         """The surface as triangles in the object frame; spheres as an icosphere of `subdivisions`."""
