@@ -9,6 +9,8 @@
 
 #include "arguments.hpp"
 #include "module.hpp"
+#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/guidance/guide.hpp"
 #include "sidestep/guidance/rrt_connect.hpp"
 
 namespace sidestep::python {
@@ -77,10 +79,135 @@ void bind_plan(nb::module_& m) {
       .def_ro("smoothing_seconds", &Plan::smoothing_seconds, "[s] to make it short.");
 }
 
+void bind_settings(nb::module_& m) {
+  nb::class_<PlannerSettings>(
+      m, "PlannerSettings",
+      "How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.\n"
+      "allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance\n"
+      "[m]: two in each other. slack [m]: kept everywhere is margin - slack. fade [m]: motion within which an end's smaller\n"
+      "margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.\n"
+      "shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.")
+      .def(
+          "__init__",
+          [](PlannerSettings* self, double margin, double floor, double allowance, double pair_allowance, double slack,
+             double fade, double range, int max_nodes, int max_iterations, double max_seconds, int shortcuts) {
+            const PlannerSettings s{margin, floor,     allowance,      pair_allowance, slack,    fade,
+                                    range,  max_nodes, max_iterations, max_seconds,    shortcuts};
+            s.validate();
+            new (self) PlannerSettings(s);
+          },
+          nb::kw_only(), nb::arg("margin") = PlannerSettings{}.margin, nb::arg("floor") = PlannerSettings{}.floor,
+          nb::arg("allowance") = PlannerSettings{}.allowance,
+          nb::arg("pair_allowance") = PlannerSettings{}.pair_allowance, nb::arg("slack") = PlannerSettings{}.slack,
+          nb::arg("fade") = PlannerSettings{}.fade, nb::arg("range") = PlannerSettings{}.range,
+          nb::arg("max_nodes") = PlannerSettings{}.max_nodes,
+          nb::arg("max_iterations") = PlannerSettings{}.max_iterations,
+          nb::arg("max_seconds") = PlannerSettings{}.max_seconds, nb::arg("shortcuts") = PlannerSettings{}.shortcuts)
+      .def_ro("margin", &PlannerSettings::margin)
+      .def_ro("floor", &PlannerSettings::floor)
+      .def_ro("allowance", &PlannerSettings::allowance)
+      .def_ro("pair_allowance", &PlannerSettings::pair_allowance)
+      .def_ro("max_seconds", &PlannerSettings::max_seconds);
+
+  nb::class_<RouteSettings>(
+      m, "RouteSettings",
+      "How fast the attractor of a Guide passes a path. speed [rad/s]: fastest |dq*/dt|; speed_share: of the joints'\n"
+      "velocity limits that it may ask for; acceleration [rad/s^2]: at which it slows down ahead. wide [m]: clearance\n"
+      "from which it goes at full speed; slowest: share of the speed that is left where there is none. lead [rad]:\n"
+      "|q - q*| at which it waits for the arm. Raises ValueError that names the setting at fault.")
+      .def(
+          "__init__",
+          [](RouteSettings* self, double speed, double speed_share, double acceleration, double wide, double slowest,
+             double lead) {
+            const RouteSettings s{speed, speed_share, acceleration, wide, slowest, lead};
+            s.validate();
+            new (self) RouteSettings(s);
+          },
+          nb::kw_only(), nb::arg("speed") = RouteSettings{}.speed, nb::arg("speed_share") = RouteSettings{}.speed_share,
+          nb::arg("acceleration") = RouteSettings{}.acceleration, nb::arg("wide") = RouteSettings{}.wide,
+          nb::arg("slowest") = RouteSettings{}.slowest, nb::arg("lead") = RouteSettings{}.lead)
+      .def_ro("speed", &RouteSettings::speed)
+      .def_ro("lead", &RouteSettings::lead);
+}
+
+/// What Python gets from a step of a guide.
+struct Guidance {
+  GuideStatus status;
+  Guide::Attractor attractor;
+};
+
+void bind_guide(nb::module_& m) {
+  nb::enum_<GuideStatus>(m, "GuideStatus", "What a guided motion is about.")
+      .value("idle", GuideStatus::idle, "No goal was given.")
+      .value("moving", GuideStatus::moving, "On the way.")
+      .value("arrived", GuideStatus::arrived, "Every joint is at the goal.")
+      .value("no_path", GuideStatus::no_path, "None was found within the budget; looked for again.")
+      .value("goal_in_collision", GuideStatus::goal_in_collision, "Gone to when it becomes free.")
+      .value("start_in_collision", GuideStatus::start_in_collision, "The reactive layer brings the arm out.")
+      .value("timeout", GuideStatus::timeout, "The time for the motion is over; it goes on.")
+      .value("invalid", GuideStatus::invalid, "The goal is outside the limits, or the state is not finite.");
+
+  nb::class_<Guidance>(m, "Guidance", "Where a guide draws the arm to, and what the motion is about.")
+      .def_ro("status", &Guidance::status)
+      .def_prop_ro("goal", [](const Guidance& g) { return JointGoal(g.attractor.position, g.attractor.velocity); },
+                   "The attractor, as a goal for a GeometricSystem.");
+
+  nb::class_<Guide>(
+      m, "Guide",
+      "Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.\n"
+      "Until there is a path, and where the straight way to the goal is free, the attractor is the goal itself.\n"
+      "robot, body, pairs: as for PathPlanner; planner: PlannerSettings, route: RouteSettings, None for the defaults.\n"
+      "period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is\n"
+      "searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed\n"
+      "for a motion; synchronous: search in step(), the same every time, else in a thread of its own.\n"
+      "Raises ValueError that names what is wrong.")
+      .def(
+          "__init__",
+          [](Guide* self, const Robot& robot, const Body& body, const Pairs& pairs,
+             const std::optional<PlannerSettings>& planner, const std::optional<RouteSettings>& route, double period,
+             double patience, double retry, double tolerance, double duration, std::uint64_t seed, bool synchronous) {
+            check_fitted_to(robot, body);
+            GuideSettings s;
+            s.planner = planner.value_or(s.planner);
+            s.route = route.value_or(s.route);
+            s.period = period, s.patience = patience, s.retry = retry, s.tolerance = tolerance;
+            s.duration = duration, s.seed = seed, s.synchronous = synchronous;
+            new (self) Guide(BodyClearance(robot, body, pairs), s);
+          },
+          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{}, nb::arg("planner") = nb::none(),
+          nb::arg("route") = nb::none(), nb::arg("period") = GuideSettings{}.period,
+          nb::arg("patience") = GuideSettings{}.patience, nb::arg("retry") = GuideSettings{}.retry,
+          nb::arg("tolerance") = GuideSettings{}.tolerance, nb::arg("duration") = GuideSettings{}.duration,
+          nb::arg("seed") = GuideSettings{}.seed, nb::arg("synchronous") = GuideSettings{}.synchronous)
+      .def(
+          "set_goal",
+          [](Guide& g, const ArrayLike& goal) {
+            g.set_goal(as_finite_vector(goal, "goal", g.body().robot().num_coordinates()));
+          },
+          nb::arg("goal"), "A configuration (nv,) [rad] to go to; from the loop that calls step().")
+      .def("set_obstacles", &Guide::set_obstacles, nb::arg("obstacles"),
+           "The obstacles as they are seen now; from any thread.")
+      .def(
+          "step",
+          [](Guide& g, const ArrayLike& q, double time) {
+            Guidance guidance;
+            const Eigen::VectorXd at = as_vector(q, "q", g.body().robot().num_coordinates());
+            const nb::gil_scoped_release release;
+            guidance.status = g.step(at, time, guidance.attractor);
+            return guidance;
+          },
+          nb::arg("q"), nb::arg("time"), "Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.")
+      .def_prop_ro("plan", &Guide::last_plan, "What the last search found.")
+      .def_prop_ro("searches", [](const Guide& g) { return g.counts().searches; }, "How often it searched.")
+      .def_prop_ro("period", [](const Guide& g) { return g.settings().period; }, "[s] between two looks at the scene.");
+}
+
 }  // namespace
 
 void bind_guidance(nb::module_& m) {
   bind_plan(m);
+  bind_settings(m);
+  bind_guide(m);
 
   nb::class_<ClearanceReport>(m, "BodyClearance", "The smallest clearance of a body, and of what.")
       .def_ro("clearance", &ClearanceReport::clearance, "[m], a lower bound of the distance; not above the cap.")
@@ -94,29 +221,16 @@ void bind_guidance(nb::module_& m) {
       "Plans a path of a covering body among obstacle points: the straight edge if it is free, else RRT-Connect\n"
       "(Kuffner and LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless time runs out.\n"
       "Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.\n"
-      "robot; body: calibrated (Body.cover); pairs: names of links that must not touch, see presets.barrier_pairs.\n"
-      "margin [m]: clearance asked for at first; floor [m]: where there is no path with it. allowance [m]: how deep\n"
-      "ellipsoids, larger than links, may be in something at start and goal; fade [m]: motion within which an end's\n"
-      "smaller margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.\n"
-      "shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.")
+      "robot; body: calibrated (Body.cover); pairs: names of links that must not touch, see presets.barrier_pairs;\n"
+      "settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.")
       .def(
           "__init__",
-          [](PathPlanner* self, const Robot& robot, const Body& body, const Pairs& pairs, double margin, double floor,
-             double allowance, double slack, double fade, double range, int max_nodes, int max_iterations,
-             double max_seconds, int shortcuts) {
+          [](PathPlanner* self, const Robot& robot, const Body& body, const Pairs& pairs,
+             const std::optional<PlannerSettings>& settings) {
             check_fitted_to(robot, body);
-            PlannerSettings s{margin, floor, allowance, slack, fade, range, max_nodes, max_iterations, max_seconds,
-                              shortcuts};
-            s.validate();
-            new (self) PathPlanner(robot, body, pairs, s);
+            new (self) PathPlanner(robot, body, pairs, settings.value_or(PlannerSettings{}));
           },
-          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{},
-          nb::arg("margin") = PlannerSettings{}.margin, nb::arg("floor") = PlannerSettings{}.floor,
-          nb::arg("allowance") = PlannerSettings{}.allowance, nb::arg("slack") = PlannerSettings{}.slack,
-          nb::arg("fade") = PlannerSettings{}.fade, nb::arg("range") = PlannerSettings{}.range,
-          nb::arg("max_nodes") = PlannerSettings{}.max_nodes,
-          nb::arg("max_iterations") = PlannerSettings{}.max_iterations,
-          nb::arg("max_seconds") = PlannerSettings{}.max_seconds, nb::arg("shortcuts") = PlannerSettings{}.shortcuts)
+          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{}, nb::arg("settings") = nb::none())
       .def(
           "plan",
           [](PathPlanner& p, const ArrayLike& start, const ArrayLike& goal, const Obstacles& obstacles,

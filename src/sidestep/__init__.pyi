@@ -10,6 +10,9 @@ from ._core import EmbeddingEvaluation as EmbeddingEvaluation
 from ._core import Escape as Escape
 from ._core import GeodesicOnly as GeodesicOnly
 from ._core import GeometricSystem as GeometricSystem
+from ._core import Guidance as Guidance
+from ._core import Guide as Guide
+from ._core import GuideStatus as GuideStatus
 from ._core import HarmonicOnly as HarmonicOnly
 from ._core import Integrator as Integrator
 from ._core import JointGoal as JointGoal
@@ -20,12 +23,14 @@ from ._core import Obstruction as Obstruction
 from ._core import PathPlanner as PathPlanner
 from ._core import Plan as Plan
 from ._core import PlaneBarrier as PlaneBarrier
+from ._core import PlannerSettings as PlannerSettings
 from ._core import PlanStatus as PlanStatus
 from ._core import PoseGoal as PoseGoal
 from ._core import ProgressMonitor as ProgressMonitor
 from ._core import PullForm as PullForm
 from ._core import Recovery as Recovery
 from ._core import Rollout as Rollout
+from ._core import RouteSettings as RouteSettings
 from ._core import SelfCollisionBarrier as SelfCollisionBarrier
 from ._core import SigmoidSwitch as SigmoidSwitch
 from ._core import SpeedRegulator as SpeedRegulator
@@ -50,6 +55,8 @@ from .control import TorqueFault as TorqueFault
 from .control import TorqueSolution as TorqueSolution
 from .control import TorqueStatus as TorqueStatus
 from .control import acceleration_bounds as acceleration_bounds
+from .guidance import GuidedMotion as GuidedMotion
+from .guidance import GuidedStep as GuidedStep
 from .obstacles import Box as Box
 from .obstacles import Cylinder as Cylinder
 from .obstacles import MeshShape as MeshShape

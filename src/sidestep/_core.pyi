@@ -1264,6 +1264,121 @@ class Plan:
     def smoothing_seconds(self) -> float:
         """[s] to make it short."""
 
+class PlannerSettings:
+    """
+    How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.
+    allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance
+    [m]: two in each other. slack [m]: kept everywhere is margin - slack. fade [m]: motion within which an end's smaller
+    margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.
+    shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
+    """
+
+    def __init__(self, *, margin: float = 0.02, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.05, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
+
+    @property
+    def margin(self) -> float: ...
+
+    @property
+    def floor(self) -> float: ...
+
+    @property
+    def allowance(self) -> float: ...
+
+    @property
+    def pair_allowance(self) -> float: ...
+
+    @property
+    def max_seconds(self) -> float: ...
+
+class RouteSettings:
+    """
+    How fast the attractor of a Guide passes a path. speed [rad/s]: fastest |dq*/dt|; speed_share: of the joints'
+    velocity limits that it may ask for; acceleration [rad/s^2]: at which it slows down ahead. wide [m]: clearance
+    from which it goes at full speed; slowest: share of the speed that is left where there is none. lead [rad]:
+    |q - q*| at which it waits for the arm. Raises ValueError that names the setting at fault.
+    """
+
+    def __init__(self, *, speed: float = 1.0, speed_share: float = 0.7, acceleration: float = 3.0, wide: float = 0.06, slowest: float = 0.25, lead: float = 0.4) -> None: ...
+
+    @property
+    def speed(self) -> float: ...
+
+    @property
+    def lead(self) -> float: ...
+
+class GuideStatus(enum.Enum):
+    """What a guided motion is about."""
+
+    idle = 0
+    """No goal was given."""
+
+    moving = 1
+    """On the way."""
+
+    arrived = 2
+    """Every joint is at the goal."""
+
+    no_path = 3
+    """None was found within the budget; looked for again."""
+
+    goal_in_collision = 4
+    """Gone to when it becomes free."""
+
+    start_in_collision = 5
+    """The reactive layer brings the arm out."""
+
+    timeout = 6
+    """The time for the motion is over; it goes on."""
+
+    invalid = 7
+    """The goal is outside the limits, or the state is not finite."""
+
+class Guidance:
+    """Where a guide draws the arm to, and what the motion is about."""
+
+    @property
+    def status(self) -> GuideStatus: ...
+
+    @property
+    def goal(self) -> JointGoal:
+        """The attractor, as a goal for a GeometricSystem."""
+
+class Guide:
+    """
+    Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.
+    Until there is a path, and where the straight way to the goal is free, the attractor is the goal itself.
+    robot, body, pairs: as for PathPlanner; planner: PlannerSettings, route: RouteSettings, None for the defaults.
+    period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is
+    searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed
+    for a motion; synchronous: search in step(), the same every time, else in a thread of its own.
+    Raises ValueError that names what is wrong.
+    """
+
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 2.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
+
+    def set_goal(self, goal: numpy.typing.ArrayLike) -> None:
+        """A configuration (nv,) [rad] to go to; from the loop that calls step()."""
+
+    def set_obstacles(self, obstacles: Obstacles) -> None:
+        """The obstacles as they are seen now; from any thread."""
+
+    def step(self, q: numpy.typing.ArrayLike, time: float) -> Guidance:
+        """
+        Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.
+        """
+
+    @property
+    def plan(self) -> Plan:
+        """What the last search found."""
+
+    @property
+    def searches(self) -> int:
+        """How often it searched."""
+
+    @property
+    def period(self) -> float:
+        """[s] between two looks at the scene."""
+
 class BodyClearance:
     """The smallest clearance of a body, and of what."""
 
@@ -1291,14 +1406,11 @@ class PathPlanner:
     Plans a path of a covering body among obstacle points: the straight edge if it is free, else RRT-Connect
     (Kuffner and LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless time runs out.
     Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.
-    robot; body: calibrated (Body.cover); pairs: names of links that must not touch, see presets.barrier_pairs.
-    margin [m]: clearance asked for at first; floor [m]: where there is no path with it. allowance [m]: how deep
-    ellipsoids, larger than links, may be in something at start and goal; fade [m]: motion within which an end's
-    smaller margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.
-    shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
+    robot; body: calibrated (Body.cover); pairs: names of links that must not touch, see presets.barrier_pairs;
+    settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], margin: float = 0.02, floor: float = 0.005, allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], settings: PlannerSettings | None = None) -> None: ...
 
     def plan(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, seed: int = 0) -> Plan:
         """

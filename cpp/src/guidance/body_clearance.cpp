@@ -301,6 +301,13 @@ BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> 
   return nearest;
 }
 
+BodyClearance::Nearest BodyClearance::nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points,
+                                              double cap, Workspace& w) const noexcept {
+  place(q, w);
+  const Found found = look(items_[static_cast<std::size_t>(item)], points, cap, -infinity, w);
+  return {found.clearance, found.clearance < cap ? item : -1, found.point};
+}
+
 void BodyClearance::clearances(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w,
                                Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   place(q, w);

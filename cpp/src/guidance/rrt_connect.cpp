@@ -47,8 +47,10 @@ void PlannerSettings::validate() const {
     throw std::invalid_argument("planner: floor is " + std::to_string(floor) + " m and margin " + std::to_string(margin) +
                                 " m; 0 <= floor <= margin is needed");
   }
-  if (!(allowance >= 0.0) || !std::isfinite(allowance)) {
-    throw std::invalid_argument("planner: allowance is " + std::to_string(allowance) + " m, must be finite and >= 0");
+  for (const double depth : {allowance, pair_allowance}) {
+    if (!(depth >= 0.0) || !std::isfinite(depth)) {
+      throw std::invalid_argument("planner: allowance is " + std::to_string(depth) + " m, must be finite and >= 0");
+    }
   }
   if (shortcuts < 0) {
     throw std::invalid_argument("planner: shortcuts is " + std::to_string(shortcuts) + ", must not be negative");
@@ -63,16 +65,29 @@ RrtConnect::RrtConnect(const BodyClearance& body, const PlannerSettings& setting
       from_goal_(body.robot().num_coordinates(), settings.max_nodes),
       sample_(body.robot().num_coordinates()),
       next_(body.robot().num_coordinates()),
-      near_(body.robot().num_coordinates()) {
+      near_(body.robot().num_coordinates()),
+      clearances_(body.num_items()) {
   settings_.validate();
 }
 
 bool RrtConnect::obstructed(const Eigen::VectorXd& q, const PointIndex& points, Obstruction& obstruction) {
-  const BodyClearance::Nearest nearest = body_->nearest(q, points, -settings_.allowance, workspace_);
-  if (nearest.item < 0) {
+  const double least = std::min(settings_.allowance, settings_.pair_allowance);
+  body_->clearances(q, points, -least, workspace_, clearances_);
+  int worst = -1;
+  double excess = 0.0;
+  for (int i = 0; i < body_->num_items(); ++i) {
+    const bool pair = body_->label(i).kind == CoordinateLabel::Kind::self;
+    const double beyond = -clearances_[i] - (pair ? settings_.pair_allowance : settings_.allowance);
+    if (clearances_[i] < -least && beyond > excess) {
+      excess = beyond;
+      worst = i;
+    }
+  }
+  if (worst < 0) {
     return false;
   }
-  obstruction = {body_->label(nearest.item), nearest.point, -nearest.clearance};
+  const BodyClearance::Nearest nearest = body_->nearest(worst, q, points, 0.0, workspace_);
+  obstruction = {body_->label(worst), nearest.point, -nearest.clearance};
   return true;
 }
 
@@ -80,10 +95,9 @@ Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const
                             const PointIndex& points) {
   Margins margins{distance, settings_.slack, settings_.fade, {}};
   for (const Eigen::VectorXd* q : {&start, &goal}) {
-    Eigen::VectorXd clearances(body_->num_items());
-    body_->clearances(*q, points, distance, workspace_, clearances);
+    body_->clearances(*q, points, distance, workspace_, clearances_);
     const Eigen::VectorXd deficits =
-        (clearances.array() < distance).select(distance + touching - clearances.array(), 0.0);
+        (clearances_.array() < distance).select(distance + touching - clearances_.array(), 0.0);
     if (deficits.maxCoeff() > 0.0) {
       margins.ends.push_back({*q, deficits});
     }
@@ -92,7 +106,7 @@ Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const
 }
 
 Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
-                      std::uint64_t seed) {
+                      std::uint64_t seed, double margin) {
   const double begin = seconds(), deadline = begin + settings_.max_seconds;
   Plan plan;
   const JointLimits& limits = body_->robot().limits();
@@ -115,9 +129,9 @@ Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
   plan.status = PlanStatus::no_path;
   Margins kept;
   // The margin may cost the path: a quarter of the budget is spent on it, the rest on what the floor allows.
-  const bool twice = settings_.floor < settings_.margin;
+  const bool twice = settings_.floor < margin;
   for (int attempt = 0; attempt < (twice ? 2 : 1) && plan.status == PlanStatus::no_path; ++attempt) {
-    plan.margin = attempt == 0 ? settings_.margin : settings_.floor;
+    plan.margin = twice && attempt == 0 ? margin : settings_.floor;
     kept = margins(plan.margin, start, goal, points);
     if (body_->edge_free(start, goal, points, kept, workspace_)) {
       plan.path.resize(start.size(), 2);

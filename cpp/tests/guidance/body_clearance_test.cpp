@@ -121,7 +121,7 @@ BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
     const int nv = robot.num_coordinates();
     const Eigen::VectorXd a = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
     const Eigen::VectorXd b = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
-    const int num = random.integer(1, 12);
+    const int num = random.integer(1, 60);
     const PointIndex points(
         Obstacles(0.7 * random.matrix(3, num), Eigen::VectorXd::Zero(num), Eigen::Matrix3Xd::Zero(3, num)));
     const Margins margins{0.01, 0.002, 0.3, {}};

@@ -9,11 +9,12 @@ class Method(StrEnum):
     thesis = "thesis"  #: one summed density, distance switch (T6.2)
     unswitched = "unswitched"  #: the same without the switch (T2.12)
     barrier = "barrier"  #: a barrier per ellipsoid of a covering body, per joint limit and per pair of links
+    guided = "guided"  #: the barriers, led along a path that is searched in the background
 
     @property
     def safe(self) -> bool:
         """Whether clearances and limits bound the acceleration as well: part of the method, not of the thesis's."""
-        return self is Method.barrier
+        return self in (Method.barrier, Method.guided)
 
     @property
     def escapes(self) -> bool:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from sidestep import presets
 from sidestep._core import GeometricSystem
 from sidestep.bench.method import Method
 from sidestep.body import Body
+from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
 
 
@@ -24,5 +27,16 @@ def build_system(method: Method, robot: Robot, body: Body | None = None) -> Geom
             return presets.thesis_system(robot, body)
         case Method.unswitched:
             return presets.thesis_system(robot, body, switched=False)
-        case Method.barrier:
+        case Method.barrier | Method.guided:
             return presets.barrier_system(robot, body)
+
+
+def build_guide(
+    method: Method, robot: Robot, system: GeometricSystem, body: Body | None = None
+) -> Callable[[int], GuidedMotion] | None:
+    """What makes a guided motion of a seed, the same every time; None where the method has no guide."""
+    if method is not Method.guided:
+        return None
+    covering = build_body(method, robot) if body is None else body
+    pairs = presets.barrier_pairs(robot, covering)
+    return lambda seed: GuidedMotion(robot, covering, system=system, pairs=pairs, seed=seed, synchronous=True)

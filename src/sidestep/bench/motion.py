@@ -21,6 +21,7 @@ from sidestep._core import (
     rollout,
 )
 from sidestep.bench.problem import Problem, poses_over
+from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
 from sidestep.simulation import Arrival, Simulation
 
@@ -95,16 +96,32 @@ class Motion:
         return float(np.linalg.norm(np.diff(self.q, axis=0), axis=1).sum())
 
 
-def move(robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings) -> Motion:
-    """Runs one problem."""
+def move(
+    robot: Robot,
+    system: GeometricSystem,
+    problem: Problem,
+    settings: MotionSettings,
+    *,
+    guided: GuidedMotion | None = None,
+) -> Motion:
+    """Runs one problem; with `guided`, made for it alone, a guide leads the goal of the system."""
     run = _under_torque if settings.torque else _integrated
-    return run(robot, system, problem, settings)
+    if guided is not None:
+        guided.set_goal(problem.goal)
+    return run(robot, system, problem, settings, guided)
 
 
-def _integrated(robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings) -> Motion:
-    total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, CHUNK))
+def _integrated(
+    robot: Robot,
+    system: GeometricSystem,
+    problem: Problem,
+    settings: MotionSettings,
+    guided: GuidedMotion | None,
+) -> Motion:
+    look = CHUNK if guided is None else guided.guide.period
+    total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, look))
     q, v = problem.start, np.zeros_like(problem.start)
-    system, escape = _prepared(robot, system, problem, settings)
+    system, escape = _prepared(robot, system, problem, settings, guided)
     guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
     rows: list[tuple[Array, Array, Array]] = []
     times: list[Array] = []
@@ -112,12 +129,14 @@ def _integrated(robot: Robot, system: GeometricSystem, problem: Problem, setting
     while done < total and not arrived:
         changes = (math.ceil(at / settings.period) - done for at in problem.changes)
         steps = min(chunk, total - done, *(steps for steps in changes if steps > 0))
+        at = done * settings.period
+        obstacles = problem.obstacles_at(at)
         part = rollout(
             system,
             q,
             v,
-            problem.goal,
-            problem.obstacles_at(done * settings.period),
+            problem.goal if guided is None else guided.lead(q, obstacles, at).goal,
+            obstacles,
             period=settings.period,
             steps=steps,
             time_steps=True,
@@ -140,13 +159,17 @@ def _integrated(robot: Robot, system: GeometricSystem, problem: Problem, setting
 
 
 def _under_torque(
-    robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings
+    robot: Robot,
+    system: GeometricSystem,
+    problem: Problem,
+    settings: MotionSettings,
+    guided: GuidedMotion | None,
 ) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period)
-    system, escape = _prepared(robot, system, problem, settings)
+    system, escape = _prepared(robot, system, problem, settings, guided)
     timer = _Timer()
     run = simulation.run(
-        _TimedSystem(system, timer, escape, settings.period),
+        _TimedSystem(system, timer, escape, settings.period, guided),
         _TimedController(TorqueController(robot, period=settings.period), timer, safe=settings.safe),
         problem.start,
         problem.goal,
@@ -167,14 +190,18 @@ def _under_torque(
 
 
 def _prepared(
-    robot: Robot, system: GeometricSystem, problem: Problem, settings: MotionSettings
+    robot: Robot,
+    system: GeometricSystem,
+    problem: Problem,
+    settings: MotionSettings,
+    guided: GuidedMotion | None,
 ) -> tuple[GeometricSystem, Escape | None]:
-    if not settings.escape:
+    if not settings.escape and guided is None:
         return system, None
     obstacles = problem.obstacles_at(0.0)
     if not np.any(obstacles.velocities):
         system = system.relaxed_at(problem.goal, obstacles)
-    return system, Escape(robot, seed=problem.index)
+    return system, Escape(robot, seed=problem.index) if settings.escape else None
 
 
 class _Timer:
@@ -186,14 +213,24 @@ class _Timer:
 
 
 class _TimedSystem:
-    def __init__(self, system: GeometricSystem, timer: _Timer, escape: Escape | None, period: float) -> None:
+    def __init__(
+        self,
+        system: GeometricSystem,
+        timer: _Timer,
+        escape: Escape | None,
+        period: float,
+        guided: GuidedMotion | None,
+    ) -> None:
         self._system, self._timer, self._escape, self._period = system, timer, escape, period
+        self._guided = guided
         self._potential = float("nan")
 
     def acceleration(self, q: Array, v: Array, goal: Array, obstacles: Obstacles) -> Any:
         begin = time.perf_counter()
         followed: Array | JointGoal | PoseGoal = goal
-        if self._escape is not None:
+        if self._guided is not None:
+            followed = self._guided.lead(q, obstacles, len(self._timer.steps) * self._period).goal
+        elif self._escape is not None:
             followed = self._escape.pursue(goal, q, self._potential, self._period)
         step = self._system.acceleration(q, v, followed, obstacles)
         self._potential = step.goal_potential

@@ -11,7 +11,7 @@ import numpy as np
 
 from sidestep._core import __version__
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_system
+from sidestep.bench.methods import build_guide, build_system
 from sidestep.bench.motion import MotionSettings, move
 from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
@@ -153,8 +153,10 @@ class _Worker:
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
         self._system = build_system(settings.method, self._robot)
+        self._guide = build_guide(settings.method, self._robot, self._system)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task
-        motion = move(self._robot, self._system, problem, self.settings.motion)
+        guided = self._guide and self._guide(problem.index)
+        motion = move(self._robot, self._system, problem, self.settings.motion, guided=guided)
         return problem, self._judge.judge(problem, motion, self.settings.motion), times_of(motion)

@@ -97,6 +97,10 @@ class BodyClearance {
   };
   Nearest nearest(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w) const noexcept;
 
+  /// The same of one item.
+  Nearest nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap,
+                  Workspace& w) const noexcept;
+
   /// The clearance of every item, not above `cap` [m], into out (num_items).
   void clearances(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;

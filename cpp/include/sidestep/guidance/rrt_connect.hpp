@@ -14,7 +14,9 @@ namespace sidestep {
 struct PlannerSettings {
   double margin = 0.02;     ///< clearance asked for at first [m]
   double floor = 0.005;     ///< clearance asked for where there is no path with the margin [m]
-  double allowance = 0.02;  ///< how deep the ellipsoids may be in something at start or goal, as they are larger than links [m]
+  double allowance = 0.02;       ///< how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
+  double pair_allowance = 0.05;  ///< how deep two ellipsoids may be in each other there: both are larger, and a pair's
+                                 ///< clearance is the gap along the line of centres alone [m]
   double slack = 0.002;     ///< see Margins [m]
   double fade = 0.3;        ///< see Margins [m]
   double range = 1.5;       ///< longest edge of the trees [rad | m]
@@ -38,11 +40,19 @@ class RrtConnect {
   /// The body must outlive the planner, which is mutable: one per thread.
   RrtConnect(const BodyClearance& body, const PlannerSettings& settings);
 
-  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points, std::uint64_t seed);
+  /// margin [m]: in place of the settings', at least the floor.
+  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points, std::uint64_t seed,
+            double margin);
+  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points, std::uint64_t seed) {
+    return plan(start, goal, points, seed, settings_.margin);
+  }
 
   const PlannerSettings& settings() const noexcept { return settings_; }
   const BodyClearance& body() const noexcept { return *body_; }
   BodyClearance::Workspace& workspace() noexcept { return workspace_; }
+
+  /// Whether an item is deeper than its allowance inside something at q; then what.
+  bool obstructed(const Eigen::VectorXd& q, const PointIndex& points, Obstruction& obstruction);
 
   /// The margins between two ends: of this distance, and less where an end asks for less.
   Margins margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points);
@@ -50,7 +60,6 @@ class RrtConnect {
  private:
   enum class Growth { trapped, advanced, reached };
 
-  bool obstructed(const Eigen::VectorXd& q, const PointIndex& points, Obstruction& obstruction);
   void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
               const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
   Growth grow(SearchTree& tree, const Eigen::VectorXd& target, const PointIndex& points, const Margins& margins);
@@ -59,7 +68,7 @@ class RrtConnect {
   PlannerSettings settings_;
   BodyClearance::Workspace workspace_;
   SearchTree from_start_, from_goal_;
-  Eigen::VectorXd sample_, next_, near_;
+  Eigen::VectorXd sample_, next_, near_, clearances_;
 };
 
 }  // namespace sidestep

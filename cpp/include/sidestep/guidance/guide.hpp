@@ -1,0 +1,150 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <semaphore>
+#include <thread>
+
+#include "sidestep/dynamical_system/progress_monitor.hpp"
+#include "sidestep/guidance/body_clearance.hpp"
+#include "sidestep/guidance/plan.hpp"
+#include "sidestep/guidance/route.hpp"
+#include "sidestep/guidance/rrt_connect.hpp"
+#include "sidestep/guidance/triple_buffer.hpp"
+
+namespace sidestep {
+
+/// What a guided motion is about.
+enum class GuideStatus {
+  idle,                ///< no goal was given
+  moving,              ///< on the way
+  arrived,             ///< every joint is at the goal
+  no_path,             ///< none was found within the budget; looked for again when the scene changes, or after a while
+  goal_in_collision,   ///< the goal is blocked; it is gone to when it becomes free
+  start_in_collision,  ///< the arm is in something; the reactive layer brings it out
+  timeout,             ///< the time for the motion is over; it goes on
+  invalid,             ///< the goal is outside the position limits, or the state is not finite
+};
+
+/// Short names, for example "goal_in_collision".
+const char* name(GuideStatus status) noexcept;
+
+struct GuideSettings {
+  PlannerSettings planner = {};
+  RouteSettings route = {};
+  double period = 0.02;     ///< between two looks at the scene [s]
+  double patience = 2.0;    ///< without progress the arm counts as stuck [s]
+  double retry = 1.0;       ///< after which a failed search is repeated in the same scene [s]
+  double tolerance = 0.05;  ///< it has arrived once every joint is this close to the goal [rad | m]
+  double duration = std::numeric_limits<double>::infinity();  ///< allowed for a motion [s]
+  std::uint64_t seed = 0;
+  /// Plans in `step()`, at times given by `period` alone, so that a motion is the same every time; else in a thread.
+  bool synchronous = false;
+
+  /// Throws std::invalid_argument that names the setting at fault.
+  void validate() const;
+};
+
+/// Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.
+///
+/// One loop calls `step()` with the state and moves by a GeometricSystem towards the attractor. Until there is a path, and
+/// where the straight way to the goal is free, the attractor is the goal itself. In its own thread the guide looks, every
+/// `period`, whether the way ahead is still free among the newest obstacles and the arm makes progress, and searches again
+/// from where the arm is where that is not so; after a stop with a larger margin.
+class Guide {
+ public:
+  /// Throws std::invalid_argument that names the setting at fault.
+  Guide(BodyClearance body, const GuideSettings& settings);
+  ~Guide();
+  Guide(const Guide&) = delete;
+  Guide& operator=(const Guide&) = delete;
+
+  /// From the loop that calls `step()`. Throws std::invalid_argument on a size or an entry that is not finite.
+  void set_goal(const Eigen::VectorXd& goal);
+
+  /// The obstacles as they are seen now; from any thread, best the camera's. It allocates, and waits for no search.
+  /// The same points again are no change.
+  void set_obstacles(const Obstacles& obstacles);
+
+  /// Where to be drawn to: position (nv) and velocity (nv) of a JointGoal.
+  struct Attractor {
+    Eigen::VectorXd position, velocity;
+  };
+
+  /// One step of the loop, at a time [s] that does not go back. Never blocks; allocates nothing unless synchronous.
+  [[nodiscard]] GuideStatus step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept;
+
+  /// What the guide found last: the path, or what is in the way. A copy; not for the loop.
+  Plan last_plan() const;
+  /// How often it searched for a path, and how often it found one.
+  struct Counts {
+    int searches = 0, found = 0;
+  };
+  Counts counts() const;
+  const GuideSettings& settings() const noexcept { return settings_; }
+  const BodyClearance& body() const noexcept { return body_; }
+
+ private:
+  /// What the loop tells the guide.
+  struct State {
+    Eigen::VectorXd q, goal;
+    double time = 0.0, station = 0.0;
+    std::uint64_t goal_number = 0;   // 0: none
+    std::uint64_t route_number = 0;  // that it follows
+    std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
+  };
+  /// What the guide tells the loop.
+  struct Answer {
+    std::uint64_t goal_number = 0, route_number = 0;
+    PlanStatus status = PlanStatus::no_path;
+    bool direct = true;  // straight to the goal
+    Route route;
+  };
+
+  void run();
+  void look(const State& state);
+  void search(const State& state, const PointIndex& points);
+  bool way_is_free(const State& state, const PointIndex& points);
+  void answer(const State& state, PlanStatus status, bool direct);
+
+  BodyClearance body_;
+  GuideSettings settings_;
+
+  // Of the loop.
+  Eigen::VectorXd goal_;
+  std::uint64_t goal_number_ = 0;
+  double begin_ = 0.0, last_time_ = 0.0, next_look_ = 0.0;
+  bool started_ = false;
+  ProgressMonitor progress_;
+  RouteFollower follower_;
+  std::uint64_t stops_ = 0, followed_ = 0;
+
+  // Between the two.
+  TripleBuffer<State> states_;
+  TripleBuffer<Answer> answers_;
+  std::binary_semaphore wake_{0};
+  std::atomic<bool> stopping_{false};
+  mutable std::mutex mutex_;  // of what follows; the loop never takes it
+  std::shared_ptr<const Obstacles> obstacles_;
+  std::uint64_t scene_number_ = 0;
+  Plan shown_;
+  Counts counts_;
+
+  // Of the guide.
+  RrtConnect planner_;
+  std::shared_ptr<const PointIndex> points_;
+  std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, searches_ = 0;
+  bool have_path_ = false, direct_ = false, failed_ = false;
+  double margin_, failed_at_ = 0.0;
+  PlanStatus status_ = PlanStatus::no_path;
+  Eigen::MatrixXd path_;
+  Eigen::VectorXd stations_;  // of its waypoints
+  Margins path_margins_;
+  Route route_;
+  std::thread thread_;
+};
+
+}  // namespace sidestep

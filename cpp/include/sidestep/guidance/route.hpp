@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "sidestep/guidance/body_clearance.hpp"
+
+namespace sidestep {
+
+struct RouteSettings {
+  double speed = 1.0;         ///< fastest |dq*/dt| of the attractor [rad/s]
+  double speed_share = 0.7;   ///< of the joints' velocity limits that it may ask for
+  double acceleration = 3.0;  ///< at which it slows down ahead [rad/s²]
+  double wide = 0.06;         ///< clearance from which it goes at full speed [m]
+  double slowest = 0.25;      ///< share of the speed that is left where there is none
+  double lead = 0.4;          ///< |q − q*| at which it waits for the arm [rad]
+
+  /// Throws std::invalid_argument that names the setting at fault.
+  void validate() const;
+};
+
+/// A path with the speed at which the attractor may pass every point of it: slower in narrow places, at corners, and
+/// before the end.
+struct Route {
+  Eigen::MatrixXd q;        ///< (nv × K) [rad]
+  Eigen::VectorXd station;  ///< length of the path up to each [rad]
+  Eigen::VectorXd speed;    ///< (K) [rad/s]
+
+  double length() const noexcept { return station.size() > 0 ? station[station.size() - 1] : 0.0; }
+};
+
+/// Samples a path.
+Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const PointIndex& points,
+                 const RouteSettings& settings, BodyClearance::Workspace& workspace);
+
+/// Where the attractor is on a route: it runs ahead of the arm as far as that can follow.
+struct RouteFollower {
+  double station = 0.0;
+  double rate = 0.0;    ///< its speed along the route [rad/s]
+  Eigen::Index at = 0;  ///< the sample before it
+
+  /// Onto a new route, at the sample nearest to q among the first ones.
+  void enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q) noexcept;
+
+  /// Moves on for `duration` [s]; writes attractor and its velocity (nv).
+  void advance(const Route& route, const RouteSettings& settings, Eigen::Ref<const Eigen::VectorXd> q, double duration,
+               Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity) noexcept;
+};
+
+}  // namespace sidestep

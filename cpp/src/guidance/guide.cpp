@@ -1,0 +1,311 @@
+#include "sidestep/guidance/guide.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace sidestep {
+namespace {
+
+constexpr double widen = 1.5;   // the margin grows by this factor each time the arm was stuck
+constexpr int widenings = 4;    // and begins anew after so many
+
+}  // namespace
+
+const char* name(GuideStatus status) noexcept {
+  switch (status) {
+    case GuideStatus::idle: return "idle";
+    case GuideStatus::moving: return "moving";
+    case GuideStatus::arrived: return "arrived";
+    case GuideStatus::no_path: return "no_path";
+    case GuideStatus::goal_in_collision: return "goal_in_collision";
+    case GuideStatus::start_in_collision: return "start_in_collision";
+    case GuideStatus::timeout: return "timeout";
+    case GuideStatus::invalid: return "invalid";
+  }
+  return "unknown";
+}
+
+void GuideSettings::validate() const {
+  planner.validate();
+  route.validate();
+  const auto positive = [](double value, const char* what) {
+    if (!(value > 0.0)) {
+      throw std::invalid_argument(std::string("guide: ") + what + " is " + std::to_string(value) + ", must be positive");
+    }
+  };
+  positive(period, "period");
+  positive(patience, "patience");
+  positive(retry, "retry");
+  positive(tolerance, "tolerance");
+  positive(duration, "duration");
+}
+
+Guide::Guide(BodyClearance body, const GuideSettings& settings)
+    : body_(std::move(body)),
+      settings_((settings.validate(), settings)),
+      goal_(Eigen::VectorXd::Zero(body_.robot().num_coordinates())),
+      progress_(settings.patience),
+      states_(State{goal_, goal_}),
+      answers_(Answer{}),
+      obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
+      planner_(body_, settings.planner),
+      points_(std::make_shared<const PointIndex>(Obstacles::none())),
+      margin_(settings.planner.margin) {
+  if (!settings_.synchronous) {
+    thread_ = std::thread([this] { run(); });
+  }
+}
+
+Guide::~Guide() {
+  stopping_.store(true);
+  wake_.release();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+void Guide::set_goal(const Eigen::VectorXd& goal) {
+  if (goal.size() != goal_.size() || !goal.allFinite()) {
+    throw std::invalid_argument("guide: the goal has " + std::to_string(goal.size()) + " entries, " +
+                                std::to_string(goal_.size()) + " finite ones are needed");
+  }
+  goal_ = goal;
+  ++goal_number_;
+  started_ = false;
+  stops_ = 0;
+  progress_.reset();
+}
+
+void Guide::set_obstacles(const Obstacles& obstacles) {
+  const auto same = [&](const Obstacles& o) {
+    return o.size() == obstacles.size() && o.points() == obstacles.points() && o.radii() == obstacles.radii();
+  };
+  auto copy = std::make_shared<const Obstacles>(obstacles);
+  const std::lock_guard lock(mutex_);
+  if (same(*obstacles_)) {
+    return;
+  }
+  obstacles_.swap(copy);
+  ++scene_number_;
+}
+
+GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept {
+  attractor.velocity.setZero(goal_.size());
+  if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite()) {
+    attractor.position = goal_;
+    if (q.size() == goal_.size()) {
+      attractor.position = q;
+    }
+    return goal_number_ == 0 ? GuideStatus::idle : GuideStatus::invalid;
+  }
+  const bool first = !started_;
+  if (first) {
+    started_ = true;
+    begin_ = last_time_ = next_look_ = time;
+  }
+  // Tell the guide; in a thread it looks at its own pace, and at once at a new goal.
+  if (!settings_.synchronous || time >= next_look_) {
+    State& state = states_.back();
+    state.q = q;
+    state.goal = goal_;
+    state.time = time;
+    state.station = follower_.station;
+    state.goal_number = goal_number_;
+    state.route_number = followed_;
+    state.stops = stops_;
+    states_.publish();
+    if (settings_.synchronous) {
+      next_look_ = time + settings_.period;
+      states_.update();
+      look(states_.front());
+    } else if (first) {
+      wake_.release();
+    }
+  }
+
+  answers_.update();
+  const Answer& answer = answers_.front();
+  const bool ours = answer.goal_number == goal_number_;
+  if (ours && answer.status == PlanStatus::found && !answer.direct) {
+    if (answer.route_number != followed_) {
+      followed_ = answer.route_number;
+      follower_.enter(answer.route, q);
+    }
+    attractor.position.resize(goal_.size());
+    follower_.advance(answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity);
+  } else {
+    attractor.position = goal_;
+    follower_.rate = 0.0;
+  }
+  last_time_ = time;
+
+  if ((q - goal_).cwiseAbs().maxCoeff() < settings_.tolerance) {
+    progress_.reset();
+    return GuideStatus::arrived;
+  }
+  const double left = ours && !answer.direct ? answer.route.length() - follower_.station : 0.0;
+  const double away = (attractor.position - q).norm() + left;
+  if (progress_.update(time, away * away)) {
+    ++stops_;
+    progress_.reset();
+  }
+  if (ours) {
+    switch (answer.status) {
+      case PlanStatus::start_in_collision: return GuideStatus::start_in_collision;
+      case PlanStatus::goal_in_collision: return GuideStatus::goal_in_collision;
+      case PlanStatus::invalid: return GuideStatus::invalid;
+      case PlanStatus::no_path:
+      case PlanStatus::timeout:
+        if (!answer.direct) {
+          return GuideStatus::no_path;
+        }
+        break;
+      case PlanStatus::found: break;
+    }
+  }
+  return time - begin_ > settings_.duration ? GuideStatus::timeout : GuideStatus::moving;
+}
+
+Plan Guide::last_plan() const {
+  const std::lock_guard lock(mutex_);
+  return shown_;
+}
+
+Guide::Counts Guide::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+void Guide::run() {
+  while (!stopping_.load()) {
+    static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.period)));
+    if (states_.update() && !stopping_.load()) {
+      look(states_.front());
+    }
+  }
+}
+
+void Guide::look(const State& state) {
+  if (state.goal_number == 0) {
+    return;
+  }
+  std::shared_ptr<const Obstacles> changed;
+  {
+    const std::lock_guard lock(mutex_);
+    if (scene_number_ != seen_scene_) {
+      changed = obstacles_;
+      seen_scene_ = scene_number_;
+    }
+  }
+  if (changed) {
+    points_ = std::make_shared<const PointIndex>(*changed);
+  }
+  const PointIndex& points = *points_;
+  const bool new_goal = state.goal_number != seen_goal_;
+  if (new_goal) {
+    seen_goal_ = state.goal_number;
+    seen_stops_ = state.stops;
+    have_path_ = direct_ = failed_ = false;
+    margin_ = settings_.planner.margin;
+  }
+  bool stuck = false;
+  if (state.stops != seen_stops_) {
+    seen_stops_ = state.stops;
+    stuck = true;
+    margin_ = settings_.planner.margin * std::pow(widen, static_cast<double>(state.stops % widenings));
+  }
+  // Straight to the goal where that is free with the margin; not where the arm was stuck, which needs another way.
+  const bool straight = state.stops == 0 && !stuck &&
+                        body_.edge_free(state.q, state.goal, points,
+                                        planner_.margins(settings_.planner.margin, state.q, state.goal, points),
+                                        planner_.workspace());
+  if (straight) {
+    Obstruction found;
+    if (!planner_.obstructed(state.goal, points, found) && !planner_.obstructed(state.q, points, found)) {
+      if (!direct_ || new_goal || status_ != PlanStatus::found) {
+        direct_ = true;
+        have_path_ = failed_ = false;
+        answer(state, PlanStatus::found, true);
+      }
+      return;
+    }
+  }
+  const bool follows = have_path_ && state.route_number == route_number_;
+  if (have_path_ && !stuck && !direct_ && (!(changed && follows) || way_is_free(state, points))) {
+    return;
+  }
+  direct_ = false;
+  const bool out_of_budget = status_ == PlanStatus::no_path || status_ == PlanStatus::timeout;
+  if (failed_ && out_of_budget && !changed && !stuck && state.time - failed_at_ < settings_.retry) {
+    return;
+  }
+  search(state, points);
+}
+
+bool Guide::way_is_free(const State& state, const PointIndex& points) {
+  // What is still ahead, from the attractor on, with what the path was made with.
+  Eigen::Index next = 1;
+  while (next + 1 < path_.cols() && stations_[next] <= state.station) {
+    ++next;
+  }
+  const double length = stations_[next] - stations_[next - 1];
+  const double share = length > 0.0 ? std::clamp((state.station - stations_[next - 1]) / length, 0.0, 1.0) : 1.0;
+  Eigen::VectorXd from = path_.col(next - 1) + share * (path_.col(next) - path_.col(next - 1));
+  // An obstacle that comes a little nearer bends the motion, it does not block the path: half the margin is enough.
+  Margins margins = path_margins_;
+  margins.margin *= 0.5;
+  for (; next < path_.cols(); ++next) {
+    if (!body_.edge_free(from, path_.col(next), points, margins, planner_.workspace())) {
+      return false;
+    }
+    from = path_.col(next);
+  }
+  return true;
+}
+
+void Guide::search(const State& state, const PointIndex& points) {
+  const JointLimits& limits = body_.robot().limits();
+  const Eigen::VectorXd start = state.q.cwiseMax(limits.lower).cwiseMin(limits.upper);
+  const double margin = std::max(margin_, settings_.planner.floor);
+  Plan plan = planner_.plan(start, state.goal, points, settings_.seed + searches_++, margin);
+  const PlanStatus status = plan.status;
+  const bool found = status == PlanStatus::found;
+  have_path_ = found;
+  failed_ = !found;
+  failed_at_ = state.time;
+  if (found) {
+    path_ = plan.path;
+    path_margins_ = planner_.margins(plan.margin, start, state.goal, points);
+    stations_ = Eigen::VectorXd::Zero(path_.cols());
+    for (Eigen::Index k = 1; k < path_.cols(); ++k) {
+      stations_[k] = stations_[k - 1] + (path_.col(k) - path_.col(k - 1)).norm();
+    }
+    route_ = make_route(path_, body_, points, settings_.route, planner_.workspace());
+    ++route_number_;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    shown_ = std::move(plan);
+    ++counts_.searches;
+    counts_.found += found;
+  }
+  answer(state, status, false);
+}
+
+void Guide::answer(const State& state, PlanStatus status, bool direct) {
+  status_ = status;
+  Answer& answer = answers_.back();
+  answer.goal_number = state.goal_number;
+  answer.status = status;
+  answer.direct = direct;
+  answer.route_number = route_number_;
+  if (status == PlanStatus::found && !direct) {
+    answer.route = route_;
+  }
+  answers_.publish();
+}
+
+}  // namespace sidestep

@@ -1,0 +1,114 @@
+"""Motion that always arrives where there is a way: a guide above the recommended system."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep import presets
+from sidestep._core import (
+    GeometricSystem,
+    Guidance,
+    Guide,
+    GuideStatus,
+    JointGoal,
+    Obstacles,
+    PlannerSettings,
+    RouteSettings,
+    Step,
+)
+from sidestep.body import Body
+from sidestep.robot import Robot
+
+Array = npt.NDArray[np.float64]
+LinkPairs = Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedStep:
+    """What a step of a guided motion gives.
+
+    Attributes:
+        acceleration: (nv,) [rad/s^2] to apply. status: what the motion is about.
+        goal: the attractor that the arm is drawn to. step: of the geometric system.
+    """
+
+    acceleration: Array
+    status: GuideStatus
+    goal: JointGoal
+    step: Step
+
+
+class GuidedMotion:
+    """Give a goal, get motion: it arrives, or says why it cannot.
+
+    A `Guide` searches a path in the background and leads the attractor of a `GeometricSystem` along it; the
+    system keeps the arm safe at every step, with or without a path.
+
+    Args:
+        robot: the arm. body: a covering body of it; by default `Body.cover(robot)`.
+        system: what moves the arm; by default `presets.barrier_system`.
+        planner, route: of the guide; None for the defaults.
+        pairs: links that must not touch; by default `presets.barrier_pairs`.
+        duration: time [s] after which the status is `timeout`.
+        seed, synchronous: of the guide; synchronous motions are the same every time.
+
+    Raises:
+        ValueError: a setting out of range, or a body of another robot.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        body: Body | None = None,
+        *,
+        system: GeometricSystem | None = None,
+        planner: PlannerSettings | None = None,
+        route: RouteSettings | None = None,
+        pairs: LinkPairs | None = None,
+        duration: float = float("inf"),
+        seed: int = 0,
+        synchronous: bool = False,
+    ) -> None:
+        body = body if body is not None else Body.cover(robot)
+        self.system = system if system is not None else presets.barrier_system(robot, body)
+        self.guide = Guide(
+            robot,
+            body,
+            pairs=list(pairs if pairs is not None else presets.barrier_pairs(robot, body)),
+            planner=planner,
+            route=route,
+            duration=duration,
+            seed=seed,
+            synchronous=synchronous,
+        )
+        self._next_look = -float("inf")
+
+    def set_goal(self, goal: npt.ArrayLike) -> None:
+        """A configuration (nv,) [rad] to go to from now on."""
+        self.guide.set_goal(goal)
+
+    def step(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, obstacles: Obstacles, *, time: float | None = None
+    ) -> GuidedStep:
+        """One step of the loop.
+
+        Args:
+            q, v: (nv,) [rad, rad/s]. obstacles: as they are seen now.
+            time: [s], not going back; by default that of the machine's clock.
+        """
+        at = clock.monotonic() if time is None else time
+        guidance = self.lead(q, obstacles, at)
+        step = self.system.acceleration(q, v, guidance.goal, obstacles)
+        return GuidedStep(step.acceleration, guidance.status, guidance.goal, step)
+
+    def lead(self, q: npt.ArrayLike, obstacles: Obstacles, time: float) -> Guidance:
+        """The guide's part of a step alone: where to be drawn to."""
+        if time >= self._next_look:
+            self.guide.set_obstacles(obstacles)
+            self._next_look = time + self.guide.period
+        return self.guide.step(q, time)
