@@ -86,11 +86,14 @@ class GuidedMotion:
             seed=seed,
             synchronous=synchronous,
         )
+        self._moving = self.system
+        self._goal: Array | None = None  # not looked at with the scene yet
         self._next_look = -float("inf")
 
     def set_goal(self, goal: npt.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to from now on."""
         self.guide.set_goal(goal)
+        self._goal = np.array(goal, dtype=np.float64)
 
     def step(
         self, q: npt.ArrayLike, v: npt.ArrayLike, obstacles: Obstacles, *, time: float | None = None
@@ -103,7 +106,11 @@ class GuidedMotion:
         """
         at = clock.monotonic() if time is None else time
         guidance = self.lead(q, obstacles, at)
-        step = self.system.acceleration(q, v, guidance.goal, obstacles)
+        if self._goal is not None:  # barriers leave a goal free that stands close to things at rest
+            at_rest = not np.any(obstacles.velocities)
+            self._moving = self.system.relaxed_at(self._goal, obstacles) if at_rest else self.system
+            self._goal = None
+        step = self._moving.acceleration(q, v, guidance.goal, obstacles)
         return GuidedStep(step.acceleration, guidance.status, guidance.goal, step)
 
     def lead(self, q: npt.ArrayLike, obstacles: Obstacles, time: float) -> Guidance:
