@@ -149,6 +149,7 @@ class _LinkProblem:
         self.fine = self.surface.points(NUM_FINE)
         self._nearest_fine = cKDTree(self.fine).query(self.coarse)[1]
         self.solutions: dict[int, _Solution] = {}
+        self._finished: set[int] = set()
 
     def solve(self, number: int) -> _Solution:
         """A proven cover, good enough to compare numbers of ellipsoids by."""
@@ -158,9 +159,11 @@ class _LinkProblem:
 
     def finish(self, number: int) -> _Solution:
         """The best cover found with more starts."""
-        starts = range(TRIAL_STARTS, TRIAL_STARTS + FINAL_STARTS)
-        found = [self.solve(number), self._search(number, starts)]
-        self.solutions[number] = min(found, key=self._excess)
+        if number not in self._finished:  # equal links share their covers
+            starts = range(TRIAL_STARTS, TRIAL_STARTS + FINAL_STARTS)
+            found = [self.solve(number), self._search(number, starts)]
+            self.solutions[number] = min(found, key=self._excess)
+            self._finished.add(number)
         return self.solutions[number]
 
     def _search(self, number: int, starts: range) -> _Solution:
