@@ -24,7 +24,6 @@ from sidestep.simulation import ExactClearance, SceneObject, SelfCollision
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]
 
-LINE_TOLERANCE = 5e-3  # [m] of the clearance of a straight line, which only says whether the problem is easy
 DESCRIPTIONS = (".urdf", ".xacro")  # suffixes of files, as against names
 
 
@@ -79,15 +78,13 @@ class Arm:
         start, goal = (np.array([state[name] for name in names]) for state in (source.start, source.goal))
         within = np.clip(goal, self.robot.limits.lower, self.robot.limits.upper)
         objects = tuple(SceneObject.from_shape(name, shape) for name, shape in source.shapes.items())
-        line = self.clearance.among(objects).minimum_over(np.array([start, within]), tolerance=LINE_TOLERANCE)
         problem = SceneProblem(
             name=source.set,
             index=source.index,
             start=start,
             goal=within,
-            objects=objects,
+            clearance=self.clearance.among(objects),
             obstacles=_points(list(source.shapes.values()), spacing, point_radius),
-            straight_line_blocked=line.clearance.distance <= 0.0,
         )
         return problem, float(np.abs(goal - within).max())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -11,10 +12,12 @@ import numpy.typing as npt
 
 from sidestep._core import Obstacles
 from sidestep.pose import pose_vector
-from sidestep.simulation import SceneObject
+from sidestep.simulation import ExactClearance, SceneObject
 from sidestep.simulation.scene import AWAY
 
 Array = npt.NDArray[np.float64]
+
+LINE_TOLERANCE = 5e-3  # [m] of the clearance of a straight line, which only says whether a problem is easy
 
 
 class Problem(Protocol):
@@ -67,18 +70,29 @@ class SceneProblem:
     """A problem among solids that stay where they are, seen as the same points all the time.
 
     Attributes:
-        name: of its set. index: its number there. start, goal: (nv,) [rad | m]. objects: the solids.
-        obstacles: points that cover their surfaces. straight_line_blocked: see `Problem`.
+        name: of its set. index: its number there. start, goal: (nv,) [rad | m].
+        clearance: exact, of the arm among the solids.
+        obstacles: points that cover their surfaces.
     """
 
     name: str
     index: int
     start: Array
     goal: Array
-    objects: tuple[SceneObject, ...]
+    clearance: ExactClearance
     obstacles: Obstacles
-    straight_line_blocked: bool
     changes: tuple[float, ...] = ()
+
+    @property
+    def objects(self) -> tuple[SceneObject, ...]:
+        """The solids."""
+        return self.clearance.objects
+
+    @cached_property
+    def straight_line_blocked(self) -> bool:
+        """The straight line in joint space touches a solid, to within 5 mm."""
+        line = self.clearance.minimum_over(np.array([self.start, self.goal]), tolerance=LINE_TOLERANCE)
+        return line.clearance.distance <= 0.0
 
     def obstacles_at(self, time: float) -> Obstacles:
         """The points."""
