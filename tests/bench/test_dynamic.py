@@ -18,7 +18,6 @@ from sidestep.bench import (
     ProblemGenerator,
     ProblemSettings,
     SceneSettings,
-    build_system,
     move,
     run_dynamic,
 )
@@ -31,8 +30,7 @@ from sidestep.bench.problem import poses_over
 @cache
 def arm() -> Arm:
     robot = Robot.named("planar3")
-    body = build_body(Method.unswitched, robot)
-    return Arm(robot, body, build_system(Method.unswitched, robot, body))
+    return Arm.of(robot, Method.unswitched, build_body(Method.unswitched, robot))
 
 
 @cache

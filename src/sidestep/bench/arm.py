@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,11 +12,13 @@ import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, Obstacles
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_system
+from sidestep.bench.methods import build_guide, build_system
+from sidestep.bench.motion import Motion, MotionSettings, move
 from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.outcome import Judge
-from sidestep.bench.problem import SceneProblem
+from sidestep.bench.problem import Problem, SceneProblem
 from sidestep.body import Body
+from sidestep.guidance import GuidedMotion
 from sidestep.obstacles import Shape, obstacles_from_shapes
 from sidestep.robot import Robot
 from sidestep.simulation import ExactClearance, SceneObject, SelfCollision
@@ -40,14 +42,35 @@ class Arm:
 
     Attributes:
         robot: it. body: covers its links; the same for every opening of a gripper. system: moves it.
+        guide: makes a guided motion of a seed; None for a method without a guide.
         allowed: pairs of links that may touch. unknown: joints of the problem that it does not have.
     """
 
     robot: Robot
     body: Body
     system: GeometricSystem
+    guide: Callable[[int], GuidedMotion] | None = None
     allowed: tuple[Pair, ...] = ()
     unknown: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        method: Method,
+        body: Body,
+        *,
+        allowed: tuple[Pair, ...] = (),
+        unknown: tuple[str, ...] = (),
+    ) -> Arm:
+        """A robot with a body of it, moved by a method."""
+        system = build_system(method, robot, body)
+        return cls(robot, body, system, build_guide(method, robot, system, body), allowed, unknown)
+
+    def move(self, problem: Problem, settings: MotionSettings) -> Motion:
+        """Runs one problem."""
+        guided = None if self.guide is None else self.guide(problem.index)
+        return move(self.robot, self.system, problem, settings, guided=guided)
 
     @cached_property
     def judge(self) -> Judge:
@@ -115,10 +138,10 @@ class Arms:
             robot = load_robot(self._name, locked=locked)
             _check_joints(problem, robot)
             body = self._body.for_robot(robot, source=self._plain)
-            self._arms[key] = Arm(
-                robot=robot,
-                body=body,
-                system=build_system(self._method, robot, body),
+            self._arms[key] = Arm.of(
+                robot,
+                self._method,
+                body,
                 allowed=problem.allowed,
                 unknown=tuple(name for name in problem.held if name not in own),
             )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from sidestep._core import Obstacles
 from sidestep.bench.arm import Arm, Arms, load_robot
-from sidestep.bench.methods import build_body, build_system
+from sidestep.bench.methods import build_body
 from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.parallel import Progress
 from sidestep.bench.problem import Problem
@@ -197,7 +197,7 @@ class _Worker:
         robot = load_robot(settings.robot)
         body = build_body(settings.method, robot)
         self._arms = Arms(settings.robot, settings.method, body)
-        self._arm = Arm(robot, body, build_system(settings.method, robot, body))
+        self._arm = Arm.of(robot, settings.method, body)
         self._generator = ProblemGenerator(random, robot=robot, self_collision=self._arm.self_collision)
 
     def run(self, task: tuple[Kind, int | MotionBenchMakerProblem]) -> tuple[SceneOutcome, StepTimes]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from sidestep._core import (
     GeometricSystem,
     JointGoal,
     Obstacles,
+    PlanStatus,
     PoseGoal,
     TorqueController,
     rollout,
@@ -72,7 +73,8 @@ class Motion:
         contacts: of MuJoCo, 0 without physics.
         arrived: within the duration.
         step_seconds: wall time [s] of steps: of the system alone, or with torque control of both from Python.
-        planning_seconds: wall time [s] until the first path, None for a method that plans none.
+        planning_seconds: wall time [s] until the first path, smoothing included; None where none was found.
+        ended: what the guide said at the end, see `GuideStatus`; empty without a guide.
     """
 
     q: Array
@@ -84,6 +86,7 @@ class Motion:
     arrived: bool
     step_seconds: Array
     planning_seconds: float | None = None
+    ended: str = ""
 
     @property
     def first_motion_seconds(self) -> float:
@@ -106,9 +109,12 @@ def move(
 ) -> Motion:
     """Runs one problem; with `guided`, made for it alone, a guide leads the goal of the system."""
     run = _under_torque if settings.torque else _integrated
-    if guided is not None:
-        guided.set_goal(problem.goal)
-    return run(robot, system, problem, settings, guided)
+    if guided is None:
+        return run(robot, system, problem, settings, None)
+    guided.set_goal(problem.goal)
+    led = _Led(guided)
+    motion = run(robot, system, problem, settings, led)
+    return replace(motion, planning_seconds=led.planning_seconds, ended=led.status)
 
 
 def _integrated(
@@ -116,9 +122,9 @@ def _integrated(
     system: GeometricSystem,
     problem: Problem,
     settings: MotionSettings,
-    guided: GuidedMotion | None,
+    guided: _Led | None,
 ) -> Motion:
-    look = CHUNK if guided is None else guided.guide.period
+    look = CHUNK if guided is None else guided.period
     total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, look))
     q, v = problem.start, np.zeros_like(problem.start)
     system, escape = _prepared(robot, system, problem, settings, guided)
@@ -135,7 +141,7 @@ def _integrated(
             system,
             q,
             v,
-            problem.goal if guided is None else guided.lead(q, obstacles, at).goal,
+            problem.goal if guided is None else guided.goal(q, obstacles, at),
             obstacles,
             period=settings.period,
             steps=steps,
@@ -163,7 +169,7 @@ def _under_torque(
     system: GeometricSystem,
     problem: Problem,
     settings: MotionSettings,
-    guided: GuidedMotion | None,
+    guided: _Led | None,
 ) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period)
     system, escape = _prepared(robot, system, problem, settings, guided)
@@ -194,7 +200,7 @@ def _prepared(
     system: GeometricSystem,
     problem: Problem,
     settings: MotionSettings,
-    guided: GuidedMotion | None,
+    guided: _Led | None,
 ) -> tuple[GeometricSystem, Escape | None]:
     if not settings.escape and guided is None:
         return system, None
@@ -202,6 +208,26 @@ def _prepared(
     if not np.any(obstacles.velocities):
         system = system.relaxed_at(problem.goal, obstacles)
     return system, Escape(robot, seed=problem.index) if settings.escape else None
+
+
+class _Led:
+    """A guided motion that keeps what its guide says."""
+
+    def __init__(self, guided: GuidedMotion) -> None:
+        self._guided = guided
+        self.period = guided.guide.period
+        self.planning_seconds: float | None = None
+        self.status = ""
+
+    def goal(self, q: Array, obstacles: Obstacles, time: float) -> JointGoal:
+        """Where to be drawn to."""
+        guidance = self._guided.lead(q, obstacles, time)
+        self.status = guidance.status.name
+        if self.planning_seconds is None:
+            plan = self._guided.guide.plan
+            if plan.status is PlanStatus.found:
+                self.planning_seconds = plan.search_seconds + plan.smoothing_seconds
+        return guidance.goal
 
 
 class _Timer:
@@ -219,7 +245,7 @@ class _TimedSystem:
         timer: _Timer,
         escape: Escape | None,
         period: float,
-        guided: GuidedMotion | None,
+        guided: _Led | None,
     ) -> None:
         self._system, self._timer, self._escape, self._period = system, timer, escape, period
         self._guided = guided
@@ -229,7 +255,7 @@ class _TimedSystem:
         begin = time.perf_counter()
         followed: Array | JointGoal | PoseGoal = goal
         if self._guided is not None:
-            followed = self._guided.lead(q, obstacles, len(self._timer.steps) * self._period).goal
+            followed = self._guided.goal(q, obstacles, len(self._timer.steps) * self._period)
         elif self._escape is not None:
             followed = self._escape.pursue(goal, q, self._potential, self._period)
         step = self._system.acceleration(q, v, followed, obstacles)

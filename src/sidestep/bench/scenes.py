@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -13,7 +14,7 @@ from sidestep._core import __version__
 from sidestep.bench.arm import Arm, Arms, load_robot
 from sidestep.bench.method import Method
 from sidestep.bench.methods import build_body
-from sidestep.bench.motion import MotionSettings, move
+from sidestep.bench.motion import MotionSettings
 from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.outcome import Outcome, times_of
 from sidestep.bench.parallel import Progress, Worker, cpu_name, run_tasks
@@ -89,6 +90,7 @@ class SceneOutcome:
         planning_s: until the first path; None where none is planned. first_motion_s: until the first command.
         num_points: that the controller saw at first. unknown_joints: held joints that the robot does not have.
         tolerance: of arriving [rad | m]. arrives: it should arrive; False where the goal stays blocked.
+        ended: what the guide said at the end; empty without a guide.
     """
 
     set: str
@@ -104,6 +106,7 @@ class SceneOutcome:
     unknown_joints: tuple[str, ...]
     tolerance: float
     arrives: bool = True
+    ended: str = ""
 
     @property
     def solved(self) -> bool:
@@ -117,6 +120,8 @@ class SceneOutcome:
         found = self.outcome.reasons(arrives=self.arrives)
         if self.goal_beyond_limits > self.tolerance:
             found.append(f"the goal is {self.goal_beyond_limits:.3f} rad beyond the position limits")
+        if found and self.ended:
+            found.append(f"the guide says {self.ended}")
         covered = self.goal.covered
         if found and covered is not None and covered.distance <= 0.0:
             found.append(
@@ -178,6 +183,7 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
             "collision": sum(item.collision for item in moved),
             "self_collision": sum(item.self_collision for item in moved),
             "limit_violations": sum(bool(item.limits) for item in moved),
+            "ended": dict(Counter(item.ended for item in items if item.ended)),
             "straight_line_blocked": sum(item.straight_line_blocked for item in moved),
             "planning_ms": _upper([i.planning_s for i, _ in solved if i.planning_s is not None], 1e3),
             "first_motion_ms": _upper([i.first_motion_s for i, _ in solved], 1e3),
@@ -276,7 +282,7 @@ def judged(
     arrives: bool = True,
 ) -> tuple[SceneOutcome, StepTimes]:
     """Moves the arm through a problem, unless only ends are asked for, and says what came of it."""
-    motion = None if settings.only_clearances else move(arm.robot, arm.system, problem, settings.motion)
+    motion = None if settings.only_clearances else arm.move(problem, settings.motion)
     outcome = SceneOutcome(
         set=set,
         index=problem.index,
@@ -291,5 +297,6 @@ def judged(
         unknown_joints=arm.unknown,
         tolerance=settings.motion.tolerance,
         arrives=arrives,
+        ended="" if motion is None else motion.ended,
     )
     return outcome, StepTimes() if motion is None else times_of(motion)
