@@ -1273,7 +1273,7 @@ class PlannerSettings:
     shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, *, margin: float = 0.02, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.05, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
+    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.05, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
 
     @property
     def margin(self) -> float: ...
@@ -1298,7 +1298,7 @@ class RouteSettings:
     |q - q*| at which it waits for the arm. Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, *, speed: float = 1.0, speed_share: float = 0.7, acceleration: float = 3.0, wide: float = 0.06, slowest: float = 0.25, lead: float = 0.4) -> None: ...
+    def __init__(self, *, speed: float = 1.0, speed_share: float = 0.7, acceleration: float = 3.0, wide: float = 0.04, slowest: float = 0.25, lead: float = 0.4) -> None: ...
 
     @property
     def speed(self) -> float: ...
@@ -1354,7 +1354,7 @@ class Guide:
     Raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 2.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
 
     def set_goal(self, goal: numpy.typing.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to; from the loop that calls step()."""

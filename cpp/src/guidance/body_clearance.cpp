@@ -285,7 +285,7 @@ double BodyClearance::margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, c
       lowered = std::max(lowered, deficit * std::max(0.0, 1.0 - away / margins.fade));
     }
   }
-  return margins.margin - lowered;
+  return margin(item, margins) - lowered;
 }
 
 BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap,

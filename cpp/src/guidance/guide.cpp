@@ -218,10 +218,12 @@ void Guide::look(const State& state) {
     margin_ = settings_.planner.margin * std::pow(widen, static_cast<double>(state.stops % widenings));
   }
   // Straight to the goal where that is free with the margin; not where the arm was stuck, which needs another way.
+  // To let go of a path it must be wide, as barriers may stop what goes straight through a narrow place.
+  const PlannerSettings& asked = settings_.planner;
+  const double wide = have_path_ ? asked.margin : std::sqrt(asked.margin * asked.floor);
   const bool straight = state.stops == 0 && !stuck &&
                         body_.edge_free(state.q, state.goal, points,
-                                        planner_.margins(settings_.planner.margin, state.q, state.goal, points),
-                                        planner_.workspace());
+                                        planner_.margins(wide, state.q, state.goal, points), planner_.workspace());
   if (straight) {
     Obstruction found;
     if (!planner_.obstructed(state.goal, points, found) && !planner_.obstructed(state.q, points, found)) {
@@ -234,7 +236,7 @@ void Guide::look(const State& state) {
     }
   }
   const bool follows = have_path_ && state.route_number == route_number_;
-  if (have_path_ && !stuck && !direct_ && (!(changed && follows) || way_is_free(state, points))) {
+  if (have_path_ && !stuck && !direct_ && (!follows || way_is_free(state, points, changed != nullptr))) {
     return;
   }
   direct_ = false;
@@ -245,7 +247,7 @@ void Guide::look(const State& state) {
   search(state, points);
 }
 
-bool Guide::way_is_free(const State& state, const PointIndex& points) {
+bool Guide::way_is_free(const State& state, const PointIndex& points, bool changed) {
   // What is still ahead, from the attractor on, with what the path was made with.
   Eigen::Index next = 1;
   while (next + 1 < path_.cols() && stations_[next] <= state.station) {
@@ -257,6 +259,15 @@ bool Guide::way_is_free(const State& state, const PointIndex& points) {
   // An obstacle that comes a little nearer bends the motion, it does not block the path: half the margin is enough.
   Margins margins = path_margins_;
   margins.margin *= 0.5;
+  margins.pair_margin *= 0.5;
+  // Barriers may have pushed the arm off the path, to where the attractor cannot be gone to straight.
+  if (!body_.edge_free(state.q, from, points, planner_.margins(settings_.planner.floor, state.q, from, points),
+                       planner_.workspace())) {
+    return false;
+  }
+  if (!changed) {
+    return true;
+  }
   for (; next < path_.cols(); ++next) {
     if (!body_.edge_free(from, path_.col(next), points, margins, planner_.workspace())) {
       return false;

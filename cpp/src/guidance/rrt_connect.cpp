@@ -1,10 +1,12 @@
 #include "sidestep/guidance/rrt_connect.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sidestep/guidance/path_smoothing.hpp"
@@ -96,8 +98,11 @@ Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const
   Margins margins{distance, settings_.slack, settings_.fade, {}};
   for (const Eigen::VectorXd* q : {&start, &goal}) {
     body_->clearances(*q, points, distance, workspace_, clearances_);
-    const Eigen::VectorXd deficits =
-        (clearances_.array() < distance).select(distance + touching - clearances_.array(), 0.0);
+    Eigen::VectorXd deficits(body_->num_items());
+    for (int i = 0; i < body_->num_items(); ++i) {
+      const double asked = body_->margin(i, margins);
+      deficits[i] = clearances_[i] < asked ? asked + touching - clearances_[i] : 0.0;
+    }
     if (deficits.maxCoeff() > 0.0) {
       margins.ends.push_back({*q, deficits});
     }
@@ -128,18 +133,23 @@ Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
   RandomStream random(seed);
   plan.status = PlanStatus::no_path;
   Margins kept;
-  // The margin may cost the path: a quarter of the budget is spent on it, the rest on what the floor allows.
-  const bool twice = settings_.floor < margin;
-  for (int attempt = 0; attempt < (twice ? 2 : 1) && plan.status == PlanStatus::no_path; ++attempt) {
-    plan.margin = twice && attempt == 0 ? margin : settings_.floor;
+  // A wide way is tried for a little, what lies between for longer.
+  const std::array<std::pair<double, int>, 3> levels{
+      std::pair{margin, settings_.max_iterations / 400},
+      std::pair{std::sqrt(margin * settings_.floor), settings_.max_iterations / 40},
+      std::pair{settings_.floor, settings_.max_iterations}};
+  for (const auto& [level, iterations] : levels) {
+    if (plan.status != PlanStatus::no_path || (level == settings_.floor && iterations < settings_.max_iterations)) {
+      continue;
+    }
+    plan.margin = level;
     kept = margins(plan.margin, start, goal, points);
     if (body_->edge_free(start, goal, points, kept, workspace_)) {
       plan.path.resize(start.size(), 2);
       plan.path << start, goal;
       plan.status = PlanStatus::found;
     } else {
-      const int budget = twice && attempt == 0 ? settings_.max_iterations / 4 : settings_.max_iterations;
-      search(start, goal, points, kept, budget, deadline, random, plan);
+      search(start, goal, points, kept, iterations, deadline, random, plan);
     }
   }
   plan.search_seconds = seconds() - begin;

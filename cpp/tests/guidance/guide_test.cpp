@@ -116,7 +116,7 @@ BOOST_AUTO_TEST_CASE(synchronous_motions_are_the_same_every_time) {
     double time = 0.0;
     static_cast<void>(follow(guide, q, time, 2.0));
   }
-  BOOST_TEST(ends[0] == ends[1]);
+  BOOST_TEST((ends[0] == ends[1]));
 }
 
 BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {

@@ -40,6 +40,7 @@ struct Margins {
   double slack = 0.002;   ///< [m], positive: smaller costs more
   double fade = 0.3;      ///< [m], positive
   std::vector<End> ends;  ///< those with a deficit
+  double pair_margin = 0.02;  ///< of two links at most [m]: neighbours are never far apart
 };
 
 /// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no derivative.
@@ -104,6 +105,12 @@ class BodyClearance {
   /// The clearance of every item, not above `cap` [m], into out (num_items).
   void clearances(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
+
+  /// What `margins` ask of an item away from the ends [m].
+  double margin(int item, const Margins& margins) const noexcept {
+    const bool pair = items_[static_cast<std::size_t>(item)].other >= 0;
+    return pair && margins.pair_margin < margins.margin ? margins.pair_margin : margins.margin;
+  }
 
   /// Whether every item keeps its margin at q. Ends at the first that does not.
   bool free(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, const Margins& margins,

@@ -36,7 +36,7 @@ struct GuideSettings {
   PlannerSettings planner = {};
   RouteSettings route = {};
   double period = 0.02;     ///< between two looks at the scene [s]
-  double patience = 2.0;    ///< without progress the arm counts as stuck [s]
+  double patience = 1.0;    ///< without progress the arm counts as stuck [s]
   double retry = 1.0;       ///< after which a failed search is repeated in the same scene [s]
   double tolerance = 0.05;  ///< it has arrived once every joint is this close to the goal [rad | m]
   double duration = std::numeric_limits<double>::infinity();  ///< allowed for a motion [s]
@@ -107,7 +107,7 @@ class Guide {
   void run();
   void look(const State& state);
   void search(const State& state, const PointIndex& points);
-  bool way_is_free(const State& state, const PointIndex& points);
+  bool way_is_free(const State& state, const PointIndex& points, bool changed);
   void answer(const State& state, PlanStatus status, bool direct);
 
   BodyClearance body_;

@@ -10,7 +10,7 @@ struct RouteSettings {
   double speed = 1.0;         ///< fastest |dq*/dt| of the attractor [rad/s]
   double speed_share = 0.7;   ///< of the joints' velocity limits that it may ask for
   double acceleration = 3.0;  ///< at which it slows down ahead [rad/s²]
-  double wide = 0.06;         ///< clearance from which it goes at full speed [m]
+  double wide = 0.04;         ///< clearance from which it goes at full speed [m]
   double slowest = 0.25;      ///< share of the speed that is left where there is none
   double lead = 0.4;          ///< |q − q*| at which it waits for the arm [rad]
 

@@ -12,8 +12,8 @@
 namespace sidestep {
 
 struct PlannerSettings {
-  double margin = 0.02;     ///< clearance asked for at first [m]
-  double floor = 0.005;     ///< clearance asked for where there is no path with the margin [m]
+  double margin = 0.06;     ///< clearance asked for at first, for ways on which barriers hardly act [m]
+  double floor = 0.005;     ///< clearance asked for at last, where there is no wider way [m]
   double allowance = 0.02;       ///< how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
   double pair_allowance = 0.05;  ///< how deep two ellipsoids may be in each other there: both are larger, and a pair's
                                  ///< clearance is the gap along the line of centres alone [m]
@@ -32,8 +32,8 @@ struct PlannerSettings {
 /// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
 /// LaValle 2000), shortened. Deterministic in (start, goal, points, seed) unless the time runs out.
 ///
-/// Margins shrink in two ways, both stated in the plan: where no path keeps `margin`, one that keeps `floor` is searched
-/// for; and near start and goal every link may be as near to things as it is there, see Margins. A link deeper than
+/// Margins shrink in two ways, both stated in the plan: where no path keeps `margin`, one with their geometric mean, then one
+/// that keeps `floor` is searched for, with a 400th, a 40th and the whole of the budget; and near start and goal every link may be as near to things as it is there, see Margins. A link deeper than
 /// `allowance` inside something at an end is refused as in collision.
 class RrtConnect {
  public:
