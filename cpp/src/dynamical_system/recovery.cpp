@@ -93,9 +93,10 @@ void RecoveryWorkspace::solve_pullback(const Recovery& settings, const Clearance
     }
     scaled = scaled || scale < 1.0;
     curvatures_[k] = scale * curvature;
-    jacobian_transposed_.col(k) = scale * jacobian_transposed.col(k);
+    fades_[k] = scale;
   }
   if (scaled) {
+    jacobian_transposed_.noalias() = jacobian_transposed * fades_.asDiagonal();
     metric_.update(jacobian_transposed_);
     metric_.solve_pullback(curvatures_, result);
   } else {

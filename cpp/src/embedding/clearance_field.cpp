@@ -7,143 +7,166 @@
 #include <stdexcept>
 #include <string>
 
+#include "kernels/clearance_kernel.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
+#include "sidestep/embedding/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Stands for the centre of an ellipsoid, where h has no gradient [m]; far below any size that matters.
-constexpr double centre_offset = 1e-9;
-
-/// h of a point at offset e (principal axes), with what its derivatives need.
-struct PointClearance {
-  double value;
-  Eigen::Vector3d gradient;  // ∂h/∂e
-
-  /// Second time derivative of h along e' with e'' = 0, given the rate h'.
-  double quadratic(const Eigen::Vector3d& e_dot, double rate, const Eigen::Vector3d& precisions) const noexcept;
-
-  Eigen::Vector3d u;  // Σ⁻¹ e
-  double root_m, norm_u, root_level;
-};
-
-PointClearance point_clearance(const Eigen::Vector3d& e, const Eigen::Vector3d& precisions,
-                               double root_level) noexcept {
-  // At the very centre the direction is undefined: take one of the steepest.
-  PointClearance p;
-  if (!(e.squaredNorm() > 0.0)) {
-    Eigen::Index steepest;
-    precisions.maxCoeff(&steepest);
-    return point_clearance(centre_offset * Eigen::Vector3d::Unit(steepest), precisions, root_level);
+kernels::AddLeaf add_leaf() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  switch (instruction_set()) {
+    case InstructionSet::avx512: return kernels::add_leaf_avx512;
+    case InstructionSet::avx2: return kernels::add_leaf_avx2;
+    case InstructionSet::baseline: break;
   }
-  p.u = precisions.cwiseProduct(e);
-  p.root_m = std::sqrt(e.dot(p.u));
-  p.norm_u = p.u.norm();
-  p.root_level = root_level;
-  const double numerator = p.root_m * (p.root_m - root_level);
-  p.value = numerator / p.norm_u;
-  // ∇(m − √c √m) = u (2 − √c/√m),  ∇|u| = Σ⁻¹ u / |u|.
-  p.gradient = (p.u * (2.0 - root_level / p.root_m) - (p.value / p.norm_u) * precisions.cwiseProduct(p.u)) / p.norm_u;
-  return p;
+#endif
+  return kernels::add_leaf_baseline;
 }
 
-double PointClearance::quadratic(const Eigen::Vector3d& e_dot, double rate,
-                                 const Eigen::Vector3d& precisions) const noexcept {
-  const Eigen::Vector3d u_dot = precisions.cwiseProduct(e_dot);
-  const double m_dot = 2.0 * u.dot(e_dot);
-  const double m_ddot = 2.0 * e_dot.dot(u_dot);
-  const double root_dot = m_dot / (2.0 * root_m);
-  const double root_ddot = (m_ddot - 2.0 * root_dot * root_dot) / (2.0 * root_m);
-  const double norm_dot = u.dot(u_dot) / norm_u;
-  const double norm_ddot = (u_dot.squaredNorm() - norm_dot * norm_dot) / norm_u;
-  // h |u| = m − √c √m, differentiated twice.
-  return (m_ddot - root_level * root_ddot - 2.0 * rate * norm_dot - value * norm_ddot) / norm_u;
+void copy(const Eigen::Vector3d& from, double* to) noexcept { Eigen::Vector3d::Map(to) = from; }
+
+kernels::LinkMotion motion_of(const KinematicState::Link& link) noexcept {
+  kernels::LinkMotion motion;
+  Eigen::Matrix3d::Map(motion.rotation) = link.R_WL;
+  copy(link.velocity.angular, motion.angular);
+  copy(link.velocity.linear, motion.linear);
+  copy(link.bias.angular, motion.bias_angular);
+  copy(link.bias.linear, motion.bias_linear);
+  return motion;
+}
+
+kernels::Points points_of(const PointTree& tree) noexcept {
+  kernels::Points points{{tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), {}};
+  for (int axis = 0; axis < 3 && tree.moves(); ++axis) {
+    points.velocity[axis] = tree.velocity(axis);
+  }
+  return points;
+}
+
+/// The mean of a query's points, with a wrench about the world origin.
+ClearanceSample mean_of(const kernels::Query& query, const Eigen::Vector3d& centre) noexcept {
+  double s[kernels::sums];
+  for (int i = 0; i < kernels::sums; ++i) {
+    s[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
+  }
+  const double above = s[3] / s[0];
+  const double rate = (s[4] - above * s[1]) / s[0];
+  const double curvature = (s[5] - 2.0 * rate * s[1] - above * s[2]) / s[0];
+  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> zeroth(s + 6), first(s + 12);
+  const Eigen::Matrix<double, 6, 1> gradient = (first - above * zeroth) / s[0];
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query.axes);
+  const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
+  const Eigen::Vector3d moment = centre.cross(force) - axes.transpose() * gradient.tail<3>();
+  return {query.reference + above, rate, curvature, {{moment, force}, {}}};
 }
 
 }  // namespace
 
 ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temperature)
     : temperature_(temperature) {
+  constexpr const char* owner = "clearance field";
   if (!(temperature > 0.0) || temperature == infinity) {
-    throw std::invalid_argument("clearance field: temperature is " + std::to_string(temperature) +
+    throw std::invalid_argument(std::string(owner) + ": temperature is " + std::to_string(temperature) +
                                 " m, must be positive and finite");
   }
-  if (body.levels.size() == 0) {
-    throw std::invalid_argument("clearance field: the body is not calibrated (it has no levels); use Body.cover");
-  }
-  for (int k = 0; k < body.num_components(); ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    const Frame& frame = robot.frames()[static_cast<std::size_t>(robot.frame_index(body.links[i]))];
-    if (frame.joint < 0) {
-      continue;
+  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, body, owner)) {
+    if (ellipsoid.joint >= 0) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(ellipsoid.shape);
+      Eigen::Matrix3d axes = eigen.eigenvectors();
+      axes.col(0) *= axes.determinant();  // right-handed, as cross products are taken in these axes
+      const double slimness = std::sqrt(eigen.eigenvalues().minCoeff()) / ellipsoid.extent;
+      ellipsoids_.push_back({ellipsoid, axes.transpose(), eigen.eigenvalues().cwiseInverse(),
+                             2.0 * slimness / (1.0 + slimness * slimness)});
     }
-    const Eigen::Matrix3d R = frame.X_JF.linear();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(R * body.covariances[i] * R.transpose());
-    const Eigen::Vector3d semi_axes = (body.levels[k] * eigen.eigenvalues()).cwiseSqrt();
-    ellipsoids_.push_back({frame.joint, k, frame.X_JF * body.means.col(k), eigen.eigenvectors().transpose(),
-                           eigen.eigenvalues().cwiseInverse(), std::sqrt(body.levels[k]),
-                           semi_axes.minCoeff() / semi_axes.maxCoeff(), semi_axes.maxCoeff()});
   }
   if (ellipsoids_.empty()) {
-    throw std::invalid_argument("clearance field: no ellipsoid of the body lies on a link that a joint of robot '" +
+    throw std::invalid_argument(std::string(owner) + ": no ellipsoid of the body lies on a link that a joint of robot '" +
                                 robot.name() + "' moves");
   }
-  std::stable_sort(ellipsoids_.begin(), ellipsoids_.end(),
-                   [](const Ellipsoid& a, const Ellipsoid& b) { return a.joint < b.joint; });
+  for (int first = 0; first < size();) {
+    const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
+    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 1.0};
+    while (first + cluster.size < size() && cluster.size < kernels::most_queries &&
+           at(first + cluster.size).body.joint == at(first).body.joint) {
+      cluster.centre += at(first + cluster.size++).body.mean;
+    }
+    cluster.centre /= cluster.size;
+    for (int k = first; k < first + cluster.size; ++k) {
+      cluster.radius = std::max(cluster.radius, (at(k).body.mean - cluster.centre).norm() + at(k).body.extent);
+      cluster.steepness = std::min(cluster.steepness, at(k).steepness);
+    }
+    clusters_.push_back(cluster);
+    first += cluster.size;
+  }
 }
 
 void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
                               ClearanceView out) const noexcept {
-  const double horizon = BoltzmannMean::window * temperature_;
-  for (int k = 0; k < size(); ++k) {
-    const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(k)];
-    const KinematicState::Link& link = state.link(ellipsoid.joint);
-    const Eigen::Matrix3d to_axes = ellipsoid.axes_T * link.R_WL.transpose();
-    const Eigen::Vector3d centre = link.p_WL + link.R_WL * ellipsoid.mean;
-    // h >= slimness (|e| − extent) − r: farther than this, a point is out of reach.
-    const double far = ellipsoid.extent + (reach + horizon) / ellipsoid.slimness;
-
-    BoltzmannMean mean(temperature_);
-    int nearest = -1;
-    for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
-      const Eigen::Vector3d x = obstacles.points().col(n);
-      const Eigen::Vector3d offset = x - centre;
-      const double radius = obstacles.radii()[n];
-      const double cut = far + radius / ellipsoid.slimness;
-      if (offset.squaredNorm() >= cut * cut) {
+  const PointTree& tree = obstacles.tree();
+  const kernels::Points points = points_of(tree);
+  const kernels::AddLeaf add = add_leaf();
+  kernels::QueryGroup group;
+  group.inverse_T = 1.0 / temperature_;
+  group.window = BoltzmannMean::window * temperature_;
+  for (const Cluster& cluster : clusters_) {
+    const int joint = ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint;
+    const KinematicState::Link& link = state.link(joint);
+    const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
+    double limit = reach + group.window;  // the largest of the group
+    const auto near = [&](const PointTree::Ball& ball) {
+      const double outside = (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).norm() - ball.spread - cluster.radius;
+      return (outside < 0.0 ? outside : cluster.steepness * outside) - ball.largest_radius < limit;
+    };
+    bool placed = false;
+    kernels::LinkMotion motion;
+    const auto place = [&] {
+      motion = motion_of(link);
+      group.link = &motion;
+      group.size = cluster.size;
+      for (int k = 0; k < kernels::most_queries; ++k) {
+        const bool used = k < cluster.size;
+        const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(cluster.first + (used ? k : 0))];
+        const Eigen::Vector3d p = link.p_WL + link.R_WL * ellipsoid.body.mean;
+        for (int axis = 0; axis < 3; ++axis) {
+          group.centre[axis][k] = p[axis];
+        }
+        group.extent[k] = ellipsoid.body.extent;
+        group.steepness[k] = ellipsoid.steepness;
+        group.limit[k] = used ? limit : -infinity;
+        group.axes_T[k] = ellipsoid.axes_T.data();
+        group.precisions[k] = ellipsoid.precisions.data();
+        group.queries[k].reference = infinity;
+        group.queries[k].ready = false;
+      }
+      placed = true;
+    };
+    tree.visit(centre, near, [&](int first, int count, const PointTree::Ball& ball) {
+      if (!placed) {
+        place();
+      }
+      if (add(group, points, {first, count, ball.x, ball.y, ball.z, ball.spread, ball.largest_radius})) {
+        limit = *std::max_element(group.limit, group.limit + cluster.size);
+      }
+    });
+    for (int k = 0; placed && k < cluster.size; ++k) {
+      const kernels::Query& query = group.queries[k];
+      if (!(query.reference < infinity)) {
         continue;
       }
-      const PointClearance point = point_clearance(to_axes * offset, ellipsoid.precisions, ellipsoid.root_level);
-      const double h = point.value - radius;
-      if (!(h < reach + horizon) || !mean.matters(h)) {
-        continue;
+      const ClearanceSample mean = mean_of(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]});
+      if (mean.value < reach) {
+        const Eigen::Index at = cluster.first + k;
+        out.values[at] = mean.value;
+        out.rates[at] = mean.rate;
+        out.curvatures[at] = mean.curvature;
+        out.nearest[at] = tree.order()[static_cast<std::size_t>(query.nearest)];
+        out.gradients.col(at).setZero();
+        accumulate_generalised_force(state, joint, mean.gradient.first, out.gradients.col(at));
       }
-      const Eigen::Vector3d x_dot = obstacles.velocities().col(n);
-      const Eigen::Vector3d slip = x_dot - link.velocity.linear - link.velocity.angular.cross(x);
-      const Eigen::Vector3d slip_dot = -link.bias.linear - link.bias.angular.cross(x) -
-                                       link.velocity.angular.cross(x_dot) - link.velocity.angular.cross(slip);
-      const Eigen::Vector3d e_dot = to_axes * slip;
-      const double rate = point.gradient.dot(e_dot);
-      const double curvature =
-          point.gradient.dot(to_axes * slip_dot) + point.quadratic(e_dot, rate, ellipsoid.precisions);
-      const Eigen::Vector3d f = to_axes.transpose() * point.gradient;
-      if (mean.add({h, rate, curvature, {{-x.cross(f), -f}, {}}})) {
-        nearest = static_cast<int>(n);
-      }
-    }
-    if (mean.empty()) {
-      continue;
-    }
-    const ClearanceSample result = mean.result();
-    if (result.value < reach) {
-      out.values[k] = result.value;
-      out.rates[k] = result.rate;
-      out.curvatures[k] = result.curvature;
-      out.nearest[k] = nearest;
-      out.gradients.col(k).setZero();
-      accumulate_generalised_force(state, ellipsoid.joint, result.gradient.first, out.gradients.col(k));
     }
   }
 }

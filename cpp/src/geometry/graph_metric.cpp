@@ -14,8 +14,15 @@ GraphMetric::GraphMetric(int nv, int m)
 
 void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed) noexcept {
   num_used_ = 0;
+  const Eigen::Index nv = jacobian_transposed.rows();
   for (Eigen::Index a = 0; a < jacobian_transposed.cols(); ++a) {
-    if ((jacobian_transposed.col(a).array() != 0.0).any()) {
+    // Of most columns every entry is zero.
+    const double* column = jacobian_transposed.data() + a * jacobian_transposed.outerStride();
+    Eigen::Index i = 0;
+    while (i < nv && column[i] == 0.0) {
+      ++i;
+    }
+    if (i < nv) {
       jacobian_transposed_.col(num_used_) = jacobian_transposed.col(a);
       used_[static_cast<std::size_t>(num_used_++)] = a;
     }

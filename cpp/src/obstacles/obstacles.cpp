@@ -21,17 +21,18 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
                                 " velocities; the numbers must be equal");
   }
   for (Eigen::Index i = 0; i < num; ++i) {
-    const std::string owner = "obstacles: point " + std::to_string(i);
+    const auto owner = [i] { return "obstacles: point " + std::to_string(i); };
     if (!points_.col(i).allFinite()) {
-      throw std::invalid_argument(owner + " is not finite");
+      throw std::invalid_argument(owner() + " is not finite");
     }
     if (!(radii_[i] >= 0.0) || !(radii_[i] < std::numeric_limits<double>::infinity())) {
-      throw std::invalid_argument(owner + " has radius " + std::to_string(radii_[i]) + ", must be finite and >= 0");
+      throw std::invalid_argument(owner() + " has radius " + std::to_string(radii_[i]) + ", must be finite and >= 0");
     }
     if (!velocities_.col(i).allFinite()) {
-      throw std::invalid_argument(owner + " has a velocity that is not finite");
+      throw std::invalid_argument(owner() + " has a velocity that is not finite");
     }
   }
+  tree_ = PointTree(points_, radii_, velocities_);
 }
 
 }  // namespace sidestep

@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "sidestep/obstacles/point_tree.hpp"
+
 namespace sidestep {
 
 /// Obstacle points in the world, each a ball with a radius that may be zero, moving with a constant velocity.
@@ -18,6 +20,7 @@ class Obstacles {
   Obstacles frozen() const {
     Obstacles copy = *this;
     copy.velocities_.setZero();
+    copy.tree_.freeze();
     return copy;
   }
 
@@ -26,8 +29,14 @@ class Obstacles {
   const Eigen::VectorXd& radii() const noexcept { return radii_; }
   const Eigen::Matrix3Xd& velocities() const noexcept { return velocities_; }
 
+  /// The same points in the order and under the hierarchy that queries use; built at construction.
+  const PointTree& tree() const noexcept { return tree_; }
+
   /// Moves every point along its velocity: x += s * duration. No allocation.
-  void advance(double duration) noexcept { points_ += duration * velocities_; }
+  void advance(double duration) noexcept {
+    points_ += duration * velocities_;
+    tree_.advance(duration);
+  }
 
  private:
   Obstacles() : points_(3, 0), radii_(0), velocities_(3, 0) {}
@@ -35,6 +44,7 @@ class Obstacles {
   Eigen::Matrix3Xd points_;
   Eigen::VectorXd radii_;
   Eigen::Matrix3Xd velocities_;
+  PointTree tree_;
 };
 
 }  // namespace sidestep

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <utility>
+#include <vector>
+
+namespace sidestep {
+
+/// Points under a hierarchy of bounding balls, so that a query looks at those near it only.
+///
+/// The points are sorted along a Morton curve and kept as structure of arrays, padded to whole leaves: point n of the
+/// tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive points, a node `fan_out` consecutive nodes
+/// below it; there are no pointers. Building sorts and allocates and belongs outside the control loop; moving the points
+/// refits the balls in place.
+class PointTree {
+ public:
+  static constexpr int leaf_size = 16;
+  static constexpr int fan_out = 8;
+
+  /// Holds the centres of all points below within `spread`; none of their radii is above `largest_radius`.
+  struct Ball {
+    double x, y, z, spread, largest_radius;
+  };
+
+  PointTree() = default;
+  /// points (3 × N) [m], radii (N) [m], velocities (3 × N) [m/s].
+  PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities);
+
+  int size() const noexcept { return static_cast<int>(order_.size()); }
+  bool moves() const noexcept { return moves_; }
+  const std::vector<int>& order() const noexcept { return order_; }
+
+  /// Coordinates [m], radii [m] and velocities [m/s] in tree order; points that fill up the last leaf lie at `padding`.
+  const double* coordinate(int axis) const noexcept { return columns_[static_cast<std::size_t>(axis)].data(); }
+  const double* radii() const noexcept { return columns_[3].data(); }
+  const double* velocity(int axis) const noexcept { return columns_[static_cast<std::size_t>(4 + axis)].data(); }
+  static constexpr double padding = 1e9;  ///< [m], out of every reach
+
+  /// Moves every point along its velocity and refits. No allocation.
+  void advance(double duration) noexcept;
+
+  /// Stops every point.
+  void freeze() noexcept;
+
+  /// Calls leaf(first, count, ball) for every leaf whose ball, and the balls above it, are `near`, the near ones of a
+  /// node in the order of their distance to x. near(ball) may become stricter on the way. No allocation.
+  template <class Near, class Leaf>
+  void visit(const Eigen::Vector3d& x, Near&& near, Leaf&& leaf) const noexcept {
+    if (!levels_.empty()) {
+      descend(static_cast<int>(levels_.size()) - 1, 0, x, near, leaf);
+    }
+  }
+
+ private:
+  void refit() noexcept;
+
+  template <class Near, class Leaf>
+  void descend(int level, int node, const Eigen::Vector3d& x, Near& near, Leaf& leaf) const noexcept {
+    const std::vector<Ball>& balls = levels_[static_cast<std::size_t>(level)];
+    const Ball& ball = balls[static_cast<std::size_t>(node)];
+    if (!near(ball)) {
+      return;
+    }
+    const int first = node * (level == 0 ? leaf_size : fan_out);
+    if (level == 0) {
+      leaf(first, std::min(leaf_size, size() - first), ball);
+      return;
+    }
+    const std::vector<Ball>& below = levels_[static_cast<std::size_t>(level) - 1];
+    const int count = std::min(fan_out, static_cast<int>(below.size()) - first);
+    std::array<std::pair<double, int>, fan_out> children;
+    for (int i = 0; i < count; ++i) {
+      const Ball& child = below[static_cast<std::size_t>(first + i)];
+      const double distance = (Eigen::Vector3d(child.x, child.y, child.z) - x).squaredNorm();
+      int at = i;
+      for (; at > 0 && children[static_cast<std::size_t>(at) - 1].first > distance; --at) {
+        children[static_cast<std::size_t>(at)] = children[static_cast<std::size_t>(at) - 1];
+      }
+      children[static_cast<std::size_t>(at)] = {distance, first + i};
+    }
+    for (int i = 0; i < count; ++i) {
+      descend(level - 1, children[static_cast<std::size_t>(i)].second, x, near, leaf);
+    }
+  }
+
+  std::vector<int> order_;
+  std::array<std::vector<double>, 7> columns_;  // x, y, z, radius, velocity
+  std::vector<std::vector<Ball>> levels_;       // leaves first, one node last
+  bool moves_ = false;
+};
+
+}  // namespace sidestep

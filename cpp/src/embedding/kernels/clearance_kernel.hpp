@@ -1,0 +1,66 @@
+#pragma once
+
+// The inner loop of ClearanceField, once per instruction set. Plain arrays only: a translation unit compiled for a newer
+// instruction set must not emit code that others share, such as Eigen's inline functions.
+namespace sidestep::kernels {
+
+/// Points as structure of arrays. `velocity[0]` is null where all are at rest.
+struct Points {
+  const double* position[3];
+  const double* radius;
+  const double* velocity[3];
+};
+
+/// How a link moves: spatial velocity and bias at the world origin, in the world (see kinematic_state.hpp).
+struct LinkMotion {
+  double rotation[9];  // R_WL, by columns
+  double angular[3], linear[3], bias_angular[3], bias_linear[3];
+};
+
+inline constexpr int sums = 18;       // s0, ṡ0, s̈0, s1, ṡ1, s̈1, two gradients of force and moment
+inline constexpr int most_lanes = 8;  // doubles in the widest register
+
+/// An ellipsoid at a state, with the sums of the Boltzmann mean over the points so far, lane by lane.
+struct Query {
+  alignas(64) double lane_sums[sums][most_lanes];
+  double axes[9];                           // world to principal axes, by rows
+  double precisions[3];
+  double linear[3], angular[3];             // velocity of the centre and of the axes, in principal axes
+  double bias_linear[3], bias_angular[3];   // the same for the bias
+  double reference;                         // smallest clearance so far; sums are relative to it
+  int nearest;                              // its point
+  int steepest;                             // the axis of the largest precision
+  bool ready;                               // whether all but the centre has been set
+};
+
+inline constexpr int most_queries = 16;
+
+/// Ellipsoids of one link that are asked together.
+struct QueryGroup {
+  int size;
+  alignas(64) double centre[3][most_queries];  // world
+  alignas(64) double extent[most_queries];     // longest semi-axis
+  alignas(64) double steepness[most_queries];  // h ≥ steepness (|e| − extent) − radius outside
+  alignas(64) double limit[most_queries];      // clearances from here on do not matter
+  const double* axes_T[most_queries];          // 3 × 3 by columns: link frame to principal axes
+  const double* precisions[most_queries];      // 1 / semi-axis² [1/m²]
+  const LinkMotion* link;
+  double inverse_T;
+  double window;                               // samples so much above the smallest do not matter [m]
+  Query queries[most_queries];
+};
+
+/// The centres of a leaf's points lie within `spread` of (x, y, z); their radii are at most `largest_radius`.
+struct Leaf {
+  int first, count;
+  double x, y, z, spread, largest_radius;
+};
+
+/// Adds the points of a leaf to every query of the group that they matter to. Returns whether a limit fell.
+using AddLeaf = bool (*)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+
+bool add_leaf_baseline(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+bool add_leaf_avx2(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+bool add_leaf_avx512(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+
+}  // namespace sidestep::kernels

@@ -1,0 +1,126 @@
+// The field, with every instruction set of this machine, against the plain sum over all points one by one.
+#include "sidestep/embedding/clearance_field.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <string>
+
+#include "sidestep/embedding/boltzmann_mean.hpp"
+#include "sidestep/embedding/instruction_set.hpp"
+#include "support/random_scene.hpp"
+
+using namespace sidestep;
+using test::Random;
+
+namespace {
+
+constexpr double temperature = 0.002;
+
+/// h = (m − √m)/|u| − r with its derivatives along the motion of point and link, term by term.
+ClearanceSample sample(const BodyEllipsoid& ellipsoid, const KinematicState::Link& link, const Eigen::Vector3d& x,
+                       const Eigen::Vector3d& x_dot, double radius) {
+  const Eigen::Matrix3d precision = ellipsoid.shape.inverse();
+  const Eigen::Vector3d slip = x_dot - link.velocity.linear - link.velocity.angular.cross(x);
+  const Eigen::Vector3d slip_dot = -link.bias.linear - link.bias.angular.cross(x) -
+                                   link.velocity.angular.cross(x_dot) - link.velocity.angular.cross(slip);
+  const Eigen::Matrix3d R_LW = link.R_WL.transpose();
+  const Eigen::Vector3d e = R_LW * (x - link.p_WL) - ellipsoid.mean;
+  const Eigen::Vector3d e_dot = R_LW * slip, e_ddot = R_LW * slip_dot;
+  const Eigen::Vector3d u = precision * e, u_dot = precision * e_dot;
+  const double root = std::sqrt(e.dot(u)), norm = u.norm();
+  const double value = root * (root - 1.0) / norm;
+  const Eigen::Vector3d gradient = (u * (2.0 - 1.0 / root) - (value / norm) * (precision * u)) / norm;
+  const double rate = gradient.dot(e_dot);
+  const double m_dot = 2.0 * u.dot(e_dot), m_ddot = 2.0 * e_dot.dot(u_dot);
+  const double root_dot = m_dot / (2.0 * root), root_ddot = (m_ddot - 2.0 * root_dot * root_dot) / (2.0 * root);
+  const double norm_dot = u.dot(u_dot) / norm, norm_ddot = (u_dot.squaredNorm() - norm_dot * norm_dot) / norm;
+  const double curvature =
+      gradient.dot(e_ddot) + (m_ddot - root_ddot - 2.0 * rate * norm_dot - value * norm_ddot) / norm;
+  const Eigen::Vector3d f = link.R_WL * gradient;
+  return {value - radius, rate, curvature, {{-x.cross(f), -f}, {}}};
+}
+
+Body calibrated(const Body& body, Random& random) {
+  Eigen::VectorXd levels(body.num_components());
+  for (Eigen::Index k = 0; k < levels.size(); ++k) {
+    levels[k] = random.uniform(0.01, 0.1);
+  }
+  return Body(body.links, body.weights, body.means, body.covariances, levels);
+}
+
+void compare(const Robot& robot, const Body& body, const KinematicState& state, const Obstacles& obstacles,
+             double reach) {
+  const ClearanceField field(robot, body, temperature);
+  Clearances found(robot.num_coordinates(), field.size());
+  field.evaluate(state, obstacles, reach, found.view(0, field.size()));
+  int k = 0;
+  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, body, "test")) {
+    if (ellipsoid.joint < 0) {
+      continue;
+    }
+    const KinematicState::Link& link = state.link(ellipsoid.joint);
+    BoltzmannMean mean(temperature);
+    int nearest = -1;
+    for (int n = 0; n < obstacles.size(); ++n) {
+      if (mean.add(sample(ellipsoid, link, obstacles.points().col(n), obstacles.velocities().col(n),
+                          obstacles.radii()[n]))) {
+        nearest = n;
+      }
+    }
+    const ClearanceSample expected = mean.result();
+    // 1e-12 of what is summed: clearances of up to 1 m, whose rates and curvatures are divided by the temperature.
+    constexpr double tolerance = 1e-12;
+    BOOST_REQUIRE_EQUAL(found.nearest[k], expected.value < reach ? nearest : -1);
+    if (expected.value < reach) {
+      Eigen::VectorXd gradient = Eigen::VectorXd::Zero(robot.num_coordinates());
+      accumulate_generalised_force(state, ellipsoid.joint, expected.gradient.first, gradient);
+      BOOST_TEST(std::abs(found.values[k] - expected.value) <= tolerance * (1.0 + std::abs(expected.value)));
+      BOOST_TEST(std::abs(found.rates[k] - expected.rate) <= tolerance / temperature * (1.0 + std::abs(expected.rate)));
+      BOOST_TEST(std::abs(found.curvatures[k] - expected.curvature) <=
+                 tolerance / temperature * (1.0 / temperature + std::abs(expected.curvature)));
+      BOOST_TEST((found.gradients.col(k) - gradient).norm() <= tolerance / temperature * (1.0 + gradient.norm()));
+    }
+    ++k;
+  }
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
+  const InstructionSet before = instruction_set();
+  for (const InstructionSet set : instruction_sets()) {
+    BOOST_TEST_CONTEXT(name(set)) {
+      use(set);
+      Random random(3);
+      for (const int num_points : {1, 7, 16, 17, 150, 1500}) {
+        for (int trial = 0; trial < 5; ++trial) {
+          const Robot robot = test::random_tree(random, 7);
+          const Body body = calibrated(test::random_body(random, robot), random);
+          KinematicState state(robot);
+          state.update(robot, random.vector(robot.num_coordinates()), random.vector(robot.num_coordinates()));
+          const Obstacles obstacles = test::random_obstacles(random, num_points);
+          for (const double reach : {-0.01, 0.1, 0.5}) {
+            compare(robot, body, state, obstacles, reach);
+            compare(robot, body, state, obstacles.frozen(), reach);
+          }
+          Obstacles moved = obstacles;
+          moved.advance(0.3);
+          compare(robot, body, state, moved, 0.3);
+        }
+      }
+    }
+  }
+  use(before);
+}
+
+BOOST_AUTO_TEST_CASE(unknown_instruction_sets_are_refused) {
+  // No processor has all three of two architectures; on one that has, there is nothing to refuse.
+  const std::vector<InstructionSet> sets = instruction_sets();
+  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (std::find(sets.begin(), sets.end(), set) == sets.end()) {
+      BOOST_CHECK_THROW(use(set), std::invalid_argument);
+    }
+  }
+  BOOST_TEST((sets.front() == InstructionSet::baseline));
+}
