@@ -10,6 +10,7 @@
 #include "module.hpp"
 #include "sidestep/embedding/clearance_barrier.hpp"
 #include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/embedding/instruction_set.hpp"
 #include "sidestep/embedding/joint_limit_barrier.hpp"
 #include "sidestep/embedding/joint_limit_potential.hpp"
 #include "sidestep/embedding/self_collision_barrier.hpp"
@@ -35,6 +36,9 @@ void check_fitted_to(const Robot& robot, const Body& body) {
 }
 
 void bind_embedding(nb::module_& m) {
+  m.def("instruction_set", [] { return std::string(name(instruction_set())); },
+        "What the inner loops over points run with on this machine: \"avx512\", \"avx2\" or \"baseline\".");
+
   nb::class_<EmbeddingEvaluation>(m, "EmbeddingEvaluation", "Values, Jacobian and curvatures of an embedding.")
       .def_prop_ro("values", [](const EmbeddingEvaluation& e) { return to_numpy(e.values); }, "psi (m,).")
       .def_prop_ro("jacobian", [](const EmbeddingEvaluation& e) { return to_numpy_matrix(e.jacobian); },

@@ -10,5 +10,6 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_geometry(m);
   sidestep::python::bind_dynamical_system(m);
   sidestep::python::bind_control(m);
+  sidestep::python::bind_loop(m);
   sidestep::python::bind_guidance(m);
 }

@@ -12,6 +12,7 @@ void bind_embedding(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
 void bind_dynamical_system(nanobind::module_& m);
 void bind_control(nanobind::module_& m);
+void bind_loop(nanobind::module_& m);
 void bind_guidance(nanobind::module_& m);
 
 }  // namespace sidestep::python

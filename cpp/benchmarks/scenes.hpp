@@ -89,6 +89,40 @@ inline Scene fr3() {
   return make_scene("fr3", placements, std::move(limits), {0.4, 0.1, 0.6});
 }
 
+/// The same arm covered by 77 ellipsoids, eleven balls stretched along every link, among balls of 6 cm.
+inline Scene covered_fr3(int num_obstacles) {
+  constexpr int per_link = 11;
+  constexpr double half_width = 0.07;  // [m] of a ball across the link
+  Scene scene = fr3();
+  std::vector<std::string> links;
+  Eigen::Matrix3Xd means(3, per_link * scene.body.num_components());
+  std::vector<Eigen::Matrix3d> covariances;
+  for (int k = 0; k < scene.body.num_components(); ++k) {
+    const Eigen::Vector3d end = 2.0 * scene.body.means.col(k);
+    for (int i = 0; i < per_link; ++i) {
+      means.col(static_cast<Eigen::Index>(links.size())) = (i + 0.5) / per_link * end;
+      links.push_back(scene.body.links[static_cast<std::size_t>(k)]);
+      covariances.push_back(half_width * half_width * Eigen::Matrix3d::Identity() +
+                            end * end.transpose() / (per_link * per_link));
+    }
+  }
+  const Eigen::Index num = means.cols();
+  std::mt19937_64 engine(1);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  Eigen::Matrix3Xd points(3, num_obstacles);
+  for (Eigen::Index n = 0; n < num_obstacles;) {
+    const Eigen::Vector3d p(unit(engine), unit(engine), 0.6 + 0.6 * unit(engine));
+    if (p.norm() > 0.5 && p.norm() < 1.2) {
+      points.col(n++) = p;
+    }
+  }
+  Body body(std::move(links), Eigen::VectorXd::Constant(num, 1.0 / per_link), std::move(means), std::move(covariances),
+            Eigen::VectorXd::Ones(num));
+  return {scene.robot, std::move(body),
+          Obstacles(std::move(points), Eigen::VectorXd::Constant(num_obstacles, 0.06),
+                    Eigen::Matrix3Xd::Zero(3, num_obstacles))};
+}
+
 /// States as a run meets them: configurations in the middle half of the limits, velocities of about 1 rad/s.
 struct State {
   Eigen::VectorXd q, v;

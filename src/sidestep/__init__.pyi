@@ -1,3 +1,4 @@
+from ._core import BatchEvaluation as BatchEvaluation
 from ._core import BinarySwitch as BinarySwitch
 from ._core import ClearanceBarrier as ClearanceBarrier
 from ._core import CollisionDensity as CollisionDensity
@@ -40,14 +41,18 @@ from ._core import Sum as Sum
 from ._core import Unswitched as Unswitched
 from ._core import __version__ as __version__
 from ._core import christoffel_symbols as christoffel_symbols
+from ._core import evaluate_batch as evaluate_batch
 from ._core import geodesic_acceleration as geodesic_acceleration
 from ._core import is_fallback as is_fallback
 from ._core import metric_matrix as metric_matrix
 from ._core import rollout as rollout
+from ._core import rollout_batch as rollout_batch
 from .body import Body as Body
 from .control import AccelerationFilter as AccelerationFilter
 from .control import Clearances as Clearances
 from .control import Limit as Limit
+from .control import Loop as Loop
+from .control import LoopStep as LoopStep
 from .control import SafetyRow as SafetyRow
 from .control import SafetySettings as SafetySettings
 from .control import TorqueController as TorqueController

@@ -193,6 +193,11 @@ class Obstacles:
     def advance(self, duration: float) -> None:
         """Moves every point along its velocity for `duration` [s]."""
 
+def instruction_set() -> str:
+    """
+    What the inner loops over points run with on this machine: "avx512", "avx2" or "baseline".
+    """
+
 class EmbeddingEvaluation:
     """Values, Jacobian and curvatures of an embedding."""
 
@@ -1180,6 +1185,69 @@ class AccelerationFilter:
 
     def count(self, status: TorqueStatus) -> int:
         """Number of calls that ended with this status."""
+
+class LoopStep:
+    """What one step of the loop gives."""
+
+    @property
+    def status(self) -> StepStatus:
+        """StepStatus of the system."""
+
+    @property
+    def solution(self) -> TorqueSolution:
+        """TorqueSolution of the controller."""
+
+    @property
+    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [Nm | N], within the effort limits, always finite."""
+
+class Loop:
+    """
+    The whole control loop, state in and torque out: a GeometricSystem and a TorqueController, which gets
+    the clearances that the system measured. Goal and obstacles may be replaced from another thread while
+    a step runs. Raises ValueError if system and controller differ in their number of coordinates.
+    """
+
+    def __init__(self, system: GeometricSystem, controller: TorqueController, *, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> None: ...
+
+    def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal) -> None:
+        """From the next step on."""
+
+    def set_obstacles(self, obstacles: Obstacles) -> None:
+        """From the next step on."""
+
+    def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike) -> LoopStep:
+        """
+        One period at q (nv,) [rad | m] and v (nv,) [/s], with mass matrix (nv, nv) and bias (nv,) [Nm | N] there.
+        Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
+        """
+
+class BatchEvaluation:
+    """One step at each of N states."""
+
+    @property
+    def accelerations(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(N, nv) [rad/s^2]"""
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """psi (N, m); NaN where the step fell back"""
+
+    @property
+    def statuses(self) -> list[StepStatus]:
+        """One StepStatus per state."""
+
+def evaluate_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, threads: int = 0) -> BatchEvaluation:
+    """
+    One step at each of N states q, v (N, nv) towards goals (N, nv), on several threads (0: one per processor).
+    Raises ValueError on wrong shapes.
+    """
+
+def rollout_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', filter: AccelerationFilter | None = None, threads: int = 0) -> list[Rollout]:
+    """
+    The motions from N states q, v (N, nv) towards goals (N, nv) as `rollout` gives them, on several threads
+    (0: one per processor). Raises ValueError on wrong shapes.
+    """
 
 class PlanStatus(enum.Enum):
     """What a search says about its result."""

@@ -198,8 +198,10 @@ TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
   solution.dominant = -1;
   if (q_known && v_known && mass_known && bias_known) {
     if (clearances != nullptr && clear) {
+      // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_cholesky_, bias_};
-      rows_.update(*clearances, velocity_, limits_, settings_.period, &braking);
+      const bool limited = limits_.effort.array().isFinite().any();
+      rows_.update(*clearances, velocity_, limits_, settings_.period, limited ? &braking : nullptr);
     }
     if (wanted_known && clear) {
       wanted_ = acceleration;

@@ -1,6 +1,7 @@
 #include "sidestep/embedding/self_collision_barrier.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -10,18 +11,29 @@ namespace {
 constexpr const char* self_owner = "self-collision barrier";
 constexpr const char* plane_owner = "plane barrier";
 
-/// An ellipsoid in the world, with the motion of its centre.
+/// An ellipsoid in the world.
+struct Side {
+  const KinematicState::Link* link;
+  const BodyEllipsoid* ellipsoid;
+  Eigen::Vector3d centre;
+
+  double half_width(const Eigen::Vector3d& n) const noexcept {
+    const Eigen::Vector3d m = link->R_WL.transpose() * n;
+    return std::sqrt(m.dot(ellipsoid->shape * m));
+  }
+};
+
+/// The same, with the motion of its centre.
 struct Placed {
   const KinematicState::Link& link;
   const BodyEllipsoid& ellipsoid;
   Eigen::Vector3d centre;
   PointMotion motion;
 
-  Placed(const KinematicState& state, const BodyEllipsoid& e) noexcept
-      : link(link_or_world(state, e.joint)),
-        ellipsoid(e),
-        centre(link.p_WL + link.R_WL * e.mean),
-        motion(point_motion(link, centre)) {}
+  Placed(const KinematicState::Link& l, const BodyEllipsoid& e, const Eigen::Vector3d& c) noexcept
+      : link(l), ellipsoid(e), centre(c), motion(point_motion(l, c)) {}
+  Placed(const KinematicState::Link& l, const BodyEllipsoid& e) noexcept : Placed(l, e, l.p_WL + l.R_WL * e.mean) {}
+  explicit Placed(const Side& side) noexcept : Placed(*side.link, *side.ellipsoid, side.centre) {}
 };
 
 /// Half-width s of an ellipsoid along a unit vector n that moves, with s' and s'' and the vector ∂s/∂n (world).
@@ -50,11 +62,13 @@ HalfWidth half_width(const Placed& p, const Eigen::Vector3d& n, const Eigen::Vec
 // Centres closer than this have no direction between them [m]; such ellipsoids overlap deeply anyway.
 constexpr double closest_centres = 1e-6;
 
+Eigen::Vector3d between_centres(const Eigen::Vector3d& a, const Eigen::Vector3d& b) noexcept {
+  const Eigen::Vector3d d = b - a;
+  return d.norm() > closest_centres ? d : closest_centres * Eigen::Vector3d::UnitX();
+}
+
 ClearanceSample between(const Placed& a, const Placed& b) noexcept {
-  Eigen::Vector3d d = b.centre - a.centre;
-  if (!(d.norm() > closest_centres)) {
-    d = closest_centres * Eigen::Vector3d::UnitX();
-  }
+  const Eigen::Vector3d d = between_centres(a.centre, b.centre);
   const Eigen::Vector3d d_dot = b.motion.velocity - a.motion.velocity;
   const Eigen::Vector3d d_ddot = b.motion.acceleration - a.motion.acceleration;
   const double length = d.norm();
@@ -74,6 +88,75 @@ ClearanceSample between(const Placed& a, const Placed& b) noexcept {
           length_ddot - s_a.curvature - s_b.curvature,
           {{-a.centre.cross(f) + n.cross(s_a.slope), -f}, {b.centre.cross(f) + n.cross(s_b.slope), f}}};
 }
+
+/// The ellipsoids of two links at a state.
+class PairOfLinks {
+ public:
+  template <class Group>
+  PairOfLinks(const KinematicState& state, const Group& first, const Group& second) noexcept
+      : first_(ball(state, first)), second_(ball(state, second)) {}
+
+  /// Calls act(a, b, h) for pairs of ellipsoids with h < limit, where `act` may lower the limit. Balls are tested from
+  /// the whole links down: most pairs of links, then of ellipsoids, are too far apart.
+  template <class Act>
+  void for_each_below(const double& limit, Act&& act) const noexcept {
+    if (!near(first_, second_.centre, second_.radius, limit)) {
+      return;
+    }
+    constexpr std::size_t most = 32;  // ellipsoids of the second link that are looked at together
+    const std::vector<BodyEllipsoid>& all = *second_.ellipsoids;
+    for (std::size_t start = 0; start < all.size(); start += most) {
+      std::array<Side, most> sides;
+      std::size_t num = 0;
+      for (std::size_t n = start; n < std::min(start + most, all.size()); ++n) {
+        const Eigen::Vector3d centre = second_.link->p_WL + second_.link->R_WL * all[n].mean;
+        if (near(first_, centre, all[n].extent, limit)) {
+          sides[num++] = {second_.link, &all[n], centre};
+        }
+      }
+      for (std::size_t m = 0; num > 0 && m < first_.ellipsoids->size(); ++m) {
+        const BodyEllipsoid& ellipsoid = (*first_.ellipsoids)[m];
+        const Side a{first_.link, &ellipsoid, first_.link->p_WL + first_.link->R_WL * ellipsoid.mean};
+        if (!near(second_, a.centre, ellipsoid.extent, limit)) {
+          continue;
+        }
+        for (std::size_t n = 0; n < num; ++n) {
+          const Side& b = sides[n];
+          if (!near(a.centre, b.centre, ellipsoid.extent + b.ellipsoid->extent + limit)) {
+            continue;
+          }
+          const Eigen::Vector3d d = between_centres(a.centre, b.centre);
+          const double length = d.norm();
+          const double clearance = length - a.half_width(d / length) - b.half_width(d / length);
+          if (clearance < limit) {
+            act(a, b, clearance);
+          }
+        }
+      }
+    }
+  }
+
+ private:
+  struct Ball {
+    const KinematicState::Link* link;
+    const std::vector<BodyEllipsoid>* ellipsoids;
+    Eigen::Vector3d centre;
+    double radius;
+  };
+  template <class Group>
+  static Ball ball(const KinematicState& state, const Group& group) noexcept {
+    const KinematicState::Link& link = link_or_world(state, group.joint);
+    return {&link, &group.ellipsoids, link.p_WL + link.R_WL * group.centre, group.radius};
+  }
+  static bool near(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double distance) noexcept {
+    return distance > 0.0 && (b - a).squaredNorm() < distance * distance;
+  }
+  static bool near(const Ball& ball, const Eigen::Vector3d& centre, double radius, double limit) noexcept {
+    return near(ball.centre, centre, ball.radius + radius + limit);
+  }
+
+  Ball first_, second_;
+};
 
 void write(const ClearanceSample& sample, int nearest, const KinematicState& state, int joint_a, int joint_b,
            Eigen::Index k, ClearanceView& out) noexcept {
@@ -140,41 +223,27 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
 
 void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state,
                                   const Obstacles& /*obstacles*/) const noexcept {
-  const double reach = function().activation;
-  const double horizon = reach + BoltzmannMean::window * temperature_;
+  const double window = BoltzmannMean::window * temperature_;
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    const Group& first = pairs_[i].first;
-    const Group& second = pairs_[i].second;
-    const KinematicState::Link& link_a = link_or_world(state, first.joint);
-    const KinematicState::Link& link_b = link_or_world(state, second.joint);
-    const Eigen::Vector3d apart =
-        link_b.p_WL + link_b.R_WL * second.centre - link_a.p_WL - link_a.R_WL * first.centre;
-    if (apart.norm() > first.radius + second.radius + horizon) {
+    const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
+    // The smallest clearance first: most pairs of links end here, and of the others only what lies near it matters.
+    double smallest = function().activation;
+    pair.for_each_below(smallest, [&](const Side& /*a*/, const Side& /*b*/, double clearance) { smallest = clearance; });
+    if (!(smallest < function().activation)) {
       continue;
     }
     BoltzmannMean mean(temperature_);
     int nearest = -1;
-    for (const BodyEllipsoid& ellipsoid_a : first.ellipsoids) {
-      const Placed a(state, ellipsoid_a);
-      for (const BodyEllipsoid& ellipsoid_b : second.ellipsoids) {
-        // Balls around the two are farther apart than anything that matters: most pairs end here.
-        const Eigen::Vector3d centre_b = link_b.p_WL + link_b.R_WL * ellipsoid_b.mean;
-        const double cut = ellipsoid_a.extent + ellipsoid_b.extent + std::min(horizon, mean.horizon());
-        if (cut <= 0.0 || (centre_b - a.centre).squaredNorm() >= cut * cut) {
-          continue;
-        }
-        const ClearanceSample sample = between(a, Placed(state, ellipsoid_b));
-        if (sample.value < horizon && mean.matters(sample.value) && mean.add(sample)) {
-          nearest = ellipsoid_b.component;
-        }
+    const double limit = smallest + window;
+    pair.for_each_below(limit, [&](const Side& a, const Side& b, double /*clearance*/) {
+      if (mean.add(between(Placed(a), Placed(b)))) {
+        nearest = b.ellipsoid->component;
       }
-    }
-    if (!mean.empty()) {
-      const ClearanceSample result = mean.result();
-      if (result.value < reach) {
-        write(result, nearest, state, first.joint, second.joint, k, out.clearances);
-      }
+    });
+    const ClearanceSample result = mean.result();
+    if (result.value < function().activation) {
+      write(result, nearest, state, pairs_[i].first.joint, pairs_[i].second.joint, static_cast<Eigen::Index>(i),
+            out.clearances);
     }
   }
   add_barriers(out);
@@ -222,7 +291,7 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
     BoltzmannMean mean(temperature_);
     int nearest = -1;
     for (const BodyEllipsoid& ellipsoid : links_[i]) {
-      const Placed placed(state, ellipsoid);
+      const Placed placed(link_or_world(state, ellipsoid.joint), ellipsoid);
       const HalfWidth s = half_width(placed, normal_, zero, zero);
       const double value = normal_.dot(placed.centre) - offset_ - s.value;
       if (!(value < function().activation + BoltzmannMean::window * temperature_) || !mean.matters(value)) {

@@ -26,3 +26,6 @@ from .scenes import SceneOutcome as SceneOutcome
 from .scenes import SceneResult as SceneResult
 from .scenes import SceneSettings as SceneSettings
 from .scenes import run_scenes as run_scenes
+from .step import StepSettings as StepSettings
+from .step import compare_steps as compare_steps
+from .step import run_step_bench as run_step_bench

@@ -1,0 +1,60 @@
+// Takes the given number of steps of one kind and nothing else, for instructions.cmake to count their instructions:
+//   instructions_benchmark density|barriers|filtered STEPS
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+
+#include "scenes.hpp"
+#include "sidestep/control/acceleration_filter.hpp"
+#include "sidestep/dynamical_system/geometric_system.hpp"
+#include "sidestep/embedding/clearance_barrier.hpp"
+#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/embedding/joint_limit_barrier.hpp"
+#include "sidestep/embedding/self_collision_barrier.hpp"
+
+int main(int argc, char** argv) {
+  using namespace sidestep;
+  const bool density = argc == 3 && std::strcmp(argv[1], "density") == 0;
+  const bool filtered = argc == 3 && std::strcmp(argv[1], "filtered") == 0;
+  if (argc != 3 || !(density || filtered || std::strcmp(argv[1], "barriers") == 0)) {
+    std::fprintf(stderr, "usage: %s density|barriers|filtered STEPS\n", argv[0]);
+    return 2;
+  }
+  const benchmarks::Scene scene = density ? benchmarks::fr3() : benchmarks::covered_fr3(10);
+  const Robot& robot = scene.robot;
+  const int nv = robot.num_coordinates();
+  std::vector<std::shared_ptr<const Embedding>> embeddings;
+  if (density) {
+    embeddings = {std::make_shared<CollisionDensity>(robot, scene.body)};
+  } else {
+    std::vector<std::pair<std::string, std::string>> pairs;
+    for (std::size_t a = 0; a < robot.frames().size(); ++a) {
+      for (std::size_t b = a + 3; b < robot.frames().size(); ++b) {
+        pairs.emplace_back(robot.frames()[a].name, robot.frames()[b].name);
+      }
+    }
+    embeddings = {std::make_shared<ClearanceBarrier>(robot, scene.body, BarrierFunction{0.1, 0.1, 2.0, 0.001}),
+                  std::make_shared<JointLimitBarrier>(robot, BarrierFunction{0.1, 0.02, 2.0, 0.001}),
+                  std::make_shared<SelfCollisionBarrier>(robot, scene.body, pairs, BarrierFunction{0.05, 0.02, 2.0, 0.001})};
+  }
+  GeometricSystemSettings settings;
+  settings.stiffness = 2.0 * Eigen::MatrixXd::Identity(nv, nv);
+  settings.damping = 3.0 * Eigen::MatrixXd::Identity(nv, nv);
+  const GeometricSystem system(robot, std::move(embeddings), settings);
+  GeometricSystem::Workspace workspace(system);
+  AccelerationFilter filter(robot);
+  TorqueSolution solution(nv);
+  const Eigen::VectorXd goal = 0.5 * (robot.limits().lower + robot.limits().upper);
+  const std::vector<benchmarks::State> states = benchmarks::states(robot, 100, 0);
+  int failures = 0;
+  for (int k = 0; k < std::atoi(argv[2]); ++k) {
+    const benchmarks::State& state = states[static_cast<std::size_t>(k) % states.size()];
+    failures += is_fallback(system.acceleration(state.q, state.v, goal, scene.obstacles, workspace));
+    if (filtered) {
+      failures += filter.apply(state.q, state.v, workspace.acceleration, &workspace.clearances, solution) ==
+                  TorqueStatus::fallback_solver;
+    }
+  }
+  return failures == 0 ? 0 : 1;
+}

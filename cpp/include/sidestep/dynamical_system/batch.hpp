@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sidestep/dynamical_system/rollout.hpp"
+
+namespace sidestep {
+
+/// One step at each of N states: row k belongs to state k.
+struct BatchEvaluation {
+  Eigen::MatrixXd accelerations;     ///< (N, nv) [rad/s²]
+  Eigen::MatrixXd values;            ///< ψ (N, m), NaN where the step fell back
+  std::vector<StepStatus> statuses;  ///< (N)
+};
+
+/// The step of the system at states q, v (N, nv) towards goals (N, nv), on `threads` threads (0: one per processor).
+/// Throws std::invalid_argument on sizes or a negative number of threads.
+BatchEvaluation evaluate_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
+                               const Eigen::MatrixXd& goals, const Obstacles& obstacles, int threads = 0);
+
+/// The motions from q, v (N, nv) towards goals (N, nv), on `threads` threads (0: one per processor); each as `rollout`
+/// gives it, whatever the number of threads. Throws std::invalid_argument as `rollout` does, on sizes, on a negative
+/// number of threads, and if the settings hold an escape, which belongs to one motion.
+std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
+                                   const Eigen::MatrixXd& goals, const Obstacles& obstacles,
+                                   const RolloutSettings& settings, int threads = 0);
+
+}  // namespace sidestep

@@ -1,0 +1,38 @@
+#include "sidestep/control/loop.hpp"
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace sidestep {
+
+Loop::Loop(std::shared_ptr<const GeometricSystem> system, TorqueController controller, Goal goal, Obstacles obstacles)
+    : system_(std::move(system)),
+      workspace_(*system_),
+      controller_(std::move(controller)),
+      solution_(controller_.num_coordinates(), controller_.settings().safety.max_rows),
+      goal_(std::move(goal)),
+      obstacles_(std::move(obstacles)) {
+  if (controller_.num_coordinates() != system_->robot().num_coordinates()) {
+    throw std::invalid_argument("loop: the controller has " + std::to_string(controller_.num_coordinates()) +
+                                " coordinates, the system " + std::to_string(system_->robot().num_coordinates()));
+  }
+}
+
+LoopStatus Loop::step(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+                      Eigen::Ref<const Eigen::MatrixXd> mass_matrix, Eigen::Ref<const Eigen::VectorXd> bias) noexcept {
+  const Goal& goal = goal_.get();
+  const Obstacles& obstacles = obstacles_.get();
+  const Eigen::Index nv = controller_.num_coordinates();
+  if (q.size() != nv || v.size() != nv) {
+    workspace_.acceleration.setZero();
+    return {StepStatus::invalid_state, controller_.solve(q, v, workspace_.acceleration, mass_matrix, bias, solution_)};
+  }
+  const StepStatus status = system_->acceleration(q, v, goal, obstacles, workspace_);
+  // After a fallback the clearances are not of this step.
+  const Clearances* clearances = is_fallback(status) ? nullptr : &workspace_.clearances;
+  return {status,
+          controller_.solve(q, v, workspace_.acceleration, mass_matrix, bias, clearances, solution_)};
+}
+
+}  // namespace sidestep

@@ -1,0 +1,228 @@
+"""What one control step costs: the settings of the thesis's Table 6.1, and the whole arm among clouds."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import sidestep
+from sidestep._core import (
+    AccelerationFilter,
+    CollisionDensity,
+    GeometricSystem,
+    Obstacles,
+    instruction_set,
+    rollout,
+)
+from sidestep.bench.step_scenes import table_cloud, uniform_cloud
+from sidestep.bench.step_times import StepTimes
+from sidestep.body import Body
+from sidestep.presets import barrier_system
+from sidestep.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+TABLE_ROBOTS = ("planar2", "planar3", "fr3_arm")  # 2, 3 and 7 joints
+POINTS = (1, 100, 1_000, 10_000, 100_000)
+MOTION = 1_000  # steps towards one goal before the next; 1 s
+WARM_UP = 0.1  # share of the steps that run before those that count
+
+
+@dataclass(frozen=True)
+class StepSettings:
+    """How long each row is measured.
+
+    Attributes:
+        steps: that are timed, unless `seconds` [s] are over before. robot: of the rows with a whole body.
+        points: numbers of points of these rows. seed: of states, goals and points.
+    """
+
+    steps: int = 1_000_000
+    seconds: float = 10.0
+    robot: str = "fr3"
+    points: tuple[int, ...] = POINTS
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.steps < 1:
+            raise ValueError(f"steps is {self.steps}, must be at least 1")
+        if not self.seconds > 0.0:
+            raise ValueError(f"seconds is {self.seconds}, must be positive")
+        if not self.points or min(self.points) < 1:
+            raise ValueError(f"points is {self.points}, must be one or more positive numbers")
+
+
+def run_step_bench(
+    settings: StepSettings, *, progress: Callable[[int, int, str], None] | None = None
+) -> dict[str, Any]:
+    """Times every row and returns a document for JSON.
+
+    Times in C++ are taken around each step of a rollout, with 30 to 50 ns for the clock; those from Python around
+    the call and the reading of its result.
+    """
+    rows = list(_rows(settings))
+    results = []
+    for k, row in enumerate(rows):
+        if progress is not None:
+            progress(k, len(rows), row.name)
+        results.append(row.measure(settings))
+    return {
+        "benchmark": "step",
+        "version": sidestep.__version__,
+        "cpu": cpu_model(),
+        "instruction_set": instruction_set(),
+        "python": platform.python_version(),
+        "steps": settings.steps,
+        "seconds": settings.seconds,
+        "results": results,
+    }
+
+
+def compare_steps(before: dict[str, Any], after: dict[str, Any]) -> list[dict[str, Any]]:
+    """The rows that two documents share, each with its medians [us] and their ratio after/before.
+
+    Raises:
+        ValueError: if a document is none of `run_step_bench`, or they share no row.
+    """
+    for document in (before, after):
+        if document.get("benchmark") != "step" or not isinstance(document.get("results"), list):
+            raise ValueError("not a result of `sidestep bench step`")
+    old = {(row["name"], row["language"]): row for row in before["results"]}
+    shared = [row for row in after["results"] if (row["name"], row["language"]) in old]
+    if not shared:
+        raise ValueError("the two results share no row")
+    return [
+        {
+            "name": row["name"],
+            "language": row["language"],
+            "before_us": old[row["name"], row["language"]]["median_us"],
+            "after_us": row["median_us"],
+            "ratio": row["median_us"] / old[row["name"], row["language"]]["median_us"],
+        }
+        for row in shared
+    ]
+
+
+def cpu_model() -> str:
+    """Model name of the processor, from the kernel."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+def one_gaussian_per_joint(robot: Robot) -> Body:
+    """By hand: a ball of 8 cm on the first link of every joint."""
+    links = [next(f.name for f in robot.frames if f.joint == j) for j in range(len(robot.joints))]
+    num = len(links)
+    covariances = np.tile(0.08**2 * np.eye(3), (num, 1, 1))
+    return Body(links=links, weights=np.ones(num), means=np.zeros((num, 3)), covariances=covariances)
+
+
+@dataclass(frozen=True)
+class _Row:
+    name: str
+    robot: Robot
+    system: GeometricSystem
+    obstacles: Obstacles
+    num_components: int
+    filter: AccelerationFilter | None
+    python: bool
+
+    def measure(self, settings: StepSettings) -> dict[str, Any]:
+        times, total, end = StepTimes(), 0.0, time.perf_counter() + settings.seconds
+        rng = np.random.default_rng(settings.seed)
+        q = self.robot.neutral
+        run = self._from_python if self.python else self._from_cpp
+        steps = min(MOTION, settings.steps)
+        run(q, self.robot.random_configuration(rng), max(1, round(WARM_UP * steps)))
+        while times.total < settings.steps and (times.total == 0 or time.perf_counter() < end):
+            q, seconds = run(q, self.robot.random_configuration(rng), steps)
+            times.add(seconds)
+            total += float(seconds.sum())
+        return {
+            "name": self.name,
+            "language": "Python" if self.python else "C++",
+            "robot": self.robot.name,
+            "joints": self.robot.num_coordinates,
+            "gaussians": self.num_components,
+            "points": len(self.obstacles.points),
+            "filter": self.filter is not None,
+            "steps": times.total,
+            **{f"{name}_us": value for name, value in times.microseconds().items()},
+            "steps_per_s": times.total / total,
+        }
+
+    def _from_cpp(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
+        moved = rollout(
+            self.system,
+            q,
+            np.zeros_like(q),
+            goal,
+            self.obstacles,
+            steps=steps,
+            time_steps=True,
+            filter=self.filter,
+        )
+        return _inside(self.robot, moved.q[-1]), moved.step_seconds
+
+    def _from_python(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
+        moved = rollout(
+            self.system, q, np.zeros_like(q), goal, self.obstacles, steps=steps, filter=self.filter
+        )
+        seconds = np.empty(steps)
+        for k in range(steps):
+            start = time.perf_counter_ns()
+            step = self.system.acceleration(moved.q[k], moved.v[k], goal, self.obstacles)
+            _ = step.acceleration
+            seconds[k] = 1e-9 * (time.perf_counter_ns() - start)
+        return _inside(self.robot, moved.q[-1]), seconds
+
+
+def _inside(robot: Robot, q: Array) -> Array:
+    return np.clip(q, robot.limits.lower, robot.limits.upper)
+
+
+def _rows(settings: StepSettings) -> Iterator[_Row]:
+    for name in TABLE_ROBOTS:
+        robot = Robot.named(name)
+        body = one_gaussian_per_joint(robot)
+        system = GeometricSystem([CollisionDensity(robot, body)])
+        for python in (False, True):
+            yield _Row(
+                f"Table 6.1, {robot.num_coordinates} joints",
+                robot,
+                system,
+                Obstacles([[0.4, 0.1, 0.3]]),
+                len(body.links),
+                None,
+                python,
+            )
+    robot = Robot.named(settings.robot)
+    body = Body.cover(robot)
+    system = barrier_system(robot, body)
+    for shape, cloud in (("uniform", uniform_cloud), ("table", table_cloud)):
+        for num in settings.points:
+            obstacles = cloud(num, np.random.default_rng(settings.seed))
+            for name, filtered, python in (
+                ("without filter", False, False),
+                ("with filter", True, False),
+                ("without filter", False, True),
+            ):
+                yield _Row(
+                    f"{robot.name}, {num} points, {shape}, {name}",
+                    robot,
+                    system,
+                    obstacles,
+                    len(body.links),
+                    AccelerationFilter(robot) if filtered else None,
+                    python,
+                )

@@ -1,0 +1,67 @@
+"""What a step costs: that the figures are of the steps asked for, not how large they are."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sidestep.bench import StepSettings, compare_steps, run_step_bench
+from sidestep.bench import step as step_module
+from sidestep.bench.step_scenes import REACH, table_cloud, uniform_cloud
+
+
+@pytest.fixture(scope="module")
+def document() -> dict[str, object]:
+    settings = StepSettings(steps=20, robot="planar3", points=(5,))
+    return run_step_bench(settings)
+
+
+def test_measures_every_row(document: dict[str, list[dict[str, object]]]) -> None:
+    rows = document["results"]
+    assert len(rows) == 2 * len(step_module.TABLE_ROBOTS) + 2 * 3
+    assert len({(row["name"], row["language"]) for row in rows}) == len(rows)
+    for row in rows:
+        assert row["steps"] >= 20
+        assert 0.0 < row["median_us"] <= row["p99_us"] <= row["p99.9_us"] <= row["max_us"]
+    assert [row["joints"] for row in rows[:6:2]] == [2, 3, 7]
+    assert {row["points"] for row in rows[6:]} == {5}
+    json.dumps(document, allow_nan=False)
+
+
+def test_compares_row_by_row(document: dict[str, list[dict[str, object]]]) -> None:
+    slower = {
+        "benchmark": "step",
+        "results": [{**row, "median_us": 2.0 * row["median_us"]} for row in document["results"][:3]],
+    }
+    rows = compare_steps(document, slower)
+    assert [row["ratio"] for row in rows] == [2.0] * 3
+    with pytest.raises(ValueError, match="share no row"):
+        compare_steps(document, {"benchmark": "step", "results": []})
+    with pytest.raises(ValueError, match="not a result of"):
+        compare_steps(document, {"benchmark": "reach"})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [({"steps": 0}, "steps is 0"), ({"seconds": 0.0}, "seconds is 0"), ({"points": ()}, r"points is \(\)")],
+)
+def test_names_wrong_settings(wrong: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        StepSettings(**wrong)
+
+
+@pytest.mark.parametrize("cloud", [uniform_cloud, table_cloud])
+def test_clouds_have_as_many_points_as_asked_for_within_the_workspace(cloud: object) -> None:
+    points = cloud(1000, np.random.default_rng(0)).points
+    assert points.shape == (1000, 3)
+    assert np.linalg.norm(points, axis=1).max() < REACH[1] + 0.05
+    assert len(np.unique(points, axis=0)) == 1000
+
+
+def test_the_committed_result_is_one(tmp_path: Path) -> None:
+    path = Path(__file__).parents[2] / "benchmarks" / "results" / "step.json"
+    stored = json.loads(path.read_text("utf-8"))
+    assert all(row["ratio"] == 1.0 for row in compare_steps(stored, stored))
