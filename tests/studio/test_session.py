@@ -12,7 +12,8 @@ from sidestep import ExactClearance, Scenario
 from sidestep.pose import pose_at
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
-from sidestep.studio.session import Session, scenario_now, tip_of
+from sidestep.studio.export import scenario_now
+from sidestep.studio.session import Session, tip_of
 from sidestep.studio.start import scenario_of
 from sidestep.studio.things import ball, box
 from sidestep.studio.truth import solid_poses
@@ -153,7 +154,7 @@ def test_what_is_saved_is_what_is_there(
     session.handle(m.AddThing(box("crate", np.array([-0.8, 0.1, 0.2]), np.array([0.1, 0.2, 0.3]))))
     session.handle(m.ThrowThing("ball", np.array([0.1, 0.0, 0.3])))
     last = run(session, 0.5)
-    now = scenario_now(session.scenario, last, name="kept")
+    now = scenario_now(last, name="kept")
     file = tmp_path / "kept.yaml"  # type: ignore[operator]
     now.save(file)
     again = make_session(Scenario.load(file)).snapshot()

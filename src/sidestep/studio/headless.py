@@ -35,6 +35,8 @@ PICTURE_TIME = 180.0  # [s] at most for one picture: without a graphics card eac
 SEND_TIME = 0.3  # [s] in which a state is on the page
 PLOT_TIME = 1.0  # [s] in which the plots have caught up
 FRAME = 0.15  # [s] of simulated time between two pictures of an animation
+CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
+  if (notice.innerText.includes('Software WebGL')) notice.querySelector('button')?.click()"""  # of viser
 ANIMATION_WIDTH = 960  # [px]
 COLOURS = 128  # of a GIF
 
@@ -89,17 +91,11 @@ def browser() -> Iterator[Any]:
 
 
 def open_page(chromium: Any, address: str, window: Window = Window()) -> Page:
-    """The page in a new window, with the scene shown and viser's notice about software rendering closed."""
+    """The page in a new window, once the scene is shown."""
     page: Page = chromium.new_page(viewport={"width": window.width, "height": window.height})
-    page.goto(address)
+    page.goto(address, timeout=1e3 * LOAD_TIME)
     page.wait_for_selector("canvas", timeout=1e3 * LOAD_TIME)
-    page.get_by_text("Sidestep", exact=True).first.wait_for(timeout=1e3 * LOAD_TIME)
-    notice = page.get_by_text("Software WebGL rendering")
-    try:
-        notice.wait_for(timeout=4e3)
-        notice.locator("xpath=ancestor::*[.//button][1]//button").first.click()
-    except Exception:  # Playwright's own timeout: with a graphics card there is no such notice
-        pass
+    page.wait_for_selector("#words", timeout=1e3 * LOAD_TIME)
     return page
 
 
@@ -152,9 +148,11 @@ def run_until(studio: Studio, time: float) -> None:
 
 def picture(page: Page) -> bytes:
     """What the page shows, as PNG, once it has drawn what it was last sent."""
-    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    clock.sleep(SEND_TIME)
-    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    for _ in range(2):
+        page.evaluate(
+            f"{CLOSE_NOTICE}; new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
+        clock.sleep(SEND_TIME)
     return page.screenshot(timeout=1e3 * PICTURE_TIME)
 
 

@@ -137,6 +137,7 @@ class Snapshot:
     """The state of the loop at one moment.
 
     Attributes:
+        scenario: that was loaded last.
         edition: grows when obstacles come or go, or a scenario is loaded; `things` then changed.
         time: simulated [s]. q, v: (nv,). running: or paused.
         goal: (nv,) of a joint goal, else None; goal_pose: (4, 4) of a pose goal, else None.
@@ -150,6 +151,7 @@ class Snapshot:
         timing: of the steps. rows: of a recording since the last snapshot. note: what is being prepared.
     """
 
+    scenario: Scenario
     edition: int
     time: float
     running: bool
@@ -179,12 +181,12 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One moment of a recording."""
+    """One moment of a recording: time [s], q (nv,), the obstacles and their poses (N, 4, 4)."""
 
     time: float
     q: Array
+    things: tuple[Thing, ...]
     poses: Array
-    words: str = ""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ It knows nothing of the page. `loop` runs it in a process of its own, tests call
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import time as clock
 from collections import deque
@@ -29,6 +28,7 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, load_robot
 from sidestep.simulation.run import status_name
 from sidestep.studio import messages as m
+from sidestep.studio.export import numbers_of
 from sidestep.studio.methods import METHODS, Method, build_system, check_numbers, method_named
 from sidestep.studio.stage import Actor, Stage
 from sidestep.studio.things import things_of
@@ -90,6 +90,7 @@ class Session:
         for name, values in (numbers or {}).items():
             self._numbers[name] = check_numbers(method_named(name), values)
         self._method = method_named(method)
+        self._given = set(numbers or {})
         self._edition = 0
         self._recording = False
         self._load(scenario)
@@ -171,7 +172,7 @@ class Session:
         else:
             self._contacts = ()
         if self._recording and self._count % RECORD_EVERY == 0:
-            self._rows.append(m.Row(self.time, q, self._poses()))
+            self._rows.append(m.Row(self.time, q, self._things, self._poses()))
 
     def snapshot(self, *, real_time: float = 0.0, note: str = "") -> m.Snapshot:
         """The state now, and the rows recorded since the last snapshot."""
@@ -191,6 +192,7 @@ class Session:
                 nearest = (diagnosis.name, float(clearances.min()))
             torque = float((np.abs(self._solution.torque) / limits.effort).max())
         return m.Snapshot(
+            scenario=self.scenario,
             edition=self._edition,
             time=self.time,
             running=self.running,
@@ -198,7 +200,7 @@ class Session:
             v=v.copy(),
             goal=self._goal,
             goal_pose=self._pose,
-            things=tuple(actor.thing for actor in self.stage.actors),
+            things=self._things,
             poses=self._poses(),
             velocities=np.array([actor.velocity for actor in self.stage.actors]).reshape(-1, 3),
             method=self._method.name,
@@ -235,17 +237,18 @@ class Session:
 
     def _load(self, scenario: Scenario) -> None:
         robot = load_robot(scenario)
-        if not self._edition or robot.fingerprint != self.robot.fingerprint:
-            bodies: dict[bool, Body] = {}
-            system = None
-        else:
-            robot, bodies, system = self.robot, self._bodies, self._system
+        bodies: dict[bool, Body] = {}
+        if self._edition and robot.fingerprint == self.robot.fingerprint:
+            robot, bodies = self.robot, self._bodies
         start = coordinates(scenario.start, robot, "start.position")
         goal = coordinates(scenario.goal, robot, "goal.position")
         stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
-        if system is None:
-            system = self._system_for(robot, bodies, self._method, self._numbers[self._method.name])
-        self.robot, self._bodies, self._system = robot, bodies, system
+        numbers = dict(self._numbers)
+        asked, values = numbers_of(scenario)
+        if asked not in self._given:
+            numbers[asked] = check_numbers(METHODS[asked], values)
+        self._system = self._system_for(robot, bodies, self._method, numbers[self._method.name])
+        self.robot, self._bodies, self._numbers = robot, bodies, numbers
         self.tip = tip_of(robot)
         self.scenario, self.stage = scenario, stage
         self.period = scenario.simulation.period
@@ -291,6 +294,7 @@ class Session:
         self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in views)])
         counts = [len(points) for points in self._views]
         self._owners = np.repeat(np.arange(len(counts)), counts)
+        self._things = tuple(actor.thing for actor in self.stage.actors)
 
     def _obstacles(self) -> Obstacles:
         actors = self.stage.actors
@@ -330,27 +334,3 @@ def tip_of(robot: Robot) -> str:
     for index, joint in enumerate(robot.joints):
         depth[index] = depth[joint.parent] + 1
     return max(enumerate(robot.frames), key=lambda item: (depth[item[1].joint], item[0]))[1].name
-
-
-def scenario_now(session_scenario: Scenario, snapshot: m.Snapshot, *, name: str) -> Scenario:
-    """The scenario as it stands: arm, goal and obstacles where they are now.
-
-    Raises:
-        ValueError: the goal is a pose, which scenario files do not have.
-    """
-    from sidestep.scenario.scenario import JointState
-
-    if snapshot.goal is None:
-        raise ValueError(
-            "a scenario file has a configuration as its goal; move a joint slider of the goal first"
-        )
-    return dataclasses.replace(
-        session_scenario,
-        name=name,
-        start=JointState("rad", tuple(float(x) for x in snapshot.q.round(6))),
-        goal=JointState("rad", tuple(float(x) for x in snapshot.goal.round(6))),
-        obstacles=tuple(
-            dataclasses.replace(thing.at(pose).obstacle, name=thing.name)
-            for thing, pose in zip(snapshot.things, snapshot.poses, strict=True)
-        ),
-    )

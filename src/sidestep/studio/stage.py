@@ -17,6 +17,7 @@ Array = npt.NDArray[np.float64]
 
 FOLLOW_TIME = 0.05  # [s] in which a drawn obstacle makes up 63 % of its way, below the speed limit
 DRAG_SPEED = 1.0  # [m/s] at most of a drawn obstacle: what the hand of a person does near an arm
+THERE = 1e-4  # [m] from its target a drawn obstacle is put there
 FAR = 3.0  # [m] from the origin; a thrown obstacle stops there
 
 
@@ -50,18 +51,24 @@ class Actor:
         self.velocity = way / (motion.end - motion.begin) if moves else np.zeros(3)
 
     def advance(self, period: float) -> None:
-        """Moves it by one period [s] towards its target, or on along its velocity."""
+        """Moves it by one period [s] towards its target, where it stays, or on along its velocity."""
+        there = False
         if self.target is not None:
             way = self.target[:3, 3] - self.pose[:3, 3]
             velocity = way / max(FOLLOW_TIME, period)
             speed = float(np.linalg.norm(velocity))
             self.velocity = velocity * min(1.0, DRAG_SPEED / speed) if speed > 0.0 else velocity
+            there = bool(np.linalg.norm(way) < THERE)
+            if there:
+                self.velocity = way / period
             if not np.array_equal(self.pose[:3, :3], self.target[:3, :3]):
                 self.pose[:3, :3] = self.target[:3, :3]
                 self.quaternion = pose_vector(self.pose)[3:]
         elif np.linalg.norm(self.pose[:3, 3]) > FAR:
             self.velocity = np.zeros(3)
         self.pose[:3, 3] += period * self.velocity
+        if there:
+            self.target, self.velocity = None, np.zeros(3)
 
 
 class Stage:

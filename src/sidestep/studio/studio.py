@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sidestep.studio.page.view import View
 
 HOST, PORT = "127.0.0.1", 8890
+NOTEBOOK_HEIGHT = 720  # [px]
 STEP_OF_TRUTH = 0.05  # [s] between two measurements on the exact meshes, at least
 
 
@@ -79,6 +80,12 @@ class Studio:
         """What to open in a browser."""
         return f"http://{'localhost' if self.host in ('0.0.0.0', '127.0.0.1') else self.host}:{self.port}"
 
+    def _repr_html_(self) -> str:
+        """The page inside a notebook whose browser runs on this machine."""
+        return (
+            f'<iframe src="{self.address}" width="100%" height="{NOTEBOOK_HEIGHT}" style="border:0"></iframe>'
+        )
+
     def send(self, command: m.Command) -> None:
         """Hands a command to the loop."""
         self._loop.send(command)
@@ -109,6 +116,7 @@ class Studio:
         self._loop.stop()
         self._truth.stop()
         self._thread.join(timeout=2.0)
+        self.view.stop()
         self.server.stop()
 
     def _take_truth(self, found: tuple[Clearance, ...], time: float) -> None:

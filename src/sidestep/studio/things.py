@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.obstacles import load_point_cloud
+from sidestep.obstacles import load_point_cloud, merge_in_voxels
 from sidestep.obstacles.covering import box as box_points
 from sidestep.obstacles.covering import cylinder as cylinder_points
 from sidestep.obstacles.covering import triangles as mesh_points
@@ -22,6 +22,8 @@ from sidestep.simulation import SceneObject
 
 Array = npt.NDArray[np.float64]
 
+CLOUD_SPACING = 0.025  # [m] between points of a cloud that is made here, and of one that is thinned, at first
+CLOUD_RADIUS = 0.012  # [m] of the ball around each point
 CLOUD_LIMIT = 400  # points: each is a ball for the physics, and the scene is built again with every change
 
 
@@ -161,6 +163,25 @@ def cloud(name: str, position: Array, file: Path, radius: float) -> Thing:
     """The points of a file (.ply, .pcd or .npy) around a position, each a ball [m]."""
     shape = Shape("points", file=str(file.resolve()), radius=radius)
     return Thing(name, Obstacle(shape, _vector(position), points="ball"), Path.cwd())
+
+
+def scattered(size: float, *, seed: int) -> Array:
+    """Points (n, 3) [m] at random on an upright square plate of edge `size`, as a camera may see a wall."""
+    count = int(np.clip(round((size / CLOUD_SPACING) ** 2), 10, CLOUD_LIMIT // 2))
+    rng = np.random.default_rng(seed)
+    points = np.zeros((count, 3))
+    points[:, 1:] = rng.uniform(-0.5 * size, 0.5 * size, (count, 2))
+    return points
+
+
+def thinned(points: Array) -> Array:
+    """At most `CLOUD_LIMIT` points (n, 3): those in one cube are merged, of the smallest cubes that suffice."""
+    voxel = CLOUD_SPACING
+    thin = points
+    while len(thin) > CLOUD_LIMIT:
+        thin = merge_in_voxels(points, voxel=voxel)[0]
+        voxel *= 1.25
+    return thin
 
 
 def _vector(values: Array) -> tuple[float, float, float]:

@@ -23,6 +23,7 @@ NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the near
 TRAIL = palette.GREEN
 BODY = palette.ORANGE
 METRIC = palette.SKY
+SURFACE = "#B7C3A5"
 LINK, BASE = "#CBD3DE", "#9AA2AE"
 
 NEAR_FROM = 0.20  # [m] clearance at which a link begins to change its colour
@@ -36,8 +37,9 @@ LEGEND = (
     ),
     (OBSTACLE, "obstacle"),
     (GOAL, "goal: ghost arm and gizmo"),
-    (TRAIL, "where the tip has been"),
+    (TRAIL, "where the tip has been; on the surface, where the joints are and have been"),
     (BODY, "body: the ellipsoids that the controller sees"),
+    (SURFACE, "configuration space, curved by ψ; cut off at the top"),
     (METRIC, "metric: how freely the tip can move in each direction"),
 )
 

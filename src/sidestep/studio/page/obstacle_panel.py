@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import atexit
+import shutil
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
+from sidestep.obstacles import load_point_cloud
 from sidestep.pose import pose_at
 from sidestep.studio import messages as m
-from sidestep.studio.things import ball, box
+from sidestep.studio.things import CLOUD_RADIUS, Thing, ball, box, cloud, scattered, thinned
 
 if TYPE_CHECKING:
     import viser
 
     from sidestep.studio.page.view import View
+
+Array = npt.NDArray[np.float64]
 
 NONE = "(none)"
 
@@ -27,17 +35,23 @@ class ObstaclePanel:
         gui.add_markdown(
             "Drag an obstacle in the scene to move it; with **shift** held, letting go throws it."
         )
-        self._kind = gui.add_dropdown("new", ("ball", "box"))
+        self._kind = gui.add_dropdown("new", ("ball", "box", "cloud"))
         self._size = gui.add_slider(
             "size [cm]",
             min=1.0,
             max=30.0,
             step=0.5,
             initial_value=6.0,
-            hint="Radius of a ball, edge of a box.",
+            hint="Radius of a ball, edge of a box or of a plate of points.",
         )
         add = gui.add_button("Add", hint="Beside the goal; drag it where you want it.")
         add.on_click(self._add)
+        upload = gui.add_upload_button(
+            "Add a point cloud file …", hint="A .ply, .pcd or .npy; it is thinned."
+        )
+        upload.on_upload(self._upload)
+        self._folder = Path(tempfile.mkdtemp(prefix="sidestep-studio-"))
+        atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
         gui.add_divider()
         self._chosen: Any = gui.add_dropdown("obstacle", (NONE,))
         self._place: Any = gui.add_vector3(
@@ -91,15 +105,37 @@ class ObstaclePanel:
         last = self._view.last
         if last is None:
             return
-        taken = {thing.name for thing in last.things}
-        while f"{self._kind.value}{self._count}" in taken:
-            self._count += 1
-        name, size = f"{self._kind.value}{self._count}", self._size.value / 100.0
-        self._count += 1
+        kind, size = str(self._kind.value), self._size.value / 100.0
+        name = self._new_name(kind)
         goal = np.array(self._view.goal.gizmo.position)
         place = goal + np.array([0.0, 0.0, size + 0.15])
-        made = ball(name, place, size) if self._kind.value == "ball" else box(name, place, np.full(3, size))
+        if kind == "ball":
+            made = ball(name, place, size)
+        elif kind == "box":
+            made = box(name, place, np.full(3, size))
+        else:
+            made = self._cloud(name, scattered(size, seed=self._count), place)
         self._view.send(m.AddThing(made))
+
+    def _upload(self, event: Any) -> None:
+        file = event.target.value
+        with self._view.telling(event.client):
+            path = self._folder / Path(file.name).name
+            path.write_bytes(file.content)
+            points = thinned(np.array(load_point_cloud(path).points))
+            self._view.send(m.AddThing(self._cloud(self._new_name("cloud"), points, np.zeros(3))))
+
+    def _cloud(self, name: str, points: Array, place: Array) -> Thing:
+        path = self._folder / f"{name}.npy"
+        np.save(path, points)
+        return cloud(name, place, path, CLOUD_RADIUS)
+
+    def _new_name(self, kind: str) -> str:
+        taken = () if self._view.last is None else {thing.name for thing in self._view.last.things}
+        while (name := f"{kind}{self._count}") in taken:
+            self._count += 1
+        self._count += 1
+        return name
 
     def _throw(self, _: Any) -> None:
         index, last = self._index(), self._view.last

@@ -119,12 +119,10 @@ class _View:
         self._path.append((now, hand))
         while now - self._path[0][0] > THROW_MEMORY:
             self._path.popleft()
-        if event.phase != "end":
-            self._send(m.DragThing(self.thing.name, pose_at(hand + self._grip, self._pose[:3, :3])))
-        elif event.modifier == "shift":
+        if event.phase == "end" and event.modifier == "shift":
             self._send(m.ThrowThing(self.thing.name, throw_velocity(list(self._path))))
         else:
-            self._send(m.DragThing(self.thing.name, None))
+            self._send(m.DragThing(self.thing.name, pose_at(hand + self._grip, self._pose[:3, :3])))
 
 
 def throw_velocity(path: list[tuple[float, Array]]) -> Array:

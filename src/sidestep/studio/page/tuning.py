@@ -6,6 +6,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from sidestep.studio import messages as m
+from sidestep.studio.export import python_snippet
 from sidestep.studio.methods import METHODS, Method, Numbers, method_named
 
 if TYPE_CHECKING:
@@ -30,8 +31,10 @@ class TuningPanel:
         self._sliders: dict[str, Any] = {}
         self._shown: Method | None = None
         self._timer: threading.Timer | None = None
-        self._defaults = gui.add_button("Recommended values")
-        self._defaults.on_click(self._reset)
+        gui.add_button("Recommended values").on_click(self._reset)
+        gui.add_button("Export as Python", hint="The system with these numbers, as code.").on_click(
+            self._export
+        )
 
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows the method and the numbers that the loop has."""
@@ -78,6 +81,18 @@ class TuningPanel:
         self._timer = threading.Timer(SETTLE, self._send_numbers)
         self._timer.daemon = True
         self._timer.start()
+
+    def _export(self, event: Any) -> None:
+        last = self._view.last
+        if last is None or event.client is None:
+            return
+        code = python_snippet(last.scenario.robot, last.method, last.numbers[last.method])
+        with event.client.gui.add_modal("As Python") as modal:
+            event.client.gui.add_markdown(f"```python\n{code}```")
+            download = event.client.gui.add_button("Download")
+            close = event.client.gui.add_button("Close")
+        download.on_click(lambda _: event.client.send_file_download("system.py", code.encode()))
+        close.on_click(lambda _: modal.close())
 
     def _send_numbers(self) -> None:
         if self._shown is not None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import threading
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
+from sidestep.scenario.assembly import load_robot
 from sidestep.simulation.clearance import Clearance
 from sidestep.studio import messages as m
 from sidestep.studio.methods import THESIS_COMPONENTS, method_named
@@ -23,13 +26,17 @@ from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacle_panel import ObstaclePanel
 from sidestep.studio.page.obstacles import ObstacleViews
 from sidestep.studio.page.plots import Plots
+from sidestep.studio.page.recorder import Recorder
+from sidestep.studio.page.scenario_panel import ScenarioPanel
+from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
 from sidestep.studio.session import tip_of
 
 if TYPE_CHECKING:
     import viser
 
-MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 330, 300, 122  # [px]
+WORDS_EVERY = 0.15  # [s] nobody reads faster
+MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 365, 290, 122  # [px]
 
 
 class View:
@@ -50,12 +57,13 @@ class View:
         self.least_clearance = np.inf
         self.last: m.Snapshot | None = None
         self._edition = -1
+        self._told = 0.0
         self._set_up_scene(scenario)
         gui = server.gui
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         panel = gui.add_panel()
         with panel.add_tab("Now"):
-            self._words = gui.add_html(in_box("preparing …"))
+            self._words: Any = gui.add_html(in_box("preparing …"))
             self.plots = Plots(server)
         panel.dock_left()
         panel.set_width(PLOT_WIDTH)
@@ -69,33 +77,63 @@ class View:
             self.obstacle_panel = ObstaclePanel(server, self)
         with tabs.add_tab("Method"):
             self.tuning = TuningPanel(server, self)
+        with tabs.add_tab("Scenario"):
+            ScenarioPanel(server, self, Path.cwd())
+            gui.add_divider()
+            self.recorder = Recorder(server, self)
         with tabs.add_tab("Show"):
             self._add_switches()
         self.obstacles = ObstacleViews(server, send, self.obstacle_panel.select)
+        self.surface = Surface(server, self._lock)
+        self._body_now: Body | None = None
+        self._choice = scenario.robot
         self._set_robot(robot)
 
     def send(self, command: m.Command) -> None:
         """Hands a command to the loop."""
         self._send(command)
 
+    def load(self, scenario: Scenario) -> None:
+        """Another scenario for loop and page."""
+        self._send(m.Load(scenario))
+
+    @contextlib.contextmanager
+    def telling(self, client: Any) -> Iterator[None]:
+        """Shows what is refused inside to the person who asked for it."""
+        try:
+            yield
+        except (ValueError, OSError) as error:
+            client.add_notification("Not possible", str(error), color="red", auto_close_seconds=8.0)
+
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows the state of the loop."""
         with self._lock, self._server.atomic():
-            if len(snapshot.q) != self.robot.num_coordinates:
-                return  # of another robot, which is about to come
+            if snapshot.scenario.robot != self._choice:
+                self._remove_robot()
+                self._choice = snapshot.scenario.robot
+                self._set_robot(load_robot(snapshot.scenario))
             if snapshot.edition != self._edition:
                 self._edition = snapshot.edition
                 self.obstacles.set_things(snapshot.things)
                 self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
                 self.least_clearance = np.inf
                 self.marks.clear_trail()
-            if self.last is None or snapshot.method != self.last.method:
+            if self._body is None or self.last is None or snapshot.method != self.last.method:
                 self._load_body(snapshot.method)
             self.last = snapshot
+            row = self.recorder.current()
+            if row is not None and len(row.q) == len(snapshot.q):
+                self.obstacles.set_things(row.things)
+                self.obstacles.show(row.things, row.poses)
+                self.arm.show(row.q)
+                self._words.content = in_box(f"Replay, {row.time:.2f} s.")
+                return
+            self.obstacles.set_things(snapshot.things)
+            self.obstacles.show(snapshot.things, snapshot.poses)
             self.arm.show(snapshot.q)
             self.arm.colour({item.link: item.distance for item in self._clearances})
-            self.obstacles.show(snapshot.things, snapshot.poses)
             self.goal.show(snapshot.goal, snapshot.goal_pose)
+            self.surface.show(snapshot, self.robot, self._body_now, self._pair())
             self.marks.show_nearest(self._clearances, visible=self._nearest.value)
             self.marks.show_trail(snapshot.q, visible=self._trail.value)
             self.marks.show_metric(snapshot.q, snapshot.metric, visible=self._metric.value)
@@ -114,6 +152,8 @@ class View:
 
     def take_rows(self, rows: list[m.Row]) -> None:
         """Rows of a recording."""
+        with self._lock:
+            self.recorder.take(rows)
 
     def tell(self, note: m.Preparing | m.Failed) -> None:
         """Shows what the loop has to say beside its state."""
@@ -126,8 +166,17 @@ class View:
         for client in self._server.get_clients().values():
             client.add_notification("Not possible", note.message, color="red", auto_close_seconds=8.0)
 
+    def stop(self) -> None:
+        """Ends what runs beside the page."""
+        self.surface.stop()
+
     def _show_words(self, snapshot: m.Snapshot) -> None:
-        words = snapshot.words[:1].upper() + snapshot.words[1:] if snapshot.running else "Paused"
+        now = clock.monotonic()
+        if now - self._told < WORDS_EVERY:
+            return
+        self._told = now
+        words = snapshot.words if snapshot.running else f"paused: {snapshot.words}"
+        words = words[:1].upper() + words[1:]
         facts = []
         if self._clearances:
             first = self._clearances[0]
@@ -159,17 +208,33 @@ class View:
         self._metric = gui.add_checkbox(
             "metric", False, hint="How freely the tip can move in each direction."
         )
+        self._curved = gui.add_checkbox(
+            "curved space",
+            False,
+            hint="ψ over two joints, the others held where they are; a second or so behind.",
+        )
+        self._first: Any = gui.add_dropdown("over", ("-",))
+        self._second: Any = gui.add_dropdown("and", ("-",))
         gui.add_html(colours.legend_html())
         self._ghost.on_update(lambda _: self.goal.set_visible(self._ghost.value))
         self._body_shown.on_update(lambda _: self._set_body_visible())
 
     def _set_robot(self, robot: Robot) -> None:
         self.robot, self.tip = robot, tip_of(robot)
+        names = tuple(robot.coordinate_names)
+        self._first.options = self._second.options = names
+        self._first.value, self._second.value = names[0], names[min(1, len(names) - 1)]
         self.arm = ArmView(self._server, robot, "/arm")
         self.marks = Marks(self._server, robot, self.tip)
         self._body: BodyView | None = None
         with self._goal_tab:
             self.goal = GoalControl(self._server, robot, self.tip, self._send)
+
+    def _remove_robot(self) -> None:
+        self.surface.clear()
+        for part in (self._body, self.arm, self.marks, self.goal):
+            if part is not None:
+                part.remove()
 
     def _load_body(self, name: str) -> None:
         """The body of a method; the loop has made it, so it comes from the cache."""
@@ -181,7 +246,16 @@ class View:
             if method.covering
             else Body.fit(self.robot, components=THESIS_COMPONENTS)
         )
+        self._body_now = body
         self._body = BodyView(self._server, body, "/arm", visible=self._body_shown.value)
+
+    def _pair(self) -> tuple[int, int] | None:
+        """The two joints over which the curved space is shown, None when it is not."""
+        names = list(self.robot.coordinate_names)
+        pair = self._first.value, self._second.value
+        if not self._curved.value or not set(pair) <= set(names):
+            return None
+        return names.index(pair[0]), names.index(pair[1])
 
     def _set_body_visible(self) -> None:
         if self._body is not None:

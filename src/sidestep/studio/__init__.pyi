@@ -1,0 +1,2 @@
+from .start import starting_scenario as starting_scenario
+from .studio import Studio as Studio

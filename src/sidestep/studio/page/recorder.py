@@ -1,0 +1,116 @@
+"""A recording of the motion, and its replay on the page."""
+
+from __future__ import annotations
+
+import io
+import time as clock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.studio import messages as m
+
+if TYPE_CHECKING:
+    import viser
+
+    from sidestep.studio.page.view import View
+
+Array = npt.NDArray[np.float64]
+
+
+class Recorder:
+    """Records rows while the loop runs, and shows them again in place of the live state."""
+
+    def __init__(self, server: viser.ViserServer, view: View) -> None:
+        self._view = view
+        self.rows: list[m.Row] = []
+        self._replaying, self._since = False, 0.0
+        gui = server.gui
+        buttons = gui.add_button_group("record", ("Record", "Stop"), hint="200 states a second.")
+        buttons.on_click(self._on_record)
+        replay = gui.add_button_group(
+            "replay", ("Play", "Live"), hint="Play shows the recording, Live the loop."
+        )
+        replay.on_click(self._on_replay)
+        self._slider: Any = gui.add_slider(
+            "moment [s]", min=0.0, max=1.0, step=0.01, initial_value=0.0, disabled=True
+        )
+        self._slider.on_update(self._on_moment)
+        save = gui.add_button("Download recording", hint="NumPy's .npz: time [s], q [rad], poses, names.")
+        save.on_click(self._on_save)
+        self.state: Any = gui.add_markdown("nothing recorded")
+
+    @property
+    def replaying(self) -> bool:
+        """Whether the recording is shown in place of the live state."""
+        return self._replaying
+
+    def take(self, rows: list[m.Row]) -> None:
+        """Rows that the loop has recorded."""
+        if rows:
+            self.rows += rows
+            self.state.content = f"recorded {self.rows[-1].time - self.rows[0].time:.1f} s"
+
+    def current(self) -> m.Row | None:
+        """The row that is shown now, None when the live state is."""
+        if not self._replaying or not self.rows:
+            return None
+        length = self.rows[-1].time - self.rows[0].time
+        if self._since > 0.0:
+            moment = min(clock.monotonic() - self._since, length)
+            self._slider.value = round(moment, 2)
+            if moment >= length:
+                self._since = 0.0
+        times = [row.time for row in self.rows]
+        index = int(np.searchsorted(times, times[0] + float(self._slider.value)))
+        return self.rows[min(index, len(self.rows) - 1)]
+
+    def _on_record(self, event: Any) -> None:
+        recording = event.target.value == "Record"
+        if recording:
+            self.rows = []
+            self._live()
+            self._view.send(m.SetRunning(True))
+        self._view.send(m.SetRecording(recording))
+
+    def _on_replay(self, event: Any) -> None:
+        if event.target.value == "Live":
+            self._live()
+        elif len(self.rows) > 1:
+            self._slider.max = max(round(self.rows[-1].time - self.rows[0].time, 2), 0.01)
+            self._slider.disabled = False
+            self._replaying, self._since = True, clock.monotonic()
+            self._view.send(m.SetRunning(False))
+
+    def _on_moment(self, event: Any) -> None:
+        if event.client is not None:
+            self._since = 0.0
+
+    def _on_save(self, event: Any) -> None:
+        if self.rows and event.client is not None:
+            event.client.send_file_download("recording.npz", as_npz(self.rows))
+
+    def _live(self) -> None:
+        self._replaying, self._slider.disabled = False, True
+
+
+def as_npz(rows: list[m.Row]) -> bytes:
+    """A recording as NumPy's .npz: time (T,), q (T, nv), poses (T, N, 4, 4) and names (N,) of the obstacles.
+
+    Obstacles that came or went on the way have NaN where they were not there.
+    """
+    names = list(dict.fromkeys(thing.name for row in rows for thing in row.things))
+    poses = np.full((len(rows), len(names), 4, 4), np.nan)
+    for k, row in enumerate(rows):
+        for thing, pose in zip(row.things, row.poses, strict=True):
+            poses[k, names.index(thing.name)] = pose
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        time=np.array([row.time for row in rows]),
+        q=np.array([row.q for row in rows]),
+        poses=poses,
+        names=np.array(names, dtype=str),
+    )
+    return buffer.getvalue()

@@ -1,0 +1,63 @@
+"""Scenarios: load a shipped one or a file, save what is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from sidestep.scenario import Scenario, shipped_scenarios
+from sidestep.studio.export import save_scenario, scenario_now
+
+if TYPE_CHECKING:
+    import viser
+
+    from sidestep.studio.page.view import View
+
+
+class ScenarioPanel:
+    """Loads scenarios, and saves the present state as one into the folder where the studio was started."""
+
+    def __init__(self, server: viser.ViserServer, view: View, folder: Path) -> None:
+        self._view, self._folder = view, folder
+        gui = server.gui
+        self._shipped: Any = gui.add_dropdown("shipped", shipped_scenarios())
+        gui.add_button("Load").on_click(self._load_shipped)
+        self._upload: Any = gui.add_upload_button("Load a file …", mime_type=".yaml,.yml")
+        self._upload.on_upload(self._load_upload)
+        gui.add_divider()
+        self._name: Any = gui.add_text("name", "my-scenario")
+        gui.add_button("Save", hint=f"Arm, goal and obstacles as they are now, in {folder}.").on_click(
+            self._save
+        )
+        gui.add_button("Download").on_click(self._download)
+
+    def _load_shipped(self, _: Any) -> None:
+        self._view.load(Scenario.load(str(self._shipped.value)))
+
+    def _load_upload(self, event: Any) -> None:
+        file = event.target.value
+        with self._view.telling(event.client):
+            text = file.content.decode("utf-8", errors="replace")
+            self._view.load(Scenario.from_text(text, file=file.name, folder=self._folder))
+
+    def _save(self, event: Any) -> None:
+        with self._view.telling(event.client):
+            path = save_scenario(self._now(), self._folder)
+            event.client.add_notification("Saved", str(path), color="green", auto_close_seconds=6.0)
+
+    def _download(self, event: Any) -> None:
+        with self._view.telling(event.client):
+            scenario = self._now()
+            text = yaml.safe_dump(scenario.to_document(), sort_keys=False, allow_unicode=True)
+            event.client.send_file_download(f"{scenario.name}.yaml", text.encode())
+
+    def _now(self) -> Scenario:
+        name = str(self._name.value)
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
+            raise ValueError(f"name is {name!r}; allowed: letters, digits, dot, dash and underscore")
+        if self._view.last is None:
+            raise ValueError("the loop does not run yet")
+        return scenario_now(self._view.last, name=name)

@@ -1,0 +1,249 @@
+"""The curved configuration space: the graph of psi over two joints, with the motion on it."""
+
+from __future__ import annotations
+
+import threading
+import time as clock
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import GeometricSystem, Obstacles
+from sidestep.body import Body
+from sidestep.robot import Robot
+from sidestep.studio.messages import Snapshot
+from sidestep.studio.methods import Method, Numbers, build_system, method_named
+from sidestep.studio.page import colours
+
+if TYPE_CHECKING:
+    import viser
+
+Array = npt.NDArray[np.float64]
+
+CELLS = 40  # along each joint
+SIDE = 1.2  # [m] of the surface in the scene
+TOP = 0.6  # [m] above the plane at which hills are cut off
+PLACE = (-0.9, 1.3, 0.02)  # [m] of its middle in the scene: beside the arm, behind it as the page opens
+LEAST_MOVE = 0.004  # [m] of an obstacle, or [rad] of a joint that is held, before it is computed again
+PAUSE = 0.3  # [s] at least between two of them: the page has other things to do
+TRAIL_POINTS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What the surface is to be computed from."""
+
+    robot: Robot
+    body: Body
+    method: Method
+    numbers: Numbers
+    joints: tuple[int, int]
+    q: Array
+    points: Array
+    radii: Array
+
+    def differs(self, other: Request | None) -> bool:
+        """Whether it would look different."""
+        if other is None or self.robot is not other.robot or self.body is not other.body:
+            return True
+        if (self.joints, self.method, self.numbers) != (other.joints, other.method, other.numbers):
+            return True
+        held = np.delete(self.q - other.q, self.joints)
+        if np.abs(held).max(initial=0.0) > 5.0 * LEAST_MOVE or self.points.shape != other.points.shape:
+            return True
+        return bool(np.abs(self.points - other.points).max(initial=0.0) > LEAST_MOVE)
+
+
+class Surface:
+    """|psi| over two joints, the others held where they are, to scale: a radian is as long upwards as sideways.
+
+    Where psi has several coordinates its Euclidean norm is drawn. It is computed in a thread of its own from the same
+    system that the loop runs.
+    """
+
+    def __init__(self, server: viser.ViserServer, lock: threading.RLock) -> None:
+        self._server, self._lock = server, lock
+        self._trail: deque[Array] = deque(maxlen=TRAIL_POINTS)
+        self._parts: dict[str, Any] = {}
+        self._request: Request | None = None
+        self._done: Request | None = None
+        self._heights: Array | None = None
+        self._wake = threading.Event()
+        self._system: tuple[Body, str, Numbers, GeometricSystem] | None = None
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def show(
+        self, snapshot: Snapshot, robot: Robot, body: Body | None, joints: tuple[int, int] | None
+    ) -> None:
+        """The surface over two joints at the present state; None hides it."""
+        if joints is None or body is None or joints[0] == joints[1]:
+            self.clear()
+            return
+        method = method_named(snapshot.method)
+        points, radii = seen(snapshot, bare=not method.safe)
+        request = Request(
+            robot, body, method, snapshot.numbers[method.name], joints, snapshot.q, points, radii
+        )
+        if self._done is not None and (self._done.robot is not robot or self._done.joints != joints):
+            self.clear()
+        if request.differs(self._request):
+            self._request = request
+            self._wake.set()
+        if self._heights is not None and self._done is not None:
+            self._show_state(snapshot, robot, joints)
+
+    def clear(self) -> None:
+        """Takes everything out of the scene."""
+        for part in self._parts.values():
+            part.remove()
+        self._parts, self._heights, self._request, self._done = {}, None, None, None
+        self._trail.clear()
+
+    def stop(self) -> None:
+        """Ends the thread."""
+        self._stopping = True
+        self._wake.set()
+        self._thread.join(timeout=2.0)
+
+    @property
+    def heights(self) -> Array | None:
+        """|psi| (CELLS + 1, CELLS + 1) over the two joints, None while there is none."""
+        return self._heights
+
+    def _run(self) -> None:
+        while True:
+            self._wake.wait()
+            self._wake.clear()
+            if self._stopping:
+                return
+            request = self._request
+            if request is not None:
+                heights = heights_over(request, self._system_of(request))
+                with self._lock:
+                    if self._request is not None and self._request.joints == request.joints:
+                        self._done, self._heights = request, heights
+                        self._show_surface(request, heights)
+            clock.sleep(PAUSE)
+
+    def _system_of(self, request: Request) -> GeometricSystem:
+        kept = self._system
+        if kept is None or kept[0] is not request.body or kept[1:3] != (request.method.name, request.numbers):
+            made = build_system(request.method, request.robot, request.body, request.numbers)
+            kept = self._system = request.body, request.method.name, dict(request.numbers), made
+        return kept[3]
+
+    def _show_surface(self, request: Request, heights: Array) -> None:
+        x, y = (np.linspace(-0.5 * SIDE, 0.5 * SIDE, CELLS + 1) for _ in range(2))
+        z = np.minimum(heights * scale(request.robot, request.joints), TOP)
+        grid = np.stack([*np.meshgrid(x, y, indexing="ij"), z], axis=-1).reshape(-1, 3)
+        vertices = (grid + np.array(PLACE)).astype(np.float32)
+        if "surface" in self._parts:
+            self._parts["surface"].vertices = vertices
+            return
+        self._parts["surface"] = self._server.scene.add_mesh_simple(
+            "/surface/mesh",
+            vertices,
+            grid_faces(),
+            color=colours.rgb(colours.SURFACE),
+            side="double",
+            opacity=0.9,
+        )
+        names = [request.robot.coordinate_names[k] for k in request.joints]
+        self._parts["label"] = self._server.scene.add_label(
+            "/surface/label",
+            f"ψ over {names[0]} (→) and {names[1]} (↗)",
+            position=np.array(PLACE) + np.array([0.0, -0.5 * SIDE - 0.08, 0.0]),
+        )
+
+    def _show_state(self, snapshot: Snapshot, robot: Robot, joints: tuple[int, int]) -> None:
+        assert self._heights is not None
+        here = on_surface(robot, joints, snapshot.q, self._heights)
+        if not self._trail or np.linalg.norm(here - self._trail[-1]) > 0.005:
+            self._trail.append(here)
+            if len(self._trail) > 1:
+                line = np.array(self._trail)
+                segments = np.stack([line[:-1], line[1:]], axis=1).astype(np.float32)
+                if "trail" in self._parts:
+                    self._parts["trail"].points = segments
+                else:
+                    self._parts["trail"] = self._server.scene.add_line_segments(
+                        "/surface/trail",
+                        segments,
+                        colours.rgb(colours.TRAIL),
+                        thickness=4.0,
+                        thickness_units="screen",
+                    )
+        self._mark("state", here, colours.TRAIL)
+        if snapshot.goal is not None:
+            self._mark("goal", on_surface(robot, joints, snapshot.goal, self._heights), colours.GOAL)
+
+    def _mark(self, name: str, place: Array, colour: str) -> None:
+        if name not in self._parts:
+            self._parts[name] = self._server.scene.add_icosphere(
+                f"/surface/{name}", 0.022, color=colours.rgb(colour), subdivisions=2
+            )
+        self._parts[name].position = place
+
+
+def seen(snapshot: Snapshot, *, bare: bool) -> tuple[Array, Array]:
+    """Points (n, 3) [m] and radii (n,) [m] of all obstacles where they are, as the loop tells its system."""
+    points, radii = [np.zeros((0, 3))], [np.zeros(0)]
+    for thing, pose in zip(snapshot.things, snapshot.poses, strict=True):
+        own, sizes = thing.seen(bare=bare)
+        points.append(own @ pose[:3, :3].T + pose[:3, 3])
+        radii.append(sizes)
+    return np.concatenate(points), np.concatenate(radii)
+
+
+def ranges(robot: Robot, joints: tuple[int, int]) -> tuple[Array, Array]:
+    """Lower and upper end (2,) of what is drawn of two joints [rad | m]."""
+    lower, upper = robot._finite_interval()
+    pick = list(joints)
+    return np.array(lower[pick]), np.array(upper[pick])
+
+
+def scale(robot: Robot, joints: tuple[int, int]) -> float:
+    """Metres in the scene per radian of the longer of two joints; psi is drawn on the same scale."""
+    lower, upper = ranges(robot, joints)
+    return SIDE / float((upper - lower).max())
+
+
+def heights_over(request: Request, system: GeometricSystem) -> Array:
+    """|psi| (CELLS + 1, CELLS + 1) at rest, over the whole range of two joints, the others as in `request.q`."""
+    lower, upper = ranges(request.robot, request.joints)
+    obstacles = Obstacles(request.points, request.radii) if len(request.points) else Obstacles.none()
+    rest, q = np.zeros_like(request.q), np.array(request.q)
+    heights = np.zeros((CELLS + 1, CELLS + 1))
+    for i, first in enumerate(np.linspace(lower[0], upper[0], CELLS + 1)):
+        for k, second in enumerate(np.linspace(lower[1], upper[1], CELLS + 1)):
+            q[list(request.joints)] = first, second
+            heights[i, k] = np.linalg.norm(system.acceleration(q, rest, q, obstacles).values)
+    return heights
+
+
+def on_surface(robot: Robot, joints: tuple[int, int], q: Array, heights: Array) -> Array:
+    """The place (3,) in the scene of a configuration (nv,) on the surface, between the corners of its cell."""
+    lower, upper = ranges(robot, joints)
+    share = np.clip((np.asarray(q)[list(joints)] - lower) / (upper - lower), 0.0, 1.0)
+    cell = np.minimum((share * CELLS).astype(int), CELLS - 1)
+    (i, k), (f, g) = cell, share * CELLS - cell
+    corners = heights[i : i + 2, k : k + 2]
+    height = np.array([1.0 - f, f]) @ corners @ np.array([1.0 - g, g])
+    z = min(float(height) * scale(robot, joints), TOP)
+    place: Array = np.array([(share[0] - 0.5) * SIDE, (share[1] - 0.5) * SIDE, z]) + np.array(PLACE)
+    return place
+
+
+def grid_faces() -> npt.NDArray[np.uint32]:
+    """Triangles of a grid of (CELLS + 1)^2 vertices."""
+    index = np.arange((CELLS + 1) ** 2).reshape(CELLS + 1, CELLS + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate(
+        [np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([a, c, d], axis=-1).reshape(-1, 3)]
+    )
+    return faces.astype(np.uint32)
