@@ -11,6 +11,7 @@ def test_every_method_of_the_benchmark_is_there() -> None:
     assert {method.value for method in BenchMethod} <= set(METHODS)
     for method in BenchMethod:
         assert METHODS[method.value].safe == method.safe
+        assert METHODS[method.value].escapes == method.escapes
 
 
 def test_the_recommended_numbers_are_the_presets() -> None:

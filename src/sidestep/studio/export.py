@@ -36,7 +36,7 @@ def scenario_now(snapshot: Snapshot, *, name: str) -> Scenario:
     scenario, numbers = snapshot.scenario, snapshot.numbers[snapshot.method]
     system = dataclasses.replace(scenario.system, stiffness=numbers["stiffness"], damping=numbers["damping"])
     body, embedding = scenario.body, scenario.embedding
-    if snapshot.method != "barrier":
+    if not METHODS[snapshot.method].covering:
         system = dataclasses.replace(system, switch=switch_of(snapshot.method, numbers, len(snapshot.q)))
         body = BodyChoice(components=THESIS_COMPONENTS)
         embedding = EmbeddingChoice(joint_limits=JointLimitChoice())

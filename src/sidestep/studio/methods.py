@@ -51,7 +51,7 @@ class Method:
     Attributes:
         name: on the command line. label: on the page. sentence: what it is.
         parameters: its numbers. covering: needs a covering body, otherwise a fitted one.
-        safe: the torque program keeps clearances as well.
+        safe: the torque program keeps clearances as well. escapes: takes sub-goals where it is stuck.
     """
 
     name: str
@@ -60,6 +60,7 @@ class Method:
     parameters: tuple[Parameter, ...]
     covering: bool
     safe: bool
+    escapes: bool = False
 
     @property
     def defaults(self) -> Numbers:
@@ -106,7 +107,16 @@ METHODS: dict[str, Method] = {
             "barrier",
             "barriers (recommended)",
             "A barrier for each part of the body, each joint limit and each pair of links; clearances are also "
-            "kept by the torque program.",
+            "kept by the torque program. Where it is stuck it follows random sub-goals for a while.",
+            BARRIER_PARAMETERS,
+            covering=True,
+            safe=True,
+            escapes=True,
+        ),
+        Method(
+            "reactive",
+            "barriers without sub-goals",
+            "The same, but where it is stuck it stays.",
             BARRIER_PARAMETERS,
             covering=True,
             safe=True,
@@ -197,7 +207,7 @@ def build_system(method: Method, robot: Robot, body: Body, numbers: Mapping[str,
     Args:
         method, numbers: see `check_numbers`. robot: the arm. body: covering or fitted, as the method says.
     """
-    if method.name == "barrier":
+    if method.covering:
         return presets.barrier_system(robot, body, numbers=presets.Barriers(**numbers))
     spring: dict[str, Any] = {"stiffness": numbers["stiffness"], "damping": numbers["damping"]}
     psi = Sum([CollisionDensity(robot, body), JointLimitPotential(robot)])

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import (
+    Escape,
     GeometricSystem,
     JointGoal,
     Obstacles,
@@ -71,6 +72,8 @@ class Session:
     _goal: Array | None
     _pose: Array | None
     _aim: JointGoal | PoseGoal
+    _escape: Escape | None
+    _potential: float
     _step: Step | None
     _solution: TorqueSolution | None
     _contacts: tuple[str, ...]
@@ -111,6 +114,7 @@ class Session:
                     position_stiffness=POSITION_STIFFNESS,
                     orientation_stiffness=TURN_STIFFNESS,
                 )
+                self._begin_pursuit()
             case m.AddThing(thing):
                 self._set_actors([*self.stage.actors, Actor(thing)])
             case m.RemoveThing(name):
@@ -152,7 +156,11 @@ class Session:
         """
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
-        step = self._system.acceleration(q, v, self._aim, self._obstacles())
+        aim = self._aim
+        if self._escape is not None:
+            aim = self._escape.pursue(aim, q, self._potential, self.period)
+        step = self._system.acceleration(q, v, aim, self._obstacles())
+        self._potential = step.goal_potential
         mass, bias = stage.dynamics()
         solution = self._controller.solve(
             q, v, step.acceleration, mass, bias, clearances=step if self._method.safe else None
@@ -185,6 +193,8 @@ class Session:
             step = self._step
             diagnosis = step.diagnosis
             words = self._in_words(diagnosis.describe())
+            if self._escape is not None and self._escape.escaping:
+                words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
             status = status_name(step.status), status_name(self._solution.status)
             values, metric = np.array(step.values), np.array(step.metric)
             clearances = np.asarray(step.clearances.values)
@@ -269,6 +279,13 @@ class Session:
 
     def _set_joint_goal(self, goal: Array) -> None:
         self._goal, self._pose, self._aim = goal, None, JointGoal(goal)
+        self._begin_pursuit()
+
+    def _begin_pursuit(self) -> None:
+        self._potential = float("nan")
+        # A pose goal is approached so slowly near a stretched arm that it would count as stuck.
+        escapes = self._method.escapes and self._pose is None
+        self._escape = Escape(self.robot) if escapes else None
 
     def _set_actors(self, actors: list[Actor]) -> None:
         self.stage.set_things(actors)
@@ -278,6 +295,7 @@ class Session:
     def _use(self, method: Method, numbers: Mapping[str, float]) -> None:
         self._system = self._system_for(self.robot, self._bodies, method, numbers)
         self._method = method
+        self._begin_pursuit()
         self._look()
 
     def _system_for(
