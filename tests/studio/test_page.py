@@ -71,19 +71,15 @@ class Looker:
     def type(self, label: str, text: str) -> None:
         """Types into the field beside a label."""
         field = self.page.locator(
-            f"xpath=//label[normalize-space()='{label}']/following::input[@type!='hidden'][1]"
+            f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]"
         )
         field.fill(text, force=True)
         field.press("Enter")
 
     def choose(self, label: str, option: str) -> None:
         """Chooses an option of the list beside a label."""
-        field = self.page.locator(
-            f"xpath=//label[normalize-space()='{label}']/following::input[@type!='hidden'][1]"
-        )
-        box = self._box(field)
-        self.page.mouse.click(box["x"] + 0.4 * box["width"], box["y"] + 0.5 * box["height"])
-        self.click(f"[role=option]:has-text('{option}')")
+        self.click(f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]")
+        self.click(f"[role=option][value='{option}']:visible")
 
     def image(self) -> np.ndarray:
         return np.asarray(Image.open(io.BytesIO(picture(self.page))).convert("RGB"), dtype=int)
@@ -201,7 +197,9 @@ def test_the_method_is_switched_on_the_page(studio: Studio, looker: Looker) -> N
     looker.tab("Method")
     looker.choose("method", "thesis: unswitched")
     until(lambda: last(studio).method == "unswitched", "the method")
-    assert len(last(studio).values) == 1  # one density
+    studio.send(m.SetRunning(True))
+    until(lambda: len(last(studio).values) == 1, "its one density")
+    studio.send(m.SetRunning(False))
     looker.choose("method", "barriers (recommended)")
     until(lambda: last(studio).method == "barrier", "the method")
 
@@ -233,7 +231,7 @@ def test_a_second_browser_sees_the_same(studio: Studio, looker: Looker, chromium
     second.tab("Goal")
     looker.type("joint2 [°]", "25")
     until(lambda: bool(np.isclose(last(studio).goal[1], np.deg2rad(25.0))), "the goal")  # type: ignore[index]
-    field = "xpath=//label[normalize-space()='joint2 [°]']/following::input[@type!='hidden'][1]"
+    field = "xpath=//label[normalize-space()='joint2 [°]']/following::input[not(@type='hidden')][1]"
     until(
         lambda: second.page.locator(field).first.input_value() == "25", "the same field in the other window"
     )

@@ -28,7 +28,7 @@ PLOTS = (
     ("psi", "height of the embedding |ψ|", 1.0, palette.BLACK),
     ("speed", "fastest joint [% of its limit]", 1e2, palette.BLACK),
     ("torque", "largest torque [% of its limit]", 1e2, palette.BLACK),
-    ("step", "time of a step, p99 [µs]", 1.0, palette.BLACK),
+    ("step", "time of a step, p99 [ms]", 1e-3, palette.BLACK),
 )
 
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import viser
 
 WORDS_EVERY = 0.15  # [s] nobody reads faster
+GRID_DEPTH = 0.05  # [m] below the base: a planar arm, half as thick, does not lie in the grid
 MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 365, 290, 122  # [px]
 
 
@@ -115,12 +116,14 @@ class View:
             if snapshot.edition != self._edition:
                 self._edition = snapshot.edition
                 self.obstacles.set_things(snapshot.things)
-                self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
                 self.least_clearance = np.inf
                 self.marks.clear_trail()
             if self._body is None or self.last is None or snapshot.method != self.last.method:
                 self._load_body(snapshot.method)
+            changed = self.last is None or snapshot.edition != self.last.edition
             self.last = snapshot
+            if changed:
+                self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
             row = self.recorder.current()
             if row is not None and len(row.q) == len(snapshot.q):
                 self.obstacles.set_things(row.things)
@@ -195,7 +198,15 @@ class View:
     def _set_up_scene(self, scenario: Scenario) -> None:
         scene = self._server.scene
         scene.set_up_direction("+z")
-        scene.add_grid("/grid", width=3.0, height=3.0, cell_size=0.1, section_size=0.5, shadow_opacity=0.2)
+        scene.add_grid(
+            "/grid",
+            width=3.0,
+            height=3.0,
+            cell_size=0.1,
+            section_size=0.5,
+            shadow_opacity=0.2,
+            position=(0.0, 0.0, -GRID_DEPTH),
+        )
         self._server.initial_camera.position = (1.75, -1.45, 1.25)
         self._server.initial_camera.look_at = (0.15, 0.1, 0.4)
 

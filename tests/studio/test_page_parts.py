@@ -1,0 +1,135 @@
+"""What the page computes by itself: surfaces, ellipsoids, colours, throws and recordings; no browser."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
+from sidestep.pose import pose_at
+from sidestep.studio import messages as m
+from sidestep.studio.methods import METHODS, build_system
+from sidestep.studio.page import colours
+from sidestep.studio.page.marks import METRIC_SIZE, metric_ellipsoid
+from sidestep.studio.page.obstacles import FASTEST_THROW, throw_velocity
+from sidestep.studio.page.recorder import as_npz
+from sidestep.studio.page.surface import (
+    CELLS,
+    PLACE,
+    SIDE,
+    TOP,
+    Request,
+    grid_faces,
+    heights_over,
+    on_surface,
+    seen,
+)
+from sidestep.studio.session import Session
+from sidestep.studio.truth import solid_poses
+
+MakeSession = Callable[..., Session]
+
+
+def test_the_surface_is_the_embedding_over_two_joints(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="unswitched")
+    snapshot, robot = session.snapshot(), session.robot
+    method, body = METHODS["unswitched"], Body.fit(robot, components=1)
+    numbers = method.defaults
+    system = build_system(method, robot, body, numbers)
+    points, radii = seen(snapshot, bare=True)
+    np.testing.assert_array_equal(points, session._obstacles().points)
+    np.testing.assert_array_equal(radii, session._obstacles().radii)
+    request = Request(robot, body, method, numbers, (0, 1), snapshot.q, points, radii)
+    heights = heights_over(request, system)
+    axis = np.linspace(-np.pi, np.pi, CELLS + 1)  # planar2 turns from -pi to pi
+    q = axis[[25, 14]]
+    psi = system.acceleration(q, np.zeros(2), q, Obstacles(points, radii)).values
+    assert heights[25, 14] == pytest.approx(abs(psi[0]), rel=1e-12)
+    place = on_surface(robot, (0, 1), q, heights) - np.array(PLACE)
+    scale = SIDE / (2.0 * np.pi)
+    np.testing.assert_allclose(
+        place, [q[0] * scale, q[1] * scale, min(heights[25, 14] * scale, TOP)], atol=1e-12
+    )
+    faces = grid_faces()
+    assert len(faces) == 2 * CELLS**2
+    assert faces.max() == (CELLS + 1) ** 2 - 1
+
+
+def test_a_surface_is_computed_again_only_when_it_would_look_different(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    snapshot, method = session.snapshot(), METHODS["unswitched"]
+    body = Body.fit(session.robot, components=1)
+
+    def request(q: np.ndarray, points: np.ndarray) -> Request:
+        return Request(session.robot, body, method, method.defaults, (0, 1), q, points, np.zeros(len(points)))
+
+    points = seen(snapshot, bare=True)[0]
+    first = request(snapshot.q, points)
+    assert first.differs(None)
+    assert not request(snapshot.q + 0.5, points).differs(first)  # both joints are drawn: none is held
+    assert request(snapshot.q, points + 0.01).differs(first)
+
+
+def test_the_metric_of_flat_space_is_drawn_at_full_size() -> None:
+    robot = Robot.named("planar3")
+    q = np.array([0.3, 0.5, -0.4])
+    pose, axes = metric_ellipsoid(robot, "tip", q, np.eye(3))
+    assert axes.max() == pytest.approx(METRIC_SIZE, rel=1e-9)
+    np.testing.assert_allclose(pose[:3, 3], robot.pose(q, "tip")[:3, 3])
+    _, smaller = metric_ellipsoid(robot, "tip", q, 4.0 * np.eye(3))
+    assert smaller.max() == pytest.approx(0.5 * METRIC_SIZE, rel=1e-9)  # G = 4: half the speed
+
+
+def test_links_change_colour_towards_contact() -> None:
+    assert colours.shade(np.inf) == colours.shade(colours.NEAR_FROM) == 0
+    assert colours.shade(-0.01) == colours.shade(0.0) == colours.SHADES
+    assert colours.shade_colour(0) == colours.rgb(colours.LINK)
+    assert colours.shade_colour(colours.SHADES) == colours.rgb(colours.NEAR)
+    used = [colour for colour, _ in colours.LEGEND]
+    assert len(set(used)) == len(used)  # each means one thing
+
+
+def test_a_throw_has_the_speed_of_the_hand_up_to_a_limit() -> None:
+    path = [(0.0, np.zeros(3)), (0.1, np.array([0.05, 0.0, 0.0]))]
+    np.testing.assert_allclose(throw_velocity(path), [0.5, 0.0, 0.0])
+    fast = [(0.0, np.zeros(3)), (0.1, np.array([0.0, 3.0, 0.0]))]
+    np.testing.assert_allclose(throw_velocity(fast), [0.0, FASTEST_THROW, 0.0])
+    np.testing.assert_array_equal(throw_velocity(path[:1]), np.zeros(3))
+
+
+def test_a_recording_keeps_time_motion_and_obstacles(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="unswitched")
+    session.handle(m.SetRecording(True))
+    for _ in range(100):
+        session.step()
+    rows = list(session.snapshot().rows)
+    session.handle(m.RemoveThing("ball"))
+    for _ in range(100):
+        session.step()
+    rows += session.snapshot().rows
+    kept = np.load(io.BytesIO(as_npz(rows)))
+    np.testing.assert_allclose(kept["time"], 0.005 * np.arange(1, 41), atol=1e-12)
+    assert kept["q"].shape == (40, 2)
+    assert list(kept["names"]) == ["ball"]
+    np.testing.assert_array_equal(kept["poses"][0, 0], rows[0].poses[0])
+    assert np.isnan(kept["poses"][20:]).all()  # it was gone
+
+
+def test_the_nearest_of_each_link_agrees_with_the_nearest_of_all(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    session.handle(m.DragThing("ball", pose_at([0.5, 0.4, 0.0])))
+    for _ in range(500):
+        session.step()
+    snapshot = session.snapshot()
+    exact = ExactClearance(session.robot, [solid for thing in snapshot.things for solid in thing.solids])
+    poses = solid_poses(snapshot.things, snapshot.poses)
+    each = exact.of_links(snapshot.q, poses)
+    assert [item.link for item in each] == ["link1", "link2"]
+    assert min(item.distance for item in each) == exact.distance(snapshot.q, poses).distance
