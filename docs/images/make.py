@@ -17,7 +17,6 @@ with tempfile.TemporaryDirectory() as folder:
     subprocess.run(["sidestep", "demo", "--no-studio", "--out", folder], check=True)
     picture = Image.open(Path(folder) / "arm.png").convert("RGB").quantize(COLOURS)
     picture.save(HERE / "demo.png", optimize=True)
-    screen = Path(folder) / "studio.png"
-    subprocess.run([*STUDIO, "--screenshot", screen, "--duration", "4"], check=True)
+    screen, way = Path(folder) / "studio.png", HERE / "studio.webp"
+    subprocess.run([*STUDIO, "--screenshot", screen, "--video", way, "--duration", "5"], check=True)
     Image.open(screen).convert("RGB").quantize(COLOURS).save(HERE / "studio.png", optimize=True)
-    subprocess.run([*STUDIO, "--video", HERE / "studio.webp", "--duration", "7"], check=True)

@@ -12,6 +12,7 @@ def test_every_method_of_the_benchmark_is_there() -> None:
     for method in BenchMethod:
         assert METHODS[method.value].safe == method.safe
         assert METHODS[method.value].escapes == method.escapes
+        assert METHODS[method.value].guided == (method is BenchMethod.guided)
 
 
 def test_the_recommended_numbers_are_the_presets() -> None:

@@ -205,6 +205,8 @@ def test_the_method_is_switched_on_the_page(studio: Studio, looker: Looker) -> N
 
 
 def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Looker, folder: Path) -> None:
+    studio.send(m.SetRunning(False))
+    until(lambda: not last(studio).running, "the pause")
     before = last(studio)
     looker.tab("Scenario")
     looker.type("name", "kept")
@@ -227,6 +229,7 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
 def test_a_second_browser_sees_the_same(studio: Studio, looker: Looker, chromium: Any) -> None:
     second = Looker(chromium, studio.address)
     studio.send(m.SetRunning(False))
+    until(lambda: not last(studio).running, "the pause")
     looker.tab("Goal")
     second.tab("Goal")
     looker.type("joint2 [°]", "25")

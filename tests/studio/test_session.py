@@ -126,6 +126,15 @@ def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, sce
         session.handle(m.SetMethod("magic"))
 
 
+def test_a_guided_arm_arrives(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="guided")
+    last, clearance = record(session, 12.0)
+    assert last.goal is not None
+    assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
+    assert clearance > 0.0
+    assert last.words.startswith("guide: ")
+
+
 def test_a_goal_outside_the_limits_is_refused(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
     goal = session.snapshot().goal

@@ -34,10 +34,10 @@ BODY_TIME = 1800.0  # [s] at most until the body is made, the first time
 PICTURE_TIME = 180.0  # [s] at most for one picture: without a graphics card each takes seconds
 SEND_TIME = 0.3  # [s] in which a state is on the page
 PLOT_TIME = 1.0  # [s] in which the plots have caught up
-FRAME = 0.15  # [s] of simulated time between two pictures of an animation
+FRAME = 0.25  # [s] of simulated time between two pictures of an animation
 CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
   if (notice.innerText.includes('Software WebGL')) notice.querySelector('button')?.click()"""  # of viser
-ANIMATION_WIDTH = 960  # [px]
+ANIMATION_WIDTH = 800  # [px]
 COLOURS = 128  # of a GIF
 
 

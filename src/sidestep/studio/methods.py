@@ -52,6 +52,7 @@ class Method:
         name: on the command line. label: on the page. sentence: what it is.
         parameters: its numbers. covering: needs a covering body, otherwise a fitted one.
         safe: the torque program keeps clearances as well. escapes: takes sub-goals where it is stuck.
+        guided: a guide searches a path in the background and leads the goal along it.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Method:
     covering: bool
     safe: bool
     escapes: bool = False
+    guided: bool = False
 
     @property
     def defaults(self) -> Numbers:
@@ -120,6 +122,15 @@ METHODS: dict[str, Method] = {
             BARRIER_PARAMETERS,
             covering=True,
             safe=True,
+        ),
+        Method(
+            "guided",
+            "barriers, guided",
+            "The same, led to configurations along a path that is searched in the background.",
+            BARRIER_PARAMETERS,
+            covering=True,
+            safe=True,
+            guided=True,
         ),
         Method(
             "thesis",

@@ -24,6 +24,7 @@ from sidestep._core import (
     TorqueSolution,
 )
 from sidestep.body import Body
+from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, load_robot
@@ -72,6 +73,9 @@ class Session:
     _goal: Array | None
     _pose: Array | None
     _aim: JointGoal | PoseGoal
+    _guide: GuidedMotion | None
+    _guide_time: float
+    _guide_says: str
     _escape: Escape | None
     _potential: float
     _step: Step | None
@@ -156,10 +160,8 @@ class Session:
         """
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
-        aim = self._aim
-        if self._escape is not None:
-            aim = self._escape.pursue(aim, q, self._potential, self.period)
-        step = self._system.acceleration(q, v, aim, self._obstacles())
+        obstacles = self._obstacles()
+        step = self._system.acceleration(q, v, self._attractor(q, obstacles), obstacles)
         self._potential = step.goal_potential
         mass, bias = stage.dynamics()
         solution = self._controller.solve(
@@ -193,6 +195,8 @@ class Session:
             step = self._step
             diagnosis = step.diagnosis
             words = self._in_words(diagnosis.describe())
+            if self._guide is not None and self._goal is not None:
+                words = f"guide: {self._guide_says}; {words}"
             if self._escape is not None and self._escape.escaping:
                 words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
             status = status_name(step.status), status_name(self._solution.status)
@@ -245,6 +249,17 @@ class Session:
 
     # --- parts ---
 
+    def _attractor(self, q: Array, obstacles: Obstacles) -> JointGoal | PoseGoal:
+        """What the system is drawn to now: the goal, a sub-goal, or a place on the guide's path."""
+        self._guide_time += self.period
+        if self._guide is not None and self._goal is not None:
+            guidance = self._guide.lead(q, obstacles, self._guide_time)
+            self._guide_says = guidance.status.name.replace("_", " ")
+            return guidance.goal
+        if self._escape is not None:
+            return self._escape.pursue(self._aim, q, self._potential, self.period)
+        return self._aim
+
     def _load(self, scenario: Scenario) -> None:
         robot = load_robot(scenario)
         bodies: dict[bool, Body] = {}
@@ -264,6 +279,7 @@ class Session:
         self.period = scenario.simulation.period
         self._controller = TorqueController(robot, period=self.period)
         self._start = start
+        self._make_guide()
         self._set_joint_goal(goal)
         self._begin()
 
@@ -281,8 +297,15 @@ class Session:
         self._goal, self._pose, self._aim = goal, None, JointGoal(goal)
         self._begin_pursuit()
 
+    def _make_guide(self) -> None:
+        self._guide, self._guide_time, self._guide_says = None, 0.0, ""
+        if self._method.guided:
+            self._guide = GuidedMotion(self.robot, self._bodies[True], system=self._system)
+
     def _begin_pursuit(self) -> None:
         self._potential = float("nan")
+        if self._guide is not None and self._goal is not None:
+            self._guide.set_goal(self._goal)
         # A pose goal is approached so slowly near a stretched arm that it would count as stuck.
         escapes = self._method.escapes and self._pose is None
         self._escape = Escape(self.robot) if escapes else None
@@ -295,6 +318,7 @@ class Session:
     def _use(self, method: Method, numbers: Mapping[str, float]) -> None:
         self._system = self._system_for(self.robot, self._bodies, method, numbers)
         self._method = method
+        self._make_guide()
         self._begin_pursuit()
         self._look()
 
