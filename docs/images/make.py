@@ -1,6 +1,6 @@
 """Makes the pictures of the README: python docs/images/make.py
 
-The studio's pictures need Chromium and `pip install 'sidestep[headless]'`.
+The studio's picture needs Chromium and `pip install 'sidestep[headless]'`.
 """
 
 import subprocess
@@ -17,6 +17,6 @@ with tempfile.TemporaryDirectory() as folder:
     subprocess.run(["sidestep", "demo", "--no-studio", "--out", folder], check=True)
     picture = Image.open(Path(folder) / "arm.png").convert("RGB").quantize(COLOURS)
     picture.save(HERE / "demo.png", optimize=True)
-    screen, way = Path(folder) / "studio.png", HERE / "studio.webp"
-    subprocess.run([*STUDIO, "--screenshot", screen, "--video", way, "--duration", "5"], check=True)
+    screen = Path(folder) / "studio.png"
+    subprocess.run([*STUDIO, "--screenshot", screen, "--duration", "4"], check=True)
     Image.open(screen).convert("RGB").quantize(COLOURS).save(HERE / "studio.png", optimize=True)
