@@ -151,7 +151,7 @@ def test_a_goal_set_on_the_page_is_reached(studio: Studio, looker: Looker) -> No
     looker.tab("Goal")
     looker.type("joint1 [°]", "-20")
     until(lambda: bool(np.isclose(last(studio).goal[0], np.deg2rad(-20.0))), "the goal")  # type: ignore[index]
-    looker.click("button:has-text('Run')")
+    looker.click("button:has-text('Run'):visible")
     until(
         lambda: np.abs(last(studio).q - last(studio).goal).max() < 0.05, "arrival"
     )  # [rad] counts as arrived
@@ -210,7 +210,7 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
     before = last(studio)
     looker.tab("Scenario")
     looker.type("name", "kept")
-    looker.click("button:has-text('Save')")
+    looker.click("button:has-text('Save'):visible")
     until((folder / "kept.yaml").is_file, "the file")
     saved = Scenario.load(folder / "kept.yaml")
     np.testing.assert_allclose(saved.start.position, before.q, atol=1e-5)  # the file has six digits
@@ -218,7 +218,7 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
     studio.send(m.RemoveThing("ball"))
     until(lambda: not last(studio).things, "the removal")
     with looker.page.expect_file_chooser() as chooser:
-        looker.click("button:has-text('Load a file')")
+        looker.click("button:has-text('Load a file'):visible")
     chooser.value.set_files(folder / "kept.yaml")
     until(lambda: last(studio).scenario.name == "kept", "the loaded scenario")
     again = last(studio)
