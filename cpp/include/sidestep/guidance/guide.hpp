@@ -125,7 +125,7 @@ class Guide {
   // Between the two.
   TripleBuffer<State> states_;
   TripleBuffer<Answer> answers_;
-  std::binary_semaphore wake_{0};
+  std::counting_semaphore<> wake_{0};
   std::atomic<bool> stopping_{false};
   mutable std::mutex mutex_;  // of what follows; the loop never takes it
   std::shared_ptr<const Obstacles> obstacles_;
