@@ -105,8 +105,8 @@ def test_a_goal_beyond_the_limits_is_said() -> None:
     [pick] = read_motion_bench_maker(PANDA / "pick_panda")
     body = Body.fit(Robot.named("panda"), components=1, cache=False, samples=200)
     arm = Arms("panda", Method.unswitched, body).of(pick)
-    problem, beyond = arm.problem(pick, spacing=0.05, point_radius=0.0)
-    assert beyond == pytest.approx(0.0162 + 0.0698)  # joint 4 ends at -0.0698 rad
+    problem, published = arm.problem(pick, spacing=0.05, point_radius=0.0)
+    assert published[3] == 0.0162  # joint 4 ends at -0.0698 rad
     assert problem.goal[3] == -0.0698
     assert len(problem.obstacles) == 0
 

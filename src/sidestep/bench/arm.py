@@ -90,8 +90,8 @@ class Arm:
 
     def problem(
         self, source: MotionBenchMakerProblem, *, spacing: float, point_radius: float
-    ) -> tuple[SceneProblem, float]:
-        """A published problem for this arm, with its goal within the limits; and how far it was beyond [rad | m].
+    ) -> tuple[SceneProblem, Array]:
+        """A published problem for this arm, with its goal within the limits; and the goal (nv,) as published.
 
         Args:
             source: as published.
@@ -109,7 +109,7 @@ class Arm:
             clearance=self.clearance.among(objects),
             obstacles=_points(list(source.shapes.values()), spacing, point_radius),
         )
-        return problem, float(np.abs(goal - within).max())
+        return problem, goal
 
 
 class Arms:

@@ -127,7 +127,7 @@ def _integrated(
     look = CHUNK if guided is None else guided.period
     total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, look))
     q, v = problem.start, np.zeros_like(problem.start)
-    system, escape = _prepared(robot, system, problem, settings, guided)
+    relaxed, escape = _prepared(robot, system, problem, settings, guided)
     guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
     rows: list[tuple[Array, Array, Array]] = []
     times: list[Array] = []
@@ -138,7 +138,7 @@ def _integrated(
         at = done * settings.period
         obstacles = problem.obstacles_at(at)
         part = rollout(
-            system,
+            relaxed.at(at),
             q,
             v,
             problem.goal if guided is None else guided.goal(q, obstacles, at),
@@ -172,10 +172,10 @@ def _under_torque(
     guided: _Led | None,
 ) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period)
-    system, escape = _prepared(robot, system, problem, settings, guided)
+    relaxed, escape = _prepared(robot, system, problem, settings, guided)
     timer = _Timer()
     run = simulation.run(
-        _TimedSystem(system, timer, escape, settings.period, guided),
+        _TimedSystem(relaxed, timer, escape, settings.period, guided),
         _TimedController(TorqueController(robot, period=settings.period), timer, safe=settings.safe),
         problem.start,
         problem.goal,
@@ -201,13 +201,27 @@ def _prepared(
     problem: Problem,
     settings: MotionSettings,
     guided: _Led | None,
-) -> tuple[GeometricSystem, Escape | None]:
-    if not settings.escape and guided is None:
-        return system, None
-    obstacles = problem.obstacles_at(0.0)
-    if not np.any(obstacles.velocities):
-        system = system.relaxed_at(problem.goal, obstacles)
-    return system, Escape(robot, seed=problem.index) if settings.escape else None
+) -> tuple[_Relaxed, Escape | None]:
+    relaxed = _Relaxed(system, problem, relax=settings.escape or guided is not None)
+    return relaxed, Escape(robot, seed=problem.index) if settings.escape else None
+
+
+class _Relaxed:
+    """The system with barriers that leave the goal free, again whenever something comes or goes."""
+
+    def __init__(self, system: GeometricSystem, problem: Problem, *, relax: bool) -> None:
+        self._system, self._problem = system, problem
+        self._looks = [0.0, *problem.changes] if relax else []
+        self._current = system
+
+    def at(self, time: float) -> GeometricSystem:
+        """The system at a time [s] that does not go back; where all that is seen rests, relaxed at the goal."""
+        while self._looks and time >= self._looks[0]:
+            self._looks.pop(0)
+            obstacles = self._problem.obstacles_at(time)
+            moving = bool(np.any(obstacles.velocities))
+            self._current = self._system if moving else self._system.relaxed_at(self._problem.goal, obstacles)
+        return self._current
 
 
 class _Led:
@@ -241,7 +255,7 @@ class _Timer:
 class _TimedSystem:
     def __init__(
         self,
-        system: GeometricSystem,
+        system: _Relaxed,
         timer: _Timer,
         escape: Escape | None,
         period: float,
@@ -253,12 +267,13 @@ class _TimedSystem:
 
     def acceleration(self, q: Array, v: Array, goal: Array, obstacles: Obstacles) -> Any:
         begin = time.perf_counter()
+        at = len(self._timer.steps) * self._period
         followed: Array | JointGoal | PoseGoal = goal
         if self._guided is not None:
-            followed = self._guided.goal(q, obstacles, len(self._timer.steps) * self._period)
+            followed = self._guided.goal(q, obstacles, at)
         elif self._escape is not None:
             followed = self._escape.pursue(goal, q, self._potential, self._period)
-        step = self._system.acceleration(q, v, followed, obstacles)
+        step = self._system.at(at).acceleration(q, v, followed, obstacles)
         self._potential = step.goal_potential
         self._timer.steps.append(time.perf_counter() - begin)
         self._timer.step = step

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from sidestep._core import __version__
 from sidestep.bench.arm import Arm, Arms, load_robot
@@ -23,6 +24,7 @@ from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
 from sidestep.simulation import Clearance, EllipsoidClearance
 
+Array = npt.NDArray[np.float64]
 Task = TypeVar("Task")
 
 
@@ -70,7 +72,7 @@ class EndClearances:
     covered: Clearance | None
 
     @classmethod
-    def at(cls, q: np.ndarray[Any, Any], arm: Arm, problem: Problem) -> EndClearances:
+    def at(cls, q: Array, arm: Arm, problem: Problem) -> EndClearances:
         """Measured at q (nv,)."""
         covered = None
         if arm.body.levels is not None:
@@ -83,7 +85,7 @@ class SceneOutcome:
     """What came of one published problem.
 
     Attributes:
-        set, index: which one. start, goal: clearances there.
+        set, index: which one. start, goal: clearances there, of the goal as published.
         goal_beyond_limits: [rad | m] by which the published goal is outside the position limits; the arm is
             sent to the nearest configuration within.
         outcome: of the motion, None if there was none. path_length: sum of |dq| [rad | m].
@@ -268,8 +270,8 @@ class _Worker:
     def run(self, task: MotionBenchMakerProblem) -> tuple[SceneOutcome, StepTimes]:
         settings = self.settings
         arm = self._arms.of(task)
-        problem, beyond = arm.problem(task, spacing=settings.spacing, point_radius=settings.point_radius)
-        return judged(arm, problem, settings, set=task.set, beyond=beyond)
+        problem, goal = arm.problem(task, spacing=settings.spacing, point_radius=settings.point_radius)
+        return judged(arm, problem, settings, set=task.set, goal=goal)
 
 
 def judged(
@@ -278,17 +280,23 @@ def judged(
     settings: SceneSettings,
     *,
     set: str,
-    beyond: float = 0.0,
+    goal: Array | None = None,
     arrives: bool = True,
 ) -> tuple[SceneOutcome, StepTimes]:
-    """Moves the arm through a problem, unless only ends are asked for, and says what came of it."""
+    """Moves the arm through a problem, unless only ends are asked for, and says what came of it.
+
+    Args:
+        arm, problem, settings: what is moved, through what, how. set: name under which it is reported.
+        goal: as published (nv,), where the problem has another. arrives: it should arrive.
+    """
+    published = problem.goal if goal is None else goal
     motion = None if settings.only_clearances else arm.move(problem, settings.motion)
     outcome = SceneOutcome(
         set=set,
         index=problem.index,
         start=EndClearances.at(problem.start, arm, problem),
-        goal=EndClearances.at(problem.goal, arm, problem),
-        goal_beyond_limits=beyond,
+        goal=EndClearances.at(published, arm, problem),
+        goal_beyond_limits=float(np.abs(published - problem.goal).max()),
         outcome=None if motion is None else arm.judge.judge(problem, motion, settings.motion),
         path_length=0.0 if motion is None else motion.path_length,
         planning_s=None if motion is None else motion.planning_seconds,
