@@ -8,10 +8,20 @@
 namespace sidestep {
 namespace {
 
-std::atomic<InstructionSet>& current() noexcept {
-  static std::atomic<InstructionSet> set = instruction_sets().back();
-  return set;
+InstructionSet best() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                        __builtin_cpu_supports("avx512vl");
+    return avx512 ? InstructionSet::avx512 : InstructionSet::avx2;
+  }
+#endif
+  return InstructionSet::baseline;
 }
+
+// Set when the program is loaded, so that the first step of a loop neither allocates nor takes a lock for it.
+std::atomic<InstructionSet> current{best()};
 
 }  // namespace
 
@@ -25,19 +35,16 @@ const char* name(InstructionSet set) noexcept {
 }
 
 std::vector<InstructionSet> instruction_sets() {
-  std::vector<InstructionSet> sets{InstructionSet::baseline};
-#if defined(SIDESTEP_X86_KERNELS)
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-    sets.push_back(InstructionSet::avx2);
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) {
-      sets.push_back(InstructionSet::avx512);
+  std::vector<InstructionSet> sets;
+  for (const InstructionSet set : {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
+    if (set <= best()) {
+      sets.push_back(set);
     }
   }
-#endif
   return sets;
 }
 
-InstructionSet instruction_set() noexcept { return current().load(std::memory_order_relaxed); }
+InstructionSet instruction_set() noexcept { return current.load(std::memory_order_relaxed); }
 
 void use(InstructionSet set) {
   const std::vector<InstructionSet> sets = instruction_sets();
@@ -48,7 +55,7 @@ void use(InstructionSet set) {
     }
     throw std::invalid_argument(std::string("instruction set ") + name(set) + " is not available; available are: " + known);
   }
-  current() = set;
+  current = set;
 }
 
 }  // namespace sidestep
