@@ -42,7 +42,7 @@ void bind_rollout(nb::module_& m) {
           nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
                   "potential: float, period: float) -> JointGoal | PoseGoal"),
           "The goal to follow in a step of `period` [s]: the goal given, or a sub-goal. potential: `Step.goal_potential`\n"
-          "of the step before; NaN where there was none.")
+          "of the step before, NaN where there was none; it is used for poses, not for configurations.")
       .def_prop_ro("escaping", &Escape::escaping, "Whether the last step followed a sub-goal.")
       .def_prop_ro("count", &Escape::count, "How many sub-goals there have been.");
 

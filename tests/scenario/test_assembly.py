@@ -142,3 +142,27 @@ def test_impossible_wishes_name_the_place(old: str, new: str, message: str) -> N
     with pytest.raises(ScenarioError) as caught:
         assemble(parse(BASE.replace(old, new, 1)))
     assert message in str(caught.value).replace("['link2']", "link2")
+
+
+def test_the_barrier_method_sees_real_sizes_covers_the_links_and_leaves_the_goal_free() -> None:
+    scenario = Scenario.from_text(
+        """
+format: 1
+name: small
+method: barrier
+robot: {name: planar2}
+start: {unit: rad, position: [1.0, 0.3]}
+goal: {unit: rad, position: [-1.0, 0.3]}
+obstacles:
+  - {name: ball, shape: {type: sphere, radius: 0.05}, position: [1.1, 0.0, 0.0]}
+"""
+    )
+    parts = assemble(scenario)
+    assert isinstance(parts.seen, Obstacles)
+    np.testing.assert_array_equal(parts.seen.radii, [0.05])
+    assert parts.safe
+    assert parts.escape is not None
+    assert len(parts.body.levels) == parts.body.num_components
+    step = parts.system.acceleration(parts.goal, np.zeros(2), parts.goal, parts.seen)
+    np.testing.assert_array_equal(step.values, 0.0)
+    assert step.acceleration == pytest.approx([0.0, 0.0], abs=1e-12)

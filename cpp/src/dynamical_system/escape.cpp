@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -14,6 +15,12 @@ constexpr double near_sub_goal = 0.2;    // [rad | m] is as good as there
 const EscapeSettings& validated(const EscapeSettings& settings) {
   settings.validate();
   return settings;
+}
+
+/// Falls as the goal gets nearer. Of a configuration it is known at once; of a pose it is that of the step before.
+double way_left(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential) noexcept {
+  const auto* joint = std::get_if<JointGoal>(&goal);
+  return joint == nullptr ? potential : (q - joint->position).squaredNorm();
 }
 
 /// Uniform in [0, 1), the same on every machine (the standard's distributions are not).
@@ -45,17 +52,15 @@ Escape::Escape(const Robot& robot, EscapeSettings settings)
 const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential,
                            double period) noexcept {
   time_ += period;
-  if (turned_ || std::isnan(potential)) {
-    turned_ = false;
-    return escaping_ ? sub_goal_ : goal;
-  }
   if (!escaping_) {
-    if (stuck_.update(time_, potential)) {
+    const double way = way_left(goal, q, turned_ ? std::numeric_limits<double>::quiet_NaN() : potential);
+    turned_ = false;
+    if (!std::isnan(way) && stuck_.update(time_, way)) {
       turn(true, q);
     }
   } else {
-    const double way = (q - std::get<JointGoal>(sub_goal_).position).cwiseAbs().maxCoeff();
-    if (halted_.update(time_, potential) || way < near_sub_goal || time_ - since_ >= settings_.leg) {
+    const double error = (q - std::get<JointGoal>(sub_goal_).position).cwiseAbs().maxCoeff();
+    if (halted_.update(time_, way_left(sub_goal_, q, potential)) || error < near_sub_goal || time_ - since_ >= settings_.leg) {
       turn(false, q);
     }
   }

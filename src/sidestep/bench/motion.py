@@ -17,7 +17,6 @@ from sidestep._core import (
     JointGoal,
     Obstacles,
     PlanStatus,
-    PoseGoal,
     TorqueController,
     rollout,
 )
@@ -175,13 +174,15 @@ def _under_torque(
     relaxed, escape = _prepared(robot, system, problem, settings, guided)
     timer = _Timer()
     run = simulation.run(
-        _TimedSystem(relaxed, timer, escape, settings.period, guided),
-        _TimedController(TorqueController(robot, period=settings.period), timer, safe=settings.safe),
+        _TimedSystem(relaxed, timer, settings.period, guided),
+        _TimedController(TorqueController(robot, period=settings.period), timer),
         problem.start,
         problem.goal,
         settings.duration,
         problem.obstacles_at,
         arrival=Arrival(position=settings.tolerance, speed=float("inf"), hold=0.0),
+        safe=settings.safe,
+        escape=escape,
     )
     return Motion(
         run.q,
@@ -245,48 +246,32 @@ class _Led:
 
 
 class _Timer:
-    """Adds the time of a step's two calls, and hands the step of the first to the second."""
+    """Adds the time of a step's two calls."""
 
     def __init__(self) -> None:
         self.steps: list[float] = []
-        self.step: Any = None
 
 
 class _TimedSystem:
-    def __init__(
-        self,
-        system: _Relaxed,
-        timer: _Timer,
-        escape: Escape | None,
-        period: float,
-        guided: _Led | None,
-    ) -> None:
-        self._system, self._timer, self._escape, self._period = system, timer, escape, period
-        self._guided = guided
-        self._potential = float("nan")
+    def __init__(self, system: _Relaxed, timer: _Timer, period: float, guided: _Led | None) -> None:
+        self._system, self._timer, self._period, self._guided = system, timer, period, guided
 
-    def acceleration(self, q: Array, v: Array, goal: Array, obstacles: Obstacles) -> Any:
+    def acceleration(self, q: Array, v: Array, goal: Any, obstacles: Obstacles) -> Any:
         begin = time.perf_counter()
         at = len(self._timer.steps) * self._period
-        followed: Array | JointGoal | PoseGoal = goal
         if self._guided is not None:
-            followed = self._guided.goal(q, obstacles, at)
-        elif self._escape is not None:
-            followed = self._escape.pursue(goal, q, self._potential, self._period)
-        step = self._system.at(at).acceleration(q, v, followed, obstacles)
-        self._potential = step.goal_potential
+            goal = self._guided.goal(q, obstacles, at)
+        step = self._system.at(at).acceleration(q, v, goal, obstacles)
         self._timer.steps.append(time.perf_counter() - begin)
-        self._timer.step = step
         return step
 
 
 class _TimedController:
-    def __init__(self, controller: TorqueController, timer: _Timer, *, safe: bool) -> None:
-        self._controller, self._timer, self._safe = controller, timer, safe
+    def __init__(self, controller: TorqueController, timer: _Timer) -> None:
+        self._controller, self._timer = controller, timer
 
-    def solve(self, q: Array, v: Array, acceleration: Array, mass_matrix: Array, bias: Array) -> Any:
-        clearances = self._timer.step if self._safe else None
+    def solve(self, *state: Any, **clearances: Any) -> Any:
         begin = time.perf_counter()
-        solution = self._controller.solve(q, v, acceleration, mass_matrix, bias, clearances=clearances)
+        solution = self._controller.solve(*state, **clearances)
         self._timer.steps[-1] += time.perf_counter() - begin
         return solution

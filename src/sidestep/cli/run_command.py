@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 DEMO_SCENARIO, DEMO_METHOD = "thesis-6.2.3", "thesis"
 
 
+class MethodChoice(StrEnum):
+    """How the arm is moved."""
+
+    written = "written"
+    barrier = "barrier"
+
+
 class ModeChoice(StrEnum):
     """How a run is simulated."""
 
@@ -70,6 +77,10 @@ def run(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Report folder [default: sidestep-report-NAME].")
     ] = None,
+    method: Annotated[
+        MethodChoice | None,
+        typer.Option(help="Instead of the scenario's: as written, or the recommended system of barriers."),
+    ] = None,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the scenario's mode.")] = None,
     switch: Annotated[
         str | None,
@@ -101,6 +112,8 @@ def run(
         simulation = dataclasses.replace(simulation, mode=mode.value)
     if duration is not None:
         simulation = dataclasses.replace(simulation, duration=duration)
+    if method is not None:
+        chosen = dataclasses.replace(chosen, method=method.value)
     system = chosen.system
     if switch is not None:
         system = dataclasses.replace(system, switch=parse_switch(switch))

@@ -18,6 +18,7 @@ from sidestep import (
     CollisionDensity,
     DistanceSwitch,
     Embedding,
+    Escape,
     GeodesicOnly,
     GeometricSystem,
     HarmonicOnly,
@@ -31,6 +32,7 @@ from sidestep._core import JointType, Obstacles
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
 from sidestep.pose import from_roll_pitch_yaw, moved, pose_at
+from sidestep.presets import barrier_system
 from sidestep.scenario.scenario import (
     BasePose,
     EmbeddingChoice,
@@ -60,6 +62,8 @@ class Assembly:
     Attributes:
         robot, body, system: as the scenario asks.
         objects: the solid obstacles, for physics and exact clearance.
+        safe: clearances bound the motion as well, as a part of the method.
+        escape: sub-goals where the arm is stuck, or None.
         start, start_velocity, goal: (nv,) [rad | m].
         seen: what the controller sees; a function of time [s] where an obstacle starts or stops.
     """
@@ -72,6 +76,8 @@ class Assembly:
     start_velocity: Array
     goal: Array
     seen: Obstacles | Callable[[float], Obstacles]
+    safe: bool = False
+    escape: Escape | None = None
 
 
 def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembly:
@@ -95,11 +101,15 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         name = item.name or f"obstacle{index}"
         things = _at(f"obstacles[{index}]", scenario, partial(solids, scenario, item, name))
         objects += things
-        views += [_view(item, thing) for thing in things]
+        views += [_view(_looked_at(scenario, item), thing) for thing in things]
     _at("obstacles", scenario, partial(check_scene, objects))
     scripted = any(item.motion is not None for item in scenario.obstacles)
+    seen = partial(_seen, tuple(views)) if scripted else _seen(tuple(views), 0.0)
+    barrier = scenario.method == "barrier"
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
     system = _at("system", scenario, partial(_system, scenario, robot, body))
+    if barrier and isinstance(seen, Obstacles) and not np.any(seen.velocities):
+        system = system.relaxed_at(goal, seen)
     return Assembly(
         robot=robot,
         body=body,
@@ -108,7 +118,9 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         start=start,
         start_velocity=velocity,
         goal=goal,
-        seen=partial(_seen, tuple(views)) if scripted else _seen(tuple(views), 0.0),
+        seen=seen,
+        safe=barrier,
+        escape=Escape(robot) if barrier else None,
     )
 
 
@@ -209,6 +221,13 @@ class _View:
     radius: float
 
 
+def _looked_at(scenario: Scenario, item: Obstacle) -> Obstacle:
+    """The obstacle with what is seen of it: a barrier needs the real size, not the bare centre."""
+    if scenario.method != "barrier" or item.points != "centre":
+        return item
+    return replace(item, points="ball" if item.shape.type in ("sphere", "points") else "surface")
+
+
 def _view(item: Obstacle, thing: SceneObject) -> _View:
     if item.points == "surface":
         surface = thing.surface(subdivisions=3)
@@ -235,6 +254,8 @@ def _seen(views: tuple[_View, ...], time: float) -> Obstacles:
 
 def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
     choice = scenario.body
+    if scenario.method == "barrier":
+        return Body.cover(robot, progress=progress)
     return Body.fit(
         robot,
         components=choice.components,
@@ -246,6 +267,8 @@ def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
 
 def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
     choice = scenario.system
+    if scenario.method == "barrier":
+        return barrier_system(robot, body)
     return GeometricSystem(
         _embeddings(scenario.embedding, robot, body),
         stiffness=choice.stiffness,

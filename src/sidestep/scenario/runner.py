@@ -88,6 +88,8 @@ def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> 
         start_velocity=parts.start_velocity,
         arrival=_arrival(scenario),
         on_step=on_step,
+        safe=parts.safe,
+        escape=parts.escape,
     )
 
 
@@ -106,4 +108,6 @@ def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) 
         integrator=choice.integrator,
         arrival=_arrival(scenario),
         on_step=on_step,
+        safe=parts.safe,
+        escape=parts.escape,
     )

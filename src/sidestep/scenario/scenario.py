@@ -20,6 +20,7 @@ Mode = Literal["torque", "kinematic"]
 SwitchType = Literal["none", "harmonic_only", "geodesic_only", "binary", "sigmoid", "distance"]
 
 FORMAT_VERSION = 1
+MethodChoice = Literal["written", "barrier"]
 
 
 @dataclass(frozen=True)
@@ -150,6 +151,8 @@ class Scenario:
 
     Args:
         name: letters, digits, dot, dash, underscore.
+        method: "written": body, embedding and system as this file says; "barrier": the recommended system with the
+            real size of the obstacles, in place of them.
         robot, start, goal, body, obstacles, embedding, system, simulation: the parts, see their classes.
         description, source: what happens, and where it comes from.
         folder: what relative file names refer to; not part of the file.
@@ -161,6 +164,7 @@ class Scenario:
     goal: JointState
     description: str = ""
     source: str = ""
+    method: MethodChoice = "written"
     body: BodyChoice = field(default_factory=BodyChoice)
     obstacles: tuple[Obstacle, ...] = ()
     embedding: EmbeddingChoice = field(default_factory=EmbeddingChoice)

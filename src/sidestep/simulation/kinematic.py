@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, rollout
+from sidestep._core import AccelerationFilter, Escape, GeometricSystem, rollout
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.run import (
@@ -40,12 +40,15 @@ def run_kinematically(
     start_velocity: Array | None = None,
     arrival: Arrival | None = Arrival(),
     on_step: Callable[[float, Array], None] | None = None,
+    safe: bool = False,
+    escape: Escape | None = None,
 ) -> KinematicRun:
     """Integrates the wanted acceleration itself, by the core's `rollout`: no masses, torques or contacts.
 
     Args:
         integrator: of the core; the rest as in `Simulation.run`. Free objects stay where they are.
         on_step: called with time [s] and q every now and then.
+        safe: the acceleration keeps the clearances of the system's barriers and the limits (`AccelerationFilter`).
 
     Raises:
         ValueError: start or goal outside the limits, a duration or timestep that is not positive.
@@ -65,11 +68,21 @@ def run_kinematically(
         name: [] for name in ("q", "v", "wanted", "achieved", "switch", "values")
     }
     statuses: list[str] = []
+    guard = AccelerationFilter(robot, period=timestep) if safe else None
     done, arrived = 0, False
     while done < steps and not arrived:
         count = min(chunk, steps - done)
         part = rollout(
-            system, q, v, goal, see(done * timestep), period=timestep, steps=count, integrator=integrator
+            system,
+            q,
+            v,
+            goal,
+            see(done * timestep),
+            period=timestep,
+            steps=count,
+            integrator=integrator,
+            filter=guard,
+            escape=escape,
         )
         if not (np.all(np.isfinite(part.q)) and np.all(np.isfinite(part.v))):
             raise RuntimeError(f"the integration diverged near {done * timestep:.3f} s; shorten the timestep")

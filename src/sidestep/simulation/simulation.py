@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Obstacles
+from sidestep._core import Escape, Obstacles
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
 from sidestep.simulation.run import (
@@ -29,15 +29,17 @@ Array = npt.NDArray[np.float64]
 class MotionSystem(Protocol):
     """What wants an acceleration: `GeometricSystem`, or anything with its `acceleration`."""
 
-    def acceleration(self, q: Array, v: Array, goal: Array, obstacles: Obstacles) -> Any:
+    def acceleration(self, q: Array, v: Array, goal: Any, obstacles: Obstacles) -> Any:
         """A step with `acceleration` (nv,), `status`, and where they exist `switch` and `values`."""
 
 
 class AccelerationController(Protocol):
     """What turns an acceleration into torque: `TorqueController`, or anything with its `solve`."""
 
-    def solve(self, q: Array, v: Array, acceleration: Array, mass_matrix: Array, bias: Array) -> Any:
-        """A solution with `torque` (nv,), `acceleration` (nv,) and `status`."""
+    @property
+    def solve(self) -> Callable[..., Any]:
+        """From q, v, acceleration, mass_matrix, bias, and `clearances` where a run is safe, to a solution with
+        `torque` (nv,), `acceleration` (nv,) and `status`."""
 
 
 class Simulation:
@@ -92,6 +94,8 @@ class Simulation:
         start_velocity: Array | None = None,
         arrival: Arrival | None = Arrival(),
         on_step: Callable[[float, Array], None] | None = None,
+        safe: bool = False,
+        escape: Escape | None = None,
     ) -> SimulationRun:
         """Runs the loop: state, wanted acceleration, torque, physics, record.
 
@@ -104,6 +108,8 @@ class Simulation:
             start_velocity: (nv,), at rest by default.
             arrival: when to stop early; None: run the whole duration.
             on_step: called with time [s] and q after every step.
+            safe: the controller keeps the clearances of the system's barriers as well.
+            escape: sub-goals where the arm is stuck.
 
         Raises:
             ValueError: start or goal outside the limits, or a duration that is not positive.
@@ -122,14 +128,19 @@ class Simulation:
         steps = max(1, round(duration / self.timestep))
         rows: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         contacts: list[Contact] = []
-        arrived = False
+        arrived, potential = False, float("nan")
         for k in range(steps):
             time = k * self.timestep
             self._drive(data, time)
             mujoco.mj_step1(built.model, data)
             q, v = built.state(data)
-            step = system.acceleration(q, v, goal, see(time))
-            solution = controller.solve(q, v, step.acceleration, built.mass_matrix(data), built.bias(data))
+            followed = goal if escape is None else escape.pursue(goal, q, potential, self.timestep)
+            step = system.acceleration(q, v, followed, see(time))
+            potential = getattr(step, "goal_potential", potential)
+            kept = {"clearances": step} if safe else {}
+            solution = controller.solve(
+                q, v, step.acceleration, built.mass_matrix(data), built.bias(data), **kept
+            )
             torque = np.asarray(solution.torque)
             poses = self._object_poses(data)
             data.ctrl[built.actuators] = torque

@@ -12,7 +12,7 @@ namespace sidestep {
 
 struct EscapeSettings {
   double patience = 0.6;   ///< [s] without progress after which the arm counts as stuck
-  double fraction = 0.05;  ///< progress is a goal potential that falls by this fraction
+  double fraction = 0.05;  ///< progress is a goal potential (or squared distance) that falls by this fraction
   double leg = 2.0;        ///< [s] the longest way towards a sub-goal
   double spread = 1.7;     ///< [rad | m] how far each joint of a sub-goal is at most from where the arm is
   std::uint64_t seed = 0;
@@ -31,8 +31,9 @@ class Escape {
  public:
   explicit Escape(const Robot& robot, EscapeSettings settings = {});
 
-  /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. `potential` is that of the goal followed in
-  /// the step before (GoalPull::potential; NaN where there was none), q (nv) [rad | m] the state. No allocation.
+  /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. q (nv) [rad | m] is the state. `potential`,
+  /// that of the goal followed in the step before (GoalPull::potential; NaN where there was none), serves for poses;
+  /// of configurations the distance is known. No allocation.
   const Goal& pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential, double period) noexcept;
 
   /// Whether the last step followed a sub-goal.
@@ -52,7 +53,7 @@ class Escape {
   Goal sub_goal_;
   double time_ = 0.0, since_ = 0.0;
   bool escaping_ = false;
-  bool turned_ = true;  // the potential at hand is that of another goal
+  bool turned_ = true;  // the potential of the step before is that of another goal
   int count_ = 0;
 };
 
