@@ -8,8 +8,17 @@ import sidestep as ss
 PERIOD = 0.01
 
 
-def pursue(escape, goal, q, potentials):
-    return [np.array(escape.pursue(goal, q, u, PERIOD).position) for u in potentials]
+GOAL = np.array([0.5, 0.5])
+AWAY = np.array([-2.0, 2.0])
+
+
+def pursue(escape, states):
+    """The configurations followed from state to state."""
+    return np.array([escape.pursue(GOAL, q, np.nan, PERIOD).position for q in states])
+
+
+def at_rest(steps):
+    return np.tile(AWAY, (steps, 1))
 
 
 @pytest.fixture
@@ -17,61 +26,66 @@ def robot():
     return ss.Robot.named("planar2")
 
 
-def test_goal_is_followed_while_the_potential_falls(robot):
+def test_goal_is_followed_while_it_gets_nearer(robot):
     escape = ss.Escape(robot, patience=0.1)
-    followed = pursue(escape, [0.5, 0.5], [0.0, 0.0], 0.97 ** np.arange(200))
-    np.testing.assert_array_equal(followed, np.full((200, 2), 0.5))
+    followed = pursue(escape, GOAL + (AWAY - GOAL) * 0.98 ** np.arange(200)[:, None])
+    np.testing.assert_array_equal(followed, np.tile(GOAL, (200, 1)))
     assert escape.count == 0
 
 
-def test_sub_goal_after_patience_lies_within_the_limits_and_ends_after_its_leg(robot):
-    escape = ss.Escape(robot, patience=0.1, leg=0.5, spread=0.7, seed=3)
-    # Falling potentials towards the sub-goal, so that only the length of the leg ends it.
-    followed = pursue(escape, [0.5, 0.5], [-2.0, 2.0], [1.0] * 12 + list(0.9 ** np.arange(60)))
-    away = np.array([not np.array_equal(row, [0.5, 0.5]) for row in followed])
+def test_sub_goal_comes_after_patience_and_is_given_up_after_half_of_it(robot):
+    escape = ss.Escape(robot, patience=0.2, leg=10.0, spread=0.7, seed=3)
+    followed = pursue(escape, at_rest(45))
+    away = np.any(followed != GOAL, axis=1)
+    # 20 periods of patience after the first; times that are sums of periods may round below it once.
     first = int(away.argmax())
-    # The first potential belongs to no step, the second is the least so far; patience is out ten periods later, and
-    # times that are sums of periods may round below it once.
-    assert first in (11, 12)
-    sub_goal = followed[first]
-    assert np.all(np.abs(sub_goal - [-2.0, 2.0]) <= 0.7)
-    assert np.any(np.abs(sub_goal - [-2.0, 2.0]) > 0.1)
-    assert away.sum() in (50, 51)
-    assert not away[-1]
+    assert first in (20, 21)
+    assert np.all(np.abs(followed[first] - AWAY) <= 0.7)
+    # Half of 20 periods without coming nearer, and the same of rounding.
+    assert int((~away[first:]).argmax()) in (11, 12)
     assert escape.count == 1
 
 
-def test_sub_goal_that_cannot_be_neared_is_given_up_after_half_the_patience(robot):
-    escape = ss.Escape(robot, patience=0.2, leg=10.0)
-    followed = pursue(escape, [0.5, 0.5], [-2.0, 2.0], [1.0] * 60)
-    away = np.array([not np.array_equal(row, [0.5, 0.5]) for row in followed])
-    first = int(away.argmax())
-    # Half of 20 periods, one whose potential is another goal's, and one for rounding.
-    assert int((~away[first:]).argmax()) in (11, 12)
+def test_sub_goal_that_gets_nearer_is_followed_for_its_leg(robot):
+    escape = ss.Escape(robot, patience=0.1, leg=0.5, seed=3)
+    first = next(k for k in range(100) if np.any(pursue(escape, at_rest(1))[0] != GOAL))
+    assert first in (10, 11)
+    sub_goal = np.array(escape.pursue(GOAL, AWAY, np.nan, PERIOD).position)
+    # Comes nearer by 3 % a step, which is more than 5 % of the squared distance, but not within 0.2 rad.
+    states = sub_goal + 0.97 ** np.arange(60)[:, None]
+    away = np.any(pursue(escape, states) != GOAL, axis=1)
+    assert away.sum() in (48, 49)
+    assert not away[-1]
 
 
 def test_sub_goals_lie_within_the_limits(robot):
     corner = robot.limits.upper
     for seed in range(5):
-        for sub_goal in pursue(ss.Escape(robot, patience=0.1, seed=seed), [0.0, 0.0], corner, [1.0] * 20)[
-            -5:
-        ]:
-            assert np.all(sub_goal <= corner)
-            assert np.any(sub_goal < corner - 0.01)
-
-
-def test_potentials_that_are_unknown_are_no_standstill(robot):
-    escape = ss.Escape(robot, patience=0.1)
-    pursue(escape, [0.5, 0.5], [-2.0, 2.0], [np.nan] * 100)
-    assert escape.count == 0
+        escape = ss.Escape(robot, patience=0.1, seed=seed)
+        sub_goals = pursue(escape, np.tile(corner, (13, 1)))[-1:]
+        assert np.all(sub_goals <= corner)
+        assert np.any(sub_goals < corner - 0.01)
 
 
 def test_sub_goals_repeat_with_the_seed_and_differ_without(robot):
     def run(seed):
-        return pursue(ss.Escape(robot, patience=0.1, seed=seed), [0.5, 0.5], [-2.0, 2.0], [1.0] * 40)
+        return pursue(ss.Escape(robot, patience=0.1, seed=seed), at_rest(40))
 
     np.testing.assert_array_equal(run(1), run(1))
     assert not np.array_equal(run(1), run(2))
+
+
+def test_a_pose_is_pursued_by_its_potential():
+    robot = ss.Robot.named("fr3_arm")
+    q = robot.neutral
+    goal = ss.PoseGoal(robot, robot.frames[-1].name, np.eye(4))
+    escape = ss.Escape(robot, patience=0.1)
+    unknown = [escape.pursue(goal, q, np.nan, PERIOD) for _ in range(50)]
+    falling = [escape.pursue(goal, q, u, PERIOD) for u in 0.9 ** np.arange(50)]
+    assert all(isinstance(followed, ss.PoseGoal) for followed in unknown + falling)
+    standing = [escape.pursue(goal, q, 1e-3, PERIOD) for _ in range(15)]
+    assert isinstance(standing[-1], ss.JointGoal)
+    assert escape.count == 1
 
 
 def test_escape_leads_an_arm_out_of_a_local_minimum():
