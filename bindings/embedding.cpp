@@ -156,14 +156,14 @@ void bind_embedding(nb::module_& m) {
           "__init__",
           [](SelfCollisionBarrier* self, const Robot& robot, const Body& body,
              const std::vector<std::pair<std::string, std::string>>& pairs, double activation, double strength,
-             double power, double floor, double temperature) {
+             double power, double floor, double temperature, double reach) {
             check_fitted_to(robot, body);
             new (self)
-                SelfCollisionBarrier(robot, body, pairs, {activation, strength, power, floor}, temperature);
+                SelfCollisionBarrier(robot, body, pairs, {activation, strength, power, floor}, temperature, reach);
           },
           nb::arg("robot"), nb::arg("body"), nb::arg("pairs"), nb::kw_only(), nb::arg("activation") = 0.05,
           nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
-          nb::arg("temperature") = 0.002);
+          nb::arg("temperature") = 0.002, nb::arg("reach") = 0.1);
 
   nb::class_<PlaneBarrier, Embedding>(
       m, "PlaneBarrier",
@@ -173,14 +173,14 @@ void bind_embedding(nb::module_& m) {
           "__init__",
           [](PlaneBarrier* self, const Robot& robot, const Body& body, const ArrayLike& point, const ArrayLike& normal,
              const std::vector<std::string>& links, double activation, double strength, double power, double floor,
-             double temperature) {
+             double temperature, double reach) {
             check_fitted_to(robot, body);
             new (self) PlaneBarrier(robot, body, as_vector(point, "point", 3), as_vector(normal, "normal", 3), links,
-                                    {activation, strength, power, floor}, temperature);
+                                    {activation, strength, power, floor}, temperature, reach);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("point"), nb::arg("normal"), nb::arg("links"),
           nb::arg("activation") = 0.05, nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
-          nb::arg("temperature") = 0.002);
+          nb::arg("temperature") = 0.002, nb::arg("reach") = 0.3);
 
   nb::class_<Sum, Embedding>(m, "Sum",
                              "Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).")

@@ -52,7 +52,8 @@ def test_sub_goal_that_gets_nearer_is_followed_for_its_leg(robot):
     assert first in (10, 11)
     sub_goal = np.array(escape.pursue(GOAL, AWAY, np.nan, PERIOD).position)
     # Comes nearer by 3 % a step, which is more than 5 % of the squared distance, but not within 0.2 rad.
-    states = sub_goal + 0.97 ** np.arange(60)[:, None]
+    assert np.abs(AWAY - sub_goal).max() * 0.97**50 > 0.2
+    states = sub_goal + (AWAY - sub_goal) * 0.97 ** np.arange(60)[:, None]
     away = np.any(pursue(escape, states) != GOAL, axis=1)
     assert away.sum() in (48, 49)
     assert not away[-1]

@@ -176,6 +176,12 @@ void check_temperature(double temperature, const char* owner) {
   }
 }
 
+void check_reach(double reach, const char* owner) {
+  if (!std::isfinite(reach)) {
+    throw std::invalid_argument(std::string(owner) + ": reach is " + std::to_string(reach) + " m, must be finite");
+  }
+}
+
 std::vector<BodyEllipsoid> of_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& link,
                                    const char* owner) {
   std::vector<BodyEllipsoid> found;
@@ -192,8 +198,9 @@ std::vector<BodyEllipsoid> of_link(const std::vector<BodyEllipsoid>& all, const 
 
 SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
                                            const std::vector<std::pair<std::string, std::string>>& pairs,
-                                           BarrierFunction barrier, double temperature)
-    : Barrier(robot, barrier, self_owner), temperature_(temperature) {
+                                           BarrierFunction barrier, double temperature, double reach)
+    : Barrier(robot, barrier, self_owner), temperature_(temperature), reach_(std::max(reach, barrier.activation)) {
+  check_reach(reach, self_owner);
   check_temperature(temperature, self_owner);
   if (pairs.empty()) {
     throw std::invalid_argument(std::string(self_owner) + ": there is no pair of links");
@@ -227,9 +234,9 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
     // The smallest clearance first: most pairs of links end here, and of the others only what lies near it matters.
-    double smallest = function().activation;
+    double smallest = reach_;
     pair.for_each_below(smallest, [&](const Side& /*a*/, const Side& /*b*/, double clearance) { smallest = clearance; });
-    if (!(smallest < function().activation)) {
+    if (!(smallest < reach_)) {
       continue;
     }
     BoltzmannMean mean(temperature_);
@@ -241,7 +248,7 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
       }
     });
     const ClearanceSample result = mean.result();
-    if (result.value < function().activation) {
+    if (result.value < reach_) {
       write(result, nearest, state, pairs_[i].first.joint, pairs_[i].second.joint, static_cast<Eigen::Index>(i),
             out.clearances);
     }
@@ -256,12 +263,14 @@ CoordinateLabel SelfCollisionBarrier::label(int k) const {
 
 PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point,
                            const Eigen::Vector3d& normal, const std::vector<std::string>& links,
-                           BarrierFunction barrier, double temperature)
+                           BarrierFunction barrier, double temperature, double reach)
     : Barrier(robot, barrier, plane_owner),
       normal_(normal.normalized()),
       offset_(normal_.dot(point)),
       temperature_(temperature),
+      reach_(std::max(reach, barrier.activation)),
       names_(links) {
+  check_reach(reach, plane_owner);
   check_temperature(temperature, plane_owner);
   if (!point.allFinite() || !normal.allFinite() || !(normal.norm() > 0.0)) {
     throw std::invalid_argument(std::string(plane_owner) + ": point and normal must be finite, and normal not zero");
@@ -294,7 +303,7 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
       const Placed placed(link_or_world(state, ellipsoid.joint), ellipsoid);
       const HalfWidth s = half_width(placed, normal_, zero, zero);
       const double value = normal_.dot(placed.centre) - offset_ - s.value;
-      if (!(value < function().activation + BoltzmannMean::window * temperature_) || !mean.matters(value)) {
+      if (!(value < reach_ + BoltzmannMean::window * temperature_) || !mean.matters(value)) {
         continue;
       }
       // δh = normal·δp + δθ·(normal × slope).
@@ -306,7 +315,7 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
     }
     if (!mean.empty()) {
       const ClearanceSample result = mean.result();
-      if (result.value < function().activation) {
+      if (result.value < reach_) {
         write(result, nearest, state, links_[i].front().joint, -1, k, out.clearances);
       }
     }

@@ -20,10 +20,11 @@ namespace sidestep {
 /// pairs of ellipsoids of two links are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp).
 class SelfCollisionBarrier final : public Barrier {
  public:
-  /// `pairs` name links. Throws std::invalid_argument if there is none, a link is unknown or has no ellipsoid, or the
+  /// `pairs` name links. Clearances are measured up to `reach` [m], at least to the activation distance, for what keeps
+  /// them, as in ClearanceBarrier. Throws std::invalid_argument if there is none, a link is unknown or has no ellipsoid, or the
   /// two are rigidly connected; or names the setting at fault.
   SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<std::pair<std::string, std::string>>& pairs,
-                       BarrierFunction barrier, double temperature = 0.002);
+                       BarrierFunction barrier, double temperature = 0.002, double reach = 0.1);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
@@ -42,7 +43,7 @@ class SelfCollisionBarrier final : public Barrier {
     Group first, second;
   };
 
-  double temperature_;
+  double temperature_, reach_;
   std::vector<Pair> pairs_;
 };
 
@@ -53,7 +54,8 @@ class PlaneBarrier final : public Barrier {
   /// point (3) [m] on the plane and normal (3) pointing to the free side, in the world; `links` to keep off it, each
   /// moved by a joint. Throws std::invalid_argument that names what is wrong.
   PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
-               const std::vector<std::string>& links, BarrierFunction barrier, double temperature = 0.002);
+               const std::vector<std::string>& links, BarrierFunction barrier, double temperature = 0.002,
+               double reach = 0.3);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
@@ -63,7 +65,7 @@ class PlaneBarrier final : public Barrier {
 
   Eigen::Vector3d normal_;
   double offset_;
-  double temperature_;
+  double temperature_, reach_;
   std::vector<std::vector<BodyEllipsoid>> links_;
   std::vector<std::string> names_;  // of the links
 };
