@@ -305,7 +305,7 @@ class SelfCollisionBarrier(Embedding):
     ClearanceBarrier; pairs: names of links.
     """
 
-    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002) -> None: ...
+    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.3) -> None: ...
 
 class PlaneBarrier(Embedding):
     """
@@ -313,7 +313,7 @@ class PlaneBarrier(Embedding):
     the plane, normal (3,) to the free side, in the world; other parameters as in ClearanceBarrier.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, point: numpy.typing.ArrayLike, normal: numpy.typing.ArrayLike, links: Sequence[str], activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, point: numpy.typing.ArrayLike, normal: numpy.typing.ArrayLike, links: Sequence[str], activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.3) -> None: ...
 
 class Sum(Embedding):
     """
@@ -788,7 +788,7 @@ class Escape:
     def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, potential: float, period: float) -> JointGoal | PoseGoal:
         """
         The goal to follow in a step of `period` [s]: the goal given, or a sub-goal. potential: `Step.goal_potential`
-        of the step before; NaN where there was none.
+        of the step before, NaN where there was none; it is used for poses, not for configurations.
         """
 
     @property
