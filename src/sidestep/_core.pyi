@@ -305,7 +305,7 @@ class SelfCollisionBarrier(Embedding):
     ClearanceBarrier; pairs: names of links.
     """
 
-    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.3) -> None: ...
+    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.1) -> None: ...
 
 class PlaneBarrier(Embedding):
     """
