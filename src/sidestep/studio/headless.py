@@ -153,7 +153,7 @@ def picture(page: Page) -> bytes:
             f"{CLOSE_NOTICE}; new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
         )
         clock.sleep(SEND_TIME)
-    return page.screenshot(timeout=1e3 * PICTURE_TIME)
+    return bytes(page.screenshot(timeout=1e3 * PICTURE_TIME))
 
 
 def check_files(screenshot: Path | None, video: Path | None) -> None:
