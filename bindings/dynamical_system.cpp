@@ -225,8 +225,8 @@ void bind_dynamical_system(nb::module_& m) {
             GeometricSystemSettings settings{as_square_matrix(stiffness, "stiffness", nv),
                                              as_square_matrix(damping, "damping", nv),
                                              as_enum<DampingForm>(damping_form, "damping_form"),
-                                             as_enum<PullForm>(pull_form, "pull_form"),
                                              as_switch(combination)};
+            settings.pull_form = as_enum<PullForm>(pull_form, "pull_form");
             if (recovery != nullptr) {
               settings.recovery = *recovery;
             }

@@ -25,11 +25,11 @@ struct GeometricSystemSettings {
   Eigen::MatrixXd stiffness;                      ///< K (nv × nv) [1/s²], symmetric positive semi-definite
   Eigen::MatrixXd damping;                        ///< D (nv × nv) [1/s], the same
   DampingForm damping_form = DampingForm::plain;
-  PullForm pull_form = PullForm::metric;
   Switch combination = Unswitched{};
   double fallback_rate = 10.0;                    ///< [1/s] the damped stop of the fallback is q̈ = −rate v
   Recovery recovery = {};                         ///< what a barrier does with an arm inside it
   std::optional<SpeedRegulator> speed = {};       ///< adds β v to the acceleration; none if empty
+  PullForm pull_form = PullForm::metric;
 };
 
 /// What a step of the system says about its result.
