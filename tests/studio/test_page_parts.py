@@ -13,18 +13,18 @@ from sidestep.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS, build_system
 from sidestep.studio.page import colours
+from sidestep.studio.page.arm import reach
 from sidestep.studio.page.marks import METRIC_SIZE, metric_ellipsoid
 from sidestep.studio.page.obstacles import FASTEST_THROW, throw_velocity
 from sidestep.studio.page.recorder import as_npz
 from sidestep.studio.page.surface import (
     CELLS,
-    PLACE,
     SIDE,
     TOP,
     Request,
-    grid_faces,
     heights_over,
     on_surface,
+    open_faces,
     seen,
 )
 from sidestep.studio.session import Session
@@ -45,17 +45,24 @@ def test_the_surface_is_the_embedding_over_two_joints(make_session: MakeSession,
     request = Request(robot, body, method, numbers, (0, 1), snapshot.q, points, radii)
     heights = heights_over(request, system)
     axis = np.linspace(-np.pi, np.pi, CELLS + 1)  # planar2 turns from -pi to pi
-    q = axis[[25, 14]]
+    q = axis[[35, 22]]
     psi = system.acceleration(q, np.zeros(2), q, Obstacles(points, radii)).values
-    assert heights[25, 14] == pytest.approx(abs(psi[0]), rel=1e-12)
-    place = on_surface(robot, (0, 1), q, heights) - np.array(PLACE)
+    assert heights[35, 22] == pytest.approx(abs(psi[0]), rel=1e-12)
+    place = on_surface(robot, (0, 1), q, heights)
     scale = SIDE / (2.0 * np.pi)
     np.testing.assert_allclose(
-        place, [q[0] * scale, q[1] * scale, min(heights[25, 14] * scale, TOP)], atol=1e-12
+        place, [q[0] * scale, q[1] * scale, min(heights[35, 22] * scale, TOP)], atol=1e-12
     )
-    faces = grid_faces()
-    assert len(faces) == 2 * CELLS**2
-    assert faces.max() == (CELLS + 1) ** 2 - 1
+
+
+def test_the_surface_is_open_where_it_is_cut_off() -> None:
+    z = np.zeros((3, 4))
+    assert len(open_faces(z)) == 2 * 2 * 3
+    assert open_faces(z).max() == 11
+    z[0, 0] = TOP  # a corner, of both triangles of its cell
+    faces = open_faces(z)
+    assert len(faces) == 2 * 2 * 3 - 2
+    assert 0 not in faces
 
 
 def test_a_surface_is_computed_again_only_when_it_would_look_different(
@@ -79,10 +86,10 @@ def test_the_metric_of_flat_space_is_drawn_at_full_size() -> None:
     robot = Robot.named("planar3")
     q = np.array([0.3, 0.5, -0.4])
     pose, axes = metric_ellipsoid(robot, "tip", q, np.eye(3))
-    assert axes.max() == pytest.approx(METRIC_SIZE, rel=1e-9)
+    assert axes.max() == pytest.approx(METRIC_SIZE * reach(robot), rel=1e-9)
     np.testing.assert_allclose(pose[:3, 3], robot.pose(q, "tip")[:3, 3])
     _, smaller = metric_ellipsoid(robot, "tip", q, 4.0 * np.eye(3))
-    assert smaller.max() == pytest.approx(0.5 * METRIC_SIZE, rel=1e-9)  # G = 4: half the speed
+    assert smaller.max() == pytest.approx(0.5 * METRIC_SIZE * reach(robot), rel=1e-9)  # G = 4: half the speed
 
 
 def test_links_change_colour_towards_contact() -> None:

@@ -32,8 +32,7 @@ FLAGS = (  # WebGL without a graphics card; a container has no sandbox of its ow
 LOAD_TIME = 90.0  # [s] at most until the page shows the scene
 BODY_TIME = 1800.0  # [s] at most until the body is made, the first time
 PICTURE_TIME = 180.0  # [s] at most for one picture: without a graphics card each takes seconds
-SEND_TIME = 0.3  # [s] in which a state is on the page
-PLOT_TIME = 1.0  # [s] in which the plots have caught up
+MOMENT = 5e-3  # [s] longer than a control period, in whose middle a pause may fall
 FRAME = 0.25  # [s] of simulated time between two pictures of an animation
 CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
   if (notice.innerText.includes('Software WebGL')) notice.querySelector('button')?.click()"""  # of viser
@@ -121,38 +120,43 @@ def take_pictures(
     with browser() as chromium, Studio(scenario, method=method, port=0, ellipsoids=ellipsoids) as studio:
         studio.wait_ready(BODY_TIME)
         page = open_page(chromium, studio.address, window)
-        studio.send(m.Restart())
-        studio.send(m.SetRunning(False))
+        studio.send(m.Restart(until=0.0))
         frames: list[Image.Image] = []
         for time in np.arange(0.0, duration if video is not None else 0.0, FRAME):
             run_until(studio, float(time))
-            frames.append(Image.open(io.BytesIO(picture(page))).convert("RGB"))
+            frames.append(Image.open(io.BytesIO(picture(studio, page))).convert("RGB"))
         run_until(studio, duration)
         if screenshot is not None:
-            clock.sleep(PLOT_TIME)
-            screenshot.write_bytes(picture(page))
+            screenshot.write_bytes(picture(studio, page))
         if video is not None:
             save_animation(frames, video)
 
 
 def run_until(studio: Studio, time: float) -> None:
-    """Lets the loop run to a simulated time [s] and pauses it there; raises RuntimeError when it ends before."""
+    """Lets the loop run to a simulated time [s] and pauses it there; the page shows state and clearances of that time.
+
+    Raises:
+        RuntimeError: the loop ends before. TimeoutError: it takes longer than `PICTURE_TIME`.
+    """
     from sidestep.studio import messages as m
 
+    end = clock.monotonic() + PICTURE_TIME
     studio.send(m.SetRunning(time > 0.0, until=time))
-    while studio.snapshot is None or studio.snapshot.running or abs(studio.snapshot.time - time) > 0.01:
+    while not np.allclose(studio.view.shown, time, rtol=0.0, atol=MOMENT):
         if studio.error:
             raise RuntimeError(studio.error)
+        if clock.monotonic() > end:
+            raise TimeoutError(f"the loop has not come to {time:.2f} s within {PICTURE_TIME:.0f} s")
         clock.sleep(0.01)
 
 
-def picture(page: Page) -> bytes:
+def picture(studio: Studio, page: Page) -> bytes:
     """What the page shows, as PNG, once it has drawn what it was last sent."""
-    for _ in range(2):
-        page.evaluate(
-            f"{CLOSE_NOTICE}; new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
-        )
-        clock.sleep(SEND_TIME)
+    stamp = studio.view.stamp()
+    page.wait_for_selector(f"#words[data-stamp='{stamp}']", timeout=1e3 * PICTURE_TIME)
+    page.evaluate(
+        f"{CLOSE_NOTICE}; new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )
     return bytes(page.screenshot(timeout=1e3 * PICTURE_TIME))
 
 

@@ -90,7 +90,9 @@ class SetRecording:
 
 @dataclass(frozen=True)
 class Restart:
-    """Back to the start: arm, obstacles and time."""
+    """Back to the start: arm, obstacles and time; it pauses at simulated time `until` [s]."""
+
+    until: float = float("inf")
 
 
 @dataclass(frozen=True)

@@ -145,8 +145,9 @@ class Session:
             case m.SetRecording(recording):
                 self._recording = recording
                 self._rows.clear()
-            case m.Restart():
+            case m.Restart(until):
                 self._begin()
+                self.running, self._until = until > 0.0, until
             case m.Load(scenario):
                 self._load(scenario)
             case m.Seen():

@@ -132,9 +132,9 @@ class Studio:
                     self.error = note.message
                 self.view.tell(note)
             if snapshot is not None:
-                self.snapshot = snapshot
                 self.view.take_rows(self._loop.take_rows())
                 self.view.show(snapshot)
+                self.snapshot = snapshot  # after it is on the page
                 now = clock.monotonic()
                 if now - last_truth > STEP_OF_TRUTH and self.view.robot.num_coordinates == len(snapshot.q):
                     last_truth = now

@@ -23,6 +23,7 @@ Array = npt.NDArray[np.float64]
 MOST_TRIANGLES = 60_000  # of an arm: a megabyte or two for each browser
 FIRST_CELL = 1e-3  # [m] detail that is given up first
 SHARP = 0.6  # [rad] edges sharper than this stay edges
+LEAST_REACH = 0.3  # [m] what the page is laid out for at least
 TWO_DEVIATIONS = 4.0  # level of the ellipsoids of a body that is not calibrated: two standard deviations
 
 
@@ -127,6 +128,12 @@ class BodyView:
         """Takes it out of the scene."""
         for batch in self._batches:
             batch.remove()
+
+
+def reach(robot: Robot) -> float:
+    """Distance [m] from the world's origin to the farthest frame at rest, at least `LEAST_REACH`."""
+    places = [robot.pose(robot.neutral, frame.name)[:3, 3] for frame in robot.frames]
+    return max(LEAST_REACH, *(float(np.linalg.norm(place)) for place in places))
 
 
 def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:

@@ -22,7 +22,7 @@ GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
 TRAIL = palette.GREEN
 BODY = palette.ORANGE
-METRIC = palette.SKY
+METRIC = palette.YELLOW
 SURFACE = "#B7C3A5"
 LINK, BASE = "#CBD3DE", "#9AA2AE"
 
@@ -36,10 +36,10 @@ LEGEND = (
         f"link near an obstacle (full colour: touching, fades out at {100 * NEAR_FROM:.0f} cm); nearest line",
     ),
     (OBSTACLE, "obstacle"),
-    (GOAL, "goal: ghost arm and gizmo"),
+    (GOAL, "goal: ghost arm; the gizmo at its tip has the colours of the axes"),
     (TRAIL, "where the tip has been; on the surface, where the joints are and have been"),
     (BODY, "body: the ellipsoids that the controller sees"),
-    (SURFACE, "configuration space, curved by ψ; cut off at the top"),
+    (SURFACE, "configuration space, curved by ψ; open where it is steep and high"),
     (METRIC, "metric: how freely the tip can move in each direction"),
 )
 

@@ -12,7 +12,7 @@ from sidestep._core import GeometricSystem, JointType, Obstacles, PoseGoal, is_f
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.studio import messages as m
-from sidestep.studio.page.arm import ArmView
+from sidestep.studio.page.arm import ArmView, reach
 from sidestep.studio.page.obstacles import gizmo_pose
 
 if TYPE_CHECKING:
@@ -38,11 +38,8 @@ class GoalControl:
         self._flat = GeometricSystem([], robot=robot, stiffness=4.0, damping=4.0)
         self.q = np.array(robot.neutral)
         self.ghost = ArmView(server, robot, "/goal", ghost=True)
-        reach = max(
-            float(np.linalg.norm(robot.pose(robot.neutral, frame.name)[:3, 3])) for frame in robot.frames
-        )
         self.gizmo = server.scene.add_transform_controls(
-            "/goal_gizmo", scale=GIZMO_SIZE * max(reach, 0.3), depth_test=False, line_width=3.0
+            "/goal_gizmo", scale=GIZMO_SIZE * reach(robot), depth_test=False, line_width=3.0
         )
         self.kind = server.gui.add_markdown("")
         self._sliders: list[Any] = []

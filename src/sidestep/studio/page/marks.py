@@ -13,6 +13,7 @@ from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.clearance import Clearance
 from sidestep.studio.page import colours
+from sidestep.studio.page.arm import reach
 
 if TYPE_CHECKING:
     import viser
@@ -21,8 +22,10 @@ Array = npt.NDArray[np.float64]
 
 TRAIL_POINTS = 150
 TRAIL_STEP = 0.01  # [m] of the tip between two points
-METRIC_SIZE = 0.15  # [m] half axis of the metric's ellipsoid where the tip moves as freely as in flat space
-THINNEST = 0.004  # [m] half axis that can still be seen
+METRIC_SIZE = (
+    0.25  # of the reach: half axis of the metric's ellipsoid where the tip moves as freely as in flat space
+)
+THINNEST = 0.05  # of the longest half axis: what can still be seen
 
 
 class Marks:
@@ -49,7 +52,7 @@ class Marks:
             unit.vertices.astype(np.float32),
             unit.faces.astype(np.uint32),
             color=colours.rgb(colours.METRIC),
-            opacity=0.45,
+            opacity=0.7,
             cast_shadow=False,
             receive_shadow=False,
             visible=False,
@@ -80,7 +83,7 @@ class Marks:
 
     def show_metric(self, q: Array, metric: Array, *, visible: bool) -> None:
         """The velocities of the tip that a joint velocity of metric length 1 gives: J G^-1 J^T, scaled so that
-        the longest half axis in flat space (G = 1) is `METRIC_SIZE`."""
+        the longest half axis in flat space (G = 1) is `METRIC_SIZE` of the reach."""
         self.metric.visible = visible
         if visible:
             pose, half_axes = metric_ellipsoid(self._robot, self._tip, q, metric)
@@ -97,11 +100,11 @@ class Marks:
 def metric_ellipsoid(robot: Robot, tip: str, q: Array, metric: Array) -> tuple[Array, Array]:
     """Pose (4, 4) and half axes (3,) [m] of the ellipsoid at the tip, see `Marks.show_metric`."""
     J = robot.jacobian(q, tip)[:3]
-    flat = float(np.linalg.norm(J, 2))
+    flat, size = float(np.linalg.norm(J, 2)), METRIC_SIZE * reach(robot)
     values, axes = np.linalg.eigh(J @ np.linalg.solve(metric, J.T))
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = axes, robot.pose(q, tip)[:3, 3]
-    lengths = np.sqrt(np.maximum(values, 0.0)) * (METRIC_SIZE / flat if flat > 0.0 else 0.0)
-    return pose, np.maximum(lengths, THINNEST)
+    lengths = np.sqrt(np.maximum(values, 0.0)) * (size / flat if flat > 0.0 else 0.0)
+    return pose, np.maximum(lengths, THINNEST * size)

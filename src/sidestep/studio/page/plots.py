@@ -37,7 +37,7 @@ class Plots:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._rows: deque[tuple[float, ...]] = deque()
-        self._drawn = 0.0
+        self._drawn, self._stale = 0.0, False
         self._handles: list[Any] = []
         start = np.array([-SPAN, 0.0])
         for _, title, _, colour in PLOTS:
@@ -59,8 +59,8 @@ class Plots:
         """Takes what is plotted; a time before the last one (a restart) begins anew."""
         if self._rows and snapshot.time < self._rows[-1][0]:
             self._rows.clear()
-        if self._rows and snapshot.time == self._rows[-1][0]:
-            return
+        if not snapshot.status[0] or (self._rows and snapshot.time == self._rows[-1][0]):
+            return  # there was no step yet, or none since
         height = float(np.linalg.norm(snapshot.values))
         self._rows.append(
             (
@@ -72,20 +72,23 @@ class Plots:
                 snapshot.timing.p99,
             )
         )
+        self._stale = True
         while self._rows[-1][0] - self._rows[0][0] > SPAN:
             self._rows.popleft()
 
-    def draw(self, now: float) -> None:
-        """Sends the plots, not more often than `EVERY`."""
-        if now - self._drawn < EVERY or len(self._rows) < 2:
+    def draw(self, now: float, *, at_once: bool = False) -> None:
+        """Sends the plots if there is something new, not more often than `EVERY` unless `at_once`."""
+        if not self._stale or len(self._rows) < 2 or (now - self._drawn < EVERY and not at_once):
             return
-        self._drawn = now
+        self._drawn, self._stale = now, False
         columns = np.array(self._rows).T
         before_now = (
             columns[0] - columns[0, -1]
         )  # the scales stay as they are: changing them is slow in the browser
         for handle, values, (_, _, factor, _) in zip(self._handles, columns[1:], PLOTS, strict=True):
-            handle.data = (before_now, factor * values)
+            known = np.isfinite(values)  # a single unknown value would empty the plot
+            if known.sum() > 1:
+                handle.data = (before_now[known], factor * values[known])
 
     @property
     def rows(self) -> Array:

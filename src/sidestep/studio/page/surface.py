@@ -13,20 +13,28 @@ import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, Obstacles
 from sidestep.body import Body
+from sidestep.pose import from_roll_pitch_yaw, pose_at, pose_vector
 from sidestep.robot import Robot
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import Method, Numbers, build_system, method_named
 from sidestep.studio.page import colours
+from sidestep.studio.page.arm import reach
 
 if TYPE_CHECKING:
     import viser
 
 Array = npt.NDArray[np.float64]
 
-CELLS = 40  # along each joint
+CELLS = 60  # along each joint: 6 degrees of a joint that turns all the way round
 SIDE = 1.2  # [m] of the surface in the scene
-TOP = 0.6  # [m] above the plane at which hills are cut off
-PLACE = (-0.9, 1.3, 0.02)  # [m] of its middle in the scene: beside the arm, behind it as the page opens
+TOP = 0.3  # [m] above the plane at which hills are cut off, and open: the walls at joint limits would hide the rest
+GAP = 0.1  # [m] between the surface and what the arm can reach
+BEHIND = (
+    -0.93,
+    0.36,
+    0.0,
+)  # direction from the arm to the surface: behind the arm, on the left as the page opens
+TURN, TILT = 0.9, 0.5  # [rad] of the surface about the vertical and then its own x, towards who looks
 LEAST_MOVE = 0.004  # [m] of an obstacle, or [rad] of a joint that is held, before it is computed again
 PAUSE = 0.3  # [s] at least between two of them: the page has other things to do
 TRAIL_POINTS = 300
@@ -99,8 +107,8 @@ class Surface:
 
     def clear(self) -> None:
         """Takes everything out of the scene."""
-        for part in self._parts.values():
-            part.remove()
+        if "root" in self._parts:
+            self._parts["root"].remove()
         self._parts, self._heights, self._request, self._done = {}, None, None, None
         self._trail.clear()
 
@@ -139,26 +147,27 @@ class Surface:
 
     def _show_surface(self, request: Request, heights: Array) -> None:
         x, y = (np.linspace(-0.5 * SIDE, 0.5 * SIDE, CELLS + 1) for _ in range(2))
-        z = np.minimum(heights * scale(request.robot, request.joints), TOP)
-        grid = np.stack([*np.meshgrid(x, y, indexing="ij"), z], axis=-1).reshape(-1, 3)
-        vertices = (grid + np.array(PLACE)).astype(np.float32)
+        z = heights * scale(request.robot, request.joints)
+        grid = np.stack([*np.meshgrid(x, y, indexing="ij"), np.minimum(z, TOP)], axis=-1).reshape(-1, 3)
+        vertices, faces = grid.astype(np.float32), open_faces(z)
         if "surface" in self._parts:
-            self._parts["surface"].vertices = vertices
+            self._parts["surface"].vertices, self._parts["surface"].faces = vertices, faces
             return
+        where = pose_vector(placement(request.robot))
+        self._parts["root"] = self._server.scene.add_frame(
+            "/surface", show_axes=False, position=where[:3], wxyz=where[3:]
+        )
         self._parts["surface"] = self._server.scene.add_mesh_simple(
-            "/surface/mesh",
-            vertices,
-            grid_faces(),
-            color=colours.rgb(colours.SURFACE),
-            side="double",
-            opacity=0.9,
+            "/surface/mesh", vertices, faces, color=colours.rgb(colours.SURFACE), side="double"
         )
-        names = [request.robot.coordinate_names[k] for k in request.joints]
-        self._parts["label"] = self._server.scene.add_label(
-            "/surface/label",
-            f"ψ over {names[0]} (→) and {names[1]} (↗)",
-            position=np.array(PLACE) + np.array([0.0, -0.5 * SIDE - 0.08, 0.0]),
-        )
+        for k, (joint, side) in enumerate(
+            zip(request.joints, ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0)), strict=True)
+        ):
+            self._parts[f"label{k}"] = self._server.scene.add_label(
+                f"/surface/label{k}",
+                request.robot.coordinate_names[joint],
+                position=(0.5 * SIDE + 0.06) * np.array(side),
+            )
 
     def _show_state(self, snapshot: Snapshot, robot: Robot, joints: tuple[int, int]) -> None:
         assert self._heights is not None
@@ -207,6 +216,13 @@ def ranges(robot: Robot, joints: tuple[int, int]) -> tuple[Array, Array]:
     return np.array(lower[pick]), np.array(upper[pick])
 
 
+def placement(robot: Robot) -> Array:
+    """Where the surface is in the scene, pose (4, 4) of its middle: behind all that the arm can reach, tilted."""
+    middle = (reach(robot) + GAP + 0.5 * SIDE) * np.array(BEHIND)
+    middle[2] = 0.5 * SIDE * np.sin(TILT)  # its lower edge lies on the floor
+    return pose_at(middle, from_roll_pitch_yaw([TILT, 0.0, TURN]))
+
+
 def scale(robot: Robot, joints: tuple[int, int]) -> float:
     """Metres in the scene per radian of the longer of two joints; psi is drawn on the same scale."""
     lower, upper = ranges(robot, joints)
@@ -227,7 +243,7 @@ def heights_over(request: Request, system: GeometricSystem) -> Array:
 
 
 def on_surface(robot: Robot, joints: tuple[int, int], q: Array, heights: Array) -> Array:
-    """The place (3,) in the scene of a configuration (nv,) on the surface, between the corners of its cell."""
+    """The place (3,) on the surface, in its frame, of a configuration (nv,): between the corners of its cell."""
     lower, upper = ranges(robot, joints)
     share = np.clip((np.asarray(q)[list(joints)] - lower) / (upper - lower), 0.0, 1.0)
     cell = np.minimum((share * CELLS).astype(int), CELLS - 1)
@@ -235,15 +251,12 @@ def on_surface(robot: Robot, joints: tuple[int, int], q: Array, heights: Array) 
     corners = heights[i : i + 2, k : k + 2]
     height = np.array([1.0 - f, f]) @ corners @ np.array([1.0 - g, g])
     z = min(float(height) * scale(robot, joints), TOP)
-    place: Array = np.array([(share[0] - 0.5) * SIDE, (share[1] - 0.5) * SIDE, z]) + np.array(PLACE)
-    return place
+    return np.array([(share[0] - 0.5) * SIDE, (share[1] - 0.5) * SIDE, z])
 
 
-def grid_faces() -> npt.NDArray[np.uint32]:
-    """Triangles of a grid of (CELLS + 1)^2 vertices."""
-    index = np.arange((CELLS + 1) ** 2).reshape(CELLS + 1, CELLS + 1)
+def open_faces(z: Array) -> npt.NDArray[np.uint32]:
+    """Triangles of a grid of heights z (n, n) [m] that lie below `TOP`."""
+    index = np.arange(z.size).reshape(z.shape)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate(
-        [np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([a, c, d], axis=-1).reshape(-1, 3)]
-    )
-    return faces.astype(np.uint32)
+    faces = np.stack([[a, b, c], [a, c, d]]).transpose(0, 2, 3, 1).reshape(-1, 3)
+    return faces[(z.ravel()[faces] < TOP).all(axis=1)].astype(np.uint32)

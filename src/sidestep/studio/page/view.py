@@ -15,12 +15,12 @@ import numpy as np
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import load_robot
+from sidestep.scenario.assembly import coordinates, load_robot
 from sidestep.simulation.clearance import Clearance
 from sidestep.studio import messages as m
 from sidestep.studio.methods import THESIS_COMPONENTS, method_named
 from sidestep.studio.page import colours
-from sidestep.studio.page.arm import ArmView, BodyView
+from sidestep.studio.page.arm import ArmView, BodyView, reach
 from sidestep.studio.page.goal import GoalControl
 from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacle_panel import ObstaclePanel
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 
 WORDS_EVERY = 0.15  # [s] nobody reads faster
 GRID_DEPTH = 0.05  # [m] below the base: a planar arm, half as thick, does not lie in the grid
+VIEW_DIRECTION = (0.63, -0.50, 0.59)  # unit vector from the arm to the camera
+VIEW_DISTANCE = 1.6  # of the arm's reach
+SKY_LIGHT = 3.2  # so that lit faces have about the colour that the legend shows
 MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 365, 290, 122  # [px]
 
 
@@ -55,16 +58,19 @@ class View:
         self._server, self._send, self._ellipsoids = server, send, ellipsoids
         self._lock = threading.RLock()
         self._clearances: tuple[Clearance, ...] = ()
+        self._measured = np.nan  # [s] simulated time of the clearances
+        self.shown = (np.nan, np.nan)  # [s] simulated times of state and clearances on the page
+        self._stamp, self._text = 0, in_box("preparing …")
         self.least_clearance = np.inf
         self.last: m.Snapshot | None = None
         self._edition = -1
         self._told = 0.0
-        self._set_up_scene(scenario)
+        self._set_up_scene(scenario, robot)
         gui = server.gui
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         panel = gui.add_panel()
         with panel.add_tab("Now"):
-            self._words: Any = gui.add_html(in_box("preparing …"))
+            self._words: Any = gui.add_html(stamped(self._text, 0))
             self.plots = Plots(server)
         panel.dock_left()
         panel.set_width(PLOT_WIDTH)
@@ -129,7 +135,7 @@ class View:
                 self.obstacles.set_things(row.things)
                 self.obstacles.show(row.things, row.poses)
                 self.arm.show(row.q)
-                self._words.content = in_box(f"Replay, {row.time:.2f} s.")
+                self._say(in_box(f"Replay, {row.time:.2f} s."))
                 return
             self.obstacles.set_things(snapshot.things)
             self.obstacles.show(snapshot.things, snapshot.poses)
@@ -145,11 +151,21 @@ class View:
             now = clock.monotonic()
             self.plots.draw(now)
             self._show_words(snapshot)
+            self.shown = snapshot.time, self._measured
+
+    def stamp(self) -> int:
+        """Sends what is not sent yet, and a number after it: a browser that has the number has all of it."""
+        with self._lock:
+            self.plots.draw(clock.monotonic(), at_once=True)
+            self._told = 0.0
+            self._stamp += 1
+            self._say(self._text)
+            return self._stamp
 
     def take_clearances(self, found: tuple[Clearance, ...], time: float) -> None:
         """What the exact meshes say, nearest first."""
         with self._lock:
-            self._clearances = found
+            self._clearances, self._measured = found, time
             if found:
                 self.least_clearance = min(self.least_clearance, found[0].distance)
 
@@ -162,10 +178,10 @@ class View:
         """Shows what the loop has to say beside its state."""
         with self._lock:
             if isinstance(note, m.Preparing):
-                self._words.content = in_box(f"preparing: {html.escape(note.note)} …")
+                self._say(in_box(f"preparing: {html.escape(note.note)} …"))
                 return
             if note.fatal:
-                self._words.content = in_box(f"The loop ended: {html.escape(note.message)}")
+                self._say(in_box(f"The loop ended: {html.escape(note.message)}"))
         for client in self._server.get_clients().values():
             client.add_notification("Not possible", note.message, color="red", auto_close_seconds=8.0)
 
@@ -190,12 +206,16 @@ class View:
         touch = (
             f"touches {html.escape(', '.join(snapshot.contacts))}" if snapshot.contacts else "touches nothing"
         )
-        facts.append(f"{touch} · {snapshot.time:.1f} s · {snapshot.timing.real_time:.2f} × real time")
-        content = in_box(f"{html.escape(words)}.", "<br>".join(facts))
+        speed = f" · {snapshot.timing.real_time:.2f} × real time" if snapshot.running else ""
+        facts.append(f"{touch} · {snapshot.time:.1f} s{speed}")
+        self._say(in_box(f"{html.escape(words)}.", "<br>".join(facts)))
+
+    def _say(self, text: str) -> None:
+        self._text, content = text, stamped(text, self._stamp)
         if content != self._words.content:
             self._words.content = content
 
-    def _set_up_scene(self, scenario: Scenario) -> None:
+    def _set_up_scene(self, scenario: Scenario, robot: Robot) -> None:
         scene = self._server.scene
         scene.set_up_direction("+z")
         scene.add_grid(
@@ -207,8 +227,22 @@ class View:
             shadow_opacity=0.2,
             position=(0.0, 0.0, -GRID_DEPTH),
         )
-        self._server.initial_camera.position = (1.75, -1.45, 1.25)
-        self._server.initial_camera.look_at = (0.15, 0.1, 0.4)
+        # Light without an environment map: such a map tints the colours, and takes seconds to prepare in a browser
+        # without a graphics card.
+        scene.configure_environment_map(hdri=None)
+        scene.add_light_hemisphere(
+            "/light", sky_color=(255, 255, 255), ground_color=(170, 170, 170), intensity=SKY_LIGHT
+        )
+        self._point_camera(scenario, robot)
+
+    def _point_camera(self, scenario: Scenario, robot: Robot) -> None:
+        """Where a new window looks from: the arm fills it at start and goal."""
+        ends = [coordinates(state, robot, "state") for state in (scenario.start, scenario.goal)]
+        places = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
+        middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+        camera = self._server.initial_camera
+        camera.look_at = tuple(middle)
+        camera.position = tuple(middle + VIEW_DISTANCE * reach(robot) * np.array(VIEW_DIRECTION))
 
     def _add_switches(self) -> None:
         gui = self._server.gui
@@ -285,7 +319,12 @@ class View:
 def in_box(words: str, facts: str = "") -> str:
     """Words about the state above smaller facts, always equally high, so that nothing below moves."""
     return (
-        f'<div id="words" style="height:{WORDS_HEIGHT}px;overflow:hidden;padding:2px 10px;line-height:1.35">'
+        f'<div style="height:{WORDS_HEIGHT}px;overflow:hidden;padding:2px 10px;line-height:1.35">'
         f'<div style="font-size:15px;font-weight:600">{words}</div>'
         f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
     )
+
+
+def stamped(text: str, stamp: int) -> str:
+    """The words with a number by which it is known that a browser has them."""
+    return f'<div id="words" data-stamp="{stamp}">{text}</div>'
