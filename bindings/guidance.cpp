@@ -237,7 +237,7 @@ void bind_guidance(nb::module_& m) {
              std::uint64_t seed) {
             const Eigen::VectorXd from = p.configuration(start, "start"), to = p.configuration(goal, "goal");
             const nb::gil_scoped_release release;
-            return p.planner().plan(from, to, PointIndex(obstacles), seed);
+            return p.planner().plan(from, to, obstacles, seed);
           },
           nb::arg("start"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(), nb::arg("seed") = 0,
           "A path from start (nv,) to goal (nv,) [rad] among the obstacles where they are now.")
@@ -245,7 +245,7 @@ void bind_guidance(nb::module_& m) {
           "clearance",
           [](PathPlanner& p, const ArrayLike& q, const Obstacles& obstacles, double cap) {
             const BodyClearance::Nearest n =
-                p.body().nearest(p.configuration(q, "q"), PointIndex(obstacles), cap, p.planner().workspace());
+                p.body().nearest(p.configuration(q, "q"), obstacles, cap, p.planner().workspace());
             return ClearanceReport{n.clearance, n.item < 0 ? CoordinateLabel{} : p.body().label(n.item), n.point};
           },
           nb::arg("q"), nb::arg("obstacles"), nb::kw_only(), nb::arg("cap") = 1.0,
@@ -253,7 +253,7 @@ void bind_guidance(nb::module_& m) {
       .def(
           "is_free",
           [](PathPlanner& p, const ArrayLike& q, const Obstacles& obstacles, std::optional<double> margin) {
-            return p.body().free(p.configuration(q, "q"), PointIndex(obstacles), p.margins(margin),
+            return p.body().free(p.configuration(q, "q"), obstacles, p.margins(margin),
                                  p.planner().workspace());
           },
           nb::arg("q"), nb::arg("obstacles"), nb::kw_only(), nb::arg("margin") = nb::none(),
@@ -262,7 +262,7 @@ void bind_guidance(nb::module_& m) {
           "is_edge_free",
           [](PathPlanner& p, const ArrayLike& a, const ArrayLike& b, const Obstacles& obstacles,
              std::optional<double> margin) {
-            return p.body().edge_free(p.configuration(a, "a"), p.configuration(b, "b"), PointIndex(obstacles),
+            return p.body().edge_free(p.configuration(a, "a"), p.configuration(b, "b"), obstacles,
                                       p.margins(margin), p.planner().workspace());
           },
           nb::arg("a"), nb::arg("b"), nb::arg("obstacles"), nb::kw_only(), nb::arg("margin") = nb::none(),

@@ -7,13 +7,35 @@
 #include <limits>
 #include <stdexcept>
 
+#include "kernels/distance_kernel.hpp"
+#include "sidestep/embedding/instruction_set.hpp"
+
 namespace sidestep {
 namespace {
 
 constexpr const char* owner = "body clearance";
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion halved down to 1 mm
+constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
 constexpr double closest_centres = 1e-6;      // [m] as for SelfCollisionBarrier
+
+kernels::Distances distances_kernel() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  switch (instruction_set()) {
+    case InstructionSet::avx512: return kernels::distances_avx512;
+    case InstructionSet::avx2: return kernels::distances_avx2;
+    case InstructionSet::baseline: break;
+  }
+#endif
+  return kernels::distances_baseline;
+}
+
+kernels::PlacedEllipsoid placed(const Eigen::Vector3d& centre, const Eigen::Matrix3d& axes, const Eigen::Vector3d& squares) noexcept {
+  kernels::PlacedEllipsoid ellipsoid;
+  Eigen::Map<Eigen::Vector3d>(ellipsoid.centre) = centre;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(ellipsoid.axes) = axes;
+  Eigen::Map<Eigen::Vector3d>(ellipsoid.squares) = squares;
+  return ellipsoid;
+}
 
 double across(const Eigen::Vector3d& offset, const Eigen::Vector3d& axis) { return offset.cross(axis).norm(); }
 
@@ -100,8 +122,7 @@ int BodyClearance::add_link(const std::vector<BodyEllipsoid>& all, const Body& b
   for (const BodyEllipsoid& e : all) {
     if (body.links[static_cast<std::size_t>(e.component)] == name) {
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(e.shape);
-      link.ellipsoids.push_back({e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues().cwiseInverse(), e.shape,
-                                 e.extent});
+      link.ellipsoids.push_back({e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), e.shape, e.extent});
       link.centre += e.mean;
     }
   }
@@ -178,7 +199,7 @@ const BodyClearance::Workspace::Pose& BodyClearance::pose(const Workspace& w, in
   return joint < 0 ? world : w.poses_[static_cast<std::size_t>(joint)];
 }
 
-BodyClearance::Found BodyClearance::look(const Item& item, const PointIndex& points, double cap, double stop,
+BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obstacles, double cap, double stop,
                                          const Workspace& w) const noexcept {
   const Link& link = links_[static_cast<std::size_t>(item.link)];
   if (item.other >= 0) {
@@ -187,40 +208,34 @@ BodyClearance::Found BodyClearance::look(const Item& item, const PointIndex& poi
   if (item.plane >= 0) {
     return {look_at_plane(link, planes_[static_cast<std::size_t>(item.plane)], cap, w), -1};
   }
-  return look_at_points(link, points, cap, stop, w);
+  return look_at_points(link, obstacles, cap, stop, w);
 }
 
-BodyClearance::Found BodyClearance::look_at_points(const Link& link, const PointIndex& points, double cap, double stop,
+BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obstacles& obstacles, double cap, double stop,
                                                    const Workspace& w) const noexcept {
   const Workspace::Pose& X = pose(w, link.joint);
+  const PointTree& tree = obstacles.tree();
+  const kernels::Distances distances = distances_kernel();
+  const auto nearest = [&](const kernels::PlacedEllipsoid& ellipsoid, double limit, double enough) {
+    return tree.nearest(limit, enough, [&](const PointTree::Balls& balls, int first, int count, double least, double* values) {
+      return distances(ellipsoid, {{balls.x, balls.y, balls.z}, balls.radius}, first, count, least, values);
+    });
+  };
   Found found{cap, -1};
-  if (!points.any_within(X.p + X.R * link.centre, link.radius + cap)) {
+  // Whether anything is near the ball around the link.
+  const kernels::PlacedEllipsoid around = placed(X.p + X.R * link.centre, Eigen::Matrix3d::Identity(),
+                                                 Eigen::Vector3d::Constant(link.radius * link.radius));
+  if (link.ellipsoids.size() > 1 && nearest(around, cap, cap).point < 0) {
     return found;
   }
   for (const Ellipsoid& e : link.ellipsoids) {
-    const Eigen::Vector3d centre = X.p + X.R * e.mean;
-    Eigen::Matrix3d to_axes;
-    bool turned = false;
-    // A point at least extent + radius + clearance away changes nothing.
-    const bool stopped = points.for_each_within(centre, e.extent + found.clearance, [&](const PointIndex::Point& p) {
-      const Eigen::Vector3d offset(p.x - centre.x(), p.y - centre.y(), p.z - centre.z());
-      if (!turned) {
-        to_axes = e.axes_T.lazyProduct(X.R.transpose());
-        turned = true;
+    const PointTree::Nearest at =
+        nearest(placed(X.p + X.R * e.mean, e.axes_T * X.R.transpose(), e.squares), found.clearance, stop);
+    if (at.point >= 0) {
+      found = {at.distance, tree.order()[static_cast<std::size_t>(at.point)]};
+      if (found.clearance < stop) {
+        break;
       }
-      const Eigen::Vector3d local = to_axes * offset;
-      const Eigen::Vector3d u = e.precisions.cwiseProduct(local);
-      const double m = local.dot(u), root = std::sqrt(m), steep = u.norm();
-      // At the very centre h has a limit along every direction, the deepest −extent.
-      const double h = steep > 0.0 ? root * (root - 1.0) / steep : -e.extent;
-      const double clearance = std::max(h, offset.norm() - e.extent) - p.radius;
-      if (clearance < found.clearance) {
-        found = {clearance, p.index};
-      }
-      return found.clearance < stop;
-    });
-    if (stopped) {
-      break;
     }
   }
   return found;
@@ -288,12 +303,12 @@ double BodyClearance::margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, c
   return margin(item, margins) - lowered;
 }
 
-BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap,
+BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap,
                                               Workspace& w) const noexcept {
   place(q, w);
   Nearest nearest{cap};
   for (int i = 0; i < num_items(); ++i) {
-    const Found found = look(items_[static_cast<std::size_t>(i)], points, nearest.clearance, -infinity, w);
+    const Found found = look(items_[static_cast<std::size_t>(i)], obstacles, nearest.clearance, -infinity, w);
     if (found.clearance < nearest.clearance) {
       nearest = {found.clearance, i, found.point};
     }
@@ -301,22 +316,22 @@ BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> 
   return nearest;
 }
 
-BodyClearance::Nearest BodyClearance::nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points,
+BodyClearance::Nearest BodyClearance::nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles,
                                               double cap, Workspace& w) const noexcept {
   place(q, w);
-  const Found found = look(items_[static_cast<std::size_t>(item)], points, cap, -infinity, w);
+  const Found found = look(items_[static_cast<std::size_t>(item)], obstacles, cap, -infinity, w);
   return {found.clearance, found.clearance < cap ? item : -1, found.point};
 }
 
-void BodyClearance::clearances(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w,
+void BodyClearance::clearances(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w,
                                Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   place(q, w);
   for (int i = 0; i < num_items(); ++i) {
-    out[i] = look(items_[static_cast<std::size_t>(i)], points, cap, -infinity, w).clearance;
+    out[i] = look(items_[static_cast<std::size_t>(i)], obstacles, cap, -infinity, w).clearance;
   }
 }
 
-bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, const Margins& margins,
+bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, const Margins& margins,
                          Workspace& w) const noexcept {
   place(q, w);
   double slope = 0.0;
@@ -324,7 +339,7 @@ bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& 
     // In the order of the items, but the one that was in the way last before all.
     const int i = k == 0 ? w.last_ : (k <= w.last_ ? k - 1 : k);
     const double margin = margin_at(i, q, margins, slope);
-    if (look(items_[static_cast<std::size_t>(i)], points, margin, margin, w).clearance < margin) {
+    if (look(items_[static_cast<std::size_t>(i)], obstacles, margin, margin, w).clearance < margin) {
       w.last_ = i;
       return false;
     }
@@ -333,7 +348,7 @@ bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& 
 }
 
 bool BodyClearance::edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b,
-                              const PointIndex& points, const Margins& margins, Workspace& w) const noexcept {
+                              const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
   w.difference_ = b - a;
   std::array<std::uint64_t, max_items / 64> all{};
   for (int i = 0; i < num_items(); ++i) {
@@ -348,33 +363,34 @@ bool BodyClearance::edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<co
     w.q_ = a + at.middle * w.difference_;
     place(w.q_, w);
     std::array<std::uint64_t, max_items / 64> open{};
-    bool any = false;
+    double decided = at.half;  // around the middle
     for (std::size_t word = 0; word < open.size(); ++word) {
       for (std::uint64_t left = at.open[word]; left != 0; left &= left - 1) {
         const int bit = std::countr_zero(left);
         const int i = static_cast<int>(word) * 64 + bit;
         double slope = 0.0;
         const double margin = margin_at(i, w.q_, margins, slope);
-        const double enough = margin - margins.slack + at.half * (1.0 + slope) * w.motions_[static_cast<std::size_t>(i)];
+        const double speed = (1.0 + slope) * w.motions_[static_cast<std::size_t>(i)];
+        const double enough = margin - margins.slack + at.half * speed;
         const double clearance =
-            look(items_[static_cast<std::size_t>(i)], points, std::max(margin, enough), margin, w).clearance;
+            look(items_[static_cast<std::size_t>(i)], obstacles, std::max(margin, enough), margin, w).clearance;
         if (clearance < margin) {
           w.last_ = i;
           return false;
         }
         if (clearance < enough) {
           open[word] |= std::uint64_t{1} << bit;
-          any = true;
+          decided = std::min(decided, (clearance - margin + margins.slack) / speed);
         }
       }
     }
-    if (any) {
+    if (decided < at.half) {
       if (w.intervals_.size() + 2 > most_intervals) {
         return false;
       }
-      const double half = 0.5 * at.half;
-      w.intervals_.push_back({at.middle - half, half, open});
-      w.intervals_.push_back({at.middle + half, half, open});
+      const double half = 0.5 * (at.half - decided), away = decided + half;
+      w.intervals_.push_back({at.middle - away, half, open});
+      w.intervals_.push_back({at.middle + away, half, open});
     }
   }
   return true;

@@ -50,9 +50,9 @@ Guide::Guide(BodyClearance body, const GuideSettings& settings)
       progress_(settings.patience),
       states_(State{goal_, goal_}),
       answers_(Answer{}),
-      obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
+      newest_(std::make_shared<const Obstacles>(Obstacles::none())),
       planner_(body_, settings.planner),
-      points_(std::make_shared<const PointIndex>(Obstacles::none())),
+      obstacles_(newest_),
       margin_(settings.planner.margin) {
   if (!settings_.synchronous) {
     thread_ = std::thread([this] { run(); });
@@ -85,10 +85,10 @@ void Guide::set_obstacles(const Obstacles& obstacles) {
   };
   auto copy = std::make_shared<const Obstacles>(obstacles);
   const std::lock_guard lock(mutex_);
-  if (same(*obstacles_)) {
+  if (same(*newest_)) {
     return;
   }
-  obstacles_.swap(copy);
+  newest_.swap(copy);
   ++scene_number_;
 }
 
@@ -108,7 +108,7 @@ GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attrac
   }
   // Tell the guide; in a thread it looks at its own pace, and at once at a new goal.
   if (!settings_.synchronous || time >= next_look_) {
-    State& state = states_.back();
+    State& state = states_.draft();
     state.q = q;
     state.goal = goal_;
     state.time = time;
@@ -116,18 +116,16 @@ GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attrac
     state.goal_number = goal_number_;
     state.route_number = followed_;
     state.stops = stops_;
-    states_.publish();
+    states_.submit();
     if (settings_.synchronous) {
       next_look_ = time + settings_.period;
-      states_.update();
-      look(states_.front());
+      look(states_.get());
     } else if (first) {
       wake_.release();
     }
   }
 
-  answers_.update();
-  const Answer& answer = answers_.front();
+  const Answer& answer = answers_.get();
   const bool ours = answer.goal_number == goal_number_;
   if (ours && answer.status == PlanStatus::found && !answer.direct) {
     if (answer.route_number != followed_) {
@@ -183,7 +181,7 @@ void Guide::run() {
   while (!stopping_.load()) {
     static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.period)));
     if (states_.update() && !stopping_.load()) {
-      look(states_.front());
+      look(states_.get());
     }
   }
 }
@@ -192,18 +190,16 @@ void Guide::look(const State& state) {
   if (state.goal_number == 0) {
     return;
   }
-  std::shared_ptr<const Obstacles> changed;
+  bool changed = false;
   {
     const std::lock_guard lock(mutex_);
     if (scene_number_ != seen_scene_) {
-      changed = obstacles_;
+      obstacles_ = newest_;
       seen_scene_ = scene_number_;
+      changed = true;
     }
   }
-  if (changed) {
-    points_ = std::make_shared<const PointIndex>(*changed);
-  }
-  const PointIndex& points = *points_;
+  const Obstacles& obstacles = *obstacles_;
   const bool new_goal = state.goal_number != seen_goal_;
   if (new_goal) {
     seen_goal_ = state.goal_number;
@@ -222,11 +218,11 @@ void Guide::look(const State& state) {
   const PlannerSettings& asked = settings_.planner;
   const double wide = have_path_ ? asked.margin : std::sqrt(asked.margin * asked.floor);
   const bool straight = state.stops == 0 && !stuck &&
-                        body_.edge_free(state.q, state.goal, points,
-                                        planner_.margins(wide, state.q, state.goal, points), planner_.workspace());
+                        body_.edge_free(state.q, state.goal, obstacles,
+                                        planner_.margins(wide, state.q, state.goal, obstacles), planner_.workspace());
   if (straight) {
     Obstruction found;
-    if (!planner_.obstructed(state.goal, points, found) && !planner_.obstructed(state.q, points, found)) {
+    if (!planner_.obstructed(state.goal, obstacles, found) && !planner_.obstructed(state.q, obstacles, found)) {
       if (!direct_ || new_goal || status_ != PlanStatus::found) {
         direct_ = true;
         have_path_ = failed_ = false;
@@ -236,7 +232,7 @@ void Guide::look(const State& state) {
     }
   }
   const bool follows = have_path_ && state.route_number == route_number_;
-  if (have_path_ && !stuck && !direct_ && (!follows || way_is_free(state, points, changed != nullptr))) {
+  if (have_path_ && !stuck && !direct_ && (!follows || way_is_free(state, obstacles, changed))) {
     return;
   }
   direct_ = false;
@@ -244,10 +240,10 @@ void Guide::look(const State& state) {
   if (failed_ && out_of_budget && !changed && !stuck && state.time - failed_at_ < settings_.retry) {
     return;
   }
-  search(state, points);
+  search(state, obstacles);
 }
 
-bool Guide::way_is_free(const State& state, const PointIndex& points, bool changed) {
+bool Guide::way_is_free(const State& state, const Obstacles& obstacles, bool changed) {
   // What is still ahead, from the attractor on, with what the path was made with.
   Eigen::Index next = 1;
   while (next + 1 < path_.cols() && stations_[next] <= state.station) {
@@ -261,7 +257,7 @@ bool Guide::way_is_free(const State& state, const PointIndex& points, bool chang
   margins.margin *= 0.5;
   margins.pair_margin *= 0.5;
   // Barriers may have pushed the arm off the path, to where the attractor cannot be gone to straight.
-  if (!body_.edge_free(state.q, from, points, planner_.margins(settings_.planner.floor, state.q, from, points),
+  if (!body_.edge_free(state.q, from, obstacles, planner_.margins(settings_.planner.floor, state.q, from, obstacles),
                        planner_.workspace())) {
     return false;
   }
@@ -269,7 +265,7 @@ bool Guide::way_is_free(const State& state, const PointIndex& points, bool chang
     return true;
   }
   for (; next < path_.cols(); ++next) {
-    if (!body_.edge_free(from, path_.col(next), points, margins, planner_.workspace())) {
+    if (!body_.edge_free(from, path_.col(next), obstacles, margins, planner_.workspace())) {
       return false;
     }
     from = path_.col(next);
@@ -277,11 +273,11 @@ bool Guide::way_is_free(const State& state, const PointIndex& points, bool chang
   return true;
 }
 
-void Guide::search(const State& state, const PointIndex& points) {
+void Guide::search(const State& state, const Obstacles& obstacles) {
   const JointLimits& limits = body_.robot().limits();
   const Eigen::VectorXd start = state.q.cwiseMax(limits.lower).cwiseMin(limits.upper);
   const double margin = std::max(margin_, settings_.planner.floor);
-  Plan plan = planner_.plan(start, state.goal, points, settings_.seed + searches_++, margin);
+  Plan plan = planner_.plan(start, state.goal, obstacles, settings_.seed + searches_++, margin);
   const PlanStatus status = plan.status;
   const bool found = status == PlanStatus::found;
   have_path_ = found;
@@ -289,12 +285,12 @@ void Guide::search(const State& state, const PointIndex& points) {
   failed_at_ = state.time;
   if (found) {
     path_ = plan.path;
-    path_margins_ = planner_.margins(plan.margin, start, state.goal, points);
+    path_margins_ = planner_.margins(plan.margin, start, state.goal, obstacles);
     stations_ = Eigen::VectorXd::Zero(path_.cols());
     for (Eigen::Index k = 1; k < path_.cols(); ++k) {
       stations_[k] = stations_[k - 1] + (path_.col(k) - path_.col(k - 1)).norm();
     }
-    route_ = make_route(path_, body_, points, settings_.route, planner_.workspace());
+    route_ = make_route(path_, body_, obstacles, settings_.route, planner_.workspace());
     ++route_number_;
   }
   {
@@ -308,7 +304,7 @@ void Guide::search(const State& state, const PointIndex& points) {
 
 void Guide::answer(const State& state, PlanStatus status, bool direct) {
   status_ = status;
-  Answer& answer = answers_.back();
+  Answer& answer = answers_.draft();
   answer.goal_number = state.goal_number;
   answer.status = status;
   answer.direct = direct;
@@ -316,7 +312,7 @@ void Guide::answer(const State& state, PlanStatus status, bool direct) {
   if (status == PlanStatus::found && !direct) {
     answer.route = route_;
   }
-  answers_.publish();
+  answers_.submit();
 }
 
 }  // namespace sidestep

@@ -10,12 +10,12 @@ namespace {
 using Waypoints = std::vector<Eigen::VectorXd>;
 
 /// From every waypoint on to the farthest that can be seen from it.
-Waypoints skip(const Waypoints& path, const BodyClearance& body, const PointIndex& points, const Margins& margins,
+Waypoints skip(const Waypoints& path, const BodyClearance& body, const Obstacles& obstacles, const Margins& margins,
                BodyClearance::Workspace& w) {
   Waypoints kept{path.front()};
   for (std::size_t at = 0; at + 1 < path.size();) {
     std::size_t next = path.size() - 1;
-    while (next > at + 1 && !body.edge_free(path[at], path[next], points, margins, w)) {
+    while (next > at + 1 && !body.edge_free(path[at], path[next], obstacles, margins, w)) {
       --next;
     }
     kept.push_back(path[next]);
@@ -35,13 +35,13 @@ std::vector<double> stations(const Waypoints& path) {
 
 }  // namespace
 
-Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, const PointIndex& points,
+Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
                         const Margins& margins, int attempts, RandomStream& random, BodyClearance::Workspace& workspace) {
   Waypoints way;
   for (Eigen::Index k = 0; k < path.cols(); ++k) {
     way.push_back(path.col(k));
   }
-  way = skip(way, body, points, margins, workspace);
+  way = skip(way, body, obstacles, margins, workspace);
   for (int attempt = 0; attempt < attempts && way.size() > 2; ++attempt) {
     const std::vector<double> at = stations(way);
     double from = random.uniform(0.0, at.back()), to = random.uniform(0.0, at.back());
@@ -62,7 +62,7 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
       return way[k] + (length > 0.0 ? (s - at[k]) / length : 0.0) * (way[k + 1] - way[k]);
     };
     const Eigen::VectorXd a = on(i, from), b = on(j, to);
-    if (body.edge_free(a, b, points, margins, workspace)) {
+    if (body.edge_free(a, b, obstacles, margins, workspace)) {
       Waypoints next(way.begin(), way.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       next.push_back(a);
       next.push_back(b);
@@ -70,7 +70,7 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
       way = std::move(next);
     }
   }
-  way = skip(way, body, points, margins, workspace);
+  way = skip(way, body, obstacles, margins, workspace);
   Eigen::MatrixXd result(path.rows(), static_cast<Eigen::Index>(way.size()));
   for (std::size_t k = 0; k < way.size(); ++k) {
     result.col(static_cast<Eigen::Index>(k)) = way[k];

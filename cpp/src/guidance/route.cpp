@@ -32,7 +32,7 @@ void RouteSettings::validate() const {
   }
 }
 
-Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const PointIndex& points,
+Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
                  const RouteSettings& settings, BodyClearance::Workspace& workspace) {
   Eigen::Index num = 1;
   const auto pieces = [&](Eigen::Index k) {
@@ -64,7 +64,7 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const P
     before = along;
   }
   for (Eigen::Index k = 0; k < num; ++k) {
-    const double clearance = body.nearest(route.q.col(k), points, settings.wide, workspace).clearance;
+    const double clearance = body.nearest(route.q.col(k), obstacles, settings.wide, workspace).clearance;
     route.speed[k] *= std::clamp(clearance / settings.wide, settings.slowest, 1.0);
   }
   // Slow down in time: v² of the next and 2 a Δs.

@@ -72,9 +72,9 @@ RrtConnect::RrtConnect(const BodyClearance& body, const PlannerSettings& setting
   settings_.validate();
 }
 
-bool RrtConnect::obstructed(const Eigen::VectorXd& q, const PointIndex& points, Obstruction& obstruction) {
+bool RrtConnect::obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles, Obstruction& obstruction) {
   const double least = std::min(settings_.allowance, settings_.pair_allowance);
-  body_->clearances(q, points, -least, workspace_, clearances_);
+  body_->clearances(q, obstacles, -least, workspace_, clearances_);
   int worst = -1;
   double excess = 0.0;
   for (int i = 0; i < body_->num_items(); ++i) {
@@ -88,16 +88,16 @@ bool RrtConnect::obstructed(const Eigen::VectorXd& q, const PointIndex& points, 
   if (worst < 0) {
     return false;
   }
-  const BodyClearance::Nearest nearest = body_->nearest(worst, q, points, 0.0, workspace_);
+  const BodyClearance::Nearest nearest = body_->nearest(worst, q, obstacles, 0.0, workspace_);
   obstruction = {body_->label(worst), nearest.point, -nearest.clearance};
   return true;
 }
 
 Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
-                            const PointIndex& points) {
+                            const Obstacles& obstacles) {
   Margins margins{distance, settings_.slack, settings_.fade, {}};
   for (const Eigen::VectorXd* q : {&start, &goal}) {
-    body_->clearances(*q, points, distance, workspace_, clearances_);
+    body_->clearances(*q, obstacles, distance, workspace_, clearances_);
     Eigen::VectorXd deficits(body_->num_items());
     for (int i = 0; i < body_->num_items(); ++i) {
       const double asked = body_->margin(i, margins);
@@ -110,7 +110,7 @@ Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const
   return margins;
 }
 
-Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
+Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
                       std::uint64_t seed, double margin) {
   const double begin = seconds(), deadline = begin + settings_.max_seconds;
   Plan plan;
@@ -121,11 +121,11 @@ Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
       return plan;
     }
   }
-  if (obstructed(start, points, plan.obstruction)) {
+  if (obstructed(start, obstacles, plan.obstruction)) {
     plan.status = PlanStatus::start_in_collision;
     return plan;
   }
-  if (obstructed(goal, points, plan.obstruction)) {
+  if (obstructed(goal, obstacles, plan.obstruction)) {
     plan.status = PlanStatus::goal_in_collision;
     return plan;
   }
@@ -143,24 +143,24 @@ Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
       continue;
     }
     plan.margin = level;
-    kept = margins(plan.margin, start, goal, points);
-    if (body_->edge_free(start, goal, points, kept, workspace_)) {
+    kept = margins(plan.margin, start, goal, obstacles);
+    if (body_->edge_free(start, goal, obstacles, kept, workspace_)) {
       plan.path.resize(start.size(), 2);
       plan.path << start, goal;
       plan.status = PlanStatus::found;
     } else {
-      search(start, goal, points, kept, iterations, deadline, random, plan);
+      search(start, goal, obstacles, kept, iterations, deadline, random, plan);
     }
   }
   plan.search_seconds = seconds() - begin;
   if (plan.status == PlanStatus::found && plan.path.cols() > 2) {
-    plan.path = shorten(plan.path, *body_, points, kept, settings_.shortcuts, random, workspace_);
+    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_);
     plan.smoothing_seconds = seconds() - begin - plan.search_seconds;
   }
   return plan;
 }
 
-void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
+void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
                         const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan) {
   from_start_.clear();
   from_goal_.clear();
@@ -182,11 +182,11 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
     for (Eigen::Index k = 0; k < sample_.size(); ++k) {
       sample_[k] = random.uniform(low[k], high[k]);
     }
-    if (grow(*one, sample_, points, margins) != Growth::trapped) {
+    if (grow(*one, sample_, obstacles, margins) != Growth::trapped) {
       const Eigen::VectorXd target = one->node(one->size() - 1);
       Growth growth = Growth::advanced;
       while (growth == Growth::advanced && !other->full()) {
-        growth = grow(*other, target, points, margins);
+        growth = grow(*other, target, obstacles, margins);
       }
       if (growth == Growth::reached) {
         std::vector<Eigen::VectorXd> way = to_root(from_start_, from_start_.size() - 1);
@@ -206,15 +206,15 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
   }
 }
 
-RrtConnect::Growth RrtConnect::grow(SearchTree& tree, const Eigen::VectorXd& target, const PointIndex& points,
+RrtConnect::Growth RrtConnect::grow(SearchTree& tree, const Eigen::VectorXd& target, const Obstacles& obstacles,
                                     const Margins& margins) {
   const int nearest = tree.nearest(target);
   near_ = tree.node(nearest);
   const double distance = (target - near_).norm();
   const bool whole = distance <= settings_.range;
   next_ = whole ? target : near_ + settings_.range / distance * (target - near_);
-  if (!body_->free(next_, points, margins, workspace_) ||
-      !body_->edge_free(near_, next_, points, margins, workspace_)) {
+  if (!body_->free(next_, obstacles, margins, workspace_) ||
+      !body_->edge_free(near_, next_, obstacles, margins, workspace_)) {
     return Growth::trapped;
   }
   tree.add(next_, nearest);

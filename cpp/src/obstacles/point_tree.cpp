@@ -66,6 +66,11 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
   while (levels_.back().size() > 1) {
     levels_.emplace_back(groups(levels_.back().size(), fan_out));
   }
+  for (const std::vector<Ball>& level : levels_) {
+    const std::size_t room = groups(level.size(), fan_out) * fan_out;
+    const std::vector<double> far(room, padding);
+    hulls_.push_back({far, far, far, std::vector<double>(room, 0.0)});
+  }
   refit();
 }
 
@@ -96,6 +101,11 @@ void PointTree::refit() noexcept {
         return level == 0 ? Ball{columns_[0][n], columns_[1][n], columns_[2][n], 0.0, columns_[3][n]}
                           : levels_[level - 1][n];
       });
+      const Ball& ball = levels_[level][node];
+      hulls_[level][0][node] = ball.x;
+      hulls_[level][1][node] = ball.y;
+      hulls_[level][2][node] = ball.z;
+      hulls_[level][3][node] = ball.spread + ball.largest_radius;
     }
   }
 }

@@ -53,33 +53,6 @@ GuideStatus follow(Guide& guide, Eigen::VectorXd& q, double& time, double durati
 
 }  // namespace
 
-BOOST_AUTO_TEST_CASE(hands_over_the_newest_value_across_threads) {
-  TripleBuffer<std::array<int, 16>> buffer({});
-  constexpr int last = 200000;
-  std::thread writer([&] {
-    for (int i = 1; i <= last; ++i) {
-      buffer.back().fill(i);
-      buffer.publish();
-    }
-  });
-  int seen = 0;
-  bool whole = true, forward = true;
-  while (seen < last) {
-    if (buffer.update()) {
-      const std::array<int, 16> value = buffer.front();
-      forward = forward && value[0] > seen;
-      for (const int v : value) {
-        whole = whole && v == value[0];
-      }
-      seen = value[0];
-    }
-  }
-  writer.join();
-  BOOST_TEST(whole);
-  BOOST_TEST(forward);
-  BOOST_TEST(!buffer.update());
-}
-
 BOOST_AUTO_TEST_CASE(arrives_around_an_obstacle_and_tells_of_a_blocked_goal) {
   const Robot robot = turning();
   GuideSettings settings;
@@ -151,7 +124,7 @@ BOOST_AUTO_TEST_CASE(the_attractor_waits_for_the_arm_and_slows_at_the_end) {
   const RouteSettings settings;
   Eigen::MatrixXd path(2, 3);
   path << 0.0, 1.0, 1.0, 0.0, 0.0, 1.0;
-  const Route route = make_route(path, body, PointIndex(Obstacles::none()), settings, w);
+  const Route route = make_route(path, body, Obstacles::none(), settings, w);
   BOOST_TEST(std::abs(route.length() - 2.0) < 1e-12);  // rounding
   BOOST_TEST(route.speed.maxCoeff() <= settings.speed);
   BOOST_TEST(route.speed[route.speed.size() - 1] == 0.0);

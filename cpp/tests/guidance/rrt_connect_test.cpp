@@ -64,7 +64,7 @@ BOOST_AUTO_TEST_CASE(goes_straight_where_that_is_free) {
   const Robot robot = planar(3);
   const BodyClearance body(robot, along_links(robot));
   RrtConnect planner(body, {});
-  const Plan plan = planner.plan(joints(0.5), joints(1.5), PointIndex(wall()), 0);
+  const Plan plan = planner.plan(joints(0.5), joints(1.5), wall(), 0);
   BOOST_TEST(name(plan.status) == "found");
   BOOST_TEST(plan.path.cols() == 2);
   BOOST_TEST(plan.iterations == 0);
@@ -75,7 +75,7 @@ BOOST_AUTO_TEST_CASE(finds_a_free_way_around_and_the_same_every_time) {
   const BodyClearance body(robot, along_links(robot));
   RrtConnect planner(body, {});
   BodyClearance::Workspace w(body);
-  const PointIndex points(wall());
+  const Obstacles points = wall();
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Plan plan = planner.plan(joints(0.5), joints(-0.5), points, seed);
     BOOST_TEST(name(plan.status) == "found");
@@ -99,19 +99,19 @@ BOOST_AUTO_TEST_CASE(says_what_is_in_the_way_and_how_deep) {
   const Robot robot = planar(3);
   const BodyClearance body(robot, along_links(robot), {{"link0", "link2"}});
   RrtConnect planner(body, {});
-  const Plan goal = planner.plan(joints(0.5), joints(0.0), PointIndex(wall()), 0);
+  const Plan goal = planner.plan(joints(0.5), joints(0.0), wall(), 0);
   BOOST_TEST(name(goal.status) == "goal_in_collision");
   BOOST_TEST(goal.obstruction.label.name == "link2");
   BOOST_TEST(goal.obstruction.point >= 0);
   // across the ellipsoid, 3 cm half-width and the 1 cm of the point: the wall runs along its axis
   BOOST_TEST(goal.obstruction.depth > 0.035);
   BOOST_TEST(goal.obstruction.depth < 0.19);
-  const Plan start = planner.plan(joints(0.0), joints(0.5), PointIndex(wall()), 0);
+  const Plan start = planner.plan(joints(0.0), joints(0.5), wall(), 0);
   BOOST_TEST(name(start.status) == "start_in_collision");
-  const Plan folded = planner.plan(joints(0.5), Eigen::Vector3d(0.0, 2.9, 2.9), PointIndex(Obstacles::none()), 0);
+  const Plan folded = planner.plan(joints(0.5), Eigen::Vector3d(0.0, 2.9, 2.9), Obstacles::none(), 0);
   BOOST_TEST(name(folded.status) == "goal_in_collision");
   BOOST_TEST(folded.obstruction.label.other == "link2");
-  BOOST_TEST(name(planner.plan(joints(0.5), joints(3.1), PointIndex(wall()), 0).status) == "invalid");
+  BOOST_TEST(name(planner.plan(joints(0.5), joints(3.1), wall(), 0).status) == "invalid");
 }
 
 BOOST_AUTO_TEST_CASE(ends_that_are_slightly_inside_are_left_and_reached) {
@@ -122,7 +122,7 @@ BOOST_AUTO_TEST_CASE(ends_that_are_slightly_inside_are_left_and_reached) {
   // A point 1 cm deep in the side of the last link at the goal: less than the allowance.
   Eigen::Matrix3Xd points(3, 1);
   points << 0.75, -0.03, 0.0;
-  const PointIndex index(at(points, 0.01));
+  const Obstacles index = at(points, 0.01);
   const double clearance = body.nearest(joints(0.0), index, 1.0, w).clearance;
   BOOST_TEST(std::abs(clearance + 0.01) < 2e-3);  // the ellipsoid is straight at its middle but for its curvature
   const Plan plan = planner.plan(joints(0.8), joints(0.0), index, 0);
@@ -142,14 +142,14 @@ BOOST_AUTO_TEST_CASE(a_closed_way_ends_with_the_budget) {
   settings.max_iterations = 500;
   RrtConnect planner(body, settings);
   const Plan plan = planner.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5),
-                                 PointIndex(at(points, 0.02)), 0);
+                                 at(points, 0.02), 0);
   BOOST_TEST(name(plan.status) == "no_path");
   BOOST_TEST(plan.path.size() == 0);
   BOOST_TEST(plan.iterations == 500 / 400 + 500 / 40 + 500);
   settings.max_seconds = 1e-9;
   RrtConnect hurried(body, settings);
   BOOST_TEST(name(hurried.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5),
-                               PointIndex(at(points, 0.02)), 0).status) == "timeout");
+                               at(points, 0.02), 0).status) == "timeout");
   settings.floor = 0.1;
   BOOST_CHECK_THROW(RrtConnect(body, settings), std::invalid_argument);
 }

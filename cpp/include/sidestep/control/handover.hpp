@@ -1,58 +1,55 @@
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <cstdint>
+#include <mutex>
 #include <utility>
 
 namespace sidestep {
 
-/// Hands the newest value from writers to one reader that must not wait, allocate or free.
+/// Hands the newest value to one reader that never waits, allocates or frees. Values in between are lost.
 ///
-/// `put` may be called from any thread, `get` from one. What the reader has done with is freed by the next `put`.
+/// Writers either `put` values, from any number of threads, which wait for each other alone; or one of them fills `draft()` in
+/// place and calls `submit()`, and waits for nobody. Of the three slots one is written, one read and one between the two; what
+/// the reader has done with is overwritten by a writer.
 template <class T>
 class Handover {
  public:
-  explicit Handover(T value) : current_(new Node{std::move(value), nullptr}) {}
-  ~Handover() {
-    delete current_;
-    delete unseen_.load();
-    free_retired();
-  }
-  Handover(const Handover&) = delete;
-  Handover& operator=(const Handover&) = delete;
+  explicit Handover(const T& initial) : slots_{initial, initial, initial} {}
 
   /// Replaces what `get` gives from its next call on.
   void put(T value) {
-    delete unseen_.exchange(new Node{std::move(value), nullptr});
-    free_retired();
+    const std::lock_guard lock(writers_);
+    draft() = std::move(value);
+    submit();
+  }
+
+  /// What `submit` hands over; it holds some older value.
+  T& draft() noexcept { return slots_[draft_]; }
+  void submit() noexcept { draft_ = between_.exchange(static_cast<std::uint8_t>(draft_ | fresh)) & index; }
+
+  /// Takes over the newest value, and says whether there is one that `get` has not given yet.
+  bool update() noexcept {
+    if ((between_.load(std::memory_order_relaxed) & fresh) == 0) {
+      return false;
+    }
+    current_ = between_.exchange(current_) & index;
+    return true;
   }
 
   /// The newest value; valid until the next call.
   const T& get() noexcept {
-    if (Node* fresh = unseen_.exchange(nullptr)) {
-      // Fails only where a writer has just emptied the list: once per `put`.
-      current_->next = retired_.load();
-      while (!retired_.compare_exchange_weak(current_->next, current_)) {
-      }
-      current_ = fresh;
-    }
-    return current_->value;
+    update();
+    return slots_[current_];
   }
 
  private:
-  struct Node {
-    T value;
-    Node* next;
-  };
-
-  void free_retired() {
-    for (Node* node = retired_.exchange(nullptr); node != nullptr;) {
-      delete std::exchange(node, node->next);
-    }
-  }
-
-  Node* current_;                       // of the reader
-  std::atomic<Node*> unseen_{nullptr};  // put, but not yet got
-  std::atomic<Node*> retired_{nullptr};
+  static constexpr std::uint8_t fresh = 4, index = 3;
+  std::array<T, 3> slots_;
+  std::uint8_t draft_ = 0, current_ = 1;
+  std::atomic<std::uint8_t> between_{2};
+  std::mutex writers_;
 };
 
 }  // namespace sidestep

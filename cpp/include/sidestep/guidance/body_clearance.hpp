@@ -11,7 +11,7 @@
 #include "sidestep/embedding/embedding.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
 #include "sidestep/kinematics/robot.hpp"
-#include "sidestep/obstacles/point_index.hpp"
+#include "sidestep/obstacles/obstacles.hpp"
 
 namespace sidestep {
 
@@ -45,15 +45,16 @@ struct Margins {
 
 /// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no derivative.
 ///
-/// What must keep apart are items: a link and the obstacles, a link and a plane, two links. The clearances are those of
-/// ClearanceBarrier, PlaneBarrier and SelfCollisionBarrier, without the mean over points: lower bounds of the distances.
+/// What must keep apart are items: a link and the obstacles, a link and a plane, two links. The clearances of planes and
+/// pairs are those of PlaneBarrier and SelfCollisionBarrier; that of obstacles is the distance of their balls from the
+/// ellipsoids, signed, by two steps of Newton towards the nearest place: a lower bound, as a supporting plane gives it.
 ///
 /// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): no point of an item moves farther than
 ///
 ///     motion(Δq) = Σ_i |Δq_i| R_i,
 ///
-/// R_i the largest distance that the item can have from the axis of joint i. An interval of an edge is free if the clearance
-/// in its middle exceeds the motion to its ends, and is halved where that is not so.
+/// R_i the largest distance that the item can have from the axis of joint i. An interval of an edge is free as far around its
+/// middle as the clearance there exceeds the motion; what is left to either side is looked at in the same way.
 class BodyClearance {
  public:
   /// `pairs` name links as for SelfCollisionBarrier. Throws std::invalid_argument if the body is not calibrated or no
@@ -96,14 +97,14 @@ class BodyClearance {
     int item = -1;   ///< -1: all are as far as `cap`
     int point = -1;  ///< which obstacle point, for an item of obstacles
   };
-  Nearest nearest(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w) const noexcept;
+  Nearest nearest(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
 
   /// The same of one item.
-  Nearest nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap,
+  Nearest nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap,
                   Workspace& w) const noexcept;
 
   /// The clearance of every item, not above `cap` [m], into out (num_items).
-  void clearances(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, double cap, Workspace& w,
+  void clearances(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
   /// What `margins` ask of an item away from the ends [m].
@@ -113,11 +114,11 @@ class BodyClearance {
   }
 
   /// Whether every item keeps its margin at q. Ends at the first that does not.
-  bool free(Eigen::Ref<const Eigen::VectorXd> q, const PointIndex& points, const Margins& margins,
+  bool free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, const Margins& margins,
             Workspace& w) const noexcept;
 
   /// Whether every item keeps its margin, less the slack, everywhere on the straight edge from a to b.
-  bool edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b, const PointIndex& points,
+  bool edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b, const Obstacles& obstacles,
                  const Margins& margins, Workspace& w) const noexcept;
 
   /// How far a point of `item` can move, relative to what it keeps off, for a displacement of the joints [m].
@@ -131,8 +132,8 @@ class BodyClearance {
  private:
   struct Ellipsoid {
     Eigen::Vector3d mean;
-    Eigen::Matrix3d axes_T;      // rotates into the principal axes, of the joint's child
-    Eigen::Vector3d precisions;  // 1 / semi-axis²
+    Eigen::Matrix3d axes_T;   // rotates into the principal axes, of the joint's child
+    Eigen::Vector3d squares;  // of the semi-axes, ascending
     Eigen::Matrix3d shape;
     double extent;
   };
@@ -163,8 +164,8 @@ class BodyClearance {
   void place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept;
   const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
   // The clearance of an item, not above `cap`; ends early, with what it found, below `stop`.
-  Found look(const Item& item, const PointIndex& points, double cap, double stop, const Workspace& w) const noexcept;
-  Found look_at_points(const Link& link, const PointIndex& points, double cap, double stop,
+  Found look(const Item& item, const Obstacles& obstacles, double cap, double stop, const Workspace& w) const noexcept;
+  Found look_at_points(const Link& link, const Obstacles& obstacles, double cap, double stop,
                        const Workspace& w) const noexcept;
   double look_at_pair(const Link& a, const Link& b, double cap, double stop, const Workspace& w) const noexcept;
   double look_at_plane(const Link& link, const Plane& plane, double cap, const Workspace& w) const noexcept;

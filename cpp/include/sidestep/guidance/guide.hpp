@@ -8,12 +8,12 @@
 #include <semaphore>
 #include <thread>
 
+#include "sidestep/control/handover.hpp"
 #include "sidestep/dynamical_system/progress_monitor.hpp"
 #include "sidestep/guidance/body_clearance.hpp"
 #include "sidestep/guidance/plan.hpp"
 #include "sidestep/guidance/route.hpp"
 #include "sidestep/guidance/rrt_connect.hpp"
-#include "sidestep/guidance/triple_buffer.hpp"
 
 namespace sidestep {
 
@@ -106,8 +106,8 @@ class Guide {
 
   void run();
   void look(const State& state);
-  void search(const State& state, const PointIndex& points);
-  bool way_is_free(const State& state, const PointIndex& points, bool changed);
+  void search(const State& state, const Obstacles& obstacles);
+  bool way_is_free(const State& state, const Obstacles& obstacles, bool changed);
   void answer(const State& state, PlanStatus status, bool direct);
 
   BodyClearance body_;
@@ -123,19 +123,19 @@ class Guide {
   std::uint64_t stops_ = 0, followed_ = 0;
 
   // Between the two.
-  TripleBuffer<State> states_;
-  TripleBuffer<Answer> answers_;
+  Handover<State> states_;
+  Handover<Answer> answers_;
   std::counting_semaphore<> wake_{0};
   std::atomic<bool> stopping_{false};
   mutable std::mutex mutex_;  // of what follows; the loop never takes it
-  std::shared_ptr<const Obstacles> obstacles_;
+  std::shared_ptr<const Obstacles> newest_;
   std::uint64_t scene_number_ = 0;
   Plan shown_;
   Counts counts_;
 
   // Of the guide.
   RrtConnect planner_;
-  std::shared_ptr<const PointIndex> points_;
+  std::shared_ptr<const Obstacles> obstacles_;  // that it plans among
   std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, searches_ = 0;
   bool have_path_ = false, direct_ = false, failed_ = false;
   double margin_, failed_at_ = 0.0;

@@ -29,7 +29,7 @@ struct Route {
 };
 
 /// Samples a path.
-Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const PointIndex& points,
+Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
                  const RouteSettings& settings, BodyClearance::Workspace& workspace);
 
 /// Where the attractor is on a route: it runs ahead of the arm as far as that can follow.

@@ -30,7 +30,7 @@ struct PlannerSettings {
 };
 
 /// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
-/// LaValle 2000), shortened. Deterministic in (start, goal, points, seed) unless the time runs out.
+/// LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless the time runs out.
 ///
 /// Margins shrink in two ways, both stated in the plan: where no path keeps `margin`, one with their geometric mean, then one
 /// that keeps `floor` is searched for, with a 400th, a 40th and the whole of the budget; and near start and goal every link may be as near to things as it is there, see Margins. A link deeper than
@@ -41,10 +41,10 @@ class RrtConnect {
   RrtConnect(const BodyClearance& body, const PlannerSettings& settings);
 
   /// margin [m]: in place of the settings', at least the floor.
-  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points, std::uint64_t seed,
+  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed,
             double margin);
-  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points, std::uint64_t seed) {
-    return plan(start, goal, points, seed, settings_.margin);
+  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed) {
+    return plan(start, goal, obstacles, seed, settings_.margin);
   }
 
   const PlannerSettings& settings() const noexcept { return settings_; }
@@ -52,17 +52,17 @@ class RrtConnect {
   BodyClearance::Workspace& workspace() noexcept { return workspace_; }
 
   /// Whether an item is deeper than its allowance inside something at q; then what.
-  bool obstructed(const Eigen::VectorXd& q, const PointIndex& points, Obstruction& obstruction);
+  bool obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles, Obstruction& obstruction);
 
   /// The margins between two ends: of this distance, and less where an end asks for less.
-  Margins margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points);
+  Margins margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles);
 
  private:
   enum class Growth { trapped, advanced, reached };
 
-  void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const PointIndex& points,
+  void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
               const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
-  Growth grow(SearchTree& tree, const Eigen::VectorXd& target, const PointIndex& points, const Margins& margins);
+  Growth grow(SearchTree& tree, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins);
 
   const BodyClearance* body_;
   PlannerSettings settings_;

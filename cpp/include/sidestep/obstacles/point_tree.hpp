@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <utility>
 #include <vector>
 
@@ -37,6 +38,29 @@ class PointTree {
   const double* radii() const noexcept { return columns_[3].data(); }
   const double* velocity(int axis) const noexcept { return columns_[static_cast<std::size_t>(4 + axis)].data(); }
   static constexpr double padding = 1e9;  ///< [m], out of every reach
+
+  /// Balls side by side: of points, or around nodes with the balls of their points.
+  struct Balls {
+    const double *x, *y, *z, *radius;
+  };
+  struct Nearest {
+    double distance;
+    int point;  ///< in tree order; -1: none
+  };
+
+  /// The point whose ball is nearest by a measure, best first. measure(balls, first, count, limit, values) writes the
+  /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that room, and returns those
+  /// below `limit` as bits; of a ball it must not exceed that of a ball inside by more than what it is content to miss. The
+  /// arrays are padded to whole multiples of `fan_out`. None from `limit` on is found, and any that is below `stop` ends the
+  /// search. No allocation.
+  template <class Measure>
+  Nearest nearest(double limit, double stop, Measure&& measure) const noexcept {
+    Nearest found{limit, -1};
+    if (!levels_.empty()) {
+      descend_to_nearest(static_cast<int>(levels_.size()) - 1, 0, stop, measure, found);
+    }
+    return found;
+  }
 
   /// Moves every point along its velocity and refits. No allocation.
   void advance(double duration) noexcept;
@@ -85,9 +109,44 @@ class PointTree {
     }
   }
 
+  template <class Measure>
+  void descend_to_nearest(int level, int node, double stop, Measure& measure, Nearest& found) const noexcept {
+    const int first = node * (level == 0 ? leaf_size : fan_out);
+    alignas(64) std::array<double, leaf_size> values;
+    if (level == 0) {
+      const Balls points{coordinate(0), coordinate(1), coordinate(2), radii()};
+      unsigned near = measure(points, first, std::min(leaf_size, size() - first), found.distance, values.data());
+      for (; near != 0; near &= near - 1) {
+        const int i = std::countr_zero(near);
+        if (values[static_cast<std::size_t>(i)] < found.distance) {
+          found = {values[static_cast<std::size_t>(i)], first + i};
+        }
+      }
+      return;
+    }
+    const auto below = static_cast<std::size_t>(level) - 1;
+    const std::array<std::vector<double>, 4>& hulls = hulls_[below];
+    const int count = std::min(fan_out, static_cast<int>(levels_[below].size()) - first);
+    unsigned near = measure(Balls{hulls[0].data(), hulls[1].data(), hulls[2].data(), hulls[3].data()}, first, count,
+                            found.distance, values.data());
+    while (near != 0 && !(found.distance < stop)) {
+      int nearest = std::countr_zero(near);
+      for (unsigned left = near & (near - 1); left != 0; left &= left - 1) {
+        const int i = std::countr_zero(left);
+        nearest = values[static_cast<std::size_t>(i)] < values[static_cast<std::size_t>(nearest)] ? i : nearest;
+      }
+      if (!(values[static_cast<std::size_t>(nearest)] < found.distance)) {
+        return;
+      }
+      near &= ~(1u << nearest);
+      descend_to_nearest(level - 1, first + nearest, stop, measure, found);
+    }
+  }
+
   std::vector<int> order_;
   std::array<std::vector<double>, 7> columns_;  // x, y, z, radius, velocity
   std::vector<std::vector<Ball>> levels_;       // leaves first, one node last
+  std::vector<std::array<std::vector<double>, 4>> hulls_;  // the same with the balls of the points inside: x, y, z, radius
   bool moves_ = false;
 };
 

@@ -1,0 +1,32 @@
+#pragma once
+
+// The inner loop of BodyClearance, once per instruction set. Plain arrays only, as in the kernels of ClearanceField.
+namespace sidestep::kernels {
+
+/// An ellipsoid in the world.
+struct PlacedEllipsoid {
+  double centre[3];
+  double axes[9];     // world to principal axes, by rows
+  double squares[3];  // of the semi-axes [m²], ascending
+};
+
+/// Balls as structure of arrays.
+struct Balls {
+  const double* centre[3];
+  const double* radius;
+};
+
+inline constexpr int most_balls = 16;  // of one call
+inline constexpr int lanes = 8;        // arrays are padded to whole multiples of it
+
+/// Writes lower bounds of the signed distances from the ellipsoid to the balls [first, first + count) into `distances`
+/// (most_balls), first and the room a multiple of `lanes`; bit i of the result: that of ball first + i is below `limit`.
+/// Those that are not may be coarse.
+using Distances = unsigned (*)(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
+                               double* distances) noexcept;
+
+unsigned distances_baseline(const PlacedEllipsoid&, const Balls&, int, int, double, double*) noexcept;
+unsigned distances_avx2(const PlacedEllipsoid&, const Balls&, int, int, double, double*) noexcept;
+unsigned distances_avx512(const PlacedEllipsoid&, const Balls&, int, int, double, double*) noexcept;
+
+}  // namespace sidestep::kernels

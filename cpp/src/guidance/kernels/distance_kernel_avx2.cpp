@@ -1,0 +1,17 @@
+// Compiled for AVX2 and FMA, see CMakeLists.txt; empty for other processors.
+#if defined(__AVX2__)
+#include "distance_kernel.hpp"
+
+#include <immintrin.h>
+
+#include "distance_kernel.inl"
+
+namespace sidestep::kernels {
+
+unsigned distances_avx2(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
+                      double* distances) noexcept {
+  return distances_to(ellipsoid, balls, first, count, limit, distances);
+}
+
+}  // namespace sidestep::kernels
+#endif
