@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from sidestep import Body, Robot, Scenario
 from sidestep.scenario.scenario import RobotChoice
+from sidestep.studio import messages as m
+from sidestep.studio.headless import browser
 from sidestep.studio.methods import Method
 from sidestep.studio.session import Session
 from sidestep.studio.start import scenario_of
+from sidestep.studio.studio import Studio
+from studio.looker import PATIENCE, Looker
 
 SMALL = 2  # ellipsoids per link: a second of work, and kept for all tests
 
@@ -33,3 +39,31 @@ def make_session() -> Callable[..., Session]:
         return Session(scenario, prepare=small_body, **options)  # type: ignore[arg-type]
 
     return make
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    with browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("scenarios")
+
+
+@pytest.fixture(scope="session")
+def studio(folder: Path) -> Iterator[Studio]:
+    scenario = scenario_of(RobotChoice(name="planar2"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        with Studio(scenario, port=0, ellipsoids=SMALL) as running:
+            running.wait_ready(PATIENCE)
+            running.send(m.SetRunning(False))
+            running.server.scene.configure_default_lights(cast_shadow=False)  # half the time of a frame
+            yield running
+
+
+@pytest.fixture(scope="session")
+def looker(chromium: Any, studio: Studio) -> Looker:
+    return Looker(chromium, studio)

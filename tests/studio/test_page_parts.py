@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from sidestep.studio.page import colours
 from sidestep.studio.page.arm import reach
 from sidestep.studio.page.marks import METRIC_SIZE, metric_ellipsoid
 from sidestep.studio.page.obstacles import FASTEST_THROW, throw_velocity
+from sidestep.studio.page.plots import Plots
 from sidestep.studio.page.recorder import as_npz
 from sidestep.studio.page.surface import (
     CELLS,
@@ -90,6 +92,22 @@ def test_the_metric_of_flat_space_is_drawn_at_full_size() -> None:
     np.testing.assert_allclose(pose[:3, 3], robot.pose(q, "tip")[:3, 3])
     _, smaller = metric_ellipsoid(robot, "tip", q, 4.0 * np.eye(3))
     assert smaller.max() == pytest.approx(0.5 * METRIC_SIZE * reach(robot), rel=1e-9)  # G = 4: half the speed
+
+
+def test_an_unknown_clearance_does_not_empty_its_plot(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="unswitched")
+    server = SimpleNamespace(gui=SimpleNamespace(add_uplot=lambda *_, **__: SimpleNamespace(data=None)))
+    plots = Plots(server)  # type: ignore[arg-type]
+    plots.add(session.snapshot(), 0.4)
+    assert len(plots.rows) == 0  # no step yet
+    for clearance in (np.inf, 0.3, 0.2):
+        session.step()
+        plots.add(session.snapshot(), clearance)
+    plots.draw(1.0)
+    times, values = plots._handles[0].data
+    np.testing.assert_allclose(times, [-0.001, 0.0], atol=1e-12)
+    np.testing.assert_allclose(values, [300.0, 200.0])  # [mm]
+    assert len(plots._handles[1].data[0]) == 3
 
 
 def test_links_change_colour_towards_contact() -> None:

@@ -154,6 +154,9 @@ def test_restart_puts_everything_back(make_session: MakeSession, scenario: Scena
     np.testing.assert_array_equal(again.q, first.q)
     np.testing.assert_array_equal(again.poses, first.poses)
     np.testing.assert_array_equal(again.velocities, np.zeros((1, 3)))
+    assert again.running
+    session.handle(m.Restart(until=0.0))
+    assert not session.running
 
 
 def test_what_is_saved_is_what_is_there(

@@ -75,6 +75,11 @@ class ArmView:
                 self._meshes[link].color = colours.shade_colour(shade)
 
     @property
+    def q(self) -> Array:
+        """The configuration (nv,) that is shown."""
+        return self._q
+
+    @property
     def shades(self) -> dict[str, int]:
         """The shade of each link that has one, see `colours.shade`."""
         return dict(self._shades)
@@ -149,3 +154,8 @@ def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:
         meshes = {name: simplified(mesh, cell) for name, mesh in whole.items()}
         cell *= 1.3
     return {name: trimesh.graph.smooth_shade(mesh, angle=SHARP) for name, mesh in meshes.items()}
+
+
+def short(name: str) -> str:
+    """A joint's name without what every joint of an arm has in front."""
+    return name.rsplit("_", 1)[-1] if "_" in name else name

@@ -22,7 +22,7 @@ GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
 TRAIL = palette.GREEN
 BODY = palette.ORANGE
-METRIC = palette.YELLOW
+METRIC = "#333333"
 SURFACE = "#B7C3A5"
 LINK, BASE = "#CBD3DE", "#9AA2AE"
 

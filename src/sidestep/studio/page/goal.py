@@ -12,7 +12,7 @@ from sidestep._core import GeometricSystem, JointType, Obstacles, PoseGoal, is_f
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.studio import messages as m
-from sidestep.studio.page.arm import ArmView, reach
+from sidestep.studio.page.arm import ArmView, reach, short
 from sidestep.studio.page.obstacles import gizmo_pose
 
 if TYPE_CHECKING:
@@ -124,8 +124,3 @@ class GoalControl:
 def same(a: Array | None, b: Array | None) -> bool:
     """Whether both are None, or equal arrays."""
     return a is b if a is None or b is None else np.array_equal(a, b)
-
-
-def short(name: str) -> str:
-    """A joint's name without what every joint of an arm has in front."""
-    return name.rsplit("_", 1)[-1] if "_" in name else name

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 THROW_MEMORY = 0.15  # [s] of a drag from which the speed of a throw is taken
+LEAST_PATH = 4  # places of the hand at least: a slow browser reports few
 FASTEST_THROW = 2.0  # [m/s]
 
 
@@ -117,7 +118,7 @@ class _View:
             self._grip = self._pose[:3, 3] - np.array(event.start_position)
             self._path.clear()
         self._path.append((now, hand))
-        while now - self._path[0][0] > THROW_MEMORY:
+        while len(self._path) > LEAST_PATH and now - self._path[0][0] > THROW_MEMORY:
             self._path.popleft()
         if event.phase == "end" and event.modifier == "shift":
             self._send(m.ThrowThing(self.thing.name, throw_velocity(list(self._path))))

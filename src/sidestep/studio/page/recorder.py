@@ -89,7 +89,7 @@ class Recorder:
 
     def _on_save(self, event: Any) -> None:
         if self.rows and event.client is not None:
-            event.client.send_file_download("recording.npz", as_npz(self.rows))
+            event.client.send_file_download("recording.npz", as_npz(self.rows), save_immediately=True)
 
     def _live(self) -> None:
         self._replaying, self._slider.disabled = False, True

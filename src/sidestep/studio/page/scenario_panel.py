@@ -52,7 +52,7 @@ class ScenarioPanel:
         with self._view.telling(event.client):
             scenario = self._now()
             text = yaml.safe_dump(scenario.to_document(), sort_keys=False, allow_unicode=True)
-            event.client.send_file_download(f"{scenario.name}.yaml", text.encode())
+            event.client.send_file_download(f"{scenario.name}.yaml", text.encode(), save_immediately=True)
 
     def _now(self) -> Scenario:
         name = str(self._name.value)

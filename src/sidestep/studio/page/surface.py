@@ -18,7 +18,7 @@ from sidestep.robot import Robot
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import Method, Numbers, build_system, method_named
 from sidestep.studio.page import colours
-from sidestep.studio.page.arm import reach
+from sidestep.studio.page.arm import reach, short
 
 if TYPE_CHECKING:
     import viser
@@ -123,6 +123,15 @@ class Surface:
         """|psi| (CELLS + 1, CELLS + 1) over the two joints, None while there is none."""
         return self._heights
 
+    @property
+    def trail(self) -> list[Array]:
+        """Places (3,) in the frame of the surface where the joints have been."""
+        return list(self._trail)
+
+    def place_of(self, name: str) -> Array:
+        """Where the mark "state" or "goal" is in the frame of the surface, (3,)."""
+        return np.array(self._parts[name].position)
+
     def _run(self) -> None:
         while True:
             self._wake.wait()
@@ -165,7 +174,7 @@ class Surface:
         ):
             self._parts[f"label{k}"] = self._server.scene.add_label(
                 f"/surface/label{k}",
-                request.robot.coordinate_names[joint],
+                short(request.robot.coordinate_names[joint]),
                 position=(0.5 * SIDE + 0.06) * np.array(side),
             )
 

@@ -91,7 +91,9 @@ class TuningPanel:
             event.client.gui.add_markdown(f"```python\n{code}```")
             download = event.client.gui.add_button("Download")
             close = event.client.gui.add_button("Close")
-        download.on_click(lambda _: event.client.send_file_download("system.py", code.encode()))
+        download.on_click(
+            lambda _: event.client.send_file_download("system.py", code.encode(), save_immediately=True)
+        )
         close.on_click(lambda _: modal.close())
 
     def _send_numbers(self) -> None:

@@ -1,0 +1,132 @@
+"""A browser window on the studio, for tests: Chromium without a display, driven by Playwright."""
+
+from __future__ import annotations
+
+import io
+import time as clock
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from sidestep.pose import from_quaternion
+from sidestep.scenario.scenario import RobotChoice
+from sidestep.studio import messages as m
+from sidestep.studio.headless import Window, open_page, picture
+from sidestep.studio.start import scenario_of
+from sidestep.studio.studio import Studio
+
+PATIENCE = 120.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
+PASSIVE = "Unable to preventDefault inside passive event listener"  # the browser's own note on viser's lists
+WINDOW = Window(1080, 560)
+
+
+class Looker:
+    """A browser window on the studio, and what went wrong in it."""
+
+    def __init__(self, chromium: Any, studio: Studio) -> None:
+        self.errors: list[str] = []
+        self.studio = studio
+        self.page = open_page(chromium, studio.address, WINDOW)
+        self.page.set_default_timeout(1e3 * PATIENCE)
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", self._hear)
+
+    def _hear(self, said: Any) -> None:
+        if said.type == "error" and PASSIVE not in said.text:
+            self.errors.append(said.text)
+
+    def click(self, selector: str) -> None:
+        """Clicks without waiting for animations, which take long without a graphics card."""
+        box = self._box(self.page.locator(selector).first)
+        self.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+
+    def _box(self, found: Any) -> dict[str, float]:
+        """Where an element is [px], once it is there."""
+        found.wait_for(state="visible")
+        box: dict[str, float] = found.bounding_box()
+        return box
+
+    def tab(self, name: str) -> None:
+        found = self.page.locator(f'[role=tab][title="{name}"]').first
+
+        def chosen() -> bool:
+            if found.get_attribute("aria-selected") != "true":
+                found.focus()
+                found.press("Enter")
+            return bool(found.get_attribute("aria-selected") == "true")
+
+        until(chosen, f"the tab {name}")
+
+    def type(self, label: str, text: str) -> None:
+        """Types into the field beside a label."""
+        field = self.page.locator(
+            f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]"
+        )
+        field.fill(text, force=True)
+        field.press("Enter")
+
+    def choose(self, label: str, option: str) -> None:
+        """Chooses an option of the list beside a label."""
+        self.click(f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]")
+        self.click(f"[role=option][value='{option}']:visible")
+
+    def press(self, name: str) -> None:
+        """Clicks the button of this name."""
+        self.click(f'role=button[name="{name}"]')
+
+    def check(self, label: str) -> None:
+        """Clicks the box beside a label."""
+        self.click(f"xpath=//label[normalize-space()='{label}']/following::input[@type='checkbox'][1]")
+
+    def drag(self, begin: np.ndarray, end: np.ndarray, *, key: str | None = None) -> None:
+        """Draws with the mouse from a point (3,) of the world to another, perhaps with a key held."""
+        mouse, keyboard = self.page.mouse, self.page.keyboard
+        (x0, y0), (x1, y1) = self.on_screen(begin), self.on_screen(end)
+        mouse.move(x0, y0)
+        if key is not None:
+            keyboard.down(key)
+        mouse.down()
+        for share in np.linspace(0.1, 1.0, 6):
+            mouse.move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+        mouse.up()
+        if key is not None:
+            keyboard.up(key)
+
+    def on_screen(self, point: np.ndarray) -> tuple[float, float]:
+        """Where a point (3,) of the world is in the window [px]."""
+        camera = next(iter(self.studio.server.get_clients().values())).camera
+        x, y, z = from_quaternion(camera.wxyz).T @ (point - camera.position)  # OpenCV: z forward, y down
+        box = self._box(self.page.locator("canvas").first)
+        focal = 0.5 * box["height"] / np.tan(0.5 * camera.fov)
+        return box["x"] + 0.5 * box["width"] + focal * x / z, box["y"] + 0.5 * box["height"] + focal * y / z
+
+    def image(self) -> np.ndarray:
+        return np.asarray(Image.open(io.BytesIO(picture(self.studio, self.page))).convert("RGB"), dtype=int)
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    end = clock.monotonic() + PATIENCE
+    while not condition():
+        assert clock.monotonic() < end, f"{what}: not within {PATIENCE:.0f} s"
+        clock.sleep(0.02)
+
+
+def last(studio: Studio) -> m.Snapshot:
+    assert studio.error == ""
+    assert studio.snapshot is not None
+    return studio.snapshot
+
+
+def reset(studio: Studio) -> None:
+    """Puts planar2 at its start, paused, with one ball."""
+    studio.send(m.Load(scenario_of(RobotChoice(name="planar2"))))
+    studio.send(m.Restart(until=0.0))
+    until(lambda: len(last(studio).things) == 1 and last(studio).time == 0.0, "the start")
+
+
+def differ(image: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Which pixels differ by more than the noise of the rendering."""
+    found: np.ndarray = np.abs(image - other).max(axis=2) > 24  # of 255
+    return found
