@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from sidestep.studio import messages as m
-from sidestep.studio.headless import find_chromium
+from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, film, find_chromium
 from sidestep.studio.page.obstacles import gizmo_pose
 from sidestep.studio.page.surface import on_surface
 from sidestep.studio.studio import Studio
-from studio.looker import PATIENCE, Looker, differ, last, reset, until
+from studio.looker import PATIENCE, WINDOW, Looker, differ, last, reset, until
 
 pytestmark = pytest.mark.skipif(
     find_chromium() is None,
@@ -159,6 +160,24 @@ def test_a_shipped_scenario_is_one_click_away(studio: Studio, looker: Looker) ->
     looker.choose("shipped", "planar-one-obstacle")
     looker.press("Load")
     until(lambda: last(studio).scenario.name == "planar-one-obstacle", "the scenario")
+
+
+def test_pictures_show_the_motion(studio: Studio, looker: Looker, tmp_path: Path) -> None:
+    end, way = tmp_path / "end.png", tmp_path / "way.gif"
+    film(studio, looker.page, duration=2 * FRAME, screenshot=end, video=way)
+    assert last(studio).time == pytest.approx(2 * FRAME, abs=1e-3)  # one period
+    assert Image.open(end).size == (WINDOW.width, WINDOW.height)
+    animation = Image.open(way)
+    assert animation.n_frames == 2  # type: ignore[attr-defined]
+    assert animation.info["duration"] == 1e3 * FRAME
+    assert animation.width == ANIMATION_WIDTH
+
+
+def test_everything_comes_from_this_machine(studio: Studio, looker: Looker) -> None:
+    loaded = looker.page.evaluate("performance.getEntriesByType('resource').map(entry => entry.name)")
+    address = (studio.address, "blob:", "data:")
+    assert [name for name in loaded if not name.startswith(address)] == []
+    assert looker.page.url.startswith(studio.address)
 
 
 def test_a_notebook_shows_the_page(studio: Studio, chromium: Any) -> None:

@@ -37,7 +37,6 @@ FRAME = 0.25  # [s] of simulated time between two pictures of an animation
 CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
   if (notice.innerText.includes('Software WebGL')) notice.querySelector('button')?.click()"""  # of viser
 ANIMATION_WIDTH = 800  # [px]
-COLOURS = 128  # of a GIF
 
 
 @dataclass(frozen=True)
@@ -119,17 +118,25 @@ def take_pictures(
     check_files(screenshot, video)
     with browser() as chromium, Studio(scenario, method=method, port=0, ellipsoids=ellipsoids) as studio:
         studio.wait_ready(BODY_TIME)
+        studio.send(m.Restart(until=0.0))  # a moving scene would leave little time to load the page
         page = open_page(chromium, studio.address, window)
-        studio.send(m.Restart(until=0.0))
-        frames: list[Image.Image] = []
-        for time in np.arange(0.0, duration if video is not None else 0.0, FRAME):
-            run_until(studio, float(time))
-            frames.append(Image.open(io.BytesIO(picture(studio, page))).convert("RGB"))
-        run_until(studio, duration)
-        if screenshot is not None:
-            screenshot.write_bytes(picture(studio, page))
-        if video is not None:
-            save_animation(frames, video)
+        film(studio, page, duration=duration, screenshot=screenshot, video=video)
+
+
+def film(studio: Studio, page: Page, *, duration: float, screenshot: Path | None, video: Path | None) -> None:
+    """The same of a studio that runs already, as one page shows it."""
+    from sidestep.studio import messages as m
+
+    studio.send(m.Restart(until=0.0))
+    frames: list[Image.Image] = []
+    for time in np.arange(0.0, duration if video is not None else 0.0, FRAME):
+        run_until(studio, float(time))
+        frames.append(Image.open(io.BytesIO(picture(studio, page))).convert("RGB"))
+    run_until(studio, duration)
+    if screenshot is not None:
+        screenshot.write_bytes(picture(studio, page))
+    if video is not None:
+        save_animation(frames, video)
 
 
 def run_until(studio: Studio, time: float) -> None:
@@ -176,6 +183,8 @@ def save_animation(frames: list[Image.Image], path: Path) -> None:
     height = round(frames[0].height * width / frames[0].width)
     small = [frame.resize((width, height), Image.Resampling.LANCZOS) for frame in frames]
     if path.suffix.lower() == ".gif":
-        palette = small[len(small) // 2].quantize(COLOURS)
+        palette = small[len(small) // 2].quantize(
+            method=Image.Quantize.MAXCOVERAGE
+        )  # keeps small things' colours
         small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
     small[0].save(path, save_all=True, append_images=small[1:], duration=round(1e3 * FRAME), loop=0)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -150,7 +150,7 @@ class Snapshot:
         values: psi (m,). metric: (nv, nv).
         torque_share, speed_share: largest of a joint over its limit.
         contacts: links that touch, each "link - obstacle"; touched: steps with contact since the start.
-        timing: of the steps. rows: of a recording since the last snapshot. note: what is being prepared.
+        timing: of the steps. rows: of a recording since the last snapshot.
     """
 
     scenario: Scenario
@@ -178,7 +178,6 @@ class Snapshot:
     timing: Timing
     recording: bool
     rows: tuple[Row, ...] = ()
-    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,4 +203,3 @@ class Failed:
 
     message: str
     fatal: bool = False
-    details: dict[str, Any] = field(default_factory=dict)

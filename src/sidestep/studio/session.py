@@ -185,12 +185,12 @@ class Session:
         if self._recording and self._count % RECORD_EVERY == 0:
             self._rows.append(m.Row(self.time, q, self._things, self._poses()))
 
-    def snapshot(self, *, real_time: float = 0.0, note: str = "") -> m.Snapshot:
+    def snapshot(self, *, real_time: float = 0.0) -> m.Snapshot:
         """The state now, and the rows recorded since the last snapshot."""
         q, v = self.stage.state()
         limits = self.robot.limits
         rows, self._rows = tuple(self._rows), []
-        words, status = "paused", ("", "")
+        words, status = "at the start", ("", "")
         nearest, values, metric, torque = ("", np.inf), np.zeros(0), np.eye(len(q)), 0.0
         if self._step is not None and self._solution is not None:
             step = self._step
@@ -232,7 +232,6 @@ class Session:
             timing=self._timing(real_time),
             recording=self._recording,
             rows=rows,
-            note=note,
         )
 
     @property

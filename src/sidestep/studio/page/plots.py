@@ -30,6 +30,7 @@ PLOTS = (
     ("torque", "largest torque [% of its limit]", 1e2, palette.BLACK),
     ("step", "time of a step, p99 [ms]", 1e-3, palette.BLACK),
 )
+NOTHING = (np.array([-SPAN, 0.0]), np.array([np.nan, np.nan]))  # a plot without a line
 
 
 class Plots:
@@ -39,11 +40,10 @@ class Plots:
         self._rows: deque[tuple[float, ...]] = deque()
         self._drawn, self._stale = 0.0, False
         self._handles: list[Any] = []
-        start = np.array([-SPAN, 0.0])
         for _, title, _, colour in PLOTS:
             self._handles.append(
                 server.gui.add_uplot(
-                    (start, np.zeros(2)),
+                    NOTHING,
                     ({"label": "t"}, {"label": title, "stroke": colour, "width": 2}),
                     title=title,
                     scales={"x": {"time": False, "range": (-SPAN, 0.0)}},
@@ -59,6 +59,8 @@ class Plots:
         """Takes what is plotted; a time before the last one (a restart) begins anew."""
         if self._rows and snapshot.time < self._rows[-1][0]:
             self._rows.clear()
+            for handle in self._handles:
+                handle.data = NOTHING
         if not snapshot.status[0] or (self._rows and snapshot.time == self._rows[-1][0]):
             return  # there was no step yet, or none since
         height = float(np.linalg.norm(snapshot.values))

@@ -122,7 +122,7 @@ class View:
             if snapshot.edition != self._edition:
                 self._edition = snapshot.edition
                 self.obstacles.set_things(snapshot.things)
-                self.least_clearance = np.inf
+                self._clearances, self.least_clearance = (), np.inf
                 self.marks.clear_trail()
             if self._body is None or self.last is None or snapshot.method != self.last.method:
                 self._load_body(snapshot.method)
@@ -165,6 +165,8 @@ class View:
     def take_clearances(self, found: tuple[Clearance, ...], time: float) -> None:
         """What the exact meshes say, nearest first."""
         with self._lock:
+            if self.last is not None and time > self.last.time:
+                return  # of before a restart
             self._clearances, self._measured = found, time
             if found:
                 self.least_clearance = min(self.least_clearance, found[0].distance)
@@ -194,8 +196,7 @@ class View:
         if now - self._told < WORDS_EVERY:
             return
         self._told = now
-        words = snapshot.words if snapshot.running else f"paused: {snapshot.words}"
-        words = words[:1].upper() + words[1:]
+        words = snapshot.words[:1].upper() + snapshot.words[1:]
         facts = []
         if self._clearances:
             first = self._clearances[0]
@@ -206,8 +207,8 @@ class View:
         touch = (
             f"touches {html.escape(', '.join(snapshot.contacts))}" if snapshot.contacts else "touches nothing"
         )
-        speed = f" · {snapshot.timing.real_time:.2f} × real time" if snapshot.running else ""
-        facts.append(f"{touch} · {snapshot.time:.1f} s{speed}")
+        speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
+        facts.append(f"{touch} · {snapshot.time:.1f} s · {speed}")
         self._say(in_box(f"{html.escape(words)}.", "<br>".join(facts)))
 
     def _say(self, text: str) -> None:
