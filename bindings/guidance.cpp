@@ -150,7 +150,10 @@ void bind_guide(nb::module_& m) {
   nb::class_<Guidance>(m, "Guidance", "Where a guide draws the arm to, and what the motion is about.")
       .def_ro("status", &Guidance::status)
       .def_prop_ro("goal", [](const Guidance& g) { return JointGoal(g.attractor.position, g.attractor.velocity); },
-                   "The attractor, as a goal for a GeometricSystem.");
+                   "The attractor, as a goal for a GeometricSystem.")
+      .def_prop_ro("tight", [](const Guidance& g) { return to_numpy(g.attractor.tight); },
+                   "Where barriers are to leave room (nv,): the tightest place of the path that the arm is about to pass, else\n"
+                   "the goal. See GeometricSystem.relaxed_at.");
 
   nb::class_<Guide>(
       m, "Guide",

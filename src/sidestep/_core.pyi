@@ -1411,6 +1411,13 @@ class Guidance:
     def goal(self) -> JointGoal:
         """The attractor, as a goal for a GeometricSystem."""
 
+    @property
+    def tight(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Where barriers are to leave room (nv,): the tightest place of the path that the arm is about to pass, else
+        the goal. See GeometricSystem.relaxed_at.
+        """
+
 class Guide:
     """
     Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.

@@ -87,13 +87,22 @@ class GuidedMotion:
             synchronous=synchronous,
         )
         self._moving = self.system
-        self._goal: Array | None = None  # not looked at with the scene yet
+        self._relaxed: tuple[bytes, Obstacles] | None = None  # where, and among what
         self._next_look = -float("inf")
+
+    @property
+    def moving(self) -> GeometricSystem:
+        """The system with barriers that leave room where the arm has to come close, as of the last step.
+
+        Relaxed at the tightest place of the path ahead, else at the goal, as long as all that is seen is at rest;
+        never below the barriers' floors, see `GeometricSystem.relaxed_at`.
+        """
+        return self._moving
 
     def set_goal(self, goal: npt.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to from now on."""
         self.guide.set_goal(goal)
-        self._goal = np.array(goal, dtype=np.float64)
+        self._next_look = -float("inf")
 
     def step(
         self, q: npt.ArrayLike, v: npt.ArrayLike, obstacles: Obstacles, *, time: float | None = None
@@ -106,16 +115,29 @@ class GuidedMotion:
         """
         at = clock.monotonic() if time is None else time
         guidance = self.lead(q, obstacles, at)
-        if self._goal is not None:  # barriers leave a goal free that stands close to things at rest
-            at_rest = not np.any(obstacles.velocities)
-            self._moving = self.system.relaxed_at(self._goal, obstacles) if at_rest else self.system
-            self._goal = None
         step = self._moving.acceleration(q, v, guidance.goal, obstacles)
         return GuidedStep(step.acceleration, guidance.status, guidance.goal, step)
 
     def lead(self, q: npt.ArrayLike, obstacles: Obstacles, time: float) -> Guidance:
         """The guide's part of a step alone: where to be drawn to."""
-        if time >= self._next_look:
+        looks = time >= self._next_look
+        if looks:
             self.guide.set_obstacles(obstacles)
             self._next_look = time + self.guide.period
-        return self.guide.step(q, time)
+        guidance = self.guide.step(q, time)
+        if looks:
+            self._relax(guidance, obstacles)
+        return guidance
+
+    def _relax(self, guidance: Guidance, obstacles: Obstacles) -> None:
+        if guidance.status is GuideStatus.idle or np.any(obstacles.velocities):
+            self._moving, self._relaxed = self.system, None
+            return
+        place = guidance.tight.tobytes()
+        if self._relaxed is None or place != self._relaxed[0] or not _same(obstacles, self._relaxed[1]):
+            self._moving = self.system.relaxed_at(guidance.tight, obstacles)
+            self._relaxed = place, obstacles
+
+
+def _same(a: Obstacles, b: Obstacles) -> bool:
+    return a is b or (np.array_equal(a.points, b.points) and np.array_equal(a.radii, b.radii))

@@ -99,3 +99,46 @@ def test_a_guide_in_its_thread_finds_the_way(robot: ss.Robot, body: _core.Body) 
     assert motion.guide.plan.status == ss.PlanStatus.found
     status = run(motion, q, WALL, 60.0, start=0.001)[1]
     assert status == ss.GuideStatus.arrived
+
+
+def test_barriers_leave_a_goal_free_once_it_is_free(robot: ss.Robot, body: _core.Body) -> None:
+    motion = guided(robot, body)
+    motion.set_goal(GOAL)
+
+    def ball(height: float) -> ss.Obstacles:
+        return ss.Obstacles([[np.cos(-0.8), np.sin(-0.8), height]], 0.1)
+
+    def pull(system: ss.GeometricSystem) -> float:
+        at = GOAL + np.array([0.02, 0.0, 0.0])
+        return float(
+            np.linalg.norm(system.acceleration(at, np.zeros(3), ss.JointGoal(GOAL), ball(0.17)).acceleration)
+        )
+
+    assert motion.step(START, np.zeros(3), ball(0.0), time=0.0).status == ss.GuideStatus.goal_in_collision
+    # 2 cm above the link, within the activation of 6 cm: barriers made for the blocked goal hold the arm back
+    motion.step(START, np.zeros(3), ball(0.17), time=0.021)  # after the guide's period
+    free = 4.0 * 0.02  # stiffness times distance
+    assert pull(motion.system) < 0.6 * free
+    assert pull(motion.moving) == pytest.approx(free, rel=1e-9)  # rounding
+
+
+def test_barriers_leave_room_at_the_tightest_place_of_the_path(robot: ss.Robot, body: _core.Body) -> None:
+    motion = guided(robot, body, planner=ss.PlannerSettings(margin=0.01, floor=0.01))
+    motion.set_goal(GOAL)
+    q, v, gains = START, np.zeros(3), []
+    for k in range(4000):
+        step = motion.step(q, v, WALL, time=PERIOD * k)
+        if step.status == ss.GuideStatus.arrived:
+            break
+        tight = motion.lead(q, WALL, PERIOD * k).tight
+        if not np.array_equal(tight, GOAL):
+            pulls = [
+                np.linalg.norm(s.acceleration(tight, np.zeros(3), step.goal, WALL).acceleration)
+                for s in (motion.moving, motion.system)
+            ]
+            gains.append(pulls[0] / pulls[1])
+        v = v + PERIOD * step.acceleration
+        q = q + PERIOD * v
+    assert step.status == ss.GuideStatus.arrived
+    assert len(gains) > 10
+    assert np.median(gains) > 1.05  # what the goal's pull gains there

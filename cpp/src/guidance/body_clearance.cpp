@@ -29,8 +29,10 @@ kernels::Distances distances_kernel() noexcept {
   return kernels::distances_baseline;
 }
 
-kernels::PlacedEllipsoid placed(const Eigen::Vector3d& centre, const Eigen::Matrix3d& axes, const Eigen::Vector3d& squares) noexcept {
+kernels::PlacedEllipsoid placed(const Eigen::Vector3d& centre, const Eigen::Matrix3d& axes, const Eigen::Vector3d& squares,
+                                double extent) noexcept {
   kernels::PlacedEllipsoid ellipsoid;
+  ellipsoid.extent = extent;
   Eigen::Map<Eigen::Vector3d>(ellipsoid.centre) = centre;
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(ellipsoid.axes) = axes;
   Eigen::Map<Eigen::Vector3d>(ellipsoid.squares) = squares;
@@ -216,21 +218,32 @@ BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obsta
   const Workspace::Pose& X = pose(w, link.joint);
   const PointTree& tree = obstacles.tree();
   const kernels::Distances distances = distances_kernel();
-  const auto nearest = [&](const kernels::PlacedEllipsoid& ellipsoid, double limit, double enough) {
-    return tree.nearest(limit, enough, [&](const PointTree::Balls& balls, int first, int count, double least, double* values) {
-      return distances(ellipsoid, {{balls.x, balls.y, balls.z}, balls.radius}, first, count, least, values);
-    });
-  };
   Found found{cap, -1};
   // Whether anything is near the ball around the link.
-  const kernels::PlacedEllipsoid around = placed(X.p + X.R * link.centre, Eigen::Matrix3d::Identity(),
-                                                 Eigen::Vector3d::Constant(link.radius * link.radius));
-  if (link.ellipsoids.size() > 1 && nearest(around, cap, cap).point < 0) {
-    return found;
+  if (link.ellipsoids.size() > 1) {
+    const Eigen::Vector3d centre = X.p + X.R * link.centre;
+    const auto around = [&](const PointTree::Balls& balls, int first, int count, double least, float* values) {
+      unsigned near = 0;
+      for (int i = 0; i < count; ++i) {
+        const int n = first + i;
+        const double x = balls.x[n] - centre.x(), y = balls.y[n] - centre.y(), z = balls.z[n] - centre.z();
+        const double distance = std::sqrt(x * x + y * y + z * z) - balls.radius[n];
+        values[i] = static_cast<float>(distance);
+        near |= (distance < least ? 1u : 0u) << i;
+      }
+      return near;
+    };
+    const double reach = link.radius + cap;
+    if (tree.nearest(reach, reach, around).point < 0) {
+      return found;
+    }
   }
   for (const Ellipsoid& e : link.ellipsoids) {
-    const PointTree::Nearest at =
-        nearest(placed(X.p + X.R * e.mean, e.axes_T * X.R.transpose(), e.squares), found.clearance, stop);
+    const kernels::PlacedEllipsoid ellipsoid = placed(X.p + X.R * e.mean, e.axes_T * X.R.transpose(), e.squares, e.extent);
+    const auto measure = [&](const PointTree::Balls& balls, int first, int count, double least, float* values) {
+      return distances(ellipsoid, {{balls.x, balls.y, balls.z}, balls.radius}, first, count, least, values);
+    };
+    const PointTree::Nearest at = tree.nearest(found.clearance, stop, measure);
     if (at.point >= 0) {
       found = {at.distance, tree.order()[static_cast<std::size_t>(at.point)]};
       if (found.clearance < stop) {
@@ -250,10 +263,17 @@ double BodyClearance::look_at_pair(const Link& a, const Link& b, double cap, dou
   if (far <= 0.0 || between.squaredNorm() >= far * far) {
     return least;
   }
-  for (const Ellipsoid& e : a.ellipsoids) {
-    const Eigen::Vector3d centre = X.p + X.R * e.mean;
-    for (const Ellipsoid& f : b.ellipsoids) {
-      Eigen::Vector3d d = Y.p + Y.R * f.mean - centre;
+  // In the frame of a's joint, where the centres of a stand still.
+  const Eigen::Matrix3d R_XY = X.R.transpose() * Y.R;
+  const Eigen::Vector3d p_XY = X.R.transpose() * (Y.p - X.p);
+  for (const Ellipsoid& f : b.ellipsoids) {
+    const Eigen::Vector3d centre = p_XY + R_XY * f.mean;
+    const double reach = f.extent + a.radius + least;
+    if (reach <= 0.0 || (centre - a.centre).squaredNorm() >= reach * reach) {
+      continue;
+    }
+    for (const Ellipsoid& e : a.ellipsoids) {
+      Eigen::Vector3d d = centre - e.mean;
       const double cut = e.extent + f.extent + least;
       const double squared = d.squaredNorm();
       if (cut <= 0.0 || squared >= cut * cut) {
@@ -265,8 +285,8 @@ double BodyClearance::look_at_pair(const Link& a, const Link& b, double cap, dou
         length = closest_centres;
       }
       const Eigen::Vector3d n = d / length;
-      const Eigen::Vector3d n_a = X.R.transpose() * n, n_b = Y.R.transpose() * n;
-      least = std::min(least, length - std::sqrt(n_a.dot(e.shape * n_a)) - std::sqrt(n_b.dot(f.shape * n_b)));
+      const Eigen::Vector3d n_b = R_XY.transpose() * n;
+      least = std::min(least, length - std::sqrt(n.dot(e.shape * n)) - std::sqrt(n_b.dot(f.shape * n_b)));
       if (least < stop) {
         return least;
       }

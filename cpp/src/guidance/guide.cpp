@@ -94,6 +94,7 @@ void Guide::set_obstacles(const Obstacles& obstacles) {
 
 GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept {
   attractor.velocity.setZero(goal_.size());
+  attractor.tight = goal_;
   if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite()) {
     attractor.position = goal_;
     if (q.size() == goal_.size()) {
@@ -134,6 +135,9 @@ GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attrac
     }
     attractor.position.resize(goal_.size());
     follower_.advance(answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity);
+    if (const Eigen::Index tightest = follower_.tightest(answer.route, settings_.route); tightest >= 0) {
+      attractor.tight = answer.route.q.col(tightest);
+    }
   } else {
     attractor.position = goal_;
     follower_.rate = 0.0;
@@ -277,21 +281,20 @@ void Guide::search(const State& state, const Obstacles& obstacles) {
   const JointLimits& limits = body_.robot().limits();
   const Eigen::VectorXd start = state.q.cwiseMax(limits.lower).cwiseMin(limits.upper);
   const double margin = std::max(margin_, settings_.planner.floor);
-  Plan plan = planner_.plan(start, state.goal, obstacles, settings_.seed + searches_++, margin);
+  const std::uint64_t seed = settings_.seed + searches_++;
+  Plan plan = planner_.find(start, state.goal, obstacles, seed, margin);
   const PlanStatus status = plan.status;
   const bool found = status == PlanStatus::found;
   have_path_ = found;
   failed_ = !found;
   failed_at_ = state.time;
   if (found) {
-    path_ = plan.path;
     path_margins_ = planner_.margins(plan.margin, start, state.goal, obstacles);
-    stations_ = Eigen::VectorXd::Zero(path_.cols());
-    for (Eigen::Index k = 1; k < path_.cols(); ++k) {
-      stations_[k] = stations_[k - 1] + (path_.col(k) - path_.col(k - 1)).norm();
+    if (!settings_.synchronous && plan.path.cols() > 2) {  // to begin with
+      follow(state, plan, obstacles, false);
     }
-    route_ = make_route(path_, body_, obstacles, settings_.route, planner_.workspace());
-    ++route_number_;
+    planner_.smooth(plan, obstacles, seed);
+    follow(state, plan, obstacles, true);
   }
   {
     const std::lock_guard lock(mutex_);
@@ -299,7 +302,20 @@ void Guide::search(const State& state, const Obstacles& obstacles) {
     ++counts_.searches;
     counts_.found += found;
   }
-  answer(state, status, false);
+  if (!found) {
+    answer(state, status, false);
+  }
+}
+
+void Guide::follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured) {
+  path_ = plan.path;
+  stations_ = Eigen::VectorXd::Zero(path_.cols());
+  for (Eigen::Index k = 1; k < path_.cols(); ++k) {
+    stations_[k] = stations_[k - 1] + (path_.col(k) - path_.col(k - 1)).norm();
+  }
+  route_ = make_route(path_, body_, obstacles, settings_.route, planner_.workspace(), measured);
+  ++route_number_;
+  answer(state, PlanStatus::found, false);
 }
 
 void Guide::answer(const State& state, PlanStatus status, bool direct) {

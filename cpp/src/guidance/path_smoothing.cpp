@@ -33,7 +33,47 @@ std::vector<double> stations(const Waypoints& path) {
   return at;
 }
 
+constexpr double sample = 0.1;       // between clearances on an edge [rad]
+constexpr double farthest = 0.3;     // that a waypoint is shifted at a time [rad]
+constexpr int shifts = 8;            // tried for a waypoint
+
+/// The least clearance on an edge, but for its ends, not above `cap`. At its ends a path may have to be near.
+double least_clearance(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const BodyClearance& body,
+                       const Obstacles& obstacles, double cap, BodyClearance::Workspace& w) {
+  const int pieces = 1 + static_cast<int>((b - a).norm() / sample);
+  for (int i = 0; i < pieces; ++i) {
+    cap = body.nearest(a + (i + 0.5) / pieces * (b - a), obstacles, cap, w).clearance;
+  }
+  return cap;
+}
+
 }  // namespace
+
+Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
+                      const Margins& margins, double wide, RandomStream& random, BodyClearance::Workspace& workspace) {
+  Eigen::MatrixXd way = path;
+  const Eigen::VectorXd &low = body.robot().limits().lower, &high = body.robot().limits().upper;
+  const auto clearance = [&](Eigen::Index k, const Eigen::VectorXd& q) {
+    const double least = least_clearance(way.col(k - 1), q, body, obstacles, wide, workspace);
+    return least_clearance(q, way.col(k + 1), body, obstacles, least, workspace);
+  };
+  for (Eigen::Index k = 1; k + 1 < way.cols(); ++k) {
+    double best = clearance(k, way.col(k));
+    for (int i = 0; i < shifts && best < wide; ++i) {
+      Eigen::VectorXd q = way.col(k);
+      for (Eigen::Index j = 0; j < q.size(); ++j) {
+        q[j] = std::clamp(q[j] + random.uniform(-farthest, farthest), low[j], high[j]);
+      }
+      const double gained = clearance(k, q);
+      if (gained > best && body.edge_free(way.col(k - 1), q, obstacles, margins, workspace) &&
+          body.edge_free(q, way.col(k + 1), obstacles, margins, workspace)) {
+        way.col(k) = q;
+        best = gained;
+      }
+    }
+  }
+  return way;
+}
 
 Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
                         const Margins& margins, int attempts, RandomStream& random, BodyClearance::Workspace& workspace) {

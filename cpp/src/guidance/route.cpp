@@ -33,7 +33,7 @@ void RouteSettings::validate() const {
 }
 
 Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                 const RouteSettings& settings, BodyClearance::Workspace& workspace) {
+                 const RouteSettings& settings, BodyClearance::Workspace& workspace, bool measured) {
   Eigen::Index num = 1;
   const auto pieces = [&](Eigen::Index k) {
     return std::max<Eigen::Index>(1, static_cast<Eigen::Index>(std::ceil((path.col(k + 1) - path.col(k)).norm() / spacing)));
@@ -41,7 +41,8 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const O
   for (Eigen::Index k = 0; k + 1 < path.cols(); ++k) {
     num += pieces(k);
   }
-  Route route{Eigen::MatrixXd(path.rows(), num), Eigen::VectorXd::Zero(num), Eigen::VectorXd::Zero(num)};
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(num);
+  Route route{Eigen::MatrixXd(path.rows(), num), zero, zero, zero};
   const Eigen::VectorXd& limit = body.robot().limits().velocity;
   Eigen::Index at = 0;
   route.q.col(0) = path.col(0);
@@ -64,8 +65,10 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const O
     before = along;
   }
   for (Eigen::Index k = 0; k < num; ++k) {
-    const double clearance = body.nearest(route.q.col(k), obstacles, settings.wide, workspace).clearance;
-    route.speed[k] *= std::clamp(clearance / settings.wide, settings.slowest, 1.0);
+    if (measured) {
+      route.clearance[k] = body.nearest(route.q.col(k), obstacles, settings.wide, workspace).clearance;
+    }
+    route.speed[k] *= std::clamp(route.clearance[k] / settings.wide, settings.slowest, 1.0);
   }
   // Slow down in time: v² of the next and 2 a Δs.
   route.speed[num - 1] = 0.0;
@@ -87,6 +90,18 @@ void RouteFollower::enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> 
     }
   }
   station = route.station[at];
+}
+
+Eigen::Index RouteFollower::tightest(const Route& route, const RouteSettings& settings) const noexcept {
+  Eigen::Index tightest = -1;
+  double least = settings.wide;
+  for (Eigen::Index k = std::min(at + 1, route.q.cols() - 1); k >= 0 && route.station[k] >= station - settings.lead; --k) {
+    if (route.clearance[k] < least) {
+      least = route.clearance[k];
+      tightest = k;
+    }
+  }
+  return tightest;
 }
 
 void RouteFollower::advance(const Route& route, const RouteSettings& settings, Eigen::Ref<const Eigen::VectorXd> q,

@@ -112,6 +112,25 @@ Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const
 
 Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
                       std::uint64_t seed, double margin) {
+  Plan plan = find(start, goal, obstacles, seed, margin);
+  smooth(plan, obstacles, seed);
+  return plan;
+}
+
+void RrtConnect::smooth(Plan& plan, const Obstacles& obstacles, std::uint64_t seed) {
+  if (plan.status != PlanStatus::found || plan.path.cols() <= 2 || settings_.shortcuts == 0) {
+    return;
+  }
+  const double begin = seconds();
+  RandomStream random(~seed);
+  const Margins kept = margins(plan.margin, plan.path.col(0), plan.path.rightCols(1), obstacles);
+  plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_);
+  plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_);
+  plan.smoothing_seconds = seconds() - begin;
+}
+
+Plan RrtConnect::find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
+                      std::uint64_t seed, double margin) {
   const double begin = seconds(), deadline = begin + settings_.max_seconds;
   Plan plan;
   const JointLimits& limits = body_->robot().limits();
@@ -153,10 +172,6 @@ Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
     }
   }
   plan.search_seconds = seconds() - begin;
-  if (plan.status == PlanStatus::found && plan.path.cols() > 2) {
-    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_);
-    plan.smoothing_seconds = seconds() - begin - plan.search_seconds;
-  }
   return plan;
 }
 

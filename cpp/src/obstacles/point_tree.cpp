@@ -67,7 +67,7 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
     levels_.emplace_back(groups(levels_.back().size(), fan_out));
   }
   for (const std::vector<Ball>& level : levels_) {
-    const std::size_t room = groups(level.size(), fan_out) * fan_out;
+    const std::size_t room = groups(level.size(), fan_out) * fan_out + leaf_size - fan_out;
     const std::vector<double> far(room, padding);
     hulls_.push_back({far, far, far, std::vector<double>(room, 0.0)});
   }

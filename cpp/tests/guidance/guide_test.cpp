@@ -42,7 +42,7 @@ Obstacles point(double x, double y) {
 
 /// An arm that is drawn to the attractor without delay.
 GuideStatus follow(Guide& guide, Eigen::VectorXd& q, double& time, double duration) {
-  Guide::Attractor attractor{q, q};
+  Guide::Attractor attractor{q, q, q};
   GuideStatus status = GuideStatus::idle;
   for (const double end = time + duration; time < end; time += 0.01) {
     status = guide.step(q, time, attractor);
@@ -60,7 +60,7 @@ BOOST_AUTO_TEST_CASE(arrives_around_an_obstacle_and_tells_of_a_blocked_goal) {
   Guide guide(body_of(robot), settings);
   guide.set_obstacles(point(0.5, 0.0));
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  Guide::Attractor attractor{q, q};
+  Guide::Attractor attractor{q, q, q};
   BOOST_TEST(name(guide.step(q, 0.0, attractor)) == "idle");
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   double time = 0.0;
@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
   guide.set_obstacles(point(0.5, 0.0));
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  Guide::Attractor attractor{q, q};
+  Guide::Attractor attractor{q, q, q};
   GuideStatus status = GuideStatus::idle;
   double time = 0.0;
   // Until it has searched, however slow the machine is.
@@ -115,6 +115,36 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
     time += 0.01;
   }
   BOOST_TEST(name(status) == "arrived");
+}
+
+BOOST_AUTO_TEST_CASE(the_tightest_place_between_arm_and_attractor_is_known) {
+  const Robot robot = turning();
+  const BodyClearance body = body_of(robot);
+  BodyClearance::Workspace w(body);
+  const RouteSettings settings;
+  Eigen::MatrixXd path(2, 2);
+  path << 0.0, 2.0, 0.0, 0.0;
+  // Beyond the tip, stretched towards 1 rad: the tip ends at 0.61 m, the point begins at 0.63 m.
+  const Route route = make_route(path, body, point(0.65 * std::cos(1.0), 0.65 * std::sin(1.0)), settings, w);
+  Eigen::Index narrowest = 0;
+  BOOST_TEST(std::abs(route.clearance.minCoeff(&narrowest) - 0.02) < 1e-3);  // the tip passes between two samples
+  BOOST_TEST(std::abs(route.q(0, narrowest) - 1.0) < 0.05);                  // their spacing
+  BOOST_TEST(route.speed[narrowest] < 0.6 * settings.speed);
+  RouteFollower follower;
+  Eigen::VectorXd q = Eigen::Vector2d::Zero(), position(2), velocity(2);
+  follower.enter(route, q);
+  BOOST_TEST(follower.tightest(route, settings) == -1);  // it is wide there
+  while (follower.station < 1.2) {
+    follower.advance(route, settings, position = Eigen::Vector2d(follower.station, 0.0), 0.01, position, velocity);
+  }
+  BOOST_TEST(follower.tightest(route, settings) == narrowest);  // behind the attractor, ahead of the arm
+  while (follower.station < 1.9) {
+    follower.advance(route, settings, position = Eigen::Vector2d(follower.station, 0.0), 0.01, position, velocity);
+  }
+  BOOST_TEST(follower.tightest(route, settings) == -1);
+  const Route quick = make_route(path, body, Obstacles::none(), settings, w, false);
+  BOOST_TEST(quick.clearance.maxCoeff() == 0.0);
+  BOOST_TEST(quick.speed.maxCoeff() <= settings.slowest * settings.speed);
 }
 
 BOOST_AUTO_TEST_CASE(the_attractor_waits_for_the_arm_and_slows_at_the_end) {

@@ -3,6 +3,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include "sidestep/guidance/path_smoothing.hpp"
 #include "support/random_scene.hpp"
 #include "support/serial_arm.hpp"
 
@@ -93,6 +94,42 @@ BOOST_AUTO_TEST_CASE(finds_a_free_way_around_and_the_same_every_time) {
     const Plan again = planner.plan(joints(0.5), joints(-0.5), points, seed);
     BOOST_TEST((again.path == plan.path));
   }
+}
+
+BOOST_AUTO_TEST_CASE(smoothing_makes_a_path_shorter_and_wide_where_there_is_room) {
+  const Robot robot = planar(3);
+  const BodyClearance body(robot, along_links(robot));
+  PlannerSettings settings;
+  settings.margin = settings.floor = 0.01;
+  RrtConnect planner(body, settings);
+  BodyClearance::Workspace w(body);
+  const Obstacles points = wall();
+  const auto least = [&](const Eigen::MatrixXd& path) {
+    double clearance = 1.0;
+    for (Eigen::Index k = 1; k < path.cols(); ++k) {
+      for (int i = 0; i <= 100; ++i) {
+        const Eigen::VectorXd q = path.col(k - 1) + (path.col(k) - path.col(k - 1)) * i / 100.0;
+        clearance = std::min(clearance, body.nearest(q, points, clearance, w).clearance);
+      }
+    }
+    return clearance;
+  };
+  int wider = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Plan plan = planner.find(joints(0.5), joints(-0.5), points, seed, settings.margin);
+    BOOST_TEST(name(plan.status) == "found");
+    const Eigen::MatrixXd found = plan.path;
+    planner.smooth(plan, points, seed);
+    BOOST_TEST(length(plan.path) <= length(found) + 1.0);  // waypoints may be shifted a little outwards
+    RandomStream random(seed);
+    const Margins kept = planner.margins(settings.margin, joints(0.5), joints(-0.5), points);
+    const Eigen::MatrixXd tight = shorten(found, body, points, kept, 40, random, w);
+    const Eigen::MatrixXd wide = widen(tight, body, points, kept, 0.06, random, w);
+    BOOST_TEST(length(tight) <= length(found) + 1e-12);  // rounding
+    BOOST_TEST(least(wide) >= settings.margin - settings.slack);
+    wider += least(wide) > least(tight) + 0.002;
+  }
+  BOOST_TEST(wider >= 10);
 }
 
 BOOST_AUTO_TEST_CASE(says_what_is_in_the_way_and_how_deep) {

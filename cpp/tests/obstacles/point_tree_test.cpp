@@ -11,6 +11,8 @@ using test::Random;
 
 namespace {
 
+constexpr double single = 1e-6;  // [m] rounding of distances of some metres
+
 double scanned(const Obstacles& obstacles, const Eigen::Vector3d& place, double limit) {
   for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
     limit = std::min(limit, (obstacles.points().col(n) - place).norm() - obstacles.radii()[n]);
@@ -20,11 +22,11 @@ double scanned(const Obstacles& obstacles, const Eigen::Vector3d& place, double 
 
 /// Nearest to a place; `looked` counts the balls that were measured.
 PointTree::Nearest nearest(const PointTree& tree, const Eigen::Vector3d& place, double limit, double stop, int& looked) {
-  return tree.nearest(limit, stop, [&](const PointTree::Balls& balls, int first, int count, double least, double* values) {
+  return tree.nearest(limit, stop, [&](const PointTree::Balls& balls, int first, int count, double least, float* values) {
     unsigned near = 0;
     for (int i = 0; i < count; ++i) {
       const int n = first + i;
-      values[i] = (Eigen::Vector3d(balls.x[n], balls.y[n], balls.z[n]) - place).norm() - balls.radius[n];
+      values[i] = static_cast<float>((Eigen::Vector3d(balls.x[n], balls.y[n], balls.z[n]) - place).norm() - balls.radius[n]);
       near |= (values[i] < least ? 1u : 0u) << i;
     }
     looked += count;
@@ -48,11 +50,11 @@ BOOST_AUTO_TEST_CASE(finds_the_nearest_point_of_a_plain_scan) {
       const double limit = query == 0 ? -0.01 : random.magnitude(1e-3, 10.0);
       int looked = 0;
       const PointTree::Nearest found = nearest(tree, place, limit, -10.0, looked);
-      BOOST_TEST(std::abs(found.distance - scanned(obstacles, place, limit)) < 1e-12);  // rounding of the motion
+      BOOST_TEST(std::abs(found.distance - scanned(obstacles, place, limit)) < single);
       BOOST_TEST((found.point >= 0) == (found.distance < limit));
       if (found.point >= 0) {
         const int n = tree.order()[static_cast<std::size_t>(found.point)];
-        BOOST_TEST(std::abs((obstacles.points().col(n) - place).norm() - obstacles.radii()[n] - found.distance) < 1e-12);
+        BOOST_TEST(std::abs((obstacles.points().col(n) - place).norm() - obstacles.radii()[n] - found.distance) < single);
       }
     }
   }
@@ -77,7 +79,8 @@ BOOST_AUTO_TEST_CASE(a_plane_a_line_and_one_point_have_a_tree) {
     const Obstacles obstacles(points, Eigen::VectorXd::Zero(50), Eigen::Matrix3Xd::Zero(3, 50));
     int looked = 0;
     for (const Eigen::Vector3d& place : {Eigen::Vector3d(0.0, 0.0, 2.0), Eigen::Vector3d(1e300, 0.0, 0.0)}) {
-      BOOST_TEST(nearest(obstacles.tree(), place, 1e6, -1.0, looked).distance == scanned(obstacles, place, 1e6));
+      BOOST_TEST(nearest(obstacles.tree(), place, 1e6, -1.0, looked).distance ==
+                 static_cast<float>(scanned(obstacles, place, 1e6)));
     }
   }
 }

@@ -126,7 +126,7 @@ def _integrated(
     look = CHUNK if guided is None else guided.period
     total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, look))
     q, v = problem.start, np.zeros_like(problem.start)
-    relaxed, escape = _prepared(robot, system, problem, settings, guided)
+    relaxed, escape = _prepared(robot, system, problem, settings)
     guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
     rows: list[tuple[Array, Array, Array]] = []
     times: list[Array] = []
@@ -136,11 +136,12 @@ def _integrated(
         steps = min(chunk, total - done, *(steps for steps in changes if steps > 0))
         at = done * settings.period
         obstacles = problem.obstacles_at(at)
+        goal = problem.goal if guided is None else guided.goal(q, obstacles, at)
         part = rollout(
-            relaxed.at(at),
+            relaxed.at(at) if guided is None else guided.moving,
             q,
             v,
-            problem.goal if guided is None else guided.goal(q, obstacles, at),
+            goal,
             obstacles,
             period=settings.period,
             steps=steps,
@@ -171,7 +172,7 @@ def _under_torque(
     guided: _Led | None,
 ) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period)
-    relaxed, escape = _prepared(robot, system, problem, settings, guided)
+    relaxed, escape = _prepared(robot, system, problem, settings)
     timer = _Timer()
     run = simulation.run(
         _TimedSystem(relaxed, timer, settings.period, guided),
@@ -201,9 +202,8 @@ def _prepared(
     system: GeometricSystem,
     problem: Problem,
     settings: MotionSettings,
-    guided: _Led | None,
 ) -> tuple[_Relaxed, Escape | None]:
-    relaxed = _Relaxed(system, problem, relax=settings.escape or guided is not None)
+    relaxed = _Relaxed(system, problem, relax=settings.escape)
     return relaxed, Escape(robot, seed=problem.index) if settings.escape else None
 
 
@@ -234,6 +234,11 @@ class _Led:
         self.planning_seconds: float | None = None
         self.status = ""
 
+    @property
+    def moving(self) -> GeometricSystem:
+        """What to move by, as of the last goal."""
+        return self._guided.moving
+
     def goal(self, q: Array, obstacles: Obstacles, time: float) -> JointGoal:
         """Where to be drawn to."""
         guidance = self._guided.lead(q, obstacles, time)
@@ -261,7 +266,8 @@ class _TimedSystem:
         at = len(self._timer.steps) * self._period
         if self._guided is not None:
             goal = self._guided.goal(q, obstacles, at)
-        step = self._system.at(at).acceleration(q, v, goal, obstacles)
+        system = self._system.at(at) if self._guided is None else self._guided.moving
+        step = system.acceleration(q, v, goal, obstacles)
         self._timer.steps.append(time.perf_counter() - begin)
         return step
 

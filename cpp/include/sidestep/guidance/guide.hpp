@@ -69,9 +69,10 @@ class Guide {
   /// The same points again are no change.
   void set_obstacles(const Obstacles& obstacles);
 
-  /// Where to be drawn to: position (nv) and velocity (nv) of a JointGoal.
+  /// Where to be drawn to: position (nv) and velocity (nv) of a JointGoal; and where barriers are to leave room (nv), see
+  /// GeometricSystem::relaxed_at: the tightest place of the path that the arm is about to pass, else the goal.
   struct Attractor {
-    Eigen::VectorXd position, velocity;
+    Eigen::VectorXd position, velocity, tight;
   };
 
   /// One step of the loop, at a time [s] that does not go back. Never blocks; allocates nothing unless synchronous.
@@ -108,6 +109,7 @@ class Guide {
   void look(const State& state);
   void search(const State& state, const Obstacles& obstacles);
   bool way_is_free(const State& state, const Obstacles& obstacles, bool changed);
+  void follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured);
   void answer(const State& state, PlanStatus status, bool direct);
 
   BodyClearance body_;

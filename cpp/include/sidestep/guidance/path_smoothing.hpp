@@ -12,4 +12,9 @@ namespace sidestep {
 Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
                         const Margins& margins, int attempts, RandomStream& random, BodyClearance::Workspace& workspace);
 
+/// Shifts the waypoints of a free path away from what is near, as long as they gain clearance, up to `wide` [m], on the edges
+/// to either side; ends stay. What it returns is free with the same margins.
+Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
+                      const Margins& margins, double wide, RandomStream& random, BodyClearance::Workspace& workspace);
+
 }  // namespace sidestep

@@ -24,13 +24,14 @@ struct Route {
   Eigen::MatrixXd q;        ///< (nv × K) [rad]
   Eigen::VectorXd station;  ///< length of the path up to each [rad]
   Eigen::VectorXd speed;    ///< (K) [rad/s]
+  Eigen::VectorXd clearance;  ///< (K) not above `wide` [m]; zero where it was not measured
 
   double length() const noexcept { return station.size() > 0 ? station[station.size() - 1] : 0.0; }
 };
 
-/// Samples a path.
+/// Samples a path. One that is not `measured` is slow everywhere, and soon made: clearances are looked at nowhere.
 Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                 const RouteSettings& settings, BodyClearance::Workspace& workspace);
+                 const RouteSettings& settings, BodyClearance::Workspace& workspace, bool measured = true);
 
 /// Where the attractor is on a route: it runs ahead of the arm as far as that can follow.
 struct RouteFollower {
@@ -40,6 +41,9 @@ struct RouteFollower {
 
   /// Onto a new route, at the sample nearest to q among the first ones.
   void enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q) noexcept;
+
+  /// The sample with the least clearance between the attractor and as far behind it as the arm may be; −1 where all are wide.
+  Eigen::Index tightest(const Route& route, const RouteSettings& settings) const noexcept;
 
   /// Moves on for `duration` [s]; writes attractor and its velocity (nv).
   void advance(const Route& route, const RouteSettings& settings, Eigen::Ref<const Eigen::VectorXd> q, double duration,

@@ -47,6 +47,11 @@ class RrtConnect {
     return plan(start, goal, obstacles, seed, settings_.margin);
   }
 
+  /// The two parts of a plan: a path as it is found, then the same, shorter and wider.
+  Plan find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed,
+            double margin);
+  void smooth(Plan& plan, const Obstacles& obstacles, std::uint64_t seed);
+
   const PlannerSettings& settings() const noexcept { return settings_; }
   const BodyClearance& body() const noexcept { return *body_; }
   BodyClearance::Workspace& workspace() noexcept { return workspace_; }

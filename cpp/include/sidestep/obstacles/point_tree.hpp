@@ -51,7 +51,7 @@ class PointTree {
   /// The point whose ball is nearest by a measure, best first. measure(balls, first, count, limit, values) writes the
   /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that room, and returns those
   /// below `limit` as bits; of a ball it must not exceed that of a ball inside by more than what it is content to miss. The
-  /// arrays are padded to whole multiples of `fan_out`. None from `limit` on is found, and any that is below `stop` ends the
+  /// arrays go on for `leaf_size` from `first`. None from `limit` on is found, and any that is below `stop` ends the
   /// search. No allocation.
   template <class Measure>
   Nearest nearest(double limit, double stop, Measure&& measure) const noexcept {
@@ -112,7 +112,7 @@ class PointTree {
   template <class Measure>
   void descend_to_nearest(int level, int node, double stop, Measure& measure, Nearest& found) const noexcept {
     const int first = node * (level == 0 ? leaf_size : fan_out);
-    alignas(64) std::array<double, leaf_size> values;
+    alignas(64) std::array<float, leaf_size> values;
     if (level == 0) {
       const Balls points{coordinate(0), coordinate(1), coordinate(2), radii()};
       unsigned near = measure(points, first, std::min(leaf_size, size() - first), found.distance, values.data());

@@ -8,6 +8,7 @@ struct PlacedEllipsoid {
   double centre[3];
   double axes[9];     // world to principal axes, by rows
   double squares[3];  // of the semi-axes [m²], ascending
+  double extent;      // the longest [m]
 };
 
 /// Balls as structure of arrays.
@@ -16,17 +17,16 @@ struct Balls {
   const double* radius;
 };
 
-inline constexpr int most_balls = 16;  // of one call
-inline constexpr int lanes = 8;        // arrays are padded to whole multiples of it
+inline constexpr int most_balls = 16;  // of one call; the arrays go on for so many from `first`
 
 /// Writes lower bounds of the signed distances from the ellipsoid to the balls [first, first + count) into `distances`
-/// (most_balls), first and the room a multiple of `lanes`; bit i of the result: that of ball first + i is below `limit`.
-/// Those that are not may be coarse.
+/// (most_balls); bit i of the result: that of ball first + i is below `limit`. Those that are not may be coarse.
+/// In single precision, relative to the centre: right to about a millionth of the distance.
 using Distances = unsigned (*)(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
-                               double* distances) noexcept;
+                               float* distances) noexcept;
 
-unsigned distances_baseline(const PlacedEllipsoid&, const Balls&, int, int, double, double*) noexcept;
-unsigned distances_avx2(const PlacedEllipsoid&, const Balls&, int, int, double, double*) noexcept;
-unsigned distances_avx512(const PlacedEllipsoid&, const Balls&, int, int, double, double*) noexcept;
+unsigned distances_baseline(const PlacedEllipsoid&, const Balls&, int, int, double, float*) noexcept;
+unsigned distances_avx2(const PlacedEllipsoid&, const Balls&, int, int, double, float*) noexcept;
+unsigned distances_avx512(const PlacedEllipsoid&, const Balls&, int, int, double, float*) noexcept;
 
 }  // namespace sidestep::kernels

@@ -1,16 +1,39 @@
-// Included by one file per instruction set, after distance_kernel.hpp and <immintrin.h> where there is one. Defines
-// distances_to in an anonymous namespace.
+// Included by one file per instruction set, after distance_kernel.hpp. Defines distances_to in an anonymous namespace: loops
+// over `most_balls` floats that the compiler puts side by side in the registers it has.
 
 namespace sidestep::kernels {
 namespace {
 
-#include "../../embedding/kernels/lanes.inl"
+constexpr int refinements = 2;           // a median error of 10⁻⁴ of the distance for axes 1 : 6
+constexpr float inside = -0.999f;        // of the least square: t stays above its pole
+constexpr float centre_offset = 1e-6f;   // [m] stands for the centre, where no direction is the nearest
 
-constexpr int refinements = 2;          // a median error of 10⁻⁴ of the distance for axes 1 : 6
-constexpr double inside = -0.999;       // of the least square: t stays above its pole
-constexpr double centre_offset = 1e-9;  // [m] stands for the centre, where no direction is the nearest
+typedef float Floats __attribute__((vector_size(4 * most_balls)));
+typedef int Ints __attribute__((vector_size(4 * most_balls)));
 
-inline Lanes larger(Lanes a, Lanes b) noexcept { return a > b ? a : b; }
+inline Floats all(float x) noexcept { return x - Floats{}; }
+inline Floats larger(Floats a, Floats b) noexcept { return a > b ? a : b; }
+inline Floats root(Floats x) noexcept {
+  Floats y;
+  for (int i = 0; i < most_balls; ++i) {
+    y[i] = __builtin_sqrtf(x[i]);
+  }
+  return y;
+}
+
+/// Which x are below the limit, as bits.
+inline unsigned below(Floats x, float limit) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_cmp_ps_mask((__m512)x, _mm512_set1_ps(limit), _CMP_LT_OQ);
+#else
+  const Ints is = x < limit;
+  unsigned bits = 0;
+  for (int i = 0; i < most_balls; ++i) {
+    bits |= static_cast<unsigned>(is[i] & 1) << i;
+  }
+  return bits;
+#endif
+}
 
 /// For every direction n the supporting plane gives a lower bound of the signed distance of e, and the best of them is
 /// the distance:
@@ -20,63 +43,66 @@ inline Lanes larger(Lanes a, Lanes b) noexcept { return a > b ? a : b; }
 /// The best is among n_i = e_i / (a_i² + t), at the root of |a_i n_i| = 1 (the secular equation). t = 0 gives the first-order
 /// distance; Newton's steps on 1/|a_i n_i| − 1, which is concave, come to the root from below.
 unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
-                      double* distances) noexcept {
-  const double* A = ellipsoid.axes;
-  const double* squares = ellipsoid.squares;
-  const double precisions[3] = {1.0 / squares[0], 1.0 / squares[1], 1.0 / squares[2]};
-  unsigned near = 0;
-  for (int at = 0; at < count; at += width) {
-    const int n = first + at;
-    const Lanes x = load(balls.centre[0] + n) - ellipsoid.centre[0];
-    const Lanes y = load(balls.centre[1] + n) - ellipsoid.centre[1];
-    const Lanes z = load(balls.centre[2] + n) - ellipsoid.centre[2];
-    const Lanes radius = load(balls.radius + n);
-    Lanes e[3], normal[3];
-    for (int i = 0; i < 3; ++i) {
-      e[i] = A[3 * i] * x + A[3 * i + 1] * y + A[3 * i + 2] * z;
-    }
-    const Lanes squared = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+                      float* distances) noexcept {
+  Floats offset[3], radius, e[3];
+  for (int i = 0; i < most_balls; ++i) {
+    offset[0][i] = static_cast<float>(balls.centre[0][first + i] - ellipsoid.centre[0]);
+    offset[1][i] = static_cast<float>(balls.centre[1][first + i] - ellipsoid.centre[1]);
+    offset[2][i] = static_cast<float>(balls.centre[2][first + i] - ellipsoid.centre[2]);
+    radius[i] = static_cast<float>(balls.radius[first + i]);
+  }
+  float squares[3];
+  for (int i = 0; i < 3; ++i) {
+    const double* A = ellipsoid.axes + 3 * i;
+    e[i] = static_cast<float>(A[0]) * offset[0] + static_cast<float>(A[1]) * offset[1] + static_cast<float>(A[2]) * offset[2];
+    squares[i] = static_cast<float>(ellipsoid.squares[i]);
+  }
+  const float least = static_cast<float>(limit);
+  const unsigned asked = (2u << (count - 1)) - 1u;
+  const Floats squared = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+  // Outside the ball around it.
+  Floats distance = root(squared) - static_cast<float>(ellipsoid.extent);
+  unsigned near = below(distance - radius, least) & asked;
+  if (near != 0) {
     e[0] = squared < centre_offset * centre_offset ? all(centre_offset) : e[0];
-    Lanes along{}, length{};
+    Floats along{}, length{}, second{}, fourth{};
     for (int i = 0; i < 3; ++i) {
-      normal[i] = precisions[i] * e[i];
-      along += e[i] * normal[i];
-      length += normal[i] * normal[i];
+      const Floats normal = (1.0f / squares[i]) * e[i];
+      along += e[i] * normal;
+      length += normal * normal;
+      const Floats a2e2 = squares[i] * e[i] * e[i];
+      second += a2e2;
+      fourth += squares[i] * a2e2;
     }
-    Lanes support = root(along);
-    Lanes distance = (along - support) / root(length);
-    if (below(distance - radius, all(limit)) != 0) {
+    Floats support = root(along);
+    distance = larger(distance, (along - support) / root(length));
+    near = below(distance - radius, least) & asked;
+    if (near != 0) {
       // From infinity the first step is to |a e| − Σ a⁴e² / Σ a²e²: the better of the two starts counts.
-      Lanes second{}, fourth{};
-      for (int i = 0; i < 3; ++i) {
-        const Lanes a2e2 = squares[i] * e[i] * e[i];
-        second += a2e2;
-        fourth += squares[i] * a2e2;
-      }
-      Lanes t = larger(along * (support - 1.0) / length, root(second) - fourth / second);
+      Floats t = larger(along * (support - 1.0f) / length, root(second) - fourth / second);
       for (int k = 0; k < refinements; ++k) {
         t = larger(t, all(inside * squares[0]));
-        Lanes square{}, slope{};
-        along = length = Lanes{};
+        Floats square{}, slope{};
+        along = length = Floats{};
         for (int i = 0; i < 3; ++i) {
-          const Lanes weight = 1.0 / (t + squares[i]);
-          normal[i] = e[i] * weight;
-          along += e[i] * normal[i];
-          length += normal[i] * normal[i];
-          const Lanes share = squares[i] * normal[i] * normal[i];
+          const Floats weight = 1.0f / (t + squares[i]);
+          const Floats normal = e[i] * weight;
+          along += e[i] * normal;
+          length += normal * normal;
+          const Floats share = squares[i] * normal * normal;
           square += share;
           slope += share * weight;
         }
         support = root(square);
         distance = larger(distance, (along - support) / root(length));
-        t += square * (support - 1.0) / slope;
+        t += square * (support - 1.0f) / slope;
       }
+      near = below(distance - radius, least) & asked;
     }
-    distance -= radius;
-    store(distances + at, distance);
-    near |= below(distance, all(limit)) << at;
   }
-  return near & ((2u << (count - 1)) - 1u);
+  distance -= radius;
+  __builtin_memcpy(distances, &distance, sizeof distance);
+  return near;
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace sidestep::kernels {
 
 unsigned distances_avx2(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
-                      double* distances) noexcept {
+                      float* distances) noexcept {
   return distances_to(ellipsoid, balls, first, count, limit, distances);
 }
 

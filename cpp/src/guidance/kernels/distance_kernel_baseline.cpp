@@ -1,16 +1,12 @@
 // For every processor of the architecture.
 #include "distance_kernel.hpp"
 
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
-
 #include "distance_kernel.inl"
 
 namespace sidestep::kernels {
 
 unsigned distances_baseline(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
-                      double* distances) noexcept {
+                      float* distances) noexcept {
   return distances_to(ellipsoid, balls, first, count, limit, distances);
 }
 
