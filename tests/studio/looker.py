@@ -45,6 +45,7 @@ class Looker:
     def _box(self, found: Any) -> dict[str, float]:
         """Where an element is [px], once it is there."""
         found.wait_for(state="visible")
+        found.evaluate("element => element.scrollIntoView({block: 'nearest'})")
         box: dict[str, float] = found.bounding_box()
         return box
 

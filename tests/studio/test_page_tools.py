@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from sidestep.studio import messages as m
+from sidestep.studio.export import python_snippet
 from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, film, find_chromium
 from sidestep.studio.page.obstacles import gizmo_pose
 from sidestep.studio.page.surface import on_surface
@@ -178,6 +179,18 @@ def test_everything_comes_from_this_machine(studio: Studio, looker: Looker) -> N
     address = (studio.address, "blob:", "data:")
     assert [name for name in loaded if not name.startswith(address)] == []
     assert looker.page.url.startswith(studio.address)
+
+
+def test_the_system_is_exported_as_python(studio: Studio, looker: Looker) -> None:
+    now = last(studio)
+    looker.tab("Method")
+    looker.press("Export as Python")
+    with looker.page.expect_download() as download:
+        looker.click("[role=dialog] button:has-text('Download')")
+    code = download.value.path().read_text()
+    assert code == python_snippet(now.scenario.robot, now.method, now.numbers[now.method])
+    looker.click("[role=dialog] button:has-text('Close')")
+    looker.page.locator("[role=dialog]").wait_for(state="detached")
 
 
 def test_a_notebook_shows_the_page(studio: Studio, chromium: Any) -> None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+LONGEST_LINE = 1.0  # [m] nearest line that is drawn: nothing farther off matters to the arm
 TRAIL_POINTS = 150
 TRAIL_STEP = 0.01  # [m] of the tip between two points
 METRIC_SIZE = (
@@ -60,7 +61,7 @@ class Marks:
 
     def show_nearest(self, found: tuple[Clearance, ...], *, visible: bool) -> None:
         """The line between the closest points of the arm and the scene; `found` nearest first."""
-        self.nearest.visible = visible and bool(found)
+        self.nearest.visible = visible and bool(found) and found[0].distance < LONGEST_LINE
         if self.nearest.visible:
             ends = np.array([[found[0].point_on_link, found[0].point_on_obstacle]])
             self.nearest.points = ends.astype(np.float32)
