@@ -4,6 +4,7 @@
 
 The two are measured in turn, `--rounds` times. A viewer here is a process that takes in everything a browser is sent;
 it does not draw. A browser on the same machine also takes processor time, as any program does: that is not counted.
+On a machine with other work, `chrt -r 1` in front of the command keeps that work out of loop and viewers alike.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import os
 import time
 from pathlib import Path
 
@@ -102,6 +104,7 @@ def main() -> None:
         "robot": options.robot,
         "method": options.method,
         "viewers": VIEWERS,
+        "real_time_scheduling": os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR),
         "rounds": [
             {
                 name: {"median_us": t.median, "p99_us": t.p99}
