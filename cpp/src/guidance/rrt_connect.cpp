@@ -17,6 +17,9 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
+constexpr double short_step = 0.25;      // of the range
+constexpr double domain = 1.0;           // of the range: how far samples may be from a node that was trapped
+constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
 constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
 
 double seconds() {
@@ -194,14 +197,22 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
       plan.status = PlanStatus::timeout;
       return;
     }
-    for (Eigen::Index k = 0; k < sample_.size(); ++k) {
-      sample_[k] = random.uniform(low[k], high[k]);
+    // Samples far from nodes that were trapped only find the same walls again.
+    int nearest = 0;
+    for (int draw = 0; draw < draws; ++draw) {
+      for (Eigen::Index k = 0; k < sample_.size(); ++k) {
+        sample_[k] = random.uniform(low[k], high[k]);
+      }
+      nearest = one->nearest(sample_);
+      if ((sample_ - one->node(nearest)).norm() <= one->domain(nearest)) {
+        break;
+      }
     }
-    if (grow(*one, sample_, obstacles, margins) != Growth::trapped) {
+    if (grow(*one, nearest, sample_, obstacles, margins) != Growth::trapped) {
       const Eigen::VectorXd target = one->node(one->size() - 1);
       Growth growth = Growth::advanced;
       while (growth == Growth::advanced && !other->full()) {
-        growth = grow(*other, target, obstacles, margins);
+        growth = grow(*other, other->nearest(target), target, obstacles, margins);
       }
       if (growth == Growth::reached) {
         std::vector<Eigen::VectorXd> way = to_root(from_start_, from_start_.size() - 1);
@@ -221,19 +232,22 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
   }
 }
 
-RrtConnect::Growth RrtConnect::grow(SearchTree& tree, const Eigen::VectorXd& target, const Obstacles& obstacles,
+RrtConnect::Growth RrtConnect::grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles,
                                     const Margins& margins) {
-  const int nearest = tree.nearest(target);
-  near_ = tree.node(nearest);
+  near_ = tree.node(from);
   const double distance = (target - near_).norm();
-  const bool whole = distance <= settings_.range;
-  next_ = whole ? target : near_ + settings_.range / distance * (target - near_);
-  if (!body_->free(next_, obstacles, margins, workspace_) ||
-      !body_->edge_free(near_, next_, obstacles, margins, workspace_)) {
-    return Growth::trapped;
+  // A long step, or where that is not free a short one.
+  for (const double range : {settings_.range, short_step * settings_.range}) {
+    const bool whole = distance <= range;
+    next_ = whole ? target : near_ + range / distance * (target - near_);
+    if (body_->free(next_, obstacles, margins, workspace_) &&
+        body_->edge_free(near_, next_, obstacles, margins, workspace_)) {
+      tree.add(next_, from);
+      return whole ? Growth::reached : Growth::advanced;
+    }
+    tree.bound(from, domain * settings_.range);
   }
-  tree.add(next_, nearest);
-  return whole ? Growth::reached : Growth::advanced;
+  return Growth::trapped;
 }
 
 }  // namespace sidestep

@@ -1,5 +1,7 @@
 #include "sidestep/guidance/search_tree.hpp"
 
+#include <limits>
+
 namespace sidestep {
 
 SearchTree::SearchTree(int num_coordinates, int capacity)
@@ -7,12 +9,14 @@ SearchTree::SearchTree(int num_coordinates, int capacity)
       nodes_(num_coordinates, capacity),
       coordinates_(capacity, num_coordinates),
       distances_(capacity),
-      parents_(static_cast<std::size_t>(capacity)) {}
+      parents_(static_cast<std::size_t>(capacity)),
+      domains_(static_cast<std::size_t>(capacity)) {}
 
 int SearchTree::add(const Eigen::VectorXd& q, int parent) noexcept {
   nodes_.col(size_) = q;
   coordinates_.row(size_) = q.transpose().cast<float>();
   parents_[static_cast<std::size_t>(size_)] = parent;
+  domains_[static_cast<std::size_t>(size_)] = std::numeric_limits<double>::infinity();
   return size_++;
 }
 

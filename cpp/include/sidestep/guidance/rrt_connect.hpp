@@ -30,11 +30,13 @@ struct PlannerSettings {
 };
 
 /// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
-/// LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless the time runs out.
+/// LaValle 2000) with dynamic domains (Yershova et al. 2005), shortened and widened. Deterministic in (start, goal,
+/// obstacles, seed) unless the time runs out.
 ///
 /// Margins shrink in two ways, both stated in the plan: where no path keeps `margin`, one with their geometric mean, then one
-/// that keeps `floor` is searched for, with a 400th, a 40th and the whole of the budget; and near start and goal every link may be as near to things as it is there, see Margins. A link deeper than
-/// `allowance` inside something at an end is refused as in collision.
+/// that keeps `floor` is searched for, with a 400th, a 40th and the whole of the budget; and near start and goal every link
+/// may be as near to things as it is there, see Margins. A link deeper than `allowance` inside something at an end is refused
+/// as in collision.
 class RrtConnect {
  public:
   /// The body must outlive the planner, which is mutable: one per thread.
@@ -67,7 +69,7 @@ class RrtConnect {
 
   void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
               const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
-  Growth grow(SearchTree& tree, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins);
+  Growth grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins);
 
   const BodyClearance* body_;
   PlannerSettings settings_;

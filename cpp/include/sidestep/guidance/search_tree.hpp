@@ -21,6 +21,10 @@ class SearchTree {
   /// The node with the least |q − node|. The tree must not be empty.
   int nearest(const Eigen::VectorXd& q) noexcept;
 
+  /// How far from a node samples may be that it is the nearest to: infinitely until `bound` [rad | m].
+  double domain(int k) const noexcept { return domains_[static_cast<std::size_t>(k)]; }
+  void bound(int k, double distance) noexcept { domains_[static_cast<std::size_t>(k)] = distance; }
+
   auto node(int k) const noexcept { return nodes_.col(k); }
   int parent(int k) const noexcept { return parents_[static_cast<std::size_t>(k)]; }
 
@@ -30,6 +34,7 @@ class SearchTree {
   Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> coordinates_;    // (capacity × nv): a run per coordinate, for the scan
   Eigen::ArrayXf distances_;
   std::vector<int> parents_;
+  std::vector<double> domains_;
 };
 
 }  // namespace sidestep
