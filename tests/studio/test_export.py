@@ -64,6 +64,20 @@ def test_the_saved_scenario_runs_the_method_that_was_chosen(
     )
 
 
+def test_the_file_says_when_barriers_move_the_arm(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+) -> None:
+    session = make_session(scenario, numbers={"barrier": SPRING})
+    loaded = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))
+    assert loaded.method == "barrier"
+    session = make_session(scenario)
+    session.handle(m.SetNumbers("barrier", SPRING))
+    session.handle(m.Load(loaded))  # it has no numbers of barriers: they stay
+    assert session.snapshot().numbers["barrier"]["stiffness"] == 3.0
+    session.handle(m.SetMethod("unswitched"))
+    assert scenario_now(session.snapshot(), name="mine").method == "written"
+
+
 def test_a_cloud_is_saved_beside_its_scenario(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
 ) -> None:

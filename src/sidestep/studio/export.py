@@ -25,8 +25,8 @@ from sidestep.studio.methods import METHODS, THESIS_COMPONENTS
 def scenario_now(snapshot: Snapshot, *, name: str) -> Scenario:
     """The scenario as it stands: arm, goal and obstacles where they are now, and the method's numbers.
 
-    Scenario files know the thesis's systems. Of another method they keep what the loaded scenario had, with its
-    stiffness and damping.
+    Scenario files know the numbers of the thesis's systems; of barriers they say only that they are used, and keep
+    what the loaded scenario had beside them.
 
     Raises:
         ValueError: the goal is a pose, which scenario files do not have.
@@ -34,15 +34,21 @@ def scenario_now(snapshot: Snapshot, *, name: str) -> Scenario:
     if snapshot.goal is None:
         raise ValueError("a scenario file has a configuration as its goal: move a slider of the goal first")
     scenario, numbers = snapshot.scenario, snapshot.numbers[snapshot.method]
-    system = dataclasses.replace(scenario.system, stiffness=numbers["stiffness"], damping=numbers["damping"])
-    body, embedding = scenario.body, scenario.embedding
-    if not METHODS[snapshot.method].covering:
-        system = dataclasses.replace(system, switch=switch_of(snapshot.method, numbers, len(snapshot.q)))
+    system, body, embedding = scenario.system, scenario.body, scenario.embedding
+    covering = METHODS[snapshot.method].covering
+    if not covering:
+        system = dataclasses.replace(
+            system,
+            stiffness=numbers["stiffness"],
+            damping=numbers["damping"],
+            switch=switch_of(snapshot.method, numbers, len(snapshot.q)),
+        )
         body = BodyChoice(components=THESIS_COMPONENTS)
         embedding = EmbeddingChoice(joint_limits=JointLimitChoice())
     return dataclasses.replace(
         scenario,
         name=name,
+        method="barrier" if covering else "written",
         start=JointState("rad", tuple(float(x) for x in snapshot.q.round(6))),
         goal=JointState("rad", tuple(float(x) for x in snapshot.goal.round(6))),
         obstacles=tuple(
@@ -72,7 +78,9 @@ def switch_of(method: str, numbers: Mapping[str, float], num_coordinates: int) -
 
 
 def numbers_of(scenario: Scenario) -> tuple[str, dict[str, float]]:
-    """The method that a scenario file asks for, and its numbers, moved into their ranges."""
+    """The method that a scenario file asks for, and the numbers it has for it, moved into their ranges."""
+    if scenario.method == "barrier":
+        return "barrier", {}
     system, switch = scenario.system, scenario.system.switch
     numbers = {"stiffness": float(np.mean(system.stiffness)), "damping": float(np.mean(system.damping))}
     method = {"none": "unswitched", "distance": "thesis"}.get(switch.type, switch.type)

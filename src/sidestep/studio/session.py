@@ -270,7 +270,7 @@ class Session:
         stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
         numbers = dict(self._numbers)
         asked, values = numbers_of(scenario)
-        if asked not in self._given:
+        if values and asked not in self._given:
             numbers[asked] = check_numbers(METHODS[asked], values)
         self._system = self._system_for(robot, bodies, self._method, numbers[self._method.name])
         self.robot, self._bodies, self._numbers = robot, bodies, numbers
