@@ -40,14 +40,14 @@ def record(session: Session, seconds: float) -> tuple[m.Snapshot, float]:
 
 def test_the_arm_arrives_past_the_ball(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
-    last, clearance = record(session, 12.0)
+    last, clearance = record(session, 7.0)
     assert last.goal is not None
     assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
     assert clearance > 0.0
     assert last.touched == 0
     assert "goal" in last.words
     assert last.status == ("ok", "ok")
-    assert last.time == pytest.approx(12.0, abs=1e-9)
+    assert last.time == pytest.approx(7.0, abs=1e-9)
 
 
 def test_a_ball_drawn_into_the_arm_at_rest_does_not_touch_it(
@@ -128,7 +128,7 @@ def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, sce
 
 def test_a_guided_arm_arrives(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario, method="guided")
-    last, clearance = record(session, 12.0)
+    last, clearance = record(session, 7.0)
     assert last.goal is not None
     assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
     assert clearance > 0.0
