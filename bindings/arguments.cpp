@@ -114,4 +114,12 @@ NumpyArray to_numpy_points(const Eigen::Ref<const Eigen::Matrix3Xd>& points) {
   return to_numpy_matrix(points.transpose());
 }
 
+std::vector<LinkPair> link_pairs(const Pairs& pairs) {
+  std::vector<LinkPair> result;
+  for (const auto& pair : pairs) {
+    std::visit([&result](const auto& names) { result.push_back(std::make_from_tuple<LinkPair>(names)); }, pair);
+  }
+  return result;
+}
+
 }  // namespace sidestep::python

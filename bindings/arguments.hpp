@@ -6,6 +6,12 @@
 #include <Eigen/Core>
 #include <memory>
 #include <string>
+#include <tuple>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "sidestep/embedding/link_pair.hpp"
 
 namespace sidestep {
 class Robot;
@@ -38,6 +44,10 @@ Eigen::Matrix3Xd as_points(nb::handle value, const char* name);
 
 /// A matrix argument of exactly this shape.
 Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols);
+
+/// Pairs of links as (first, second) or (first, second, contact).
+using Pairs = std::vector<std::variant<std::pair<std::string, std::string>, std::tuple<std::string, std::string, double>>>;
+std::vector<LinkPair> link_pairs(const Pairs& pairs);
 
 /// Throws std::invalid_argument if the body was fitted to another robot than this. A body made by hand, and a robot
 /// of the core without geometry, have no fingerprint and are taken as they are.

@@ -1,6 +1,8 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
 #include <stdexcept>
@@ -149,17 +151,18 @@ void bind_embedding(nb::module_& m) {
 
   nb::class_<SelfCollisionBarrier, Embedding>(
       m, "SelfCollisionBarrier",
-      "One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: the gap\n"
-      "between their extents along the line of centres, a lower bound of the distance. Parameters as in\n"
-      "ClearanceBarrier; pairs: names of links.")
+      "One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: their\n"
+      "distance, or minus their depth, less the gap at which the links touch. pairs: (first, second) or\n"
+      "(first, second, contact), names of links and that gap [m], see presets.barrier_pairs. Other parameters as in\n"
+      "ClearanceBarrier.")
       .def(
           "__init__",
           [](SelfCollisionBarrier* self, const Robot& robot, const Body& body,
-             const std::vector<std::pair<std::string, std::string>>& pairs, double activation, double strength,
-             double power, double floor, double temperature, double reach) {
+             const Pairs& pairs, double activation, double strength, double power, double floor, double temperature,
+             double reach) {
             check_fitted_to(robot, body);
-            new (self)
-                SelfCollisionBarrier(robot, body, pairs, {activation, strength, power, floor}, temperature, reach);
+            new (self) SelfCollisionBarrier(robot, body, link_pairs(pairs), {activation, strength, power, floor},
+                                            temperature, reach);
           },
           nb::arg("robot"), nb::arg("body"), nb::arg("pairs"), nb::kw_only(), nb::arg("activation") = 0.05,
           nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,

@@ -2,6 +2,8 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
 #include <memory>
@@ -16,13 +18,12 @@
 namespace sidestep::python {
 namespace {
 
-using Pairs = std::vector<std::pair<std::string, std::string>>;
 
 /// A planner with the body it searches for.
 class PathPlanner {
  public:
   PathPlanner(const Robot& robot, const Body& body, const Pairs& pairs, const PlannerSettings& settings)
-      : body_(robot, body, pairs), planner_(body_, settings) {}
+      : body_(robot, body, link_pairs(pairs)), planner_(body_, settings) {}
   PathPlanner(const PathPlanner&) = delete;
   PathPlanner& operator=(const PathPlanner&) = delete;
 
@@ -175,7 +176,7 @@ void bind_guide(nb::module_& m) {
             s.route = route.value_or(s.route);
             s.period = period, s.patience = patience, s.retry = retry, s.tolerance = tolerance;
             s.duration = duration, s.seed = seed, s.synchronous = synchronous;
-            new (self) Guide(BodyClearance(robot, body, pairs), s);
+            new (self) Guide(BodyClearance(robot, body, link_pairs(pairs)), s);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{}, nb::arg("planner") = nb::none(),
           nb::arg("route") = nb::none(), nb::arg("period") = GuideSettings{}.period,
@@ -224,7 +225,7 @@ void bind_guidance(nb::module_& m) {
       "Plans a path of a covering body among obstacle points: the straight edge if it is free, else RRT-Connect\n"
       "(Kuffner and LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless time runs out.\n"
       "Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.\n"
-      "robot; body: calibrated (Body.cover); pairs: names of links that must not touch, see presets.barrier_pairs;\n"
+      "robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier;\n"
       "settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.")
       .def(
           "__init__",

@@ -28,10 +28,10 @@ int main(int argc, char** argv) {
   if (density) {
     embeddings = {std::make_shared<CollisionDensity>(robot, scene.body)};
   } else {
-    std::vector<std::pair<std::string, std::string>> pairs;
+    std::vector<LinkPair> pairs;
     for (std::size_t a = 0; a < robot.frames().size(); ++a) {
       for (std::size_t b = a + 3; b < robot.frames().size(); ++b) {
-        pairs.emplace_back(robot.frames()[a].name, robot.frames()[b].name);
+        pairs.push_back({robot.frames()[a].name, robot.frames()[b].name});
       }
     }
     embeddings = {std::make_shared<ClearanceBarrier>(robot, scene.body, BarrierFunction{0.1, 0.1, 2.0, 0.001}),

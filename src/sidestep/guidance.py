@@ -25,7 +25,7 @@ from sidestep.body import Body
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
-LinkPairs = Sequence[tuple[str, str]]
+LinkPairs = Sequence[tuple[str, str] | tuple[str, str, float]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,9 +78,7 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(ellipsoid.shape);
       Eigen::Matrix3d axes = eigen.eigenvectors();
       axes.col(0) *= axes.determinant();  // right-handed, as cross products are taken in these axes
-      const double slimness = std::sqrt(eigen.eigenvalues().minCoeff()) / ellipsoid.extent;
-      ellipsoids_.push_back({ellipsoid, axes.transpose(), eigen.eigenvalues().cwiseInverse(),
-                             2.0 * slimness / (1.0 + slimness * slimness)});
+      ellipsoids_.push_back({ellipsoid, axes.transpose(), eigen.eigenvalues().cwiseSqrt()});
     }
   }
   if (ellipsoids_.empty()) {
@@ -89,7 +87,7 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
   }
   for (int first = 0; first < size();) {
     const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
-    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 1.0};
+    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0};
     while (first + cluster.size < size() && cluster.size < kernels::most_queries &&
            at(first + cluster.size).body.joint == at(first).body.joint) {
       cluster.centre += at(first + cluster.size++).body.mean;
@@ -97,7 +95,6 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
     cluster.centre /= cluster.size;
     for (int k = first; k < first + cluster.size; ++k) {
       cluster.radius = std::max(cluster.radius, (at(k).body.mean - cluster.centre).norm() + at(k).body.extent);
-      cluster.steepness = std::min(cluster.steepness, at(k).steepness);
     }
     clusters_.push_back(cluster);
     first += cluster.size;
@@ -118,8 +115,8 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
     const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
     double limit = reach + group.window;  // the largest of the group
     const auto near = [&](const PointTree::Ball& ball) {
-      const double outside = (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).norm() - ball.spread - cluster.radius;
-      return (outside < 0.0 ? outside : cluster.steepness * outside) - ball.largest_radius < limit;
+      const double distance = (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).norm();
+      return distance - ball.spread - cluster.radius - ball.largest_radius < limit;
     };
     bool placed = false;
     kernels::LinkMotion motion;
@@ -135,10 +132,9 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
           group.centre[axis][k] = p[axis];
         }
         group.extent[k] = ellipsoid.body.extent;
-        group.steepness[k] = ellipsoid.steepness;
         group.limit[k] = used ? limit : -infinity;
         group.axes_T[k] = ellipsoid.axes_T.data();
-        group.precisions[k] = ellipsoid.precisions.data();
+        group.semi_axes[k] = ellipsoid.semi_axes.data();
         group.queries[k].reference = infinity;
         group.queries[k].ready = false;
       }

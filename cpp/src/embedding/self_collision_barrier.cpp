@@ -5,11 +5,14 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "sidestep/embedding/ellipsoid_gap.hpp"
+
 namespace sidestep {
 namespace {
 
 constexpr const char* self_owner = "self-collision barrier";
 constexpr const char* plane_owner = "plane barrier";
+constexpr double closest_centres = 1e-6;  // [m] of which a direction is taken
 
 /// An ellipsoid in the world.
 struct Side {
@@ -17,6 +20,7 @@ struct Side {
   const BodyEllipsoid* ellipsoid;
   Eigen::Vector3d centre;
 
+  Eigen::Matrix3d shape() const noexcept { return link->R_WL * ellipsoid->shape * link->R_WL.transpose(); }
   double half_width(const Eigen::Vector3d& n) const noexcept {
     const Eigen::Vector3d m = link->R_WL.transpose() * n;
     return std::sqrt(m.dot(ellipsoid->shape * m));
@@ -59,34 +63,31 @@ HalfWidth half_width(const Placed& p, const Eigen::Vector3d& n, const Eigen::Vec
           p.link.R_WL * S_m / s};
 }
 
-// Centres closer than this have no direction between them [m]; such ellipsoids overlap deeply anyway.
-constexpr double closest_centres = 1e-6;
-
-Eigen::Vector3d between_centres(const Eigen::Vector3d& a, const Eigen::Vector3d& b) noexcept {
-  const Eigen::Vector3d d = b - a;
-  return d.norm() > closest_centres ? d : closest_centres * Eigen::Vector3d::UnitX();
+/// The boundary point of an ellipsoid farthest along a fixed unit vector n, from the centre, and how it moves.
+Eigen::Vector3d support_rate(const Placed& p, const Eigen::Vector3d& n) noexcept {
+  const Eigen::Vector3d& omega = p.link.velocity.angular;
+  const Eigen::Vector3d m = p.link.R_WL.transpose() * n;
+  const Eigen::Vector3d m_dot = p.link.R_WL.transpose() * n.cross(omega);
+  const Eigen::Vector3d S_m = p.ellipsoid.shape * m;
+  const double s = std::sqrt(m.dot(S_m));
+  const Eigen::Vector3d k_dot = (p.ellipsoid.shape * m_dot - S_m * (S_m.dot(m_dot) / (s * s))) / s;
+  return omega.cross(p.link.R_WL * S_m / s) + p.link.R_WL * k_dot;
 }
 
-ClearanceSample between(const Placed& a, const Placed& b) noexcept {
-  const Eigen::Vector3d d = between_centres(a.centre, b.centre);
+ClearanceSample between(const Placed& a, const Placed& b, const EllipsoidGap& gap) noexcept {
+  const Eigen::Vector3d d = b.centre - a.centre;
   const Eigen::Vector3d d_dot = b.motion.velocity - a.motion.velocity;
   const Eigen::Vector3d d_ddot = b.motion.acceleration - a.motion.acceleration;
-  const double length = d.norm();
-  const Eigen::Vector3d n = d / length;
-  const double length_dot = n.dot(d_dot);
-  const Eigen::Vector3d n_dot = (d_dot - length_dot * n) / length;
-  const double length_ddot = n.dot(d_ddot) + length * n_dot.squaredNorm();
-  const Eigen::Vector3d n_ddot = (d_ddot - 2.0 * length_dot * n_dot - length_ddot * n) / length;
+  const Eigen::Vector3d& n = gap.normal;
+  // n keeps the slope of φ across it at zero. To first order h does not feel that n turns; n'' counts along n alone.
+  const Eigen::Vector3d n_dot = gap.turn(d_dot - support_rate(a, n) - support_rate(b, n));
+  const Eigen::Vector3d n_ddot = -n_dot.squaredNorm() * n;
   const HalfWidth s_a = half_width(a, n, n_dot, n_ddot);
   const HalfWidth s_b = half_width(b, n, n_dot, n_ddot);
-
-  // δh = n·δd − k·δn + Σ_i δθ_i·(n × k_i), with δn = (I − n nᵀ) δd / |d| and k = k_a + k_b the slopes.
-  const Eigen::Vector3d k = s_a.slope + s_b.slope;
-  const Eigen::Vector3d f = n - (k - n.dot(k) * n) / length;
-  return {length - s_a.value - s_b.value,
-          length_dot - s_a.rate - s_b.rate,
-          length_ddot - s_a.curvature - s_b.curvature,
-          {{-a.centre.cross(f) + n.cross(s_a.slope), -f}, {b.centre.cross(f) + n.cross(s_b.slope), f}}};
+  return {gap.value,
+          n.dot(d_dot) + n_dot.dot(d) - s_a.rate - s_b.rate,
+          n.dot(d_ddot) + 2.0 * n_dot.dot(d_dot) + n_ddot.dot(d) - s_a.curvature - s_b.curvature,
+          {{-(a.centre + s_a.slope).cross(n), -n}, {(b.centre - s_b.slope).cross(n), n}}};
 }
 
 /// The ellipsoids of two links at a state.
@@ -96,7 +97,7 @@ class PairOfLinks {
   PairOfLinks(const KinematicState& state, const Group& first, const Group& second) noexcept
       : first_(ball(state, first)), second_(ball(state, second)) {}
 
-  /// Calls act(a, b, h) for pairs of ellipsoids with h < limit, where `act` may lower the limit. Balls are tested from
+  /// Calls act(a, b, gap) for pairs of ellipsoids with a gap h < limit, where `act` may lower the limit. Balls are tested from
   /// the whole links down: most pairs of links, then of ellipsoids, are too far apart.
   template <class Act>
   void for_each_below(const double& limit, Act&& act) const noexcept {
@@ -125,11 +126,13 @@ class PairOfLinks {
           if (!near(a.centre, b.centre, ellipsoid.extent + b.ellipsoid->extent + limit)) {
             continue;
           }
-          const Eigen::Vector3d d = between_centres(a.centre, b.centre);
-          const double length = d.norm();
-          const double clearance = length - a.half_width(d / length) - b.half_width(d / length);
-          if (clearance < limit) {
-            act(a, b, clearance);
+          const Eigen::Vector3d d = b.centre - a.centre;
+          const double length = std::max(d.norm(), closest_centres);
+          if (length - a.half_width(d / length) - b.half_width(d / length) < limit) {  // a lower bound of the gap
+            const EllipsoidGap gap = ellipsoid_gap(d, a.shape(), b.shape());
+            if (gap.value < limit) {
+              act(a, b, gap);
+            }
           }
         }
       }
@@ -197,8 +200,8 @@ std::vector<BodyEllipsoid> of_link(const std::vector<BodyEllipsoid>& all, const 
 }  // namespace
 
 SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
-                                           const std::vector<std::pair<std::string, std::string>>& pairs,
-                                           BarrierFunction barrier, double temperature, double reach)
+                                           const std::vector<LinkPair>& pairs, BarrierFunction barrier, double temperature,
+                                           double reach)
     : Barrier(robot, barrier, self_owner), temperature_(temperature), reach_(std::max(reach, barrier.activation)) {
   check_reach(reach, self_owner);
   check_temperature(temperature, self_owner);
@@ -217,8 +220,12 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
     }
     return g;
   };
-  for (const auto& [a, b] : pairs) {
-    Pair pair{group(a), group(b)};
+  for (const auto& [a, b, contact] : pairs) {
+    Pair pair{group(a), group(b), contact};
+    if (!std::isfinite(contact)) {
+      throw std::invalid_argument(std::string(self_owner) + ": contact of links '" + a + "' and '" + b + "' is " +
+                                  std::to_string(contact) + " m, must be finite");
+    }
     if (pair.first.joint == pair.second.joint) {
       throw std::invalid_argument(std::string(self_owner) + ": links '" + a + "' and '" + b +
                                   "' are rigidly connected, so nothing could keep them apart");
@@ -234,20 +241,24 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
     // The smallest clearance first: most pairs of links end here, and of the others only what lies near it matters.
-    double smallest = reach_;
-    pair.for_each_below(smallest, [&](const Side& /*a*/, const Side& /*b*/, double clearance) { smallest = clearance; });
-    if (!(smallest < reach_)) {
+    const double reach = reach_ + pairs_[i].contact;  // of the gap
+    double smallest = reach;
+    pair.for_each_below(smallest, [&](const Side& /*a*/, const Side& /*b*/, const EllipsoidGap& gap) {
+      smallest = gap.value;
+    });
+    if (!(smallest < reach)) {
       continue;
     }
     BoltzmannMean mean(temperature_);
     int nearest = -1;
     const double limit = smallest + window;
-    pair.for_each_below(limit, [&](const Side& a, const Side& b, double /*clearance*/) {
-      if (mean.add(between(Placed(a), Placed(b)))) {
+    pair.for_each_below(limit, [&](const Side& a, const Side& b, const EllipsoidGap& gap) {
+      if (mean.add(between(Placed(a), Placed(b), gap))) {
         nearest = b.ellipsoid->component;
       }
     });
-    const ClearanceSample result = mean.result();
+    ClearanceSample result = mean.result();
+    result.value -= pairs_[i].contact;
     if (result.value < reach_) {
       write(result, nearest, state, pairs_[i].first.joint, pairs_[i].second.joint, static_cast<Eigen::Index>(i),
             out.clearances);

@@ -9,6 +9,7 @@
 
 #include "kernels/distance_kernel.hpp"
 #include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/embedding/ellipsoid_gap.hpp"
 
 namespace sidestep {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 constexpr const char* owner = "body clearance";
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
-constexpr double closest_centres = 1e-6;      // [m] as for SelfCollisionBarrier
+constexpr double closest_centres = 1e-6;      // [m] of which a direction is taken
 
 kernels::Distances distances_kernel() noexcept {
 #if defined(SIDESTEP_X86_KERNELS)
@@ -43,7 +44,7 @@ double across(const Eigen::Vector3d& offset, const Eigen::Vector3d& axis) { retu
 
 }  // namespace
 
-BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<std::pair<std::string, std::string>>& pairs,
+BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs,
                              const std::vector<KeptPlane>& planes)
     : robot_(std::move(robot)) {
   for (const Joint& joint : robot_.joints()) {
@@ -56,7 +57,7 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<st
   const std::vector<BodyEllipsoid> all = body_ellipsoids(robot_, body, owner);
   const auto nv = robot_.num_coordinates();
   const auto item = [&](CoordinateLabel label, int link) {
-    return Item{std::move(label), link, -1, -1, Eigen::VectorXd::Zero(nv)};
+    return Item{std::move(label), link, -1, -1, Eigen::VectorXd::Zero(nv), 0.0};
   };
   // The links far from the base first: they are the likeliest in the way.
   for (auto e = all.rbegin(); e != all.rend(); ++e) {
@@ -71,9 +72,10 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<st
     throw std::invalid_argument(std::string(owner) + ": no ellipsoid of the body lies on a link that a joint of robot '" +
                                 robot_.name() + "' moves");
   }
-  for (const auto& [a, b] : pairs) {
+  for (const auto& [a, b, contact] : pairs) {
     items_.push_back(item({CoordinateLabel::Kind::self, a, b}, add_link(all, body, a)));
     Item& pair = items_.back();
+    pair.contact = contact;
     pair.other = add_link(all, body, b);
     const Link &first = links_[static_cast<std::size_t>(pair.link)], &second = links_[static_cast<std::size_t>(pair.other)];
     if (first.joint == second.joint) {
@@ -205,7 +207,8 @@ BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obst
                                          const Workspace& w) const noexcept {
   const Link& link = links_[static_cast<std::size_t>(item.link)];
   if (item.other >= 0) {
-    return {look_at_pair(link, links_[static_cast<std::size_t>(item.other)], cap, stop, w), -1};
+    const Link& other = links_[static_cast<std::size_t>(item.other)];
+    return {look_at_pair(link, other, cap + item.contact, stop + item.contact, w) - item.contact, -1};
   }
   if (item.plane >= 0) {
     return {look_at_plane(link, planes_[static_cast<std::size_t>(item.plane)], cap, w), -1};
@@ -273,22 +276,19 @@ double BodyClearance::look_at_pair(const Link& a, const Link& b, double cap, dou
       continue;
     }
     for (const Ellipsoid& e : a.ellipsoids) {
-      Eigen::Vector3d d = centre - e.mean;
+      const Eigen::Vector3d d = centre - e.mean;
       const double cut = e.extent + f.extent + least;
       const double squared = d.squaredNorm();
       if (cut <= 0.0 || squared >= cut * cut) {
         continue;
       }
-      double length = std::sqrt(squared);
-      if (!(length > closest_centres)) {
-        d = closest_centres * Eigen::Vector3d::UnitX();
-        length = closest_centres;
-      }
-      const Eigen::Vector3d n = d / length;
+      const Eigen::Vector3d n = d / std::max(std::sqrt(squared), closest_centres);
       const Eigen::Vector3d n_b = R_XY.transpose() * n;
-      least = std::min(least, length - std::sqrt(n.dot(e.shape * n)) - std::sqrt(n_b.dot(f.shape * n_b)));
-      if (least < stop) {
-        return least;
+      if (n.dot(d) - std::sqrt(n.dot(e.shape * n)) - std::sqrt(n_b.dot(f.shape * n_b)) < least) {  // not above the gap
+        least = std::min(least, ellipsoid_gap(d, e.shape, R_XY * f.shape * R_XY.transpose()).value);
+        if (least < stop) {
+          return least;
+        }
       }
     }
   }

@@ -17,28 +17,56 @@ namespace {
 
 constexpr double temperature = 0.002;
 
-/// h = (m − √m)/|u| − r with its derivatives along the motion of point and link, term by term.
+/// Gradient, and what of the second derivative the motion's velocity makes.
+struct Distance {
+  double value, bend;
+  Eigen::Vector3d gradient;
+};
+
+/// The distance to the ellipsoid y S⁻¹ y ≤ 1, by halving the interval of its multiplier t.
+Distance outside(const Eigen::Matrix3d& S, const Eigen::Vector3d& e, const Eigen::Vector3d& v) {
+  const auto foot = [&](double t) -> Eigen::Vector3d { return (S + t * Eigen::Matrix3d::Identity()).ldlt().solve(e); };
+  const auto excess = [&](double t) { return foot(t).dot(S * foot(t)) - 1.0; };
+  double low = 0.0, high = 1.0;
+  while (excess(high) > 0.0) {
+    high *= 2.0;
+  }
+  while (low < 0.5 * (low + high) && 0.5 * (low + high) < high) {
+    (excess(0.5 * (low + high)) > 0.0 ? low : high) = 0.5 * (low + high);
+  }
+  const Eigen::Matrix3d M = S + low * Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d w = foot(low), n = w.normalized();
+  const Eigen::Vector3d slope = M.ldlt().solve(S * w);
+  const Eigen::Vector3d w_dot = M.ldlt().solve(v - w * (slope.dot(v) / slope.dot(w)));
+  return {low * w.norm(), v.dot(w_dot - n * n.dot(w_dot)) / w.norm(), n};
+}
+
+/// h = (m − √m)/|u|, differentiated term by term.
+Distance inside(const Eigen::Matrix3d& S, const Eigen::Vector3d& e, const Eigen::Vector3d& v) {
+  const Eigen::Matrix3d precision = S.inverse();
+  const Eigen::Vector3d u = precision * e, u_dot = precision * v;
+  const double root = std::sqrt(e.dot(u)), norm = u.norm();
+  const double value = root * (root - 1.0) / norm;
+  const Eigen::Vector3d gradient = (u * (2.0 - 1.0 / root) - (value / norm) * (precision * u)) / norm;
+  const double m_dot = 2.0 * u.dot(v), m_ddot = 2.0 * v.dot(u_dot);
+  const double root_dot = m_dot / (2.0 * root), root_ddot = (m_ddot - 2.0 * root_dot * root_dot) / (2.0 * root);
+  const double norm_dot = u.dot(u_dot) / norm, norm_ddot = (u_dot.squaredNorm() - norm_dot * norm_dot) / norm;
+  return {value, (m_ddot - root_ddot - 2.0 * gradient.dot(v) * norm_dot - value * norm_ddot) / norm, gradient};
+}
+
+/// The clearance of a point with its derivatives along the motion of point and link.
 ClearanceSample sample(const BodyEllipsoid& ellipsoid, const KinematicState::Link& link, const Eigen::Vector3d& x,
                        const Eigen::Vector3d& x_dot, double radius) {
-  const Eigen::Matrix3d precision = ellipsoid.shape.inverse();
   const Eigen::Vector3d slip = x_dot - link.velocity.linear - link.velocity.angular.cross(x);
   const Eigen::Vector3d slip_dot = -link.bias.linear - link.bias.angular.cross(x) -
                                    link.velocity.angular.cross(x_dot) - link.velocity.angular.cross(slip);
   const Eigen::Matrix3d R_LW = link.R_WL.transpose();
   const Eigen::Vector3d e = R_LW * (x - link.p_WL) - ellipsoid.mean;
   const Eigen::Vector3d e_dot = R_LW * slip, e_ddot = R_LW * slip_dot;
-  const Eigen::Vector3d u = precision * e, u_dot = precision * e_dot;
-  const double root = std::sqrt(e.dot(u)), norm = u.norm();
-  const double value = root * (root - 1.0) / norm;
-  const Eigen::Vector3d gradient = (u * (2.0 - 1.0 / root) - (value / norm) * (precision * u)) / norm;
-  const double rate = gradient.dot(e_dot);
-  const double m_dot = 2.0 * u.dot(e_dot), m_ddot = 2.0 * e_dot.dot(u_dot);
-  const double root_dot = m_dot / (2.0 * root), root_ddot = (m_ddot - 2.0 * root_dot * root_dot) / (2.0 * root);
-  const double norm_dot = u.dot(u_dot) / norm, norm_ddot = (u_dot.squaredNorm() - norm_dot * norm_dot) / norm;
-  const double curvature =
-      gradient.dot(e_ddot) + (m_ddot - root_ddot - 2.0 * rate * norm_dot - value * norm_ddot) / norm;
-  const Eigen::Vector3d f = link.R_WL * gradient;
-  return {value - radius, rate, curvature, {{-x.cross(f), -f}, {}}};
+  const bool is_outside = e.dot(ellipsoid.shape.ldlt().solve(e)) >= 1.0;
+  const Distance h = is_outside ? outside(ellipsoid.shape, e, e_dot) : inside(ellipsoid.shape, e, e_dot);
+  const Eigen::Vector3d f = link.R_WL * h.gradient;
+  return {h.value - radius, h.gradient.dot(e_dot), h.gradient.dot(e_ddot) + h.bend, {{-x.cross(f), -f}, {}}};
 }
 
 Body calibrated(const Body& body, Random& random) {

@@ -45,7 +45,7 @@ BOOST_AUTO_TEST_CASE(agrees_with_the_barriers_clearances) {
   for (int trial = 0; trial < 60; ++trial) {
     const Robot robot = test::random_tree(random, 6);
     const Body body = calibrated(random, robot, 0.05);
-    const std::vector<std::pair<std::string, std::string>> pairs{{"link0", "link5"}, {"link1", "link4"}};
+    const std::vector<LinkPair> pairs{{"link0", "link5"}, {"link1", "link4", -0.03}};
     const KeptPlane plane{Eigen::Vector3d(0.0, 0.0, -1.0), Eigen::Vector3d(0.1, 0.2, 1.0), {"link3", "link5"}};
     const BodyClearance checked(robot, body, pairs, {plane});
     BodyClearance::Workspace w(checked);
@@ -71,15 +71,17 @@ BOOST_AUTO_TEST_CASE(agrees_with_the_barriers_clearances) {
             least = std::min(least, values.clearances.values[k]);
           }
         }
-        BOOST_TEST(found[i] >= least - 1e-6);  // the mean lies above the least by less than the temperature
         if (!below) {
-          BOOST_TEST(std::abs(found[i] - least) < 1e-5);
+          BOOST_TEST(std::abs(found[i] - least) < 1e-5);  // the mean lies above the least by less than the temperature
+        } else if (least > 0.0) {
+          BOOST_TEST(found[i] <= least + 1e-5);
+          BOOST_TEST(1.5 * found[i] >= least - 1e-5);  // random ellipsoids may be needles, of which it misses a part
         }
       }
     };
     by_link(SelfCollisionBarrier(robot, body, pairs, f, cold), CoordinateLabel::Kind::self, false);
     by_link(PlaneBarrier(robot, body, plane.point, plane.normal, plane.links, f, cold), CoordinateLabel::Kind::plane, false);
-    // The field's clearance of points never exceeds the distance.
+    // The field's clearance of points outside is their distance.
     by_link(ClearanceBarrier(robot, body, f, cold), CoordinateLabel::Kind::obstacle, true);
     BOOST_TEST(std::abs(checked.nearest(q, obstacles, cap, w).clearance - found.minCoeff()) < 1e-12);  // rounding
     BOOST_TEST(checked.free(q, obstacles, none, w) == (found.minCoeff() >= 0.0));

@@ -13,17 +13,17 @@ namespace sidestep {
 
 /// Clearance between the calibrated ellipsoids of a body and obstacle points, one per Gaussian.
 ///
-/// An ellipsoid is {y : (y − μ)ᵀ S⁻¹ (y − μ) ≤ 1}. With e = y − μ, u = S⁻¹ e, m = e·u the clearance of a point is
+/// An ellipsoid is {y : (y − μ)ᵀ S⁻¹ (y − μ) ≤ 1}. With e = y − μ the clearance of a point outside is its distance, found
+/// with w = (S + t I)⁻¹ e, where t > 0 is the root of wᵀ S w = 1,
 ///
-///     h(y) = (m − √m) / |u| − r,
+///     h(y) = t |w| − r,      ∂h = n = w / |w|,
 ///
-/// the first-order distance of √m, less the point's radius. Because √m is convex it never exceeds the distance to the
-/// ellipsoid; it has the right zero set, is exact along the axes and exact everywhere for spheres.
+/// less the point's radius r. Inside it is the first-order distance h = (m − √m) / |u| − r with u = S⁻¹ e and m = e·u,
+/// which has the same value and gradient on the surface, and one kink only, at the centre.
 ///
 /// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
-/// depend on how densely a surface is sampled. Points that do not matter are left out in groups: by Kantorovich's
-/// inequality u·e ≥ |u| |e| 2s/(1 + s²) with s the shortest over the longest semi-axis a, so outside the ellipsoid
-/// h ≥ (|e| − a) 2s/(1 + s²) − r. The others are taken side by side, with the widest registers of the machine.
+/// depend on how densely a surface is sampled. Points that do not matter are left out in groups, by h ≥ |e| − a − r with a
+/// the longest semi-axis. The others are taken side by side, with the widest registers of the machine.
 class ClearanceField {
  public:
   /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, or the
@@ -42,15 +42,14 @@ class ClearanceField {
  private:
   struct Ellipsoid {
     BodyEllipsoid body;
-    Eigen::Matrix3d axes_T;      // rotates into the principal axes
-    Eigen::Vector3d precisions;  // 1 / semi-axis², along them
-    double steepness;            // h ≥ steepness (|y − μ| − extent) − r outside
+    Eigen::Matrix3d axes_T;     // rotates into the principal axes
+    Eigen::Vector3d semi_axes;  // along them [m]
   };
   /// Consecutive ellipsoids of one joint, with a ball around them in the frame of its child.
   struct Cluster {
     int first, size;
     Eigen::Vector3d centre;
-    double radius, steepness;  // the least
+    double radius;
   };
 
   double temperature_;

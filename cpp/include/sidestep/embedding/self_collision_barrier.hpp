@@ -1,30 +1,27 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "sidestep/embedding/barrier.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
+#include "sidestep/embedding/link_pair.hpp"
 
 namespace sidestep {
 
 /// One coordinate per pair of links that must not touch, a barrier of the clearance between their ellipsoids.
 ///
-/// For two ellipsoids with centres d apart, n = d/|d|, and half-widths s_i(n) along n, the clearance is
-///
-///     h = |d| − s_1(n) − s_2(n),
-///
-/// the gap between their extents along the line of centres: a lower bound of their distance, exact for spheres. The
-/// pairs of ellipsoids of two links are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp).
+/// The clearance of two ellipsoids is the gap between them (see ellipsoid_gap.hpp), their distance, less the gap at which
+/// the links touch (see link_pair.hpp). The pairs of ellipsoids of two links are reduced to one clearance by the Boltzmann
+/// mean (see boltzmann_mean.hpp).
 class SelfCollisionBarrier final : public Barrier {
  public:
-  /// `pairs` name links. Clearances are measured up to `reach` [m], at least to the activation distance, for what keeps
-  /// them, as in ClearanceBarrier. Throws std::invalid_argument if there is none, a link is unknown or has no ellipsoid, or the
-  /// two are rigidly connected; or names the setting at fault.
-  SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<std::pair<std::string, std::string>>& pairs,
-                       BarrierFunction barrier, double temperature = 0.002, double reach = 0.1);
+  /// Clearances are measured up to `reach` [m], at least to the activation distance, for what keeps
+  /// them, as in ClearanceBarrier. Throws std::invalid_argument if there is no pair, a link is unknown or has no ellipsoid, the
+  /// two are rigidly connected or `contact` is not finite; or names the setting at fault.
+  SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<LinkPair>& pairs, BarrierFunction barrier,
+                       double temperature = 0.002, double reach = 0.1);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
@@ -41,6 +38,7 @@ class SelfCollisionBarrier final : public Barrier {
   };
   struct Pair {
     Group first, second;
+    double contact;
   };
 
   double temperature_, reach_;

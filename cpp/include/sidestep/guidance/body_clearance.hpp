@@ -10,6 +10,7 @@
 #include "sidestep/body/body.hpp"
 #include "sidestep/embedding/embedding.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
+#include "sidestep/embedding/link_pair.hpp"
 #include "sidestep/kinematics/robot.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
@@ -57,9 +58,9 @@ struct Margins {
 /// middle as the clearance there exceeds the motion; what is left to either side is looked at in the same way.
 class BodyClearance {
  public:
-  /// `pairs` name links as for SelfCollisionBarrier. Throws std::invalid_argument if the body is not calibrated or no
+  /// `pairs` as for SelfCollisionBarrier. Throws std::invalid_argument if the body is not calibrated or no
   /// joint moves it, a name is unknown, a prismatic joint has no limits, or there are more than `max_items` items.
-  BodyClearance(Robot robot, const Body& body, const std::vector<std::pair<std::string, std::string>>& pairs = {},
+  BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                 const std::vector<KeptPlane>& planes = {});
 
   static constexpr int max_items = 256;
@@ -149,6 +150,7 @@ class BodyClearance {
     int link, other = -1;    // links_; other: of a pair
     int plane = -1;          // planes_
     Eigen::VectorXd reach;   // R of every coordinate
+    double contact = 0.0;    // of a pair [m]
   };
   struct Plane {
     Eigen::Vector3d normal;

@@ -24,12 +24,12 @@ inline constexpr int most_lanes = 8;  // doubles in the widest register
 struct Query {
   alignas(64) double lane_sums[sums][most_lanes];
   double axes[9];                           // world to principal axes, by rows
-  double precisions[3];
+  double semi_axes[3], squared_axes[3];     // a and a²
   double linear[3], angular[3];             // velocity of the centre and of the axes, in principal axes
   double bias_linear[3], bias_angular[3];   // the same for the bias
   double reference;                         // smallest clearance so far; sums are relative to it
   int nearest;                              // its point
-  int steepest;                             // the axis of the largest precision
+  int shortest;                             // the axis of the smallest a
   bool ready;                               // whether all but the centre has been set
 };
 
@@ -40,10 +40,9 @@ struct QueryGroup {
   int size;
   alignas(64) double centre[3][most_queries];  // world
   alignas(64) double extent[most_queries];     // longest semi-axis
-  alignas(64) double steepness[most_queries];  // h ≥ steepness (|e| − extent) − radius outside
   alignas(64) double limit[most_queries];      // clearances from here on do not matter
   const double* axes_T[most_queries];          // 3 × 3 by columns: link frame to principal axes
-  const double* precisions[most_queries];      // 1 / semi-axis² [1/m²]
+  const double* semi_axes[most_queries];       // [m]
   const LinkMotion* link;
   double inverse_T;
   double window;                               // samples so much above the smallest do not matter [m]

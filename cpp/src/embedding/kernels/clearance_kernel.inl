@@ -9,6 +9,11 @@ namespace {
 // Stands for the centre of an ellipsoid, where the clearance has no gradient [m]; far below any size that matters.
 constexpr double centre_offset = 1e-9;
 
+// √S is 1 at the foot of the perpendicular; the iteration ends above by rounding, after at most 6 steps for semi-axes of
+// a ratio up to 6, and 8 up to 24.
+constexpr double converged = 1.0 + 1e-14;
+constexpr int most_iterations = 16;
+
 void rotate(const double* rows, const double* x, double* result) noexcept {
   for (int i = 0; i < 3; ++i) {
     result[i] = rows[3 * i] * x[0] + rows[3 * i + 1] * x[1] + rows[3 * i + 2] * x[2];
@@ -34,13 +39,14 @@ void prepare(QueryGroup& group, int k) noexcept {
       query.axes[3 * i + j] = axes_T[i] * link.rotation[j] + axes_T[3 + i] * link.rotation[3 + j] +
                               axes_T[6 + i] * link.rotation[6 + j];
     }
-    query.precisions[i] = group.precisions[k][i];
+    query.semi_axes[i] = group.semi_axes[k][i];
+    query.squared_axes[i] = query.semi_axes[i] * query.semi_axes[i];
   }
   const double centre[3] = {group.centre[0][k], group.centre[1][k], group.centre[2][k]};
   express(query, centre, link.angular, link.linear, query.angular, query.linear);
   express(query, centre, link.bias_angular, link.bias_linear, query.bias_angular, query.bias_linear);
-  const double* p = query.precisions;
-  query.steepest = p[0] >= p[1] && p[0] >= p[2] ? 0 : p[1] >= p[2] ? 1 : 2;
+  const double* A = query.squared_axes;
+  query.shortest = A[0] <= A[1] && A[0] <= A[2] ? 0 : A[1] <= A[2] ? 1 : 2;
   for (auto& lanes : query.lane_sums) {
     for (double& sum : lanes) {
       sum = 0.0;
@@ -66,33 +72,126 @@ void rescale(Query& query, double shift, double inverse_T) noexcept {
   }
 }
 
+/// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where Σ A w² = 1.
+struct Outside {
+  Lanes t, inverse[3], w[3], flatness, inverse_norm;  // 1 / (A + t), Σ A w² / (A + t), 1 / |w|
+
+  /// n' · v, of points that move by v.
+  Lanes bend(const double* A, const Lanes* v) const noexcept {
+    const Lanes t_dot =
+        (A[0] * w[0] * inverse[0] * v[0] + A[1] * w[1] * inverse[1] * v[1] + A[2] * w[2] * inverse[2] * v[2]) / flatness;
+    Lanes along = {}, squared = {}, across = {};
+    for (int i = 0; i < 3; ++i) {
+      const Lanes w_dot = (v[i] - w[i] * t_dot) * inverse[i];
+      along += w[i] * w_dot;
+      across += w[i] * v[i];
+      squared += w_dot * v[i];
+    }
+    return (squared - across * along * inverse_norm * inverse_norm) * inverse_norm;
+  }
+};
+
+/// Points inside: u = e / A, m = e·u < 1, h = (m − √m) / |u|.
+struct Inside {
+  Lanes u[3], root_m, inverse_norm, value, gradient[3];
+
+  Inside(const double* A, const Lanes* e) noexcept {
+    for (int i = 0; i < 3; ++i) {
+      u[i] = e[i] / A[i];
+    }
+    root_m = root(e[0] * u[0] + e[1] * u[1] + e[2] * u[2]);
+    inverse_norm = 1.0 / root(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    value = root_m * (root_m - 1.0) * inverse_norm;
+    for (int i = 0; i < 3; ++i) {
+      gradient[i] = ((2.0 - 1.0 / root_m) - value * inverse_norm / A[i]) * u[i] * inverse_norm;
+    }
+  }
+
+  /// vᵀ ∂²h v: h |u| = m − √m, differentiated twice.
+  Lanes bend(const double* A, const Lanes* v, Lanes rate) const noexcept {
+    Lanes m_dot = {}, m_ddot = {}, norm_dot = {}, squared = {};
+    for (int i = 0; i < 3; ++i) {
+      const Lanes u_dot = v[i] / A[i];
+      m_dot += 2.0 * u[i] * v[i];
+      m_ddot += 2.0 * u_dot * v[i];
+      norm_dot += u[i] * u_dot * inverse_norm;
+      squared += u_dot * u_dot;
+    }
+    const Lanes root_dot = 0.5 * m_dot / root_m;
+    const Lanes root_ddot = (0.5 * m_ddot - root_dot * root_dot) / root_m;
+    const Lanes norm_ddot = (squared - norm_dot * norm_dot) * inverse_norm;
+    return (m_ddot - root_ddot - 2.0 * rate * norm_dot - value * norm_ddot) * inverse_norm;
+  }
+};
+
 void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf) noexcept {
   Query& query = group.queries[k];
-  const double* A = query.axes;
-  const double* P = query.precisions;
+  const double* R = query.axes;
+  const double* A = query.squared_axes;
   const bool moving = points.velocity[0] != nullptr;
   for (int n = leaf.first; n < leaf.first + leaf.count; n += width) {
-    // The offset e in principal axes, u = P e and the clearance h = (m − √m)/|u| − r with m = e·u.
     const Lanes x = load(points.position[0] + n) - group.centre[0][k];
     const Lanes y = load(points.position[1] + n) - group.centre[1][k];
     const Lanes z = load(points.position[2] + n) - group.centre[2][k];
-    Lanes e[3], u[3], w[3];
+    const Lanes radius = load(points.radius + n);
+    Lanes e[3];  // the offset in principal axes
     for (int i = 0; i < 3; ++i) {
-      e[i] = A[3 * i] * x + A[3 * i + 1] * y + A[3 * i + 2] * z;
+      e[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
     }
-    const Lanes squared = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-    if (__builtin_expect(below(squared, all(1e-300)) != 0, 0)) {
-      e[query.steepest] = squared < 1e-300 ? all(centre_offset) : e[query.steepest];
-    }
+
+    // t from below. Newton's iteration on 1/√S − 1, which is concave in t, stays below; and so does t |w| below h.
+    Outside out;
+    out.t = Lanes{};
     for (int i = 0; i < 3; ++i) {
-      u[i] = P[i] * e[i];
-      w[i] = P[i] * u[i];
+      const Lanes least = query.semi_axes[i] * magnitude(e[i]) - A[i];
+      out.t = least > out.t ? least : out.t;
     }
-    const Lanes root_m = root(e[0] * u[0] + e[1] * u[1] + e[2] * u[2]);
-    const Lanes inverse_u = 1.0 / root(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-    const Lanes value = root_m * (root_m - 1.0) * inverse_u;
-    const Lanes h = value - load(points.radius + n);
-    if (below(h, all(group.limit[k])) == 0) {
+    Lanes S, h;
+    const auto update = [&]() noexcept {
+      Lanes squared = {};
+      S = out.flatness = Lanes{};
+      for (int i = 0; i < 3; ++i) {
+        out.inverse[i] = 1.0 / (A[i] + out.t);
+        out.w[i] = e[i] * out.inverse[i];
+        const Lanes term = A[i] * out.w[i] * out.w[i];
+        S += term;
+        out.flatness += term * out.inverse[i];
+        squared += out.w[i] * out.w[i];
+      }
+      const Lanes norm = root(squared);
+      out.inverse_norm = 1.0 / norm;
+      h = out.t * norm - radius;
+    };
+    update();
+    const auto inside = S < 1.0;
+    const unsigned any_inside = below(S, all(1.0));
+    const Lanes limit = all(group.limit[k]);
+    if ((any_inside | below(h, limit)) == 0) {
+      continue;
+    }
+    for (int i = 0; i < most_iterations; ++i) {
+      const Lanes root_S = root(S);
+      if (below(all(converged), root_S) == 0) {
+        break;
+      }
+      const Lanes step = S * (root_S - 1.0) / out.flatness;
+      out.t += step > 0.0 ? step : Lanes{};
+      update();
+    }
+    Lanes g[3];
+    for (int i = 0; i < 3; ++i) {
+      g[i] = out.w[i] * out.inverse_norm;
+    }
+    if (__builtin_expect(any_inside != 0, 0)) {
+      const Lanes squared = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+      e[query.shortest] = squared < 1e-300 ? all(centre_offset) : e[query.shortest];
+      const Inside in(A, e);
+      h = inside ? in.value - radius : h;
+      for (int i = 0; i < 3; ++i) {
+        g[i] = inside ? in.gradient[i] : g[i];
+      }
+    }
+    if (below(h, limit) == 0) {
       continue;
     }
     if (below(h, all(query.reference)) != 0) {
@@ -107,8 +206,8 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
       if (before < __builtin_inf()) {
         rescale(query, before - query.reference, group.inverse_T);
       }
-      const double limit = query.reference + group.window;
-      group.limit[k] = limit < group.limit[k] ? limit : group.limit[k];
+      const double lower = query.reference + group.window;
+      group.limit[k] = lower < group.limit[k] ? lower : group.limit[k];
     }
 
     // Velocity and acceleration of the point in the ellipsoid's moving axes.
@@ -122,7 +221,7 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     if (moving) {
       const Lanes vx = load(points.velocity[0] + n), vy = load(points.velocity[1] + n), vz = load(points.velocity[2] + n);
       for (int i = 0; i < 3; ++i) {
-        s[i] = A[3 * i] * vx + A[3 * i + 1] * vy + A[3 * i + 2] * vz;
+        s[i] = R[3 * i] * vx + R[3 * i + 1] * vy + R[3 * i + 2] * vz;
         v[i] += s[i];
       }
     }
@@ -136,29 +235,12 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
         a[i] -= W[j] * s[l] - W[l] * s[j];
       }
     }
-
-    const Lanes inverse_root = 1.0 / root_m;
-    const Lanes along_u = (2.0 - inverse_root) * inverse_u;
-    const Lanes along_w = value * inverse_u * inverse_u;
-    Lanes g[3];
-    for (int i = 0; i < 3; ++i) {
-      g[i] = along_u * u[i] - along_w * w[i];
-    }
     const Lanes rate = g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
-    // h |u| = m − √m, differentiated twice.
-    Lanes u_dot[3];
-    for (int i = 0; i < 3; ++i) {
-      u_dot[i] = P[i] * v[i];
+    Lanes bend = out.bend(A, v);
+    if (__builtin_expect(any_inside != 0, 0)) {
+      bend = inside ? Inside(A, e).bend(A, v, rate) : bend;
     }
-    const Lanes m_dot = 2.0 * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
-    const Lanes m_ddot = 2.0 * (u_dot[0] * v[0] + u_dot[1] * v[1] + u_dot[2] * v[2]);
-    const Lanes root_dot = 0.5 * m_dot * inverse_root;
-    const Lanes root_ddot = (0.5 * m_ddot - root_dot * root_dot) * inverse_root;
-    const Lanes norm_dot = (u[0] * u_dot[0] + u[1] * u_dot[1] + u[2] * u_dot[2]) * inverse_u;
-    const Lanes norm_ddot =
-        (u_dot[0] * u_dot[0] + u_dot[1] * u_dot[1] + u_dot[2] * u_dot[2] - norm_dot * norm_dot) * inverse_u;
-    const Lanes curvature = g[0] * a[0] + g[1] * a[1] + g[2] * a[2] +
-                            (m_ddot - root_ddot - 2.0 * rate * norm_dot - value * norm_ddot) * inverse_u;
+    const Lanes curvature = g[0] * a[0] + g[1] * a[1] + g[2] * a[2] + bend;
 
     // Weights; those beyond the limit, and the padding, are zero.
     const double inverse_T = group.inverse_T;
@@ -197,8 +279,7 @@ bool add_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcep
     const Lanes x = load(group.centre[0] + first) - leaf.x;
     const Lanes y = load(group.centre[1] + first) - leaf.y;
     const Lanes z = load(group.centre[2] + first) - leaf.z;
-    const Lanes outside = root(x * x + y * y + z * z) - leaf.spread - load(group.extent + first);
-    const Lanes bound = (outside < 0.0 ? outside : load(group.steepness + first) * outside) - leaf.largest_radius;
+    const Lanes bound = root(x * x + y * y + z * z) - leaf.spread - load(group.extent + first) - leaf.largest_radius;
     unsigned near = below(bound, load(group.limit + first));
     for (int k = first; near != 0; ++k, near >>= 1) {
       if ((near & 1u) != 0 && k < group.size) {

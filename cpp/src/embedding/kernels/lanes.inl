@@ -37,6 +37,8 @@ inline Lanes root(Lanes x) noexcept {
 #endif
 }
 
+inline Lanes magnitude(Lanes x) noexcept { return x < 0.0 ? -x : x; }
+
 /// Lane i is bit i.
 inline unsigned below(Lanes x, Lanes limit) noexcept {
 #if defined(__AVX512F__)
