@@ -17,7 +17,7 @@ import numpy as np
 import sidestep as ss
 from sidestep.bench.parallel import cpu_name
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
-from sidestep.presets import barrier_pairs
+from sidestep.link_pairs import barrier_pairs
 
 
 def summary(seconds: list[float]) -> dict[str, float]:

@@ -14,21 +14,12 @@ from sidestep._core import (
     GeometricSystem,
     JointLimitBarrier,
     JointLimitPotential,
-    Obstacles,
     SelfCollisionBarrier,
     Sum,
 )
 from sidestep.body import Body
+from sidestep.link_pairs import barrier_pairs
 from sidestep.robot import Robot
-from sidestep.simulation import SelfCollision
-
-GAP_SAMPLES = (
-    200  # configurations by which it is found which pairs of links the covering ellipsoids keep apart
-)
-GAP_SHARE = (
-    0.95  # share of them in which the ellipsoids of a pair must be apart: otherwise they are no measure
-)
-
 
 @dataclass(frozen=True)
 class Barriers:
@@ -123,25 +114,3 @@ def thesis_system(
         damping=numbers.damping,
         switch=DistanceSwitch(thresholds=thresholds, slope=numbers.slope) if switched else None,
     )
-
-
-def barrier_pairs(robot: Robot, body: Body) -> tuple[tuple[str, str], ...]:
-    """The pairs of links for `SelfCollisionBarrier`: those that may collide and whose ellipsoids can part.
-
-    Ellipsoids are larger than links. Where those of a pair overlap in more than 5 % of random configurations
-    that are free of self-collision, they are no measure of its distance, and the pair is left out.
-    """
-    check = SelfCollision(robot)
-    covered = set(body.links)
-    pairs = [pair for pair in check.pairs if covered.issuperset(pair)]
-    if not pairs:
-        return ()
-    barrier = SelfCollisionBarrier(robot, body, pairs)
-    rng, rest = np.random.default_rng(0), np.zeros(robot.num_coordinates)
-    apart, free = np.zeros(len(pairs)), 0
-    for _ in range(GAP_SAMPLES):
-        q = robot.random_configuration(rng)
-        if not check.touching(q):
-            free += 1
-            apart += barrier.evaluate(q, rest, Obstacles.none()).clearances > 0.0
-    return tuple(pair for pair, count in zip(pairs, apart, strict=True) if count >= GAP_SHARE * free)

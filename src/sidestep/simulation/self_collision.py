@@ -119,6 +119,19 @@ class SelfCollision:
         """The pairs of links that are checked."""
         return tuple(self._name(pair) for pair in self._pairs)
 
+    def coordinates_between(self, first: str, second: str) -> tuple[int, ...]:
+        """The coordinates that move one link of a checked pair relative to the other."""
+        return tuple(int(j) for j in np.flatnonzero(self._find(first, second).travel))
+
+    def distance_between(self, q: Array, first: str, second: str) -> float:
+        """The distance [m] of a checked pair at q (nv,); 0 when they touch or overlap.
+
+        Raises:
+            ValueError: the pair is not checked.
+        """
+        pair = self._find(first, second)
+        return self._measure(pair, self._poses(q, pair))
+
     def touching(self, q: Array) -> tuple[Pair, ...]:
         """The pairs that touch at q (nv,)."""
         poses = self._poses(q)
@@ -184,6 +197,12 @@ class SelfCollision:
             if count >= ALWAYS * samples:
                 self.left_out[self._name(pair)] = "always"
         self._pairs = [pair for pair in self._pairs if self._name(pair) not in self.left_out]
+
+    def _find(self, first: str, second: str) -> _PairOfLinks:
+        for pair in self._pairs:
+            if {first, second} == set(self._name(pair)):
+                return pair
+        raise ValueError(f"the pair ({first}, {second}) is not checked; see `pairs` and `left_out`")
 
     def _name(self, pair: _PairOfLinks) -> Pair:
         return self._names[pair.first], self._names[pair.second]
