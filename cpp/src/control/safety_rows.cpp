@@ -146,7 +146,7 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
         demanded_deceleration(clearances.values[k] - settings_.margin, -clearances.rates[k], closing, period);
     const double length = gradient.norm();
     normals.row(row) = gradient.transpose() / length;
-    lower[row] = (demand - clearances.curvatures[k]) / length;
+    lower[row] = (demand - (clearances.curvatures[k] - clearances.mixing[k])) / length;
     lengths[row] = length;
     nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];
   }

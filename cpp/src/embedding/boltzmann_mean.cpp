@@ -12,6 +12,8 @@ bool BoltzmannMean::add(const ClearanceSample& sample) noexcept {
       s1_ = decay * (s1_ + shift * s0_);
       s1_dot_ = decay * (s1_dot_ + shift * s0_dot_);
       s1_ddot_ = decay * (s1_ddot_ + shift * s0_ddot_);
+      c1_ = decay * (c1_ + shift * c0_);
+      c0_ *= decay;
       g1_.add(shift, g0_);
       g1_.scale(decay);
       s0_ *= decay, s0_dot_ *= decay, s0_ddot_ *= decay;
@@ -27,6 +29,8 @@ bool BoltzmannMean::add(const ClearanceSample& sample) noexcept {
   s0_dot_ += w_dot;
   s0_ddot_ += w_ddot;
   s1_ += w * above;
+  c0_ += w * sample.curvature;
+  c1_ += w * above * sample.curvature;
   s1_dot_ += w_dot * above + w * sample.rate;
   s1_ddot_ += w_ddot * above + 2.0 * w_dot * sample.rate + w * sample.curvature;
   g0_.add(-w * inverse_T_, sample.gradient);
@@ -40,7 +44,8 @@ ClearanceSample BoltzmannMean::result() const noexcept {
   WrenchPair gradient = g1_;
   gradient.add(-above, g0_);
   gradient.scale(1.0 / s0_);
-  return {reference_ + above, rate, (s1_ddot_ - 2.0 * rate * s0_dot_ - above * s0_ddot_) / s0_, gradient};
+  const double curvature = (s1_ddot_ - 2.0 * rate * s0_dot_ - above * s0_ddot_) / s0_;
+  return {reference_ + above, rate, curvature, gradient, curvature - (c0_ - (c1_ - above * c0_) * inverse_T_) / s0_};
 }
 
 }  // namespace sidestep

@@ -48,7 +48,7 @@ kernels::Points points_of(const PointTree& tree) noexcept {
 }
 
 /// The mean of a query's points, with a wrench about the world origin.
-ClearanceSample mean_of(const kernels::Query& query, const Eigen::Vector3d& centre) noexcept {
+ClearanceSample mean_of(const kernels::Query& query, const Eigen::Vector3d& centre, double inverse_T) noexcept {
   double s[kernels::sums];
   for (int i = 0; i < kernels::sums; ++i) {
     s[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
@@ -61,7 +61,8 @@ ClearanceSample mean_of(const kernels::Query& query, const Eigen::Vector3d& cent
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query.axes);
   const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
   const Eigen::Vector3d moment = centre.cross(force) - axes.transpose() * gradient.tail<3>();
-  return {query.reference + above, rate, curvature, {{moment, force}, {}}};
+  const double mixing = curvature - (s[18] - (s[19] - above * s[18]) * inverse_T) / s[0];
+  return {query.reference + above, rate, curvature, {{moment, force}, {}}, mixing};
 }
 
 }  // namespace
@@ -153,12 +154,14 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       if (!(query.reference < infinity)) {
         continue;
       }
-      const ClearanceSample mean = mean_of(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]});
+      const ClearanceSample mean = 
+          mean_of(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]}, group.inverse_T);
       if (mean.value < reach) {
         const Eigen::Index at = cluster.first + k;
         out.values[at] = mean.value;
         out.rates[at] = mean.rate;
         out.curvatures[at] = mean.curvature;
+        out.mixing[at] = mean.mixing;
         out.nearest[at] = tree.order()[static_cast<std::size_t>(query.nearest)];
         out.gradients.col(at).setZero();
         accumulate_generalised_force(state, joint, mean.gradient.first, out.gradients.col(at));

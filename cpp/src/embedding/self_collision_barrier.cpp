@@ -166,6 +166,7 @@ void write(const ClearanceSample& sample, int nearest, const KinematicState& sta
   out.values[k] = sample.value;
   out.rates[k] = sample.rate;
   out.curvatures[k] = sample.curvature;
+  out.mixing[k] = sample.mixing;
   out.nearest[k] = nearest;
   out.gradients.col(k).setZero();
   accumulate_generalised_force(state, joint_a, sample.gradient.first, out.gradients.col(k));

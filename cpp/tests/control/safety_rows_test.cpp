@@ -135,7 +135,8 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   clearances.nearest << -1, 7, -1;
   clearances.values[1] = 0.105;
   clearances.rates[1] = -0.4;
-  clearances.curvatures[1] = -0.7;
+  clearances.curvatures[1] = -5.7;
+  clearances.mixing[1] = -5.0;
   clearances.gradients.col(1) << 0.3, -0.4;
   SafetyRows rows(2, {});
   Eigen::VectorXd v = Eigen::VectorXd::Zero(2);

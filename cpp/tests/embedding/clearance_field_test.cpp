@@ -107,6 +107,8 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
       BOOST_TEST(std::abs(found.rates[k] - expected.rate) <= tolerance / temperature * (1.0 + std::abs(expected.rate)));
       BOOST_TEST(std::abs(found.curvatures[k] - expected.curvature) <=
                  tolerance / temperature * (1.0 / temperature + std::abs(expected.curvature)));
+      BOOST_TEST(std::abs(found.mixing[k] - expected.mixing) <=
+                 tolerance / temperature * (1.0 / temperature + std::abs(expected.mixing)));
       BOOST_TEST((found.gradients.col(k) - gradient).norm() <= tolerance / temperature * (1.0 + gradient.norm()));
     }
     ++k;

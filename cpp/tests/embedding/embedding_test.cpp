@@ -4,6 +4,7 @@
 #include <boost/test/unit_test.hpp>
 #include <memory>
 
+#include "sidestep/embedding/boltzmann_mean.hpp"
 #include "sidestep/embedding/collision_density.hpp"
 #include "sidestep/embedding/joint_limit_potential.hpp"
 #include "sidestep/embedding/sum.hpp"
@@ -75,4 +76,16 @@ BOOST_AUTO_TEST_CASE(wrong_arguments_are_named) {
   });
   BOOST_CHECK_THROW(JointLimitPotential(robot, 0.0), std::invalid_argument);
   BOOST_CHECK_THROW(Sum({}), std::invalid_argument);
+}
+
+BOOST_AUTO_TEST_CASE(the_mean_tells_what_changing_weights_add_to_its_curvature) {
+  // h = t / (1 + exp(t/T)) + const, of two samples that are equal at t = 0, one at rest: h'' = -1/(2T).
+  constexpr double T = 0.002;
+  BoltzmannMean mean(T);
+  mean.add({0.1, 0.0, 3.0, {}});
+  mean.add({0.1, 1.0, 5.0, {}});
+  const ClearanceSample result = mean.result();
+  BOOST_TEST(result.rate == 0.5, boost::test_tools::tolerance(1e-14));
+  BOOST_TEST(result.mixing == -1.0 / (2.0 * T), boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(result.curvature - result.mixing == 4.0, boost::test_tools::tolerance(1e-12));
 }

@@ -27,6 +27,7 @@ struct WrenchPair {
 struct ClearanceSample {
   double value, rate, curvature;
   WrenchPair gradient;
+  double mixing = 0.0;  ///< what of the curvature comes of weights that change, see BoltzmannMean
 };
 
 /// Reduces clearances h_n to one by the Boltzmann mean with temperature T, and carries its derivatives:
@@ -36,6 +37,10 @@ struct ClearanceSample {
 /// It is smooth, does not depend on how densely a surface is sampled (unlike a soft minimum, which is low by up to
 /// T log N), and exceeds the smallest clearance by about T at most where many are about equally small. Samples may come
 /// in any order: the sums are kept relative to the smallest clearance so far.
+///
+/// Of the second derivative, Σ_n ∂h/∂h_n h_n'' is what the samples do. The rest, about −Var(h_n')/T, is the mean going over
+/// from one sample to another (`mixing`): it is as large as the samples' rates differ, but over once the other is
+/// the smallest, so that it says nothing about the rate after more than a moment.
 class BoltzmannMean {
  public:
   explicit BoltzmannMean(double temperature) noexcept : inverse_T_(1.0 / temperature) {}
@@ -58,6 +63,7 @@ class BoltzmannMean {
   double reference_ = std::numeric_limits<double>::infinity();
   // Sums of w and w (h − reference), with their time derivatives and gradients.
   double s0_ = 0.0, s0_dot_ = 0.0, s0_ddot_ = 0.0, s1_ = 0.0, s1_dot_ = 0.0, s1_ddot_ = 0.0;
+  double c0_ = 0.0, c1_ = 0.0;  // of w h'' and w (h − reference) h''
   WrenchPair g0_, g1_;
 };
 

@@ -17,7 +17,7 @@ struct LinkMotion {
   double angular[3], linear[3], bias_angular[3], bias_linear[3];
 };
 
-inline constexpr int sums = 18;       // s0, ṡ0, s̈0, s1, ṡ1, s̈1, two gradients of force and moment
+inline constexpr int sums = 20;       // s0, ṡ0, s̈0, s1, ṡ1, s̈1, two gradients of force and moment, c0, c1
 inline constexpr int most_lanes = 8;  // doubles in the widest register
 
 /// An ellipsoid at a state, with the sums of the Boltzmann mean over the points so far, lane by lane.

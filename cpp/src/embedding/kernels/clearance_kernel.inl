@@ -70,6 +70,7 @@ void rescale(Query& query, double shift, double inverse_T) noexcept {
   for (int i = 6; i < 12; ++i) {
     move(i, 6 + i);
   }
+  move(18, 19);
 }
 
 /// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where Σ A w² = 1.
@@ -260,6 +261,8 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     add(3, weight * over);
     add(4, weight_dot * over + weight * rate);
     add(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * curvature);
+    add(18, weight * curvature);
+    add(19, weight * curvature * over);
     const Lanes zeroth = -inverse_T * weight;
     const Lanes first = weight + zeroth * over;
     for (int i = 0; i < 3; ++i) {
