@@ -300,12 +300,13 @@ class JointLimitBarrier(Embedding):
 
 class SelfCollisionBarrier(Embedding):
     """
-    One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: the gap
-    between their extents along the line of centres, a lower bound of the distance. Parameters as in
-    ClearanceBarrier; pairs: names of links.
+    One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: their
+    distance, or minus their depth, less the gap at which the links touch. pairs: (first, second) or
+    (first, second, contact), names of links and that gap [m], see presets.barrier_pairs. Other parameters as in
+    ClearanceBarrier.
     """
 
-    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.1) -> None: ...
+    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str] | tuple[str, str, float]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.1) -> None: ...
 
 class PlaneBarrier(Embedding):
     """
@@ -1429,7 +1430,7 @@ class Guide:
     Raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
 
     def set_goal(self, goal: numpy.typing.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to; from the loop that calls step()."""
@@ -1481,11 +1482,11 @@ class PathPlanner:
     Plans a path of a covering body among obstacle points: the straight edge if it is free, else RRT-Connect
     (Kuffner and LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless time runs out.
     Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.
-    robot; body: calibrated (Body.cover); pairs: names of links that must not touch, see presets.barrier_pairs;
+    robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier;
     settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str]] = [], settings: PlannerSettings | None = None) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], settings: PlannerSettings | None = None) -> None: ...
 
     def plan(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, seed: int = 0) -> Plan:
         """
