@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sidestep.robot import Robot
 
 CACHE_VARIABLE = "SIDESTEP_CACHE_DIR"
+SHIPPED = Path(__file__).parent / "covers"  # made by benchmarks/ship_covers.py, under the names of `cache_path`
 
 
 def cache_directory() -> Path:
@@ -45,15 +46,22 @@ def cache_path(robot: Robot, settings: FitSettings | CoverSettings) -> Path:
 
 
 def read(robot: Robot, settings: FitSettings | CoverSettings) -> body_file.BodyContents | None:
-    """The stored fit, or None if there is none; warns about an entry that cannot be read."""
+    """The stored fit, the user's or one that comes with Sidestep, or None if there is none.
+
+    Warns about an entry that cannot be read.
+    """
     path = cache_path(robot, settings)
-    try:
-        return body_file.read(path, robot)
-    except FileNotFoundError:
-        return None
-    except (ValueError, OSError) as error:
-        warnings.warn(f"cached body is unreadable and is fitted again: {error}", RuntimeWarning, stacklevel=3)
-        return None
+    for stored in (path, SHIPPED / path.name):
+        try:
+            return body_file.read(stored, robot)
+        except FileNotFoundError:
+            continue
+        except (ValueError, OSError) as error:
+            warnings.warn(
+                f"cached body is unreadable and is fitted again: {error}", RuntimeWarning, stacklevel=3
+            )
+            return None
+    return None
 
 
 def write(robot: Robot, settings: FitSettings | CoverSettings, contents: body_file.BodyContents) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sidestep.scenario.result import ScenarioResult
     from sidestep.scenario.scenario import SwitchChoice, SwitchType
 
-DEMO_SCENARIO, DEMO_METHOD = "thesis-6.2.3", "thesis"
+DEMO_SCENARIO = "thesis-6.2.3"
 
 
 class MethodChoice(StrEnum):
@@ -146,11 +146,11 @@ def demo(
     """
     from sidestep.scenario import Scenario
 
-    scenario = Scenario.load(DEMO_SCENARIO)
+    scenario = dataclasses.replace(Scenario.load(DEMO_SCENARIO), method="barrier")
     if studio if studio is not None else json is None and _can_open_studio():
         from sidestep.cli.studio_command import open_studio
 
-        open_studio(scenario, method=DEMO_METHOD)
+        open_studio(scenario, method="barrier")
         return
     result = run_and_show(scenario, folder=out, json=json, quiet=quiet)
     raise typer.Exit(0 if result.success else 1)
@@ -198,7 +198,8 @@ def _facts(scenario: Scenario) -> str:
     count = len(scenario.obstacles)
     obstacles = "no obstacle" if count == 0 else f"{count} obstacle{'s' if count > 1 else ''}"
     switch = scenario.system.switch.type.replace("_", " ")
-    return f"{robot}, {obstacles}, switch: {switch}, {scenario.simulation.mode} mode"
+    method = "barriers" if scenario.method == "barrier" else f"switch: {switch}"
+    return f"{robot}, {obstacles}, {method}, {scenario.simulation.mode} mode"
 
 
 def _table(result: ScenarioResult) -> object:

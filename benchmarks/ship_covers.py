@@ -1,0 +1,32 @@
+"""Makes the covering bodies that come with Sidestep (src/sidestep/body/covers), one minute each.
+
+    python benchmarks/ship_covers.py
+
+Those of the same robots made by an older algorithm, or of older meshes, are removed. Copies of the user's cache are
+taken where there are any: a fit is determined by robot, settings and algorithm, which name its file.
+"""
+
+from __future__ import annotations
+
+import shutil
+
+from sidestep import Body, Robot
+from sidestep.body import cache
+from sidestep.body.cover import CoverSettings
+
+ROBOTS = ("fr3", "fr3_arm", "panda", "ur10", "xarm7", "iiwa", "planar3")
+
+
+def main() -> None:
+    shutil.rmtree(cache.SHIPPED, ignore_errors=True)
+    cache.SHIPPED.mkdir()
+    for name in ROBOTS:
+        robot = Robot.named(name)
+        Body.cover(robot)
+        path = cache.cache_path(robot, CoverSettings())
+        shutil.copy(path, cache.SHIPPED / path.name)
+        print(f"{name}: {path.name}")
+
+
+if __name__ == "__main__":
+    main()

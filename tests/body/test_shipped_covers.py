@@ -1,0 +1,42 @@
+"""The covering bodies that come with Sidestep are used, and hold their robots."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sidestep import Body, Robot
+from sidestep.body import cache
+from sidestep.body.cover import CoverSettings
+
+FILES = sorted(cache.SHIPPED.glob("*.json"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: json.loads(path.read_text())["robot"]["name"])
+def test_it_is_taken_and_holds_every_link(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written = json.loads(path.read_text())["robot"]
+    try:
+        robot = Robot.named(written["name"])
+    except ModuleNotFoundError as error:
+        pytest.skip(str(error))
+    if robot.fingerprint != written["fingerprint"]:
+        pytest.skip("its package has other meshes by now: run benchmarks/ship_covers.py")
+    assert cache.cache_path(robot, CoverSettings()).name == path.name  # of today's algorithm
+    monkeypatch.setattr("sidestep.body.body.cover_mixtures", None)  # nothing is left to fit
+    body = Body.cover(robot)
+    assert len(body.links) <= 80
+    for link in dict.fromkeys(body.links):
+        mesh = robot.collision_mesh(link)
+        assert mesh is not None
+        ks = [k for k, name in enumerate(body.links) if name == link]
+        offsets = mesh.vertices[None] - body.means[ks][:, None]
+        shapes = np.asarray(body.levels)[ks, None, None] * body.covariances[ks]
+        depth = np.einsum("kni,kij,knj->kn", offsets, np.linalg.inv(shapes), offsets).min(axis=0)
+        assert depth.max() <= 1.0 + 1e-9
+
+
+def test_planar3_is_there() -> None:
+    assert cache.cache_path(Robot.named("planar3"), CoverSettings()).name in {path.name for path in FILES}
