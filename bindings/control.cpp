@@ -1,8 +1,10 @@
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "arguments.hpp"
 #include "module.hpp"
@@ -136,7 +138,7 @@ void bind_safety(nb::module_& m) {
       .def(
           "__init__",
           [](Clearances* self, const ArrayLike& values, const ArrayLike& rates, const ArrayLike& curvatures,
-             const ArrayLike& gradients, const std::vector<int>& nearest) {
+             const ArrayLike& gradients, const std::vector<int>& nearest, const std::optional<ArrayLike>& mixing) {
             const auto num = static_cast<Eigen::Index>(nearest.size());
             const Array rows = as_array(gradients, "gradients");
             if (rows.ndim() != 2) {
@@ -149,16 +151,21 @@ void bind_safety(nb::module_& m) {
             result.curvatures = as_vector(curvatures, "curvatures", num);
             result.gradients = as_matrix(gradients, "gradients", num, nv).transpose();
             result.nearest = Eigen::Map<const Eigen::VectorXi>(nearest.data(), num);
+            if (mixing) {
+              result.mixing = as_vector(*mixing, "mixing", num);
+            }
             new (self) Clearances(std::move(result));
           },
           nb::kw_only(), nb::arg("values"), nb::arg("rates"), nb::arg("curvatures"), nb::arg("gradients"),
-          nb::arg("nearest"))
+          nb::arg("nearest"), nb::arg("mixing") = nb::none())
       .def_prop_ro("values", [](const Clearances& c) { return to_numpy(c.values); },
                    "h (m,) [m]; inf beyond the reach, where the rest has no meaning.")
       .def_prop_ro("rates", [](const Clearances& c) { return to_numpy(c.rates); },
                    "dh/dt (m,) [m/s], obstacle velocities included.")
       .def_prop_ro("curvatures", [](const Clearances& c) { return to_numpy(c.curvatures); },
                    "d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity.")
+      .def_prop_ro("mixing", [](const Clearances& c) { return to_numpy(c.mixing); },
+                   "What of the curvatures is the mean going over from point to point (m,) [m/s^2].")
       .def_prop_ro("gradients", [](const Clearances& c) { return to_numpy_matrix(c.gradients.transpose()); },
                    "dh/dq (m, nv) [m/rad].")
       .def_prop_ro("nearest",

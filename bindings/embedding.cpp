@@ -54,6 +54,8 @@ void bind_embedding(nb::module_& m) {
       .def_prop_ro("clearance_curvatures",
                    [](const EmbeddingEvaluation& e) { return to_numpy(e.clearances.curvatures); },
                    "d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity.")
+      .def_prop_ro("clearance_mixing", [](const EmbeddingEvaluation& e) { return to_numpy(e.clearances.mixing); },
+                   "What of it is the mean over points going over from one to another (m,) [m/s^2].")
       .def_prop_ro("clearance_gradients",
                    [](const EmbeddingEvaluation& e) { return to_numpy_matrix(e.clearances.gradients.transpose()); },
                    "dh/dq (m, nv) [m/rad].");
@@ -153,7 +155,7 @@ void bind_embedding(nb::module_& m) {
       m, "SelfCollisionBarrier",
       "One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: their\n"
       "distance, or minus their depth, less the gap at which the links touch. pairs: (first, second) or\n"
-      "(first, second, contact), names of links and that gap [m], see presets.barrier_pairs. Other parameters as in\n"
+      "(first, second, contact), names of links and that gap [m], see link_pairs.barrier_pairs. Other parameters as in\n"
       "ClearanceBarrier.")
       .def(
           "__init__",

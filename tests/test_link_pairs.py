@@ -41,6 +41,11 @@ def test_what_lies_between_two_links() -> None:
     assert check.distance_between(folded, "link1", "link3") == 0.0
     straight = np.zeros(3)
     assert check.distance_between(straight, "link1", "link3") == check.distance(straight).distance > 0.1
+    assert check.within(folded, "link1", "link3", 0.0)
+    distance = check.distance_between(np.array([0.0, 1.9, 1.6]), "link1", "link3")
+    assert distance > 0.01
+    assert check.within(np.array([0.0, 1.9, 1.6]), "link1", "link3", 1.001 * distance)
+    assert not check.within(np.array([0.0, 1.9, 1.6]), "link1", "link3", 0.999 * distance)
     with pytest.raises(ValueError, match=r"\(link1, link2\) is not checked"):
         check.distance_between(straight, "link1", "link2")
 
@@ -49,7 +54,9 @@ def test_a_contact_moves_the_clearance_by_as_much() -> None:
     robot = Robot.named("planar3")
     body = Body.cover(robot, components=4)
     q, v = np.array([0.0, 1.9, 1.6]), np.array([0.3, -0.2, 0.1])
-    plain = SelfCollisionBarrier(robot, body, [("link1", "link3")], reach=1.0).evaluate(q, v, Obstacles.none())
+    plain = SelfCollisionBarrier(robot, body, [("link1", "link3")], reach=1.0).evaluate(
+        q, v, Obstacles.none()
+    )
     moved = SelfCollisionBarrier(robot, body, [("link1", "link3", -0.01)], reach=1.0).evaluate(
         q, v, Obstacles.none()
     )

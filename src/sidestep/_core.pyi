@@ -228,6 +228,12 @@ class EmbeddingEvaluation:
         """d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity."""
 
     @property
+    def clearance_mixing(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        What of it is the mean over points going over from one to another (m,) [m/s^2].
+        """
+
+    @property
     def clearance_gradients(self) -> numpy.typing.NDArray[numpy.float64]:
         """dh/dq (m, nv) [m/rad]."""
 
@@ -302,7 +308,7 @@ class SelfCollisionBarrier(Embedding):
     """
     One coordinate per pair of links, a barrier of the clearance between their covering ellipsoids: their
     distance, or minus their depth, less the gap at which the links touch. pairs: (first, second) or
-    (first, second, contact), names of links and that gap [m], see presets.barrier_pairs. Other parameters as in
+    (first, second, contact), names of links and that gap [m], see link_pairs.barrier_pairs. Other parameters as in
     ClearanceBarrier.
     """
 
@@ -964,7 +970,7 @@ class Clearances:
     Clearances h(q, t) of parts of an arm with what their motion needs; arrays are copies.
     """
 
-    def __init__(self, *, values: numpy.typing.ArrayLike, rates: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike, gradients: numpy.typing.ArrayLike, nearest: Sequence[int]) -> None: ...
+    def __init__(self, *, values: numpy.typing.ArrayLike, rates: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike, gradients: numpy.typing.ArrayLike, nearest: Sequence[int], mixing: numpy.typing.ArrayLike | None = None) -> None: ...
 
     @property
     def values(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -977,6 +983,12 @@ class Clearances:
     @property
     def curvatures(self) -> numpy.typing.NDArray[numpy.float64]:
         """d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity."""
+
+    @property
+    def mixing(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        What of the curvatures is the mean going over from point to point (m,) [m/s^2].
+        """
 
     @property
     def gradients(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1342,7 +1354,7 @@ class PlannerSettings:
     shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.05, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
+    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
 
     @property
     def margin(self) -> float: ...

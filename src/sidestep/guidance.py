@@ -22,6 +22,7 @@ from sidestep._core import (
     Step,
 )
 from sidestep.body import Body
+from sidestep.link_pairs import barrier_pairs
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -53,7 +54,7 @@ class GuidedMotion:
         robot: the arm. body: a covering body of it; by default `Body.cover(robot)`.
         system: what moves the arm; by default `presets.barrier_system`.
         planner, route: of the guide; None for the defaults.
-        pairs: links that must not touch; by default `presets.barrier_pairs`.
+        pairs: links that must not touch; by default `sidestep.link_pairs.barrier_pairs`.
         duration: time [s] after which the status is `timeout`.
         seed, synchronous: of the guide; synchronous motions are the same every time.
 
@@ -79,7 +80,7 @@ class GuidedMotion:
         self.guide = Guide(
             robot,
             body,
-            pairs=list(pairs if pairs is not None else presets.barrier_pairs(robot, body)),
+            pairs=list(pairs if pairs is not None else barrier_pairs(robot, body)),
             planner=planner,
             route=route,
             duration=duration,

@@ -21,6 +21,7 @@ from sidestep.body import Body
 from sidestep.link_pairs import barrier_pairs
 from sidestep.robot import Robot
 
+
 @dataclass(frozen=True)
 class Barriers:
     """The numbers of the recommended system; see the barriers of the core for what each trades.

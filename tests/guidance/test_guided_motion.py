@@ -111,12 +111,12 @@ def test_barriers_leave_a_goal_free_once_it_is_free(robot: ss.Robot, body: _core
     def pull(system: ss.GeometricSystem) -> float:
         at = GOAL + np.array([0.02, 0.0, 0.0])
         return float(
-            np.linalg.norm(system.acceleration(at, np.zeros(3), ss.JointGoal(GOAL), ball(0.17)).acceleration)
+            np.linalg.norm(system.acceleration(at, np.zeros(3), ss.JointGoal(GOAL), ball(0.15)).acceleration)
         )
 
     assert motion.step(START, np.zeros(3), ball(0.0), time=0.0).status == ss.GuideStatus.goal_in_collision
-    # 2 cm above the link, within the activation of 6 cm: barriers made for the blocked goal hold the arm back
-    motion.step(START, np.zeros(3), ball(0.17), time=0.021)  # after the guide's period
+    # 2.5 cm from the ellipsoids, within the activation of 6 cm: barriers made for the blocked goal hold the arm back
+    motion.step(START, np.zeros(3), ball(0.15), time=0.021)  # after the guide's period
     free = 4.0 * 0.02  # stiffness times distance
     assert pull(motion.system) < 0.6 * free
     assert pull(motion.moving) == pytest.approx(free, rel=1e-9)  # rounding
@@ -141,4 +141,6 @@ def test_barriers_leave_room_at_the_tightest_place_of_the_path(robot: ss.Robot, 
         q = q + PERIOD * v
     assert step.status == ss.GuideStatus.arrived
     assert len(gains) > 10
-    assert np.median(gains) > 1.05  # what the goal's pull gains there
+    # What the goal's pull gains there: always something, and most where the path is tightest.
+    assert np.median(gains) > 1.02
+    assert np.max(gains) > 1.3

@@ -77,14 +77,14 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
 
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
-  if (clearances.values.size() != num || clearances.rates.size() != num || clearances.curvatures.size() != num ||
+  if (clearances.values.size() != num || clearances.rates.size() != num || clearances.curvatures.size() != num || clearances.mixing.size() != num ||
       clearances.gradients.rows() != normals.cols() || clearances.gradients.cols() != num) {
     return false;
   }
   for (Eigen::Index k = 0; k < num; ++k) {
     if (clearances.nearest[k] >= 0 &&
         !(std::isfinite(clearances.values[k]) && std::isfinite(clearances.rates[k]) &&
-          std::isfinite(clearances.curvatures[k]) && clearances.gradients.col(k).allFinite())) {
+          std::isfinite(clearances.curvatures[k]) && std::isfinite(clearances.mixing[k]) && clearances.gradients.col(k).allFinite())) {
       return false;
     }
   }
@@ -146,7 +146,9 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
         demanded_deceleration(clearances.values[k] - settings_.margin, -clearances.rates[k], closing, period);
     const double length = gradient.norm();
     normals.row(row) = gradient.transpose() / length;
-    lower[row] = (demand - (clearances.curvatures[k] - clearances.mixing[k])) / length;
+    // Of the points, but no more than the mean where it says that a surface recedes: see the header.
+    const double c = std::min(clearances.curvatures[k] - clearances.mixing[k], std::max(clearances.curvatures[k], 0.0));
+    lower[row] = (demand - c) / length;
     lengths[row] = length;
     nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];
   }

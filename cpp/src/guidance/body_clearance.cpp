@@ -208,7 +208,9 @@ BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obst
   const Link& link = links_[static_cast<std::size_t>(item.link)];
   if (item.other >= 0) {
     const Link& other = links_[static_cast<std::size_t>(item.other)];
-    return {look_at_pair(link, other, cap + item.contact, stop + item.contact, w) - item.contact, -1};
+    const double gap_cap = cap + item.contact;
+    const double gap = look_at_pair(link, other, gap_cap, stop + item.contact, w);
+    return {gap < gap_cap ? gap - item.contact : cap, -1};  // exactly the cap where nothing is nearer
   }
   if (item.plane >= 0) {
     return {look_at_plane(link, planes_[static_cast<std::size_t>(item.plane)], cap, w), -1};

@@ -136,7 +136,7 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   clearances.values[1] = 0.105;
   clearances.rates[1] = -0.4;
   clearances.curvatures[1] = -5.7;
-  clearances.mixing[1] = -5.0;
+  clearances.mixing[1] = -5.0;  // -0.7 of the point
   clearances.gradients.col(1) << 0.3, -0.4;
   SafetyRows rows(2, {});
   Eigen::VectorXd v = Eigen::VectorXd::Zero(2);
@@ -279,4 +279,29 @@ BOOST_AUTO_TEST_CASE(update_allocates_nothing) {
                         }),
                         0u);
   }
+}
+
+BOOST_AUTO_TEST_CASE(changing_points_never_make_a_surface_recede) {
+  JointLimits limits = JointLimits::unlimited(1);
+  limits.acceleration << 10.0;
+  limits.effort << 30.0;
+  Clearances clearances(1, 1);
+  clearances.nearest << 0;
+  clearances.values << 0.105;
+  clearances.rates << -0.4;
+  clearances.gradients << 1.0;
+  SafetyRows rows(1, {});
+  const double demand = demanded_deceleration(0.1, 0.4, {5.0, 10.0, 20.0, 0.5}, 0.001);
+  const auto lower = [&](double curvature, double mixing) {
+    clearances.curvatures << curvature;
+    clearances.mixing << mixing;
+    rows.update(clearances, Eigen::VectorXd::Zero(1), limits, 0.001);
+    return rows.lower[0] - demand;
+  };
+  const auto close = boost::test_tools::tolerance(1e-9);
+  BOOST_TEST(lower(-430.0, -432.0) == 0.0, close);  // going over to another point, while each recedes
+  BOOST_TEST(lower(-430.0, -427.0) == 3.0, close);  // while each comes
+  BOOST_TEST(lower(0.0, -14.0) == 0.0, close);      // sliding along a flat wall of points
+  BOOST_TEST(lower(-3.0, -14.0) == 0.0, close);     // along a hollow one
+  BOOST_TEST(lower(9.0, 0.0) == -9.0, close);       // past one point
 }

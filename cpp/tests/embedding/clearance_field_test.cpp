@@ -9,6 +9,7 @@
 #include "sidestep/embedding/boltzmann_mean.hpp"
 #include "sidestep/embedding/instruction_set.hpp"
 #include "support/random_scene.hpp"
+#include "support/serial_arm.hpp"
 
 using namespace sidestep;
 using test::Random;
@@ -139,6 +140,33 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
           compare(robot, body, state, moved, 0.3);
         }
       }
+    }
+  }
+  use(before);
+}
+
+BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
+  // There the iteration begins at its end, where S is 1 but for rounding. A foot that stays on an axis a of curvature
+  // radius b²/a bends the distance h by v²/(b²/a + h) for a speed v across.
+  const InstructionSet before = instruction_set();
+  const Robot robot = test::serial_arm(test::arm_limits(1));
+  const std::string link = robot.frames().back().name;
+  for (const InstructionSet set : instruction_sets()) {
+    use(set);
+    Random random(4);
+    for (int trial = 0; trial < 200; ++trial) {
+      const double a = random.uniform(0.05, 0.3), b = random.uniform(0.03, 0.3), h = random.uniform(0.01, 0.3), v = 0.7;
+      const Eigen::Matrix3d S = Eigen::Vector3d(a * a, b * b, b * b).asDiagonal();
+      const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {S}, Eigen::VectorXd::Ones(1));
+      const ClearanceField field(robot, body, temperature);
+      KinematicState state(robot);
+      state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
+      const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
+      const Eigen::Matrix3Xd at = X * Eigen::Vector3d(a + h, 0.0, 0.0), slip = X.linear() * Eigen::Vector3d(0.0, v, 0.0);
+      Clearances found(1, 1);
+      field.evaluate(state, Obstacles(at, Eigen::VectorXd::Zero(1), slip), 1.0, found.view(0, 1));
+      BOOST_TEST(std::abs(found.values[0] - h) < 1e-12);
+      BOOST_TEST(std::abs(found.curvatures[0] - v * v / (b * b / a + h)) < 1e-9);
     }
   }
   use(before);

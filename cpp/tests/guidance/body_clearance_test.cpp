@@ -239,3 +239,25 @@ BOOST_AUTO_TEST_CASE(queries_allocate_nothing) {
   BOOST_TEST(answers >= 0);
   BOOST_TEST(allocations == 0);
 }
+
+BOOST_AUTO_TEST_CASE(links_far_apart_are_free_whatever_their_contact) {
+  Random random(7);
+  const Robot robot = test::random_tree(random, 4);
+  Body body = calibrated(random, robot, 1.0);
+  for (Eigen::Matrix3d& covariance : body.covariances) {
+    covariance = 1e-6 * Eigen::Matrix3d::Identity();
+  }
+  body = Body(body.links, body.weights, body.means, body.covariances, Eigen::VectorXd::Ones(body.num_components()));
+  const int nv = robot.num_coordinates();
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), b = Eigen::VectorXd::Constant(nv, 1e-3);
+  for (int trial = 0; trial < 200; ++trial) {
+    const BodyClearance checked(robot, body, {{body.links.front(), body.links.back(), random.uniform(-0.08, -0.001)}});
+    BodyClearance::Workspace w(checked);
+    for (const double margin : {0.005, 0.0025, 0.02}) {
+      const Margins margins{margin, 0.002, 0.3, {}};
+      BOOST_TEST(checked.free(q, Obstacles::none(), margins, w));
+      BOOST_TEST(checked.edge_free(q, b, Obstacles::none(), margins, w));
+    }
+    BOOST_TEST(checked.nearest(q, Obstacles::none(), 0.01, w).item == -1);
+  }
+}

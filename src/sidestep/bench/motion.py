@@ -113,7 +113,9 @@ def move(
     guided.set_goal(problem.goal)
     led = _Led(guided)
     motion = run(robot, system, problem, settings, led)
-    return replace(motion, planning_seconds=led.planning_seconds, ended=led.status)
+    return replace(
+        motion, planning_seconds=led.planning_seconds, ended="arrived" if motion.arrived else led.status
+    )
 
 
 def _integrated(

@@ -132,6 +132,17 @@ class SelfCollision:
         pair = self._find(first, second)
         return self._measure(pair, self._poses(q, pair))
 
+    def within(self, q: Array, first: str, second: str, distance: float) -> bool:
+        """Whether a checked pair is no farther apart than a distance [m] at q (nv,); faster than to measure it.
+
+        Raises:
+            ValueError: the pair is not checked, or the distance is negative.
+        """
+        if not distance >= 0.0:
+            raise ValueError(f"distance is {distance} m, must be >= 0")
+        pair = self._find(first, second)
+        return self._touch(pair, self._poses(q, pair), margin=distance)
+
     def touching(self, q: Array) -> tuple[Pair, ...]:
         """The pairs that touch at q (nv,)."""
         poses = self._poses(q)
@@ -234,11 +245,12 @@ class SelfCollision:
         request.enable_signed_distance = False
         return max(0.0, float(coal.distance(*self._placed(pair, poses), request, result)))
 
-    def _touch(self, pair: _PairOfLinks, poses: dict[int, Array]) -> bool:
-        if self._balls_apart(pair, poses) > 0.0:
+    def _touch(self, pair: _PairOfLinks, poses: dict[int, Array], *, margin: float = 0.0) -> bool:
+        if self._balls_apart(pair, poses) > margin:
             return False
-        result = coal.CollisionResult()
-        return bool(coal.collide(*self._placed(pair, poses), coal.CollisionRequest(), result))
+        request, result = coal.CollisionRequest(), coal.CollisionResult()
+        request.security_margin = margin
+        return bool(coal.collide(*self._placed(pair, poses), request, result))
 
     def _placed(self, pair: _PairOfLinks, poses: dict[int, Array]) -> tuple[object, ...]:
         placed: list[object] = []

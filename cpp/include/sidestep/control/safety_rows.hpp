@@ -22,8 +22,10 @@ struct ClosingLimits {
 // q̈ = 0 and the acceleration a held for one period T, the closing speed is  w = u − (c + ∇h·a) T  afterwards, up to
 // terms of order T². So a bound w ≤ w_max is one linear inequality,
 //     ∇h·a ≥ (u − w_max)/T − c.
-// c is that of the points now nearest (without the clearances' `mixing`): when the mean over points goes over to one that
+// c is that of the points now nearest, without the clearances' `mixing`: when the mean over points goes over to one that
 // comes faster, u soon is that point's closing speed, and no more, whatever the mean's second derivative says meanwhile.
+// But along a sampled surface the nearest point changes all the time, and what each point recedes the mixing takes back:
+// where c of the points is positive, it counts only as far as the mean's own is.
 //
 // Which closing speeds leave enough room? Close to the margin γ s, so that the room shrinks at most exponentially; the
 // deceleration along that line is γ u, which a fast approach could not deliver. So from u = A/γ on, the parabola of

@@ -15,8 +15,7 @@ struct PlannerSettings {
   double margin = 0.06;     ///< clearance asked for at first, for ways on which barriers hardly act [m]
   double floor = 0.005;     ///< clearance asked for at last, where there is no wider way [m]
   double allowance = 0.02;       ///< how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
-  double pair_allowance = 0.05;  ///< how deep two ellipsoids may be in each other there: both are larger, and a pair's
-                                 ///< clearance is the gap along the line of centres alone [m]
+  double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
   double slack = 0.002;     ///< see Margins [m]
   double fade = 0.3;        ///< see Margins [m]
   double range = 1.5;       ///< longest edge of the trees [rad | m]

@@ -164,8 +164,10 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
       h = out.t * norm - radius;
     };
     update();
-    const auto inside = S < 1.0;
-    const unsigned any_inside = below(S, all(1.0));
+    // S = 1 but for rounding at a first t > 0 that is exact, of points on an axis: they are outside.
+    const Lanes S_if_inside = out.t > 0.0 ? all(1.0) : S;
+    const auto inside = S_if_inside < 1.0;
+    const unsigned any_inside = below(S_if_inside, all(1.0));
     const Lanes limit = all(group.limit[k]);
     if ((any_inside | below(h, limit)) == 0) {
       continue;
