@@ -63,6 +63,10 @@ HalfWidth half_width(const Placed& p, const Eigen::Vector3d& n, const Eigen::Vec
           p.link.R_WL * S_m / s};
 }
 
+EllipsoidGap gap_between(const Side& a, const Side& b) noexcept {
+  return ellipsoid_gap(b.centre - a.centre, a.shape(), b.shape());
+}
+
 /// The boundary point of an ellipsoid farthest along a fixed unit vector n, from the centre, and how it moves.
 Eigen::Vector3d support_rate(const Placed& p, const Eigen::Vector3d& n) noexcept {
   const Eigen::Vector3d& omega = p.link.velocity.angular;
@@ -97,8 +101,8 @@ class PairOfLinks {
   PairOfLinks(const KinematicState& state, const Group& first, const Group& second) noexcept
       : first_(ball(state, first)), second_(ball(state, second)) {}
 
-  /// Calls act(a, b, gap) for pairs of ellipsoids with a gap h < limit, where `act` may lower the limit. Balls are tested from
-  /// the whole links down: most pairs of links, then of ellipsoids, are too far apart.
+  /// Calls act(a, b, bound) for pairs of ellipsoids of which a lower bound of the gap is below the limit, which `act` may
+  /// lower. Balls are tested from the whole links down: most pairs of links, then of ellipsoids, are too far apart.
   template <class Act>
   void for_each_below(const double& limit, Act&& act) const noexcept {
     if (!near(first_, second_.centre, second_.radius, limit)) {
@@ -128,11 +132,9 @@ class PairOfLinks {
           }
           const Eigen::Vector3d d = b.centre - a.centre;
           const double length = std::max(d.norm(), closest_centres);
-          if (length - a.half_width(d / length) - b.half_width(d / length) < limit) {  // a lower bound of the gap
-            const EllipsoidGap gap = ellipsoid_gap(d, a.shape(), b.shape());
-            if (gap.value < limit) {
-              act(a, b, gap);
-            }
+          const double bound = length - a.half_width(d / length) - b.half_width(d / length);
+          if (bound < limit) {
+            act(a, b, bound);
           }
         }
       }
@@ -241,11 +243,21 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
   const double window = BoltzmannMean::window * temperature_;
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
-    // The smallest clearance first: most pairs of links end here, and of the others only what lies near it matters.
+    // The smallest gap first, from that with the smallest bound: most pairs of links end here, and of the others only
+    // what lies near it matters.
     const double reach = reach_ + pairs_[i].contact;  // of the gap
-    double smallest = reach;
-    pair.for_each_below(smallest, [&](const Side& /*a*/, const Side& /*b*/, const EllipsoidGap& gap) {
-      smallest = gap.value;
+    double smallest = reach, least_bound = reach;
+    Side first, second;
+    pair.for_each_below(least_bound, [&](const Side& a, const Side& b, double bound) {
+      first = a, second = b;
+      least_bound = bound;
+    });
+    if (!(least_bound < reach)) {
+      continue;
+    }
+    smallest = std::min(reach, gap_between(first, second).value);
+    pair.for_each_below(smallest, [&](const Side& a, const Side& b, double /*bound*/) {
+      smallest = std::min(smallest, gap_between(a, b).value);
     });
     if (!(smallest < reach)) {
       continue;
@@ -253,8 +265,9 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     BoltzmannMean mean(temperature_);
     int nearest = -1;
     const double limit = smallest + window;
-    pair.for_each_below(limit, [&](const Side& a, const Side& b, const EllipsoidGap& gap) {
-      if (mean.add(between(Placed(a), Placed(b), gap))) {
+    pair.for_each_below(limit, [&](const Side& a, const Side& b, double /*bound*/) {
+      const EllipsoidGap gap = gap_between(a, b);
+      if (gap.value < limit && mean.add(between(Placed(a), Placed(b), gap))) {
         nearest = b.ellipsoid->component;
       }
     });

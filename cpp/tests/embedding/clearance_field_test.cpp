@@ -26,8 +26,15 @@ struct Distance {
 
 /// The distance to the ellipsoid y S⁻¹ y ≤ 1, by halving the interval of its multiplier t.
 Distance outside(const Eigen::Matrix3d& S, const Eigen::Vector3d& e, const Eigen::Vector3d& v) {
-  const auto foot = [&](double t) -> Eigen::Vector3d { return (S + t * Eigen::Matrix3d::Identity()).ldlt().solve(e); };
-  const auto excess = [&](double t) { return foot(t).dot(S * foot(t)) - 1.0; };
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(S);
+  const Eigen::Vector3d A = principal.eigenvalues(), along = principal.eigenvectors().transpose() * e;
+  const auto excess = [&](double t) {
+    double sum = -1.0;
+    for (int i = 0; i < 3; ++i) {
+      sum += A[i] * (along[i] / (A[i] + t)) * (along[i] / (A[i] + t));
+    }
+    return sum;
+  };
   double low = 0.0, high = 1.0;
   while (excess(high) > 0.0) {
     high *= 2.0;
@@ -36,7 +43,7 @@ Distance outside(const Eigen::Matrix3d& S, const Eigen::Vector3d& e, const Eigen
     (excess(0.5 * (low + high)) > 0.0 ? low : high) = 0.5 * (low + high);
   }
   const Eigen::Matrix3d M = S + low * Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d w = foot(low), n = w.normalized();
+  const Eigen::Vector3d w = M.ldlt().solve(e), n = w.normalized();
   const Eigen::Vector3d slope = M.ldlt().solve(S * w);
   const Eigen::Vector3d w_dot = M.ldlt().solve(v - w * (slope.dot(v) / slope.dot(w)));
   return {low * w.norm(), v.dot(w_dot - n * n.dot(w_dot)) / w.norm(), n};
@@ -125,7 +132,7 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
       use(set);
       Random random(3);
       for (const int num_points : {1, 7, 16, 17, 150, 1500}) {
-        for (int trial = 0; trial < 5; ++trial) {
+        for (int trial = 0; trial < (num_points < 100 ? 5 : 1); ++trial) {
           const Robot robot = test::random_tree(random, 7);
           const Body body = calibrated(test::random_body(random, robot), random);
           KinematicState state(robot);
