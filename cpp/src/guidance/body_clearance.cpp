@@ -19,6 +19,8 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
 constexpr double closest_centres = 1e-6;      // [m] of which a direction is taken
 
+static_assert(kernels::most_balls == PointTree::leaf_size);
+
 kernels::Distances distances_kernel() noexcept {
 #if defined(SIDESTEP_X86_KERNELS)
   switch (instruction_set()) {
@@ -227,7 +229,7 @@ BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obsta
   // Whether anything is near the ball around the link.
   if (link.ellipsoids.size() > 1) {
     const Eigen::Vector3d centre = X.p + X.R * link.centre;
-    const auto around = [&](const PointTree::Balls& balls, int first, int count, double least, float* values) {
+    const auto around = [&](const Balls& balls, int first, int count, double least, float* values) {
       unsigned near = 0;
       for (int i = 0; i < count; ++i) {
         const int n = first + i;
@@ -245,8 +247,8 @@ BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obsta
   }
   for (const Ellipsoid& e : link.ellipsoids) {
     const kernels::PlacedEllipsoid ellipsoid = placed(X.p + X.R * e.mean, e.axes_T * X.R.transpose(), e.squares, e.extent);
-    const auto measure = [&](const PointTree::Balls& balls, int first, int count, double least, float* values) {
-      return distances(ellipsoid, {{balls.x, balls.y, balls.z}, balls.radius}, first, count, least, values);
+    const auto measure = [&](const Balls& balls, int first, int count, double least, float* values) {
+      return distances(ellipsoid, balls, first, count, least, values);
     };
     const PointTree::Nearest at = tree.nearest(found.clearance, stop, measure);
     if (at.point >= 0) {

@@ -62,21 +62,24 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
                                                           : velocities(c - 4, order_[n]);
     }
   }
-  levels_.emplace_back(leaves);
-  while (levels_.back().size() > 1) {
-    levels_.emplace_back(groups(levels_.back().size(), fan_out));
-  }
-  for (const std::vector<Ball>& level : levels_) {
-    const std::size_t room = groups(level.size(), fan_out) * fan_out + leaf_size - fan_out;
-    const std::vector<double> far(room, padding);
-    hulls_.push_back({far, far, far, std::vector<double>(room, 0.0)});
+  levels_.emplace_back(static_cast<int>(leaves));
+  while (levels_.back().size > 1) {
+    levels_.emplace_back(static_cast<int>(groups(static_cast<std::size_t>(levels_.back().size), fan_out)));
   }
   refit();
 }
 
+PointTree::Level::Level(int count) : size(count) {
+  const std::size_t room = groups(static_cast<std::size_t>(count), fan_out) * fan_out + leaf_size - fan_out;
+  for (std::vector<double>* centre : {&x, &y, &z}) {
+    centre->assign(room, padding);
+  }
+  radius.assign(room, 0.0);
+}
+
 void PointTree::refit() noexcept {
-  // A node's ball is around the box of the centres below it.
-  const auto fit = [](Ball& ball, int first, int count, auto&& member) {
+  // A node's ball is around the middle of the box of the centres below it.
+  const auto fit = [](int first, int count, auto&& member) {
     Eigen::Vector3d low = Eigen::Vector3d::Constant(infinity), high = -low;
     for (int i = first; i < first + count; ++i) {
       const Ball m = member(i);
@@ -84,28 +87,28 @@ void PointTree::refit() noexcept {
       high = high.cwiseMax(Eigen::Vector3d(m.x, m.y, m.z));
     }
     const Eigen::Vector3d centre = 0.5 * (low + high);
-    ball = {centre.x(), centre.y(), centre.z(), 0.0, 0.0};
+    Ball ball{centre.x(), centre.y(), centre.z(), 0.0};
     for (int i = first; i < first + count; ++i) {
       const Ball m = member(i);
-      ball.spread = std::max(ball.spread, (Eigen::Vector3d(m.x, m.y, m.z) - centre).norm() + m.spread);
-      ball.largest_radius = std::max(ball.largest_radius, m.largest_radius);
+      ball.radius = std::max(ball.radius, (Eigen::Vector3d(m.x, m.y, m.z) - centre).norm() + m.radius);
     }
+    return ball;
   };
   for (std::size_t level = 0; level < levels_.size(); ++level) {
     const int per_node = level == 0 ? leaf_size : fan_out;
-    const int members = level == 0 ? size() : static_cast<int>(levels_[level - 1].size());
-    for (std::size_t node = 0; node < levels_[level].size(); ++node) {
-      const int first = static_cast<int>(node) * per_node;
-      fit(levels_[level][node], first, std::min(per_node, members - first), [this, level](int i) {
+    const int members = level == 0 ? size() : levels_[level - 1].size;
+    for (int node = 0; node < levels_[level].size; ++node) {
+      const int first = node * per_node;
+      const Ball ball = fit(first, std::min(per_node, members - first), [this, level](int i) {
         const auto n = static_cast<std::size_t>(i);
-        return level == 0 ? Ball{columns_[0][n], columns_[1][n], columns_[2][n], 0.0, columns_[3][n]}
-                          : levels_[level - 1][n];
+        return level == 0 ? Ball{columns_[0][n], columns_[1][n], columns_[2][n], columns_[3][n]}
+                          : levels_[level - 1].ball(i);
       });
-      const Ball& ball = levels_[level][node];
-      hulls_[level][0][node] = ball.x;
-      hulls_[level][1][node] = ball.y;
-      hulls_[level][2][node] = ball.z;
-      hulls_[level][3][node] = ball.spread + ball.largest_radius;
+      const auto n = static_cast<std::size_t>(node);
+      levels_[level].x[n] = ball.x;
+      levels_[level].y[n] = ball.y;
+      levels_[level].z[n] = ball.z;
+      levels_[level].radius[n] = ball.radius;
     }
   }
 }

@@ -22,7 +22,7 @@ double scanned(const Obstacles& obstacles, const Eigen::Vector3d& place, double 
 
 /// Nearest to a place; `looked` counts the balls that were measured.
 PointTree::Nearest nearest(const PointTree& tree, const Eigen::Vector3d& place, double limit, double stop, int& looked) {
-  return tree.nearest(limit, stop, [&](const PointTree::Balls& balls, int first, int count, double least, float* values) {
+  return tree.nearest(limit, stop, [&](const Balls& balls, int first, int count, double least, float* values) {
     unsigned near = 0;
     for (int i = 0; i < count; ++i) {
       const int n = first + i;

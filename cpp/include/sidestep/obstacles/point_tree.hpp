@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "sidestep/obstacles/balls.hpp"
+
 namespace sidestep {
 
 /// Points under a hierarchy of bounding balls, so that a query looks at those near it only.
@@ -20,9 +22,9 @@ class PointTree {
   static constexpr int leaf_size = 16;
   static constexpr int fan_out = 8;
 
-  /// Holds the centres of all points below within `spread`; none of their radii is above `largest_radius`.
+  /// Holds the balls of all points below.
   struct Ball {
-    double x, y, z, spread, largest_radius;
+    double x, y, z, radius;
   };
 
   PointTree() = default;
@@ -39,16 +41,12 @@ class PointTree {
   const double* velocity(int axis) const noexcept { return columns_[static_cast<std::size_t>(4 + axis)].data(); }
   static constexpr double padding = 1e9;  ///< [m], out of every reach
 
-  /// Balls side by side: of points, or around nodes with the balls of their points.
-  struct Balls {
-    const double *x, *y, *z, *radius;
-  };
   struct Nearest {
     double distance;
     int point;  ///< in tree order; -1: none
   };
 
-  /// The point whose ball is nearest by a measure, best first. measure(balls, first, count, limit, values) writes the
+  /// The point whose ball is nearest by a measure, best first. measure(Balls, first, count, limit, values) writes the
   /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that room, and returns those
   /// below `limit` as bits; of a ball it must not exceed that of a ball inside by more than what it is content to miss. The
   /// arrays go on for `leaf_size` from `first`. None from `limit` on is found, and any that is below `stop` ends the
@@ -78,12 +76,24 @@ class PointTree {
   }
 
  private:
+  /// The balls of all nodes, with room to read `leaf_size` from any node on.
+  struct Level {
+    int size;
+    std::vector<double> x, y, z, radius;
+
+    explicit Level(int count);
+    Balls balls() const noexcept { return {x.data(), y.data(), z.data(), radius.data()}; }
+    Ball ball(int node) const noexcept {
+      const auto n = static_cast<std::size_t>(node);
+      return {x[n], y[n], z[n], radius[n]};
+    }
+  };
+
   void refit() noexcept;
 
   template <class Near, class Leaf>
   void descend(int level, int node, const Eigen::Vector3d& x, Near& near, Leaf& leaf) const noexcept {
-    const std::vector<Ball>& balls = levels_[static_cast<std::size_t>(level)];
-    const Ball& ball = balls[static_cast<std::size_t>(node)];
+    const Ball ball = levels_[static_cast<std::size_t>(level)].ball(node);
     if (!near(ball)) {
       return;
     }
@@ -92,11 +102,11 @@ class PointTree {
       leaf(first, std::min(leaf_size, size() - first), ball);
       return;
     }
-    const std::vector<Ball>& below = levels_[static_cast<std::size_t>(level) - 1];
-    const int count = std::min(fan_out, static_cast<int>(below.size()) - first);
+    const Level& below = levels_[static_cast<std::size_t>(level) - 1];
+    const int count = std::min(fan_out, below.size - first);
     std::array<std::pair<double, int>, fan_out> children;
     for (int i = 0; i < count; ++i) {
-      const Ball& child = below[static_cast<std::size_t>(first + i)];
+      const Ball child = below.ball(first + i);
       const double distance = (Eigen::Vector3d(child.x, child.y, child.z) - x).squaredNorm();
       int at = i;
       for (; at > 0 && children[static_cast<std::size_t>(at) - 1].first > distance; --at) {
@@ -124,11 +134,9 @@ class PointTree {
       }
       return;
     }
-    const auto below = static_cast<std::size_t>(level) - 1;
-    const std::array<std::vector<double>, 4>& hulls = hulls_[below];
-    const int count = std::min(fan_out, static_cast<int>(levels_[below].size()) - first);
-    unsigned near = measure(Balls{hulls[0].data(), hulls[1].data(), hulls[2].data(), hulls[3].data()}, first, count,
-                            found.distance, values.data());
+    const Level& below = levels_[static_cast<std::size_t>(level) - 1];
+    const int count = std::min(fan_out, below.size - first);
+    unsigned near = measure(below.balls(), first, count, found.distance, values.data());
     while (near != 0 && !(found.distance < stop)) {
       int nearest = std::countr_zero(near);
       for (unsigned left = near & (near - 1); left != 0; left &= left - 1) {
@@ -145,8 +153,7 @@ class PointTree {
 
   std::vector<int> order_;
   std::array<std::vector<double>, 7> columns_;  // x, y, z, radius, velocity
-  std::vector<std::vector<Ball>> levels_;       // leaves first, one node last
-  std::vector<std::array<std::vector<double>, 4>> hulls_;  // the same with the balls of the points inside: x, y, z, radius
+  std::vector<Level> levels_;                   // leaves first, one node last
   bool moves_ = false;
 };
 

@@ -49,10 +49,10 @@ struct QueryGroup {
   Query queries[most_queries];
 };
 
-/// The centres of a leaf's points lie within `spread` of (x, y, z); their radii are at most `largest_radius`.
+/// The balls of a leaf's points lie within `radius` of (x, y, z).
 struct Leaf {
   int first, count;
-  double x, y, z, spread, largest_radius;
+  double x, y, z, radius;
 };
 
 /// Adds the points of a leaf to every query of the group that they matter to. Returns whether a limit fell.

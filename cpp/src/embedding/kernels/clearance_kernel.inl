@@ -284,7 +284,7 @@ bool add_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcep
     const Lanes x = load(group.centre[0] + first) - leaf.x;
     const Lanes y = load(group.centre[1] + first) - leaf.y;
     const Lanes z = load(group.centre[2] + first) - leaf.z;
-    const Lanes bound = root(x * x + y * y + z * z) - leaf.spread - load(group.extent + first) - leaf.largest_radius;
+    const Lanes bound = root(x * x + y * y + z * z) - load(group.extent + first) - leaf.radius;
     unsigned near = below(bound, load(group.limit + first));
     for (int k = first; near != 0; ++k, near >>= 1) {
       if ((near & 1u) != 0 && k < group.size) {

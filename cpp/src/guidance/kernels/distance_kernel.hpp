@@ -1,5 +1,7 @@
 #pragma once
 
+#include "sidestep/obstacles/balls.hpp"
+
 // The inner loop of BodyClearance, once per instruction set. Plain arrays only, as in the kernels of ClearanceField.
 namespace sidestep::kernels {
 
@@ -9,12 +11,6 @@ struct PlacedEllipsoid {
   double axes[9];     // world to principal axes, by rows
   double squares[3];  // of the semi-axes [m²], ascending
   double extent;      // the longest [m]
-};
-
-/// Balls as structure of arrays.
-struct Balls {
-  const double* centre[3];
-  const double* radius;
 };
 
 inline constexpr int most_balls = 16;  // of one call; the arrays go on for so many from `first`

@@ -46,9 +46,9 @@ unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int 
                       float* distances) noexcept {
   Floats offset[3], radius, e[3];
   for (int i = 0; i < most_balls; ++i) {
-    offset[0][i] = static_cast<float>(balls.centre[0][first + i] - ellipsoid.centre[0]);
-    offset[1][i] = static_cast<float>(balls.centre[1][first + i] - ellipsoid.centre[1]);
-    offset[2][i] = static_cast<float>(balls.centre[2][first + i] - ellipsoid.centre[2]);
+    offset[0][i] = static_cast<float>(balls.x[first + i] - ellipsoid.centre[0]);
+    offset[1][i] = static_cast<float>(balls.y[first + i] - ellipsoid.centre[1]);
+    offset[2][i] = static_cast<float>(balls.z[first + i] - ellipsoid.centre[2]);
     radius[i] = static_cast<float>(balls.radius[first + i]);
   }
   float squares[3];
