@@ -53,16 +53,15 @@ ClearanceSample mean_of(const kernels::Query& query, const Eigen::Vector3d& cent
   for (int i = 0; i < kernels::sums; ++i) {
     s[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
   }
-  const double above = s[3] / s[0];
-  const double rate = (s[4] - above * s[1]) / s[0];
-  const double curvature = (s[5] - 2.0 * rate * s[1] - above * s[2]) / s[0];
+  ClearanceSample mean = BoltzmannMean::Sums{s[0], s[1], s[2], s[3], s[4], s[5], s[18], s[19]}.mean(inverse_T);
   const Eigen::Map<const Eigen::Matrix<double, 6, 1>> zeroth(s + 6), first(s + 12);
-  const Eigen::Matrix<double, 6, 1> gradient = (first - above * zeroth) / s[0];
+  const Eigen::Matrix<double, 6, 1> gradient = (first - mean.value * zeroth) / s[0];
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query.axes);
   const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
   const Eigen::Vector3d moment = centre.cross(force) - axes.transpose() * gradient.tail<3>();
-  const double mixing = curvature - (s[18] - (s[19] - above * s[18]) * inverse_T) / s[0];
-  return {query.reference + above, rate, curvature, {{moment, force}, {}}, mixing};
+  mean.gradient = {{moment, force}, {}};
+  mean.value += query.reference;
+  return mean;
 }
 
 }  // namespace
@@ -117,7 +116,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
     double limit = reach + group.window;  // the largest of the group
     const auto near = [&](const PointTree::Ball& ball) {
       const double distance = (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).norm();
-      return distance - ball.spread - cluster.radius - ball.largest_radius < limit;
+      return distance - cluster.radius - ball.radius < limit;
     };
     bool placed = false;
     kernels::LinkMotion motion;
@@ -145,7 +144,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       if (!placed) {
         place();
       }
-      if (add(group, points, {first, count, ball.x, ball.y, ball.z, ball.spread, ball.largest_radius})) {
+      if (add(group, points, {first, count, ball.x, ball.y, ball.z, ball.radius})) {
         limit = *std::max_element(group.limit, group.limit + cluster.size);
       }
     });
@@ -154,7 +153,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       if (!(query.reference < infinity)) {
         continue;
       }
-      const ClearanceSample mean = 
+      const ClearanceSample mean =
           mean_of(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]}, group.inverse_T);
       if (mean.value < reach) {
         const Eigen::Index at = cluster.first + k;

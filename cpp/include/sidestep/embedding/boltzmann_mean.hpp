@@ -43,6 +43,19 @@ struct ClearanceSample {
 /// the smallest, so that it says nothing about the rate after more than a moment.
 class BoltzmannMean {
  public:
+  /// What a mean is made of, relative to a reference: sums of w and w (h − reference) with their time derivatives, and of
+  /// w h'' and w (h − reference) h''.
+  struct Sums {
+    double s0 = 0.0, s0_dot = 0.0, s0_ddot = 0.0, s1 = 0.0, s1_dot = 0.0, s1_ddot = 0.0, c0 = 0.0, c1 = 0.0;
+
+    /// The mean, less the reference, and without its gradient.
+    ClearanceSample mean(double inverse_T) const noexcept {
+      const double above = s1 / s0, rate = (s1_dot - above * s0_dot) / s0;
+      const double curvature = (s1_ddot - 2.0 * rate * s0_dot - above * s0_ddot) / s0;
+      return {above, rate, curvature, {}, curvature - (c0 - (c1 - above * c0) * inverse_T) / s0};
+    }
+  };
+
   explicit BoltzmannMean(double temperature) noexcept : inverse_T_(1.0 / temperature) {}
 
   /// Samples this far beyond the smallest weigh less than exp(−30) = 1e-13: rounding.
@@ -61,10 +74,8 @@ class BoltzmannMean {
  private:
   double inverse_T_;
   double reference_ = std::numeric_limits<double>::infinity();
-  // Sums of w and w (h − reference), with their time derivatives and gradients.
-  double s0_ = 0.0, s0_dot_ = 0.0, s0_ddot_ = 0.0, s1_ = 0.0, s1_dot_ = 0.0, s1_ddot_ = 0.0;
-  double c0_ = 0.0, c1_ = 0.0;  // of w h'' and w (h − reference) h''
-  WrenchPair g0_, g1_;
+  Sums sums_;
+  WrenchPair g0_, g1_;  // gradients of s0 and s1
 };
 
 }  // namespace sidestep
