@@ -159,9 +159,8 @@ void bind_embedding(nb::module_& m) {
       "ClearanceBarrier.")
       .def(
           "__init__",
-          [](SelfCollisionBarrier* self, const Robot& robot, const Body& body,
-             const Pairs& pairs, double activation, double strength, double power, double floor, double temperature,
-             double reach) {
+          [](SelfCollisionBarrier* self, const Robot& robot, const Body& body, const Pairs& pairs, double activation,
+             double strength, double power, double floor, double temperature, double reach) {
             check_fitted_to(robot, body);
             new (self) SelfCollisionBarrier(robot, body, link_pairs(pairs), {activation, strength, power, floor},
                                             temperature, reach);

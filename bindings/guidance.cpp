@@ -18,7 +18,6 @@
 namespace sidestep::python {
 namespace {
 
-
 /// A planner with the body it searches for.
 class PathPlanner {
  public:

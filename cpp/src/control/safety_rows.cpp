@@ -77,14 +77,16 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
 
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
-  if (clearances.values.size() != num || clearances.rates.size() != num || clearances.curvatures.size() != num || clearances.mixing.size() != num ||
-      clearances.gradients.rows() != normals.cols() || clearances.gradients.cols() != num) {
+  if (clearances.values.size() != num || clearances.rates.size() != num || clearances.curvatures.size() != num ||
+      clearances.mixing.size() != num || clearances.gradients.rows() != normals.cols() ||
+      clearances.gradients.cols() != num) {
     return false;
   }
   for (Eigen::Index k = 0; k < num; ++k) {
     if (clearances.nearest[k] >= 0 &&
         !(std::isfinite(clearances.values[k]) && std::isfinite(clearances.rates[k]) &&
-          std::isfinite(clearances.curvatures[k]) && std::isfinite(clearances.mixing[k]) && clearances.gradients.col(k).allFinite())) {
+          std::isfinite(clearances.curvatures[k]) && std::isfinite(clearances.mixing[k]) &&
+          clearances.gradients.col(k).allFinite())) {
       return false;
     }
   }

@@ -246,7 +246,7 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     // The smallest gap first, from that with the smallest bound: most pairs of links end here, and of the others only
     // what lies near it matters.
     const double reach = reach_ + pairs_[i].contact;  // of the gap
-    double smallest = reach, least_bound = reach;
+    double least_bound = reach;
     Side first, second;
     pair.for_each_below(least_bound, [&](const Side& a, const Side& b, double bound) {
       first = a, second = b;
@@ -255,7 +255,7 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     if (!(least_bound < reach)) {
       continue;
     }
-    smallest = std::min(reach, gap_between(first, second).value);
+    double smallest = std::min(reach, gap_between(first, second).value);
     pair.for_each_below(smallest, [&](const Side& a, const Side& b, double /*bound*/) {
       smallest = std::min(smallest, gap_between(a, b).value);
     });

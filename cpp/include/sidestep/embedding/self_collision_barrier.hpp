@@ -17,9 +17,9 @@ namespace sidestep {
 /// mean (see boltzmann_mean.hpp).
 class SelfCollisionBarrier final : public Barrier {
  public:
-  /// Clearances are measured up to `reach` [m], at least to the activation distance, for what keeps
-  /// them, as in ClearanceBarrier. Throws std::invalid_argument if there is no pair, a link is unknown or has no ellipsoid, the
-  /// two are rigidly connected or `contact` is not finite; or names the setting at fault.
+  /// Clearances are measured up to `reach` [m], at least to the activation distance, for what keeps them, as in
+  /// ClearanceBarrier. Throws std::invalid_argument if there is no pair, a link is unknown or has no ellipsoid, the two are
+  /// rigidly connected or `contact` is not finite; or names the setting at fault.
   SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<LinkPair>& pairs, BarrierFunction barrier,
                        double temperature = 0.002, double reach = 0.1);
 
