@@ -12,6 +12,7 @@ from sidestep.pose import (
     pose_at,
     pose_matrix,
     pose_vector,
+    rotation_vector,
 )
 
 
@@ -62,3 +63,17 @@ def test_points_are_moved_as_by_the_matrix() -> None:
 def test_what_is_no_pose_is_refused(value: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         checked_pose(value, "arm: pose")
+
+
+def test_a_rotation_vector_is_the_logarithm() -> None:
+    rng = np.random.default_rng(0)
+    for angle in (0.0, 1e-12, 1e-4, 1.0, 3.0, np.pi - 1e-6):
+        axis = rng.normal(size=3)
+        vector = angle * axis / np.linalg.norm(axis)
+        rotation = Rotation.from_rotvec(vector).as_matrix()
+        np.testing.assert_allclose(
+            rotation_vector(rotation), vector, atol=1e-9
+        )  # digits lost near half a turn
+    for axis in np.eye(3):
+        half = rotation_vector(2.0 * np.outer(axis, axis) - np.eye(3))
+        np.testing.assert_allclose(np.abs(half), np.pi * axis, atol=1e-12)

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+NO_TURN = 1e-9  # sine of an angle that is none, or half a turn
+
 
 def about_axis(axis: Array, angle: float) -> Array:
     """The rotation (3, 3) by `angle` [rad] about a unit axis (3,), by Rodrigues' formula
@@ -36,6 +38,22 @@ def from_quaternion(quaternion: Array) -> Array:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def rotation_vector(rotation: Array) -> Array:
+    """The axis times the angle (3,) [rad] in [0, pi] of a rotation (3, 3): its logarithm."""
+    axis = 0.5 * np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(rotation)) - 1.0)
+    if sine < NO_TURN and cosine < 0.0:  # half a turn: the axis is in the symmetric part
+        along = (rotation + np.eye(3))[:, int(np.argmax(np.diag(rotation)))]
+        return np.asarray(np.pi * along / np.linalg.norm(along))
+    return np.asarray(axis * (math.atan2(sine, cosine) / sine if sine > NO_TURN else 1.0))
 
 
 def pose_at(translation: npt.ArrayLike, rotation: npt.ArrayLike | None = None) -> Array:

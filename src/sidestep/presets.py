@@ -31,6 +31,7 @@ class Barriers:
         activation [m], strength, power: of obstacles.
         limit_activation [rad | m], limit_strength: of joint limits.
         self_activation [m], self_strength: of self-collision.
+        floor [m]: clearance below which obstacles and links count as touched. temperature [m]: smoothing between them.
     """
 
     stiffness: float = 4.0
@@ -42,6 +43,8 @@ class Barriers:
     limit_strength: float = 0.02
     self_activation: float = 0.05
     self_strength: float = 0.02
+    floor: float = 0.002
+    temperature: float = 0.002
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,13 @@ def barrier_system(
     body = body if body is not None else Body.cover(robot)
     parts: list[Embedding] = [
         ClearanceBarrier(
-            robot, body, activation=numbers.activation, strength=numbers.strength, power=numbers.power
+            robot,
+            body,
+            activation=numbers.activation,
+            strength=numbers.strength,
+            power=numbers.power,
+            floor=numbers.floor,
+            temperature=numbers.temperature,
         ),
         JointLimitBarrier(
             robot, activation=numbers.limit_activation, strength=numbers.limit_strength, power=numbers.power
@@ -91,6 +100,8 @@ def barrier_system(
                 activation=numbers.self_activation,
                 strength=numbers.self_strength,
                 power=numbers.power,
+                floor=numbers.floor,
+                temperature=numbers.temperature,
             )
         )
     return GeometricSystem(parts, stiffness=numbers.stiffness, damping=numbers.damping, pull_form="one_sided")

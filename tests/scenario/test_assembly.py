@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep._core import DistanceSwitch, Obstacles
+from sidestep._core import DistanceSwitch, JointGoal, Obstacles
+from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import assemble
 
@@ -166,3 +167,63 @@ obstacles:
     step = parts.system.acceleration(parts.goal, np.zeros(2), parts.goal, parts.seen)
     np.testing.assert_array_equal(step.values, 0.0)
     assert step.acceleration == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+POSE = """
+format: 1
+name: pose
+method: {method}
+robot: {{name: planar3}}
+start: {{unit: rad, position: [0.2, 0.3, 0.4]}}
+goal: {{frame: {frame}, position: [0.5, 0.6, 0.0], rotation_deg: [0, 0, 90]}}
+barriers: {{activation: {activation}, ellipsoids: 2}}
+obstacles:
+  - {{name: crate, shape: {{type: box, size: [0.1, 0.1, 0.1]}}, position: [-0.9, 0.0, 0.0]}}
+"""
+
+
+def test_a_pose_is_reached_from_a_posture_that_has_it() -> None:
+    parts = assemble(Scenario.from_text(POSE.format(method="barrier", frame="tip", activation=0.12)))
+    assert parts.pose is not None
+    expected = pose_at([0.5, 0.6, 0.0], from_roll_pitch_yaw([0.0, 0.0, np.pi / 2]))
+    np.testing.assert_allclose(parts.pose.goal.pose, expected, atol=1e-15)
+    np.testing.assert_allclose(
+        parts.robot.pose(parts.goal, "tip"), expected, atol=1e-7
+    )  # what counts as there
+    assert parts.pose.at(parts.goal) is parts.pose.goal
+    assert isinstance(parts.pose.at(parts.start), JointGoal)
+    assert parts.escape is not None
+    assert (
+        assemble(Scenario.from_text(POSE.format(method="reactive", frame="tip", activation=0.12))).escape
+        is None
+    )
+
+
+def test_a_barrier_sees_a_box_without_gaps() -> None:
+    parts = assemble(Scenario.from_text(POSE.format(method="barrier", frame="tip", activation=0.12)))
+    assert isinstance(parts.seen, Obstacles)
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.05, 0.05, (200, 3))
+    points[np.arange(200), rng.integers(0, 3, 200)] = 0.05  # on its faces
+    gaps = np.linalg.norm(points[:, None] + [-0.9, 0.0, 0.0] - parts.seen.points, axis=2) - parts.seen.radii
+    assert gaps.min(axis=1).max() <= 0.0
+
+
+@pytest.mark.parametrize(
+    ("method", "frame", "activation", "message"),
+    [
+        ("barrier", "hand", 0.1, "goal.frame is 'hand'; allowed: link1, link2, link3, tip"),
+        (
+            "barrier",
+            "tip",
+            0.001,
+            "barriers: clearance barrier: floor is 0.002000, must be positive and below",
+        ),
+        ("guided", "tip", 0.1, "method is 'guided', which goes with simulation.mode torque alone"),
+    ],
+)
+def test_what_does_not_fit_is_named(method: str, frame: str, activation: float, message: str) -> None:
+    text = POSE.format(method=method, frame=frame, activation=activation) + "simulation: {mode: kinematic}\n"
+    with pytest.raises(ScenarioError) as caught:
+        assemble(Scenario.from_text(text))
+    assert message in str(caught.value)

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from sidestep.scenario import Scenario, run_scenario
@@ -117,3 +118,42 @@ def test_planar_scenarios_go_around(name: str) -> None:
     assert result.evaluation.min_clearance_m is not None
     assert result.evaluation.min_clearance_m > 0.003  # [m] as measured when they were made, less a safe part
     assert result.evaluation.path_deviation_rad > 0.1  # the straight path would have hit
+
+
+POSE = """
+format: 1
+name: pose
+method: {method}
+robot: {{name: planar3}}
+start: {{unit: rad, position: [0.2, 0.3, 0.4]}}
+goal: {{frame: tip, position: [{x}, 0.6, 0.0], rotation_deg: [0, 0, 90]}}
+barriers: {{ellipsoids: 2}}
+simulation: {{mode: {mode}, duration: {duration}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("method", "mode"), [("barrier", "torque"), ("barrier", "kinematic"), ("guided", "torque")]
+)
+def test_a_pose_is_reached(method: str, mode: str) -> None:
+    result = run_scenario(Scenario.from_text(POSE.format(method=method, mode=mode, x=0.5, duration=6.0)))
+    document = result.to_document()
+    assert result.success, result.sentence()
+    assert document["position_error_rad"] is None
+    assert document["pose_distance_m"] < 0.01
+    assert document["pose_angle_rad"] < 0.05
+    np.testing.assert_allclose(
+        result.run.robot.pose(result.run.q[-1], "tip")[:3, 3], [0.5, 0.6, 0.0], atol=0.01
+    )
+    assert (
+        document["time_to_goal_s"] < 5.0
+    )  # stiffness 4, damping 4: e(t) = (1 + 2 t) exp(-2 t), 1 mm after 5 s
+
+
+def test_a_pose_out_of_reach_is_said() -> None:
+    result = run_scenario(
+        Scenario.from_text(POSE.format(method="barrier", mode="kinematic", x=2.0, duration=2.0))
+    )
+    assert not result.success
+    assert "mm and" in result.sentence()
+    assert "from the goal, which it does not reach" in result.sentence()

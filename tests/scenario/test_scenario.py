@@ -7,6 +7,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from sidestep import presets
 from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
 from sidestep.scenario import scenario as module
 
@@ -26,6 +27,10 @@ obstacles:
 system: {stiffness: 2, switch: {type: distance, thresholds: [0.1, 0.2], slope: 30}}
 simulation: {mode: kinematic, period: 0.002}
 """
+
+
+GOAL = "goal: {unit: rad, position: [0.5, 0.25]}"
+POSE = "goal: {frame: tip, position: [1, 0.5, 0], rotation_deg: [0, 0, 45]}"
 
 
 def parse(text: str) -> Scenario:
@@ -85,6 +90,18 @@ def test_every_value_of_a_file_arrives() -> None:
         ("points: surface", "velocity: [1, 0, 0]", "give either velocity or motion, not both"),
         ("seed: 7", "seed: 7, seed: 8", "line 6, column 54: not valid YAML: the key 'seed' is given twice"),
         ("robot: {", "robot: {{", "not valid YAML"),
+        (GOAL, "goal: {frame: tip, position: [1, 0, 0]}", "goal: the key 'rotation_deg' is missing"),
+        (GOAL, POSE.replace("frame", "link"), "allowed: unit, position, or of a pose frame, position"),
+        (
+            GOAL,
+            POSE.replace("45]", "45], unit: rad"),
+            "unknown key 'unit' (value 'rad'); allowed: frame, pos",
+        ),
+        (GOAL, POSE.replace("[1, 0.5, 0]", "[1, 0.5]"), "goal.position is [1, 0.5] with 2 values; it must"),
+        ("body:", "barriers: {flor: 1}\nbody:", "unknown key 'flor' (value 1); allowed: stiffness, damping"),
+        ("body:", "barriers: {power: 1}\nbody:", "barriers.power is 1; it must be at least 2"),
+        ("body:", "barriers: {ellipsoids: 0}\nbody:", "barriers.ellipsoids is 0; it must be at least 1"),
+        ("body:", "method: magic\nbody:", "allowed: written, barrier, reactive, guided"),
         (BASE, "- 1", "a scenario is a mapping of keys to values, got list"),
         (BASE, "", "a scenario is a mapping of keys to values, got NoneType"),
     ],
@@ -102,6 +119,27 @@ def test_a_ball_of_points_is_refused_for_a_box() -> None:
     text = BASE.replace("{type: sphere, radius: 0.05}", "{type: box, size: [1, 1, 1]}")
     with pytest.raises(ScenarioError, match="points is 'ball'; a box allows centre, surface"):
         parse(text.replace("points: surface", "points: ball"))
+
+
+def test_a_pose_and_the_numbers_of_barriers_arrive_and_survive_saving(tmp_path: Path) -> None:
+    numbers = "barriers: {activation: 0.15, floor: 0.003, temperature: 0.001234567890123, ellipsoids: 2}"
+    posture = POSE.replace("45]", "45], posture: {unit: deg, position: [10, 20]}")
+    scenario = parse(BASE.replace(GOAL, f"{posture}\nmethod: guided\n{numbers}"))
+    assert scenario.goal == module.PoseChoice(
+        "tip", (1.0, 0.5, 0.0), (0.0, 0.0, 45.0), module.JointState("deg", (10.0, 20.0))
+    )
+    assert scenario.method == "guided"
+    assert scenario.barriers == module.BarrierChoice(
+        activation=0.15, floor=0.003, temperature=0.001234567890123, ellipsoids=2
+    )
+    scenario.save(tmp_path / "copy.yaml")
+    assert Scenario.load(tmp_path / "copy.yaml") == scenario
+
+
+def test_the_numbers_of_barriers_are_those_of_the_presets() -> None:
+    choice = dataclasses.asdict(module.BarrierChoice())
+    assert choice.pop("ellipsoids") is None
+    assert choice == dataclasses.asdict(presets.Barriers())
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
@@ -168,6 +206,7 @@ def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
         "body": module.BodyChoice(),
         "embedding": module.EmbeddingChoice(),
         "system": module.SystemChoice(),
+        "barriers": module.BarrierChoice(),
         "simulation": module.SimulationChoice(),
     }
     for key, value in parts.items():

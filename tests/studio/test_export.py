@@ -3,79 +3,139 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from sidestep import GeometricSystem, Robot, Scenario, presets
+from sidestep import Scenario
 from sidestep.scenario.assembly import assemble
-from sidestep.scenario.scenario import RobotChoice
+from sidestep.scenario.scenario import JointState, RobotChoice, SystemChoice
+from sidestep.simulation.pose_aim import PoseAim
 from sidestep.studio import messages as m
-from sidestep.studio.export import python_snippet, save_scenario, scenario_now
-from sidestep.studio.methods import METHODS, build_system
+from sidestep.studio.export import numbers_of, python_snippet, save_scenario, scenario_now, switch_of
+from sidestep.studio.methods import METHODS
 from sidestep.studio.session import Session
 from sidestep.studio.things import CLOUD_LIMIT, cloud, scattered, thinned
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
+SMALL_ARM: dict[str, Any] = {
+    "start": JointState("rad", (0.1, 0.2, 0.3)),
+    "goal": JointState("rad", (0.5, 0.2, 0.3)),
+}
+POSE = np.array([0.4, -0.7])  # [rad] whose pose of the tip is a goal
 
 
-@pytest.mark.parametrize("name", ["thesis", "unswitched", "sigmoid", "binary", "harmonic_only"])
-def test_the_snippet_makes_the_same_system(name: str) -> None:
-    robot = Robot.named("planar2")
-    numbers = {**METHODS[name].defaults, **SPRING}
-    variables: dict[str, object] = {}
-    exec(python_snippet(RobotChoice(name="planar2"), name, numbers), variables)
-    made, system = variables["system"], build_system(METHODS[name], robot, body_of(robot), numbers)
-    assert isinstance(made, GeometricSystem)
-    q, v, goal = np.array([0.3, 0.4]), np.array([0.2, -0.1]), np.array([1.0, 0.5])
-    obstacles = ball()
-    np.testing.assert_array_equal(
-        made.acceleration(q, v, goal, obstacles).acceleration,
-        system.acceleration(q, v, goal, obstacles).acceleration,
-    )
+def tuned(name: str) -> dict[str, float]:
+    """Every number of a method away from its default, with all its digits."""
+    return {p.name: p.default + 0.0712345678901 * (p.upper - p.default) for p in METHODS[name].parameters}
 
 
-def test_the_snippet_of_barriers_has_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[presets.Barriers] = []
-    monkeypatch.setattr(presets, "barrier_system", lambda robot, numbers: asked.append(numbers))
-    exec(
-        python_snippet(RobotChoice(name="planar2"), "barrier", {**METHODS["barrier"].defaults, **SPRING}), {}
-    )
-    assert asked == [presets.Barriers(stiffness=3.0, damping=2.0)]
+def begun(session: Session, goal: str) -> Session:
+    """After the first step to a configuration, or to a pose."""
+    if goal == "pose":
+        session.handle(m.SetPoseGoal(session.robot.pose(POSE, session.tip)))
+    session.step()
+    return session
 
 
-def test_the_saved_scenario_runs_the_method_that_was_chosen(
-    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+@pytest.mark.parametrize("goal", ["configuration", "pose"])
+@pytest.mark.parametrize("name", [name for name in METHODS if name != "guided"])
+def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, name: str, goal: str
 ) -> None:
-    session = make_session(scenario, method="thesis", numbers={"thesis": SPRING})
-    path = save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path)
-    parts = assemble(Scenario.load(path))
-    system = build_system(
-        METHODS["thesis"], parts.robot, parts.body, {**METHODS["thesis"].defaults, **SPRING}
-    )
-    step, again = (
-        s.acceleration(parts.start, parts.start, parts.goal, ball()) for s in (parts.system, system)
-    )
-    np.testing.assert_array_equal(step.acceleration, again.acceleration)
-    # and loaded again it has the same numbers
-    assert (
-        make_session(Scenario.load(path)).snapshot().numbers["thesis"] == session.snapshot().numbers["thesis"]
+    """The first acceleration is the same to the last digit, and so is every number after loading."""
+    session = begun(make_session(scenario, method=name, numbers={name: tuned(name)}), goal)
+    before = session.snapshot()
+    session.handle(m.Restart())
+    at_start = session.snapshot()
+    expected = np.array(begun(session, goal)._step.acceleration)  # type: ignore[union-attr]
+    assert before.numbers[name] == tuned(name)
+    assert np.abs(expected).max() > 0.01  # [rad/s^2] it does move
+
+    loaded = Scenario.load(save_scenario(scenario_now(at_start, name="mine"), tmp_path))
+    assert loaded.method == (name if METHODS[name].covering else "written")
+    again = make_session(loaded, method=numbers_of(loaded)[0])
+    assert again.snapshot().method == name
+    kept = tuned(name)
+    if name == "thesis":
+        kept["inner"] = METHODS[name].defaults["inner"]  # two joints have no inner ones
+    assert again.snapshot().numbers[name] == kept
+    again.step()
+    parts = assemble(loaded)
+    rest = np.zeros_like(parts.start)
+    aim = parts.goal if parts.pose is None else parts.pose.at(parts.start)
+    run = parts.system.acceleration(parts.start, rest, aim, parts.seen)  # type: ignore[arg-type]
+    variables: dict[str, Any] = {}
+    exec(python_snippet(at_start), variables)
+    system, place = variables["system"], variables.get("posture", variables["goal"])
+    if METHODS[name].covering:
+        system = system.relaxed_at(place, parts.seen)
+    written = system.acceleration(parts.start, rest, place, parts.seen)
+    # A rotation in degrees has lost its last digits, and with it the pose, but not the posture.
+    np.testing.assert_array_equal(again._step.acceleration, expected)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(run.acceleration, expected)
+    np.testing.assert_array_equal(written.acceleration, expected)
+
+
+def test_the_thresholds_of_seven_joints_survive() -> None:
+    numbers = tuned("thesis")
+    switch = switch_of("thesis", numbers, 7)
+    state = JointState("rad", (0.0,) * 7)
+    system = SystemChoice(numbers["stiffness"], numbers["damping"], switch=switch)
+    assert numbers_of(Scenario("mine", RobotChoice("fr3"), state, state, system=system)) == (
+        "thesis",
+        numbers,
     )
 
 
-def test_the_file_says_when_barriers_move_the_arm(
-    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+def test_the_snippet_of_a_pose_holds_the_same_pose(
+    make_session: Callable[..., Session], scenario: Scenario
 ) -> None:
-    session = make_session(scenario, numbers={"barrier": SPRING})
-    loaded = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))
-    assert loaded.method == "barrier"
     session = make_session(scenario)
-    session.handle(m.SetNumbers("barrier", SPRING))
-    session.handle(m.Load(loaded))  # it has no numbers of barriers: they stay
-    assert session.snapshot().numbers["barrier"]["stiffness"] == 3.0
+    session.handle(m.SetPoseGoal(session.robot.pose(POSE, session.tip)))
+    variables: dict[str, Any] = {}
+    exec(python_snippet(session.snapshot()), variables)
+    goal, q, v = variables["goal"], POSE + 0.01, np.zeros(2)
+    assert isinstance(session._aim, PoseAim)
+    np.testing.assert_array_equal(
+        variables["system"].acceleration(q, v, goal, ball()).acceleration,
+        session._system.acceleration(q, v, session._aim.goal, ball()).acceleration,
+    )
+
+
+def test_a_loaded_file_brings_its_method_a_shipped_scenario_leaves_it(
+    make_session: Callable[..., Session], scenario: Scenario
+) -> None:
+    session = make_session(scenario, method="reactive", numbers={"reactive": SPRING})
+    saved = scenario_now(session.snapshot(), name="mine")
     session.handle(m.SetMethod("unswitched"))
-    assert scenario_now(session.snapshot(), name="mine").method == "written"
+    session.handle(m.Load(saved))
+    assert session.snapshot().method == "unswitched"
+    session.handle(m.SetNumbers("reactive", {}))
+    session.handle(m.Load(saved, numbers_of(saved)[0]))
+    last = session.snapshot()
+    assert last.method == "reactive"
+    assert last.numbers["reactive"] == {**METHODS["reactive"].defaults, **SPRING}
+    assert last.ellipsoids == saved.barriers.ellipsoids == 2
+
+
+def test_a_pose_goal_survives_saving_and_loading(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+) -> None:
+    session = make_session(replace(scenario, robot=RobotChoice(name="planar3"), **SMALL_ARM))
+    aim = session.robot.pose(np.array([0.3, 0.5, -0.4]), session.tip)
+    session.handle(m.SetPoseGoal(aim))
+    posture = session.snapshot().posture
+    assert posture.found
+    loaded = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))
+    again = make_session(loaded).snapshot()
+    assert again.goal is None
+    assert again.goal_pose is not None
+    np.testing.assert_allclose(again.goal_pose, aim, atol=1e-14)  # an angle in degrees loses a digit
+    np.testing.assert_array_equal(again.posture.q, posture.q)
 
 
 def test_a_cloud_is_saved_beside_its_scenario(
@@ -105,20 +165,6 @@ def test_a_large_cloud_is_thinned() -> None:
     thin = thinned(points)
     assert 0.3 * CLOUD_LIMIT < len(thin) <= CLOUD_LIMIT
     np.testing.assert_array_equal(thinned(points[:100]), points[:100])
-
-
-def test_a_pose_goal_cannot_be_saved(make_session: Callable[..., Session], scenario: Scenario) -> None:
-    session = make_session(scenario)
-    session.handle(m.SetPoseGoal(session.robot.pose(np.array([0.1, 0.2]), session.tip)))
-    with pytest.raises(ValueError, match="a scenario file has a configuration as its goal"):
-        scenario_now(session.snapshot(), name="mine")
-
-
-def body_of(robot: Robot) -> object:
-    from sidestep import Body
-    from sidestep.studio.methods import THESIS_COMPONENTS
-
-    return Body.fit(robot, components=THESIS_COMPONENTS)
 
 
 def ball() -> object:

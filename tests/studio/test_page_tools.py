@@ -188,7 +188,7 @@ def test_the_system_is_exported_as_python(studio: Studio, looker: Looker) -> Non
     with looker.page.expect_download() as download:
         looker.click("[role=dialog] button:has-text('Download')")
     code = download.value.path().read_text()
-    assert code == python_snippet(now.scenario.robot, now.method, now.numbers[now.method])
+    assert code == python_snippet(now)
     looker.click("[role=dialog] button:has-text('Close')")
     looker.page.locator("[role=dialog]").wait_for(state="detached")
 

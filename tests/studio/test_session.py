@@ -13,9 +13,10 @@ from sidestep.pose import pose_at
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
 from sidestep.studio.export import scenario_now
-from sidestep.studio.session import Session, tip_of
+from sidestep.studio.session import Session
 from sidestep.studio.start import scenario_of
 from sidestep.studio.things import ball, box
+from sidestep.studio.tip import tip_of
 from sidestep.studio.truth import solid_poses
 
 MakeSession = Callable[..., Session]
@@ -62,7 +63,7 @@ def test_a_ball_drawn_into_the_arm_at_rest_does_not_touch_it(
     last, clearance = record(session, 3.0)
     moved = np.abs(last.q - here).max()
     assert clearance > 0.0
-    assert moved > 0.1  # [rad] it yields: the ball of 6 cm takes the place of the tip, one metre out
+    assert moved > 0.06  # [rad] it yields: the ball of 6 cm takes the place of the tip, one metre out
     assert last.touched == 0
     np.testing.assert_allclose(
         last.poses[0][:3, 3], tip, atol=1e-3
@@ -104,10 +105,10 @@ def test_a_pose_goal_is_reached(make_session: MakeSession) -> None:
     session = make_session(replace(scenario_of(RobotChoice(name="planar3")), obstacles=()))
     aim = session.robot.pose(np.array([0.3, 0.5, -0.4]), session.tip)
     session.handle(m.SetPoseGoal(aim))
-    last = run(session, 15.0)
+    last = run(session, 5.0)
     assert last.goal is None
-    # position within 3 cm: along a nearly stretched arm the pull of a pose goal is weak, and the motion slow
-    np.testing.assert_allclose(session.robot.pose(last.q, session.tip), aim, atol=0.03)
+    # as to a configuration, e(t) = (1 + 2 t) exp(-2 t), 0.0005 after 5 s; of at most 1 m or rad
+    np.testing.assert_allclose(session.robot.pose(last.q, session.tip), aim, atol=1e-3)
 
 
 def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, scenario: Scenario) -> None:

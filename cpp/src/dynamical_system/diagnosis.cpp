@@ -41,7 +41,7 @@ Parties parties(const Diagnosis& d, const CoordinateLabel& label) {
     case CoordinateLabel::Kind::potential:
       break;
   }
-  return {"the arm", "the hill of an embedding that measures no clearance"};
+  return {"the arm", "an obstacle or a limit (a density does not tell which)"};
 }
 
 std::string way_left(const Diagnosis& d) {

@@ -71,7 +71,11 @@ class _Follower:
     def update(self, time: float, q: Array) -> None:
         if clock.monotonic() - self._last < REFRESH:
             return
-        facts = f"{time:5.2f} s   error {np.abs(q - self._parts.goal).max():.3f} rad"
+        parts = self._parts
+        error = f"{np.abs(q - parts.goal).max():.3f} rad"
+        if parts.pose is not None:
+            error = f"{1e3 * parts.pose.errors(q)[0]:4.0f} mm"
+        facts = f"{time:5.2f} s   error {error}"
         if self._clearance is not None:
             poses = np.array([self._pose_vector(item.pose_at(time)) for item in self._parts.objects])
             facts += f"   clearance {1000.0 * self._clearance.distance(q, poses).distance:5.0f} mm"

@@ -28,6 +28,8 @@ class MethodChoice(StrEnum):
 
     written = "written"
     barrier = "barrier"
+    reactive = "reactive"
+    guided = "guided"
 
 
 class ModeChoice(StrEnum):
@@ -37,6 +39,11 @@ class ModeChoice(StrEnum):
     kinematic = "kinematic"
 
 
+METHOD_FACTS = {
+    "barrier": "barriers",
+    "reactive": "barriers without sub-goals",
+    "guided": "barriers, guided",
+}
 SWITCH_FORMS = {  # how --switch is written, and what its numbers are
     "none": (),
     "harmonic_only": (),
@@ -79,7 +86,10 @@ def run(
     ] = None,
     method: Annotated[
         MethodChoice | None,
-        typer.Option(help="Instead of the scenario's: as written, or the recommended system of barriers."),
+        typer.Option(
+            help="Instead of the scenario's: as written, or the recommended system of barriers (reactive: without "
+            "sub-goals; guided: along a path)."
+        ),
     ] = None,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the scenario's mode.")] = None,
     switch: Annotated[
@@ -198,7 +208,7 @@ def _facts(scenario: Scenario) -> str:
     count = len(scenario.obstacles)
     obstacles = "no obstacle" if count == 0 else f"{count} obstacle{'s' if count > 1 else ''}"
     switch = scenario.system.switch.type.replace("_", " ")
-    method = "barriers" if scenario.method == "barrier" else f"switch: {switch}"
+    method = f"switch: {switch}" if scenario.method == "written" else METHOD_FACTS[scenario.method]
     return f"{robot}, {obstacles}, {method}, {scenario.simulation.mode} mode"
 
 

@@ -25,8 +25,12 @@ def studio(
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
     method: Annotated[
-        str, typer.Option(help="How the arm is moved at first; the page lists the methods.")
-    ] = "barrier",
+        str | None,
+        typer.Option(
+            help="How the arm is moved at first; the page lists the methods [default: as a scenario file says, else "
+            "barrier]."
+        ),
+    ] = None,
     ellipsoids: Annotated[
         int | None,
         typer.Option(min=1, help="Per link of the covering body [default: as many as it takes, but slower]."),
@@ -56,9 +60,13 @@ def studio(
 
     Ends with Ctrl-C. The first run with a robot fits its body, which can take minutes; the page says how far it is.
     """
+    from sidestep.studio.export import numbers_of
     from sidestep.studio.start import starting_scenario
 
     chosen = starting_scenario(scenario, robot=robot, urdf=urdf, package_dirs=package_dir or ())
+    if method is None:
+        own = scenario is not None and Path(scenario).is_file()
+        method = numbers_of(chosen)[0] if own else "barrier"
     if not headless and (screenshot or video):
         raise ValueError("--screenshot and --video go with --headless")
     if headless:

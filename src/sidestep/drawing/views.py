@@ -32,7 +32,7 @@ class ArmViews:
     Args:
         robot: the arm.
         q: (T, nv) the motion.
-        goal: (nv,); its tip position is marked by a cross.
+        goal: (nv,); its tip position is marked by a cross, or goal_point (3,) [m].
         objects: the solids around; object_poses: (T, num_objects, 7), or None: where they stand.
         size: width and height of one view [pixel].
     """
@@ -43,6 +43,7 @@ class ArmViews:
         q: Array,
         *,
         goal: Array,
+        goal_point: Array | None = None,
         objects: Sequence[Solid] = (),
         object_poses: Array | None = None,
         size: tuple[int, int] = (400, 360),
@@ -50,7 +51,7 @@ class ArmViews:
         tip = robot.frames[-1].name
         self._traced = np.unique(np.linspace(0, len(q) - 1, TRACE_POINTS).round().astype(int))
         trace = np.array([robot.pose(q[k], tip)[:3, 3] for k in self._traced])
-        goal_tip = np.asarray(robot.pose(goal, tip)[:3, 3])
+        goal_tip = np.asarray(robot.pose(goal, tip)[:3, 3] if goal_point is None else goal_point)
         self._robot, self._q, self._objects, self._poses = robot, q, objects, object_poses
         seen = np.concatenate([trace, goal_tip[None], self._reached(goal)])
         planar = is_planar(robot)

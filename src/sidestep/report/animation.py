@@ -27,6 +27,7 @@ class ArmPictures:
             run.robot,
             run.q,
             goal=run.goal,
+            goal_point=None if run.pose is None else run.pose.goal.pose[:3, 3],
             objects=run.objects,
             object_poses=run.object_poses,
             size=VIEW_SIZE,
@@ -38,8 +39,11 @@ class ArmPictures:
         views = Image.fromarray(self._views.picture(sample))
         picture = Image.new("RGB", (views.width, views.height + CAPTION_HEIGHT), "white")
         picture.paste(views, (0, CAPTION_HEIGHT))
-        error = float(np.abs(self._run.q[sample] - self._run.goal).max())
-        caption = f"t = {self._run.time[sample]:5.2f} s    largest joint error {error:.2f} rad"
+        run, q = self._run, self._run.q[sample]
+        error = f"largest joint error {np.abs(q - run.goal).max():.2f} rad"
+        if run.pose is not None:
+            error = f"{1e3 * run.pose.errors(q)[0]:.0f} mm from the goal"
+        caption = f"t = {run.time[sample]:5.2f} s    {error}"
         font = ImageFont.load_default(size=14)
         ImageDraw.Draw(picture).text((8, 3), caption, fill=(30, 30, 30), font=font)
         return picture

@@ -55,7 +55,8 @@ def position_figure(result: ScenarioResult) -> Figure:
     def draw(axes: Axes, index: int, scale: float) -> None:
         axes.plot(run.time, scale * run.q[:, index], color=BLUE, label="q")
         axes.plot(run.time[0], scale * run.start[index], "o", color=BLACK, markersize=5, label="start")
-        axes.axhline(scale * run.goal[index], color=GREEN, linestyle="--", label="goal")
+        label = "goal" if run.pose is None else "end"
+        axes.axhline(scale * run.goal[index], color=GREEN, linestyle="--", label=label)
         low, high = scale * limits.lower[index], scale * limits.upper[index]
         shown = [*(scale * run.q[:, index]), scale * run.goal[index]]
         span = max(max(shown) - min(shown), 0.2 * scale)

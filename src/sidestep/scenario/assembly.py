@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, TypeAlias, TypeVar
@@ -29,22 +29,27 @@ from sidestep import (
     Unswitched,
 )
 from sidestep._core import JointType, Obstacles
+from sidestep.guidance import GuidedMotion
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
-from sidestep.pose import from_roll_pitch_yaw, moved, pose_at
-from sidestep.presets import barrier_system
+from sidestep.pose import from_roll_pitch_yaw, pose_at
+from sidestep.presets import Barriers, barrier_system
 from sidestep.scenario.scenario import (
+    BarrierChoice,
     BasePose,
     EmbeddingChoice,
     JointState,
     Obstacle,
+    PoseChoice,
     RobotChoice,
     Scenario,
     Shape,
     SwitchChoice,
 )
+from sidestep.scenario.seen import View, seen_at, view_of
 from sidestep.scenario.validation import ScenarioError
 from sidestep.simulation import SceneObject
+from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
 from sidestep.simulation.scene import Kind, check_scene
 
 Array = npt.NDArray[np.float64]
@@ -52,6 +57,7 @@ Progress = Callable[[str, int, int], None]
 _T = TypeVar("_T")
 Switch: TypeAlias = Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch
 
+POSTURE_STARTS = 20  # from which a posture for a pose is searched: at most a fifth of a second
 MAX_CLOUD_POINTS = 2000  # more balls than this make the physics and the exact distances too slow to be of use
 
 
@@ -63,8 +69,9 @@ class Assembly:
         robot, body, system: as the scenario asks.
         objects: the solid obstacles, for physics and exact clearance.
         safe: clearances bound the motion as well, as a part of the method.
-        escape: sub-goals where the arm is stuck, or None.
-        start, start_velocity, goal: (nv,) [rad | m].
+        escape: sub-goals where the arm is stuck, or None. guide: what leads the arm along a path, or None.
+        start, start_velocity, goal: (nv,) [rad | m]; for a pose a configuration that has it, or is near it.
+        pose: in place of the goal.
         seen: what the controller sees; a function of time [s] where an obstacle starts or stops.
     """
 
@@ -78,6 +85,8 @@ class Assembly:
     seen: Obstacles | Callable[[float], Obstacles]
     safe: bool = False
     escape: Escape | None = None
+    guide: GuidedMotion | None = None
+    pose: PoseAim | None = None
 
 
 def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembly:
@@ -89,27 +98,38 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
 
     Raises:
         ScenarioError: a number of values that does not fit the robot, a start or goal outside the limits, an
-            unknown robot, a file that is missing or malformed; names the key and what is allowed.
+            unknown robot or frame, a file that is missing or malformed; names the key and what is allowed.
     """
     robot = _at("robot", scenario, partial(load_robot, scenario))
     start = _at("start.position", scenario, partial(coordinates, scenario.start, robot, "start.position"))
     velocity = _at("start.velocity", scenario, partial(start_velocity, scenario.start, robot))
-    goal = _at("goal.position", scenario, partial(coordinates, scenario.goal, robot, "goal.position"))
+    posture = _at("goal", scenario, partial(goal_posture, scenario, robot, start))
     objects: list[SceneObject] = []
-    views: list[_View] = []
+    views: list[View] = []
     for index, item in enumerate(scenario.obstacles):
         name = item.name or f"obstacle{index}"
         things = _at(f"obstacles[{index}]", scenario, partial(solids, scenario, item, name))
         objects += things
-        views += [_view(_looked_at(scenario, item), thing) for thing in things]
+        views += [view_of(item, thing, bare=scenario.method == "written") for thing in things]
     _at("obstacles", scenario, partial(check_scene, objects))
     scripted = any(item.motion is not None for item in scenario.obstacles)
-    seen = partial(_seen, tuple(views)) if scripted else _seen(tuple(views), 0.0)
-    barrier = scenario.method == "barrier"
+    seen = partial(seen_at, tuple(views)) if scripted else seen_at(tuple(views), 0.0)
+    barrier, guided = scenario.method != "written", scenario.method == "guided"
+    if guided and scenario.simulation.mode != "torque":
+        raise ScenarioError(
+            f"{scenario.name}: method is 'guided', which goes with simulation.mode torque alone"
+        )
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
-    system = _at("system", scenario, partial(_system, scenario, robot, body))
-    if barrier and isinstance(seen, Obstacles) and not np.any(seen.velocities):
-        system = system.relaxed_at(goal, seen)
+    system = _at("barriers" if barrier else "system", scenario, partial(_system, scenario, robot, body))
+    leads = guided and posture.found
+    if (
+        barrier
+        and not leads
+        and posture.found
+        and isinstance(seen, Obstacles)
+        and not np.any(seen.velocities)
+    ):
+        system = system.relaxed_at(posture.q, seen)
     return Assembly(
         robot=robot,
         body=body,
@@ -117,11 +137,37 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         objects=tuple(objects),
         start=start,
         start_velocity=velocity,
-        goal=goal,
+        goal=posture.q,
         seen=seen,
         safe=barrier,
-        escape=Escape(robot) if barrier else None,
+        escape=Escape(robot) if scenario.method == "barrier" and posture.found else None,
+        guide=GuidedMotion(robot, body, system=system, synchronous=True) if leads else None,
+        pose=_pose_aim(scenario, robot, posture),
     )
+
+
+def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> Posture:
+    """The configuration where the goal is reached; of a pose the one that the file names, or found from the start.
+
+    Raises ValueError that says what is wrong.
+    """
+    choice = scenario.goal
+    if isinstance(choice, JointState):
+        return Posture(coordinates(choice, robot, "goal.position"), True)
+    links = [frame.name for frame in robot.frames if frame.joint >= 0]
+    if choice.frame not in links:
+        raise ValueError(f"goal.frame is {choice.frame!r}; allowed: {', '.join(links)}")
+    if choice.posture is not None:
+        return Posture(coordinates(choice.posture, robot, "goal.posture.position"), True)
+    return posture_at(robot, choice.frame, pose_of(choice), start, starts=POSTURE_STARTS)
+
+
+def _pose_aim(scenario: Scenario, robot: Robot, posture: Posture) -> PoseAim | None:
+    choice = scenario.goal
+    if isinstance(choice, JointState):
+        return None
+    stiffness = scenario.system.stiffness if scenario.method == "written" else scenario.barriers.stiffness
+    return PoseAim(robot, choice.frame, pose_of(choice), stiffness=stiffness, posture=posture)
 
 
 def load_robot(scenario: Scenario) -> Robot:
@@ -138,7 +184,7 @@ def load_robot(scenario: Scenario) -> Robot:
         package_dirs=[scenario.file(folder) for folder in choice.package_dirs],
         tip=choice.tip,
         locked=choice.locked,
-        base_pose=None if choice.base is None else _pose(choice.base),
+        base_pose=None if choice.base is None else pose_of(choice.base),
     )
 
 
@@ -161,7 +207,7 @@ def start_velocity(state: JointState, robot: Robot) -> Array:
 
 def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, ...]:
     """The solid of an obstacle; a point cloud gives one ball per point, called NAME.0, NAME.1, …"""
-    shape, pose = item.shape, _pose(item)
+    shape, pose = item.shape, pose_of(item)
     velocity, interval = np.array(item.velocity), (0.0, float("inf"))
     if item.motion is not None:
         interval = (item.motion.begin, item.motion.end)
@@ -212,50 +258,10 @@ def _mesh(path: Path, scale: float) -> trimesh.Trimesh:
     return mesh
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """What is seen of one solid: points (N, 3) in its frame, and the radius of each [m]."""
-
-    thing: SceneObject
-    points: Array
-    radius: float
-
-
-def _looked_at(scenario: Scenario, item: Obstacle) -> Obstacle:
-    """The obstacle with what is seen of it: a barrier needs the real size, not the bare centre."""
-    if scenario.method != "barrier" or item.points != "centre":
-        return item
-    return replace(item, points="ball" if item.shape.type in ("sphere", "points") else "surface")
-
-
-def _view(item: Obstacle, thing: SceneObject) -> _View:
-    if item.points == "surface":
-        surface = thing.surface(subdivisions=3)
-        count = max(12, round(surface.area / item.spacing**2))
-        points, _ = trimesh.sample.sample_surface_even(surface, count, seed=0)
-        return _View(thing, np.asarray(points), 0.0)
-    centre = np.zeros((1, 3)) if thing.mesh is None else thing.mesh.bounds.mean(axis=0, keepdims=True)
-    return _View(thing, centre, float(item.shape.radius or 0.0) if item.points == "ball" else 0.0)
-
-
-def _seen(views: tuple[_View, ...], time: float) -> Obstacles:
-    if not views:
-        return Obstacles.none()
-    points, radii, velocities = [], [], []
-    for view in views:
-        pose = view.thing.pose_at(time)
-        begin, end = view.thing.moves_during
-        moves = view.thing.motion == "moving" and begin <= time < end
-        points.append(moved(view.points, pose))
-        radii.append(np.full(len(view.points), view.radius))
-        velocities.append(np.tile(view.thing.velocity if moves else np.zeros(3), (len(view.points), 1)))
-    return Obstacles(np.concatenate(points), np.concatenate(radii), np.concatenate(velocities))
-
-
 def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
     choice = scenario.body
-    if scenario.method == "barrier":
-        return Body.cover(robot, progress=progress)
+    if scenario.method != "written":
+        return Body.cover(robot, components=scenario.barriers.ellipsoids, progress=progress)
     return Body.fit(
         robot,
         components=choice.components,
@@ -267,8 +273,8 @@ def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
 
 def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
     choice = scenario.system
-    if scenario.method == "barrier":
-        return barrier_system(robot, body)
+    if scenario.method != "written":
+        return barrier_system(robot, body, numbers=barrier_numbers(scenario.barriers))
     return GeometricSystem(
         _embeddings(scenario.embedding, robot, body),
         stiffness=choice.stiffness,
@@ -276,6 +282,13 @@ def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
         damping_form=choice.damping_form,
         switch=_switch(choice.switch, robot),
     )
+
+
+def barrier_numbers(choice: BarrierChoice) -> Barriers:
+    """The numbers of the recommended system that a file has."""
+    numbers = asdict(choice)
+    del numbers["ellipsoids"]
+    return Barriers(**numbers)
 
 
 def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[Embedding]:
@@ -324,7 +337,8 @@ def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:
     return array
 
 
-def _pose(thing: BasePose | Obstacle) -> Array:
+def pose_of(thing: BasePose | Obstacle | PoseChoice) -> Array:
+    """The pose (4, 4) in the world of what a file places."""
     roll, pitch, yaw = np.deg2rad(thing.rotation_deg)
     return pose_at(thing.position, from_roll_pitch_yaw((roll, pitch, yaw)))
 

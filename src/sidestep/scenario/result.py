@@ -66,7 +66,7 @@ class ScenarioResult:
     def sentence(self) -> str:
         """What happened, in one sentence."""
         evaluation = self.evaluation
-        arrival = f"ends {evaluation.position_error_rad:.4g} rad from the goal, which it does not reach"
+        arrival = f"ends {evaluation.way_left()} from the goal, which it does not reach"
         if evaluation.reached and evaluation.time_to_goal_s is not None:
             arrival = f"reaches the goal after {evaluation.time_to_goal_s:.1f} s"
         encounter = ""

@@ -8,10 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from sidestep._core import Obstacles, Step
+from sidestep.guidance import GuidedMotion
 from sidestep.scenario.assembly import Assembly, Progress, assemble
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.scenario import Scenario
 from sidestep.simulation import Arrival, ExactClearance, Run, Simulation, evaluate, run_kinematically
+from sidestep.simulation.evaluation import POSE_TOLERANCE
 from sidestep.simulation.run import obstacles_over_time
 
 Array = npt.NDArray[np.float64]
@@ -66,11 +69,14 @@ def run_scenario(
 
 def _reason(parts: Assembly, run: Run) -> str:
     seen = obstacles_over_time(parts.seen)(float(run.time[-1]))
-    return parts.system.diagnose(run.q[-1], run.v[-1], parts.goal, seen).describe()
+    goal = parts.goal if parts.pose is None else parts.pose.goal
+    return parts.system.diagnose(run.q[-1], run.v[-1], goal, seen).describe()
 
 
 def _arrival(scenario: Scenario) -> Arrival:
-    return Arrival(position=ARRIVAL_SHARE * scenario.simulation.tolerance)
+    return Arrival(
+        position=ARRIVAL_SHARE * scenario.simulation.tolerance, distance=ARRIVAL_SHARE * POSE_TOLERANCE
+    )
 
 
 def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
@@ -79,10 +85,10 @@ def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> 
     choice = scenario.simulation
     simulation = Simulation(parts.robot, parts.objects, timestep=choice.period)
     return simulation.run(
-        parts.system,
+        parts.system if parts.guide is None else _Guided(parts.guide, parts.goal, choice.period),
         TorqueController(parts.robot, period=choice.period),
         parts.start,
-        parts.goal,
+        parts.pose or parts.goal,
         choice.duration,
         parts.seen,
         start_velocity=parts.start_velocity,
@@ -93,13 +99,26 @@ def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> 
     )
 
 
+class _Guided:
+    """A guided motion in the place of a system."""
+
+    def __init__(self, motion: GuidedMotion, goal: Array, period: float) -> None:
+        self._motion, self._period, self._steps = motion, period, 0
+        motion.set_goal(goal)
+
+    def acceleration(self, q: Array, v: Array, goal: object, obstacles: Obstacles) -> Step:
+        """The step of the system towards where the guide leads."""
+        self._steps += 1
+        return self._motion.step(q, v, obstacles, time=self._steps * self._period).step
+
+
 def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
     choice = scenario.simulation
     return run_kinematically(
         parts.robot,
         parts.system,
         parts.start,
-        parts.goal,
+        parts.pose or parts.goal,
         choice.duration,
         parts.seen,
         objects=parts.objects,

@@ -20,7 +20,7 @@ Mode = Literal["torque", "kinematic"]
 SwitchType = Literal["none", "harmonic_only", "geodesic_only", "binary", "sigmoid", "distance"]
 
 FORMAT_VERSION = 1
-MethodChoice = Literal["written", "barrier"]
+MethodChoice = Literal["written", "barrier", "reactive", "guided"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,19 @@ class JointState:
     unit: Literal["deg", "rad"]
     position: tuple[float, ...]
     velocity: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class PoseChoice:
+    """Pose of a frame of the robot in the world: position [m], roll, pitch, yaw about fixed x, y, z [deg].
+
+    posture: a configuration that the joints are drawn to as well; left out: one with that pose, found from the start.
+    """
+
+    frame: str
+    position: Vector3
+    rotation_deg: Vector3
+    posture: JointState | None = None
 
 
 @dataclass(frozen=True)
@@ -135,8 +148,30 @@ class SystemChoice:
 
 
 @dataclass(frozen=True)
+class BarrierChoice:
+    """Numbers of the recommended system, see `sidestep.presets.Barriers`, with the same defaults.
+
+    ellipsoids: of the covering body per link; left out: as many as it takes.
+    """
+
+    stiffness: float = 4.0
+    damping: float = 4.0
+    activation: float = 0.1
+    strength: float = 0.1
+    power: float = 2.0
+    limit_activation: float = 0.1
+    limit_strength: float = 0.02
+    self_activation: float = 0.05
+    self_strength: float = 0.02
+    floor: float = 0.002
+    temperature: float = 0.002
+    ellipsoids: int | None = None
+
+
+@dataclass(frozen=True)
 class SimulationChoice:
-    """How the run is simulated: mode, control period [s], longest time [s], integrator, tolerance [rad]."""
+    """How the run is simulated: mode, control period [s], longest time [s], integrator, tolerance [rad]; a pose also
+    has to be reached within 1 cm."""
 
     mode: Mode = "torque"
     period: float = 0.001
@@ -151,9 +186,10 @@ class Scenario:
 
     Args:
         name: letters, digits, dot, dash, underscore.
-        method: "written": body, embedding and system as this file says; "barrier": the recommended system with the
-            real size of the obstacles, in place of them.
-        robot, start, goal, body, obstacles, embedding, system, simulation: the parts, see their classes.
+        method: "written": body, embedding and system as this file says; in place of them the recommended system with
+            the real size of the obstacles: "barrier" (with sub-goals where it is stuck), "reactive" (without), "guided"
+            (led along a path).
+        robot, start, goal, body, obstacles, embedding, system, barriers, simulation: the parts, see their classes.
         description, source: what happens, and where it comes from.
         folder: what relative file names refer to; not part of the file.
     """
@@ -161,7 +197,7 @@ class Scenario:
     name: str
     robot: RobotChoice
     start: JointState
-    goal: JointState
+    goal: JointState | PoseChoice
     description: str = ""
     source: str = ""
     method: MethodChoice = "written"
@@ -169,6 +205,7 @@ class Scenario:
     obstacles: tuple[Obstacle, ...] = ()
     embedding: EmbeddingChoice = field(default_factory=EmbeddingChoice)
     system: SystemChoice = field(default_factory=SystemChoice)
+    barriers: BarrierChoice = field(default_factory=BarrierChoice)
     simulation: SimulationChoice = field(default_factory=SimulationChoice)
     folder: Path = field(default_factory=Path.cwd, compare=False, repr=False)
 
@@ -284,7 +321,7 @@ def _build(kind: Any, value: Any) -> Any:
             return None
         for option in kind.__args__:
             is_tuple = typing.get_origin(option) is tuple
-            if dataclasses.is_dataclass(option) or (is_tuple and isinstance(value, list)):
+            if _has_all(option, value) or (is_tuple and isinstance(value, list)):
                 return _build(option, value)
         return _numbers(value, kind.__args__)
     if dataclasses.is_dataclass(kind):
@@ -294,6 +331,15 @@ def _build(kind: Any, value: Any) -> Any:
         item_kind = typing.get_args(kind)[0]
         return tuple(_build(item_kind, item) for item in value)
     return _numbers(value, (kind,))
+
+
+def _has_all(kind: Any, value: Any) -> bool:
+    """Whether a mapping has every key that a dataclass must have."""
+    return dataclasses.is_dataclass(kind) and all(
+        entry.name in value
+        for entry in dataclasses.fields(kind)
+        if entry.default is dataclasses.MISSING and entry.default_factory is dataclasses.MISSING
+    )
 
 
 def _numbers(value: Any, kinds: tuple[Any, ...]) -> Any:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from sidestep.scenario.result import ScenarioResult
+from sidestep.simulation.evaluation import POSE_TOLERANCE
 
 
 def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
     """Rows (quantity, value with unit, what is allowed or what it means)."""
     evaluation, choice = result.evaluation, result.scenario.simulation
+    pose = result.run.pose is not None
     rows = [
-        ("goal reached", _yes(evaluation.reached), f"error under {choice.tolerance:g} rad at the end"),
-        ("largest joint error", f"{evaluation.position_error_rad:.4g} rad", "at the end"),
+        ("goal reached", _yes(evaluation.reached), _allowed(result)),
+        ("error of the pose" if pose else "largest joint error", evaluation.way_left(), "at the end"),
         (
             "time to goal",
             _number(evaluation.time_to_goal_s, "{:.2f} s"),
@@ -49,6 +51,13 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
         ),
     ]
     return [row for row in rows if row[1] != "-" or row[0] == "time to goal"]
+
+
+def _allowed(result: ScenarioResult) -> str:
+    angle = f"{result.scenario.simulation.tolerance:g} rad"
+    if result.run.pose is None:
+        return f"error under {angle} at the end"
+    return f"within {1e3 * POSE_TOLERANCE:g} mm and {angle} at the end"
 
 
 def _limits(result: ScenarioResult) -> str:

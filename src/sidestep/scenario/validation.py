@@ -99,7 +99,9 @@ def _explain(error: jsonschema.ValidationError) -> str:
         case "additionalProperties":
             known = error.schema["properties"]
             unknown = next(key for key in value if key not in known)
-            return f"{place}: unknown key {unknown!r} (value {value[unknown]!r}); allowed: {', '.join(known)}"
+            pose = ", or of a pose frame, position, rotation_deg, posture"
+            other = pose if place == "goal" and "frame" not in known else ""
+            return f"{place}: unknown key {unknown!r} (value {value[unknown]!r}); allowed: {', '.join(known)}{other}"
         case "enum":
             return f"{place} is {value!r}; allowed: {', '.join(map(str, allowed))}"
         case "const":

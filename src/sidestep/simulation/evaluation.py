@@ -16,6 +16,7 @@ from sidestep.simulation.run import Run, SimulationRun
 Array = npt.NDArray[np.float64]
 
 GOAL_TOLERANCE = 0.05  # [rad] the project's definition of arriving
+POSE_TOLERANCE = 0.01  # [m] the same of the frame of a pose goal, whose angle has the tolerance of joints
 MOVED = (
     1e-4  # [m] a free object that nothing touches floats still to rounding; a tenth of a millimetre is a push
 )
@@ -50,10 +51,13 @@ class Evaluation:
     """The figures of a run. Fields that a run without physics does not have are None.
 
     Attributes:
-        reached: criterion 1: the largest joint error at the end is under the tolerance.
-        position_error_rad: that error.
+        reached: criterion 1: the largest joint error at the end is under the tolerance; of a pose goal the angle
+            under the tolerance and the distance under 1 cm.
+        position_error_rad: that joint error, None for a pose goal.
+        pose_distance_m, pose_angle_rad: those of a pose goal, else None.
         time_to_goal_s: when the error went under the tolerance for good, or None.
-        path_deviation_rad: criterion 2: the largest joint offset from the straight segment start-goal;
+        path_deviation_rad: criterion 2: the largest joint offset from the straight segment from the start to the
+            goal, or to the configuration at the end of a run to a pose;
             path_deviation_joint: the name of that joint.
         contacts: criterion 3: arm-scene contact points that MuJoCo counted, over all steps; contact_pairs:
             which "link - obstacle" they were; max_contact_force_n.
@@ -71,7 +75,9 @@ class Evaluation:
     """
 
     reached: bool
-    position_error_rad: float
+    position_error_rad: float | None
+    pose_distance_m: float | None
+    pose_angle_rad: float | None
     time_to_goal_s: float | None
     path_deviation_rad: float
     path_deviation_joint: str
@@ -100,6 +106,12 @@ class Evaluation:
         apart = self.min_clearance_m is None or self.min_clearance_m > self.clearance_tolerance_m
         return not self.contacts and not self.moved_objects and apart
 
+    def way_left(self) -> str:
+        """How far from the goal the run ended, in words."""
+        if self.position_error_rad is not None:
+            return f"{self.position_error_rad:.4g} rad"
+        return f"{1e3 * (self.pose_distance_m or 0.0):.1f} mm and {self.pose_angle_rad or 0.0:.2g} rad"
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; what is not a finite number is None."""
         record = asdict(self)
@@ -120,12 +132,15 @@ def evaluate(
 
     Args:
         run: of `Simulation.run` or `run_kinematically`.
-        goal_tolerance: largest joint error [rad | m] that counts as reached.
+        goal_tolerance: largest joint error [rad | m], or angle of a pose [rad], that counts as reached.
         clearance_tolerance: accuracy [m] of the minimum clearance, see `ExactClearance.minimum_over`; where
             the minimum is smaller than this, it is measured again, finer, until it is clear whether the arm
             touched.
     """
-    error = np.abs(run.q - run.goal).max(axis=1)
+    error, distance = np.abs(run.q - run.goal).max(axis=1), np.zeros(len(run))
+    if run.pose is not None:
+        distance, error = np.array([run.pose.errors(q) for q in run.q]).T
+    inside = (error < goal_tolerance) & (distance < POSE_TOLERANCE)
     deviation = np.abs(run.q - _on_segment(run.q, run.start, run.goal)).max(axis=0)
     physics = run if isinstance(run, SimulationRun) else None
     pair, minimum, when, worst = None, None, None, None
@@ -137,9 +152,11 @@ def evaluate(
         pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
     effort = run.robot.limits.effort
     return Evaluation(
-        reached=bool(error[-1] < goal_tolerance),
-        position_error_rad=float(error[-1]),
-        time_to_goal_s=_settled(run.time, error < goal_tolerance),
+        reached=bool(inside[-1]),
+        position_error_rad=float(error[-1]) if run.pose is None else None,
+        pose_distance_m=None if run.pose is None else float(distance[-1]),
+        pose_angle_rad=None if run.pose is None else float(error[-1]),
+        time_to_goal_s=_settled(run.time, inside),
         path_deviation_rad=float(deviation.max()),
         path_deviation_joint=run.robot.coordinate_names[int(deviation.argmax())],
         contacts=None if physics is None else len(physics.contacts),

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sidestep._core import AccelerationFilter, Escape, GeometricSystem, rollout
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
+from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.run import (
     Arrival,
     ArrivalWatch,
@@ -30,7 +31,7 @@ def run_kinematically(
     robot: Robot,
     system: GeometricSystem,
     start: Array,
-    goal: Array,
+    goal: Array | PoseAim,
     duration: float,
     obstacles: ObstacleSource,
     *,
@@ -58,7 +59,8 @@ def run_kinematically(
         raise ValueError(f"duration and timestep must be finite and positive, got {duration} and {timestep}")
     scene = check_scene(objects)
     start = robot.check_configuration(start, "start")
-    goal = robot.check_configuration(goal, "goal")
+    if not isinstance(goal, PoseAim):
+        goal = robot.check_configuration(goal, "goal")
     see = obstacles_over_time(obstacles)
     watch = None if arrival is None else ArrivalWatch(goal, arrival)
     steps = max(1, round(duration / timestep))
@@ -76,7 +78,7 @@ def run_kinematically(
             system,
             q,
             v,
-            goal,
+            goal.at(q) if isinstance(goal, PoseAim) else goal,
             see(done * timestep),
             period=timestep,
             steps=count,
@@ -109,7 +111,8 @@ def run_kinematically(
         robot=robot,
         objects=scene,
         start=start,
-        goal=goal,
+        goal=columns["q"][-1][-1] if isinstance(goal, PoseAim) else goal,
+        pose=goal if isinstance(goal, PoseAim) else None,
         timestep=timestep,
         time=time,
         arrived=arrived,

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from sidestep._core import Obstacles
 from sidestep.robot import Robot
+from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.scene import SceneObject
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +23,7 @@ class Arrival:
     """When a run counts as arrived and may stop.
 
     Attributes:
-        position: largest joint error [rad | m].
+        position: largest joint error [rad | m]; of a pose goal the angle [rad]. distance: of a pose goal [m].
         speed: largest joint speed [rad/s | m/s].
         hold: for how long both must hold [s].
     """
@@ -30,9 +31,10 @@ class Arrival:
     position: float = 0.02
     speed: float = 0.02
     hold: float = 0.2
+    distance: float = 0.005
 
     def __post_init__(self) -> None:
-        if not (self.position > 0.0 and self.speed > 0.0 and self.hold >= 0.0):
+        if not (min(self.position, self.speed, self.distance) > 0.0 and self.hold >= 0.0):
             raise ValueError(f"arrival tolerances must be positive and hold not negative, got {self}")
 
 
@@ -57,7 +59,7 @@ class Run:
 
     Attributes:
         robot, objects: what moved, among what.
-        start, goal: (nv,).
+        start, goal: (nv,). pose: that was to be reached, where `goal` is the configuration at the end.
         timestep: control period [s]; time: (T,) [s].
         q, v: (T, nv) state at the beginning of each step.
         wanted: (T, nv) acceleration that the dynamical system asked for.
@@ -84,6 +86,7 @@ class Run:
     object_poses: Array
     arrived: bool
     time_to_goal: float | None
+    pose: PoseAim | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -115,13 +118,18 @@ class KinematicRun(Run):
 class ArrivalWatch:
     """Follows a motion and says when it has arrived."""
 
-    goal: Array
+    goal: Array | PoseAim
     rule: Arrival
     since: float | None = field(default=None, init=False)
 
     def update(self, time: float, q: Array, v: Array) -> bool:
         """True once error and speed have been small for the rule's hold time; `since` is when that began."""
-        near = np.abs(q - self.goal).max() < self.rule.position and np.abs(v).max() < self.rule.speed
+        near = bool(np.abs(v).max() < self.rule.speed)
+        if isinstance(self.goal, PoseAim):
+            distance, angle = self.goal.errors(q)
+            near = near and distance < self.rule.distance and angle < self.rule.position
+        else:
+            near = near and bool(np.abs(q - self.goal).max() < self.rule.position)
         if not near:
             self.since = None
         elif self.since is None:

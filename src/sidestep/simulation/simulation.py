@@ -9,9 +9,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Escape, Obstacles
+from sidestep._core import Escape, Obstacles, PoseGoal
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
+from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.run import (
     Arrival,
     ArrivalWatch,
@@ -87,7 +88,7 @@ class Simulation:
         system: MotionSystem,
         controller: AccelerationController,
         start: Array,
-        goal: Array,
+        goal: Array | PoseAim,
         duration: float,
         obstacles: ObstacleSource,
         *,
@@ -101,7 +102,7 @@ class Simulation:
 
         Args:
             system, controller: the dynamical system and the torque controller.
-            start, goal: (nv,) configurations inside the limits.
+            start, goal: (nv,) configurations inside the limits; the goal may be a pose.
             duration: at most this long [s].
             obstacles: what the controller sees: points, moved along their velocities as time passes, or a
                 function of time [s]. It never sees `objects`.
@@ -118,7 +119,8 @@ class Simulation:
         if not (np.isfinite(duration) and duration > 0.0):
             raise ValueError(f"duration must be positive, got {duration}")
         start = self.robot.check_configuration(start, "start")
-        goal = self.robot.check_configuration(goal, "goal")
+        if not isinstance(goal, PoseAim):
+            goal = self.robot.check_configuration(goal, "goal")
         built, data = self.built, mujoco.MjData(self.built.model)
         built.set_state(
             data, start, np.zeros_like(start) if start_velocity is None else np.asarray(start_velocity)
@@ -134,7 +136,9 @@ class Simulation:
             self._drive(data, time)
             mujoco.mj_step1(built.model, data)
             q, v = built.state(data)
-            followed = goal if escape is None else escape.pursue(goal, q, potential, self.timestep)
+            followed = goal.at(q) if isinstance(goal, PoseAim) else goal
+            if escape is not None and not isinstance(followed, PoseGoal):
+                followed = escape.pursue(followed, q, potential, self.timestep)
             step = system.acceleration(q, v, followed, see(time))
             potential = getattr(step, "goal_potential", potential)
             kept = {"clearances": step} if safe else {}
@@ -180,7 +184,8 @@ class Simulation:
             robot=self.robot,
             objects=self.objects,
             start=start,
-            goal=goal,
+            goal=rows["q"][-1] if isinstance(goal, PoseAim) else goal,
+            pose=goal if isinstance(goal, PoseAim) else None,
             timestep=self.timestep,
             arrived=arrived,
             time_to_goal=watch.since if watch is not None and arrived else None,

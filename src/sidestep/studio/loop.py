@@ -158,13 +158,17 @@ def serve(connection: Connection[Any, Any]) -> None:
     """Runs a session in real time until the other end hangs up."""
     beginning: Beginning = connection.recv()
 
-    def prepare(robot: Robot, method: Method) -> Body:
-        return prepare_body(robot, method, ellipsoids=beginning.ellipsoids, tell=connection.send)
+    def prepare(robot: Robot, method: Method, ellipsoids: int | None) -> Body:
+        return prepare_body(robot, method, ellipsoids=ellipsoids, tell=connection.send)
 
     connection.send(m.Preparing(f"loading {beginning.scenario.name}"))
     try:
         session = Session(
-            beginning.scenario, method=beginning.method, numbers=beginning.numbers, prepare=prepare
+            beginning.scenario,
+            method=beginning.method,
+            numbers=beginning.numbers,
+            ellipsoids=beginning.ellipsoids,
+            prepare=prepare,
         )
     except (ValueError, OSError) as error:
         connection.send(m.Failed(str(error), fatal=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.scenario import Scenario
+from sidestep.simulation.pose_aim import Posture
 from sidestep.studio.things import Thing
 
 Array = npt.NDArray[np.float64]
@@ -97,9 +99,10 @@ class Restart:
 
 @dataclass(frozen=True)
 class Load:
-    """Another scenario, perhaps with another robot."""
+    """Another scenario, perhaps with another robot, and the method to go on with; None: the one that is on."""
 
     scenario: Scenario
+    method: str | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,14 @@ class Timing:
     worst: float = 0.0
     real_time: float = 0.0
 
+    @classmethod
+    def of(cls, seconds: Collection[float], real_time: float) -> Timing:
+        """Of steps that took so many seconds."""
+        if not seconds:
+            return cls(real_time=real_time)
+        median, p99, worst = 1e6 * np.percentile(np.array(seconds), [50.0, 99.0, 100.0])
+        return cls(float(median), float(p99), float(worst), real_time)
+
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
@@ -142,7 +153,9 @@ class Snapshot:
         scenario: that was loaded last.
         edition: grows when obstacles come or go, or a scenario is loaded; `things` then changed.
         time: simulated [s]. q, v: (nv,). running: or paused.
-        goal: (nv,) of a joint goal, else None; goal_pose: (4, 4) of a pose goal, else None.
+        goal: (nv,) of a joint goal, else None; goal_pose: (4, 4) of a pose goal, else None, of the frame `tip`;
+            posture: where the arm is at the goal.
+        ellipsoids: of a covering body per link, None: as many as it takes.
         things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s].
         method: its name; numbers: its parameters by method and name.
         words: what the arm does; status: names of the step's and the torque program's status.
@@ -161,6 +174,9 @@ class Snapshot:
     v: Array
     goal: Array | None
     goal_pose: Array | None
+    posture: Posture
+    tip: str
+    ellipsoids: int | None
     things: tuple[Thing, ...]
     poses: Array
     velocities: Array

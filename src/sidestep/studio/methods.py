@@ -93,6 +93,12 @@ BARRIER_PARAMETERS = (
     _barrier("limit_strength", "", 0.001, 0.2, "Higher turns away from joint limits earlier."),
     _barrier("self_activation", "m", 0.01, 0.2, "Higher keeps links farther apart, and bars more poses."),
     _barrier("self_strength", "", 0.001, 0.2, "Higher turns links away from each other earlier."),
+    _barrier(
+        "floor", "m", 0.0005, 0.008, "Higher counts as touched earlier; lower lets the arm come closer."
+    ),
+    _barrier(
+        "temperature", "m", 0.0005, 0.02, "Higher is smoother between neighbours, and keeps farther off."
+    ),
 )
 _SPRING = (
     _thesis("stiffness", "1/s²", 0.1, 10.0, "Higher arrives sooner, and climbs higher onto obstacles."),

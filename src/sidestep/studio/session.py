@@ -27,20 +27,23 @@ from sidestep.body import Body
 from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import coordinates, load_robot
+from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
+from sidestep.scenario.scenario import JointState
+from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
 from sidestep.simulation.run import status_name
 from sidestep.studio import messages as m
 from sidestep.studio.export import numbers_of
-from sidestep.studio.methods import METHODS, Method, build_system, check_numbers, method_named
+from sidestep.studio.methods import METHODS, Method, Numbers, build_system, check_numbers, method_named
 from sidestep.studio.stage import Actor, Stage
-from sidestep.studio.things import things_of
+from sidestep.studio.things import Thing, things_of
+from sidestep.studio.tip import at_tip, tip_of
 
 Array = npt.NDArray[np.float64]
-Prepare = Callable[[Robot, Method], Body]
+Prepare = Callable[[Robot, Method, int | None], Body]
 
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
-POSITION_STIFFNESS, TURN_STIFFNESS = 8.0, 2.0  # of pose goals [1/(m s)^2], [1/s^2]: as quick as joint goals
+STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
 
 
 class Session:
@@ -49,7 +52,8 @@ class Session:
     Args:
         scenario: robot, start, goal, obstacles and control period.
         method: one of `METHODS`. numbers: of methods, by name; defaults for the rest.
-        prepare: gives the body of a robot that a method needs; may take long.
+        ellipsoids: of a covering body per link, where the scenario does not say; None: as many as it takes.
+        prepare: gives the body of a robot that a method needs, with this number of ellipsoids; may take long.
 
     Raises:
         ValueError: that names what is wrong in the scenario, the method or its numbers.
@@ -70,9 +74,11 @@ class Session:
     _system: GeometricSystem
     _controller: TorqueController
     _start: Array
-    _goal: Array | None
     _pose: Array | None
-    _aim: JointGoal | PoseGoal
+    _posture: Posture
+    _ellipsoids: int | None
+    _relaxed: GeometricSystem | None
+    _aim: JointGoal | PoseAim
     _guide: GuidedMotion | None
     _guide_time: float
     _guide_says: str
@@ -90,17 +96,16 @@ class Session:
         *,
         method: str = "barrier",
         numbers: Mapping[str, Mapping[str, float]] | None = None,
+        ellipsoids: int | None = None,
         prepare: Prepare,
     ) -> None:
-        self._prepare = prepare
+        self._prepare, self._usual_ellipsoids = prepare, ellipsoids
         self._numbers = {name: check_numbers(METHODS[name], {}) for name in METHODS}
-        for name, values in (numbers or {}).items():
-            self._numbers[name] = check_numbers(method_named(name), values)
         self._method = method_named(method)
-        self._given = set(numbers or {})
         self._edition = 0
         self._recording = False
-        self._load(scenario)
+        given = {name: check_numbers(method_named(name), values) for name, values in (numbers or {}).items()}
+        self._load(scenario, self._method, given)
 
     # --- what happens ---
 
@@ -108,17 +113,11 @@ class Session:
         """Does what a command says; raises ValueError or OSError, and stays as it was, where it cannot."""
         match command:
             case m.SetJointGoal(position):
-                self._set_joint_goal(self.robot.check_configuration(position, "goal"))
+                self._set_goal(None, Posture(self.robot.check_configuration(position, "goal"), True))
             case m.SetPoseGoal(pose):
-                self._goal, self._pose = None, np.array(pose, dtype=float)
-                self._aim = PoseGoal(
-                    self.robot,
-                    self.tip,
-                    self._pose,
-                    position_stiffness=POSITION_STIFFNESS,
-                    orientation_stiffness=TURN_STIFFNESS,
-                )
-                self._begin_pursuit()
+                target = np.array(pose, dtype=float)
+                near = self.stage.state()[0] if self._pose is None else self._posture.q
+                self._set_goal(target, posture_at(self.robot, self.tip, target, near))
             case m.AddThing(thing):
                 self._set_actors([*self.stage.actors, Actor(thing)])
             case m.RemoveThing(name):
@@ -148,8 +147,8 @@ class Session:
             case m.Restart(until):
                 self._begin()
                 self.running, self._until = until > 0.0, until
-            case m.Load(scenario):
-                self._load(scenario)
+            case m.Load(scenario, asked):
+                self._load(scenario, self._method if asked is None else method_named(asked), {})
             case m.Seen():
                 pass
 
@@ -162,7 +161,8 @@ class Session:
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
         obstacles = self._obstacles()
-        step = self._system.acceleration(q, v, self._attractor(q, obstacles), obstacles)
+        goal = self._attractor(q, obstacles)
+        step = self._moving_by(obstacles).acceleration(q, v, goal, obstacles)
         self._potential = step.goal_potential
         mass, bias = stage.dynamics()
         solution = self._controller.solve(
@@ -195,8 +195,8 @@ class Session:
         if self._step is not None and self._solution is not None:
             step = self._step
             diagnosis = step.diagnosis
-            words = self._in_words(diagnosis.describe())
-            if self._guide is not None and self._goal is not None:
+            words = in_words(diagnosis.describe(), self._owners, self._things)
+            if self._led:
                 words = f"guide: {self._guide_says}; {words}"
             if self._escape is not None and self._escape.escaping:
                 words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
@@ -213,8 +213,11 @@ class Session:
             running=self.running,
             q=q.copy(),
             v=v.copy(),
-            goal=self._goal,
+            goal=self._posture.q if self._pose is None else None,
             goal_pose=self._pose,
+            posture=self._posture,
+            tip=self.tip,
+            ellipsoids=self._ellipsoids,
             things=self._things,
             poses=self._poses(),
             velocities=np.array([actor.velocity for actor in self.stage.actors]).reshape(-1, 3),
@@ -229,7 +232,7 @@ class Session:
             speed_share=float((np.abs(v) / limits.velocity).max()),
             contacts=self._contacts,
             touched=self._touched,
-            timing=self._timing(real_time),
+            timing=m.Timing.of(self._times, real_time),
             recording=self._recording,
             rows=rows,
         )
@@ -252,35 +255,56 @@ class Session:
     def _attractor(self, q: Array, obstacles: Obstacles) -> JointGoal | PoseGoal:
         """What the system is drawn to now: the goal, a sub-goal, or a place on the guide's path."""
         self._guide_time += self.period
-        if self._guide is not None and self._goal is not None:
+        if self._led and self._guide is not None:
             guidance = self._guide.lead(q, obstacles, self._guide_time)
             self._guide_says = guidance.status.name.replace("_", " ")
             return guidance.goal
-        if self._escape is not None:
-            return self._escape.pursue(self._aim, q, self._potential, self.period)
-        return self._aim
+        aim = self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
+        if self._escape is not None and isinstance(aim, JointGoal):
+            return self._escape.pursue(aim, q, self._potential, self.period)
+        return aim
 
-    def _load(self, scenario: Scenario) -> None:
+    @property
+    def _led(self) -> bool:
+        """Whether a guide leads the arm: it needs a configuration to go to."""
+        return self._guide is not None and self._posture.found
+
+    def _moving_by(self, obstacles: Obstacles) -> GeometricSystem:
+        """The system, with barriers that leave the goal free as long as all obstacles are at rest."""
+        if self._led and self._guide is not None:
+            return self._guide.moving
+        speeds = (np.abs(actor.velocity).max() for actor in self.stage.actors)
+        if not (self._method.safe and self._posture.found) or max(speeds, default=0.0) > STILL:
+            self._relaxed = None
+            return self._system
+        if self._relaxed is None:
+            self._relaxed = self._system.relaxed_at(self._posture.q, obstacles)
+        return self._relaxed
+
+    def _load(self, scenario: Scenario, method: Method, given: dict[str, Numbers]) -> None:
         robot = load_robot(scenario)
+        ellipsoids = scenario.barriers.ellipsoids or self._usual_ellipsoids
         bodies: dict[bool, Body] = {}
         if self._edition and robot.fingerprint == self.robot.fingerprint:
-            robot, bodies = self.robot, self._bodies
+            robot, bodies = self.robot, dict(self._bodies)
+            if ellipsoids != self._ellipsoids:
+                bodies.pop(True, None)
         start = coordinates(scenario.start, robot, "start.position")
-        goal = coordinates(scenario.goal, robot, "goal.position")
+        posture = goal_posture(scenario, robot, start)
+        pose = None if isinstance(scenario.goal, JointState) else at_tip(scenario.goal, robot)
         stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
-        numbers = dict(self._numbers)
         asked, values = numbers_of(scenario)
-        if values and asked not in self._given:
-            numbers[asked] = check_numbers(METHODS[asked], values)
-        self._system = self._system_for(robot, bodies, self._method, numbers[self._method.name])
-        self.robot, self._bodies, self._numbers = robot, bodies, numbers
+        numbers = self._numbers | {asked: check_numbers(METHODS[asked], values)} | given
+        self._system = self._system_for(robot, bodies, method, numbers[method.name], ellipsoids)
+        self.robot, self._bodies, self._numbers, self._method = robot, bodies, numbers, method
+        self._ellipsoids = ellipsoids
         self.tip = tip_of(robot)
         self.scenario, self.stage = scenario, stage
         self.period = scenario.simulation.period
         self._controller = TorqueController(robot, period=self.period)
         self._start = start
         self._make_guide()
-        self._set_joint_goal(goal)
+        self._set_goal(pose, posture)
         self._begin()
 
     def _begin(self) -> None:
@@ -293,8 +317,8 @@ class Session:
         self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(self._start, np.zeros_like(self._start))
 
-    def _set_joint_goal(self, goal: Array) -> None:
-        self._goal, self._pose, self._aim = goal, None, JointGoal(goal)
+    def _set_goal(self, pose: Array | None, posture: Posture) -> None:
+        self._pose, self._posture = pose, posture
         self._begin_pursuit()
 
     def _make_guide(self) -> None:
@@ -303,11 +327,15 @@ class Session:
             self._guide = GuidedMotion(self.robot, self._bodies[True], system=self._system)
 
     def _begin_pursuit(self) -> None:
-        self._potential = float("nan")
-        if self._guide is not None and self._goal is not None:
-            self._guide.set_goal(self._goal)
-        # A pose goal is approached so slowly near a stretched arm that it would count as stuck.
-        escapes = self._method.escapes and self._pose is None
+        self._potential, self._relaxed = float("nan"), None
+        self._aim = JointGoal(self._posture.q)
+        if self._pose is not None:
+            stiffness = self._numbers[self._method.name]["stiffness"]
+            self._aim = PoseAim(self.robot, self.tip, self._pose, stiffness=stiffness, posture=self._posture)
+        if self._led and self._guide is not None:
+            self._guide.set_goal(self._posture.q)
+        # A pose without a posture is approached so slowly that it would count as stuck.
+        escapes = self._method.escapes and self._posture.found
         self._escape = Escape(self.robot) if escapes else None
 
     def _set_actors(self, actors: list[Actor]) -> None:
@@ -316,21 +344,27 @@ class Session:
         self._look()
 
     def _use(self, method: Method, numbers: Mapping[str, float]) -> None:
-        self._system = self._system_for(self.robot, self._bodies, method, numbers)
-        self._method = method
+        self._system = self._system_for(self.robot, self._bodies, method, numbers, self._ellipsoids)
+        self._method, self._numbers[method.name] = method, dict(numbers)
         self._make_guide()
         self._begin_pursuit()
         self._look()
 
     def _system_for(
-        self, robot: Robot, bodies: dict[bool, Body], method: Method, numbers: Mapping[str, float]
+        self,
+        robot: Robot,
+        bodies: dict[bool, Body],
+        method: Method,
+        numbers: Mapping[str, float],
+        ellipsoids: int | None,
     ) -> GeometricSystem:
         if method.covering not in bodies:
-            bodies[method.covering] = self._prepare(robot, method)
+            bodies[method.covering] = self._prepare(robot, method, ellipsoids)
         return build_system(method, robot, bodies[method.covering], numbers)
 
     def _look(self) -> None:
         """Lays out what is seen: points of each obstacle in its frame, and whose each point is."""
+        self._relaxed = None
         views = [actor.thing.seen(bare=not self._method.safe) for actor in self.stage.actors]
         self._views = [points for points, _ in views]
         self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in views)])
@@ -352,27 +386,12 @@ class Session:
     def _poses(self) -> Array:
         return np.array([actor.pose for actor in self.stage.actors]).reshape(-1, 4, 4)
 
-    def _in_words(self, sentence: str) -> str:
-        """The diagnosis with the names of obstacles in place of the numbers of their points."""
 
-        def name(match: re.Match[str]) -> str:
-            point = int(match[1])
-            known = 0 <= point < len(self._owners)
-            return self.stage.actors[self._owners[point]].thing.name if known else match[0]
+def in_words(sentence: str, owners: npt.NDArray[np.intp], things: tuple[Thing, ...]) -> str:
+    """A diagnosis with the names of obstacles in place of the numbers of their points."""
 
-        named = re.sub(r"obstacle point (-?\d+)", name, sentence)
-        return re.sub(r"\blink (?=\S*link)", "", named)
+    def name(match: re.Match[str]) -> str:
+        point = int(match[1])
+        return things[owners[point]].name if 0 <= point < len(owners) else match[0]
 
-    def _timing(self, real_time: float) -> m.Timing:
-        if not self._times:
-            return m.Timing(real_time=real_time)
-        median, p99, worst = 1e6 * np.percentile(np.array(self._times), [50.0, 99.0, 100.0])
-        return m.Timing(float(median), float(p99), float(worst), real_time)
-
-
-def tip_of(robot: Robot) -> str:
-    """The link whose pose is a goal: of those that the last joint of the arm carries, the last named."""
-    depth = {-1: 0}
-    for index, joint in enumerate(robot.joints):
-        depth[index] = depth[joint.parent] + 1
-    return max(enumerate(robot.frames), key=lambda item: (depth[item[1].joint], item[0]))[1].name
+    return re.sub(r"\blink (?=\S*link)", "", re.sub(r"obstacle point (-?\d+)", name, sentence))

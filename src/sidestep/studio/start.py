@@ -12,7 +12,7 @@ from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
 from sidestep.scenario.scenario import JointState, Obstacle, RobotChoice, Shape
-from sidestep.studio.session import tip_of
+from sidestep.studio.tip import tip_of
 
 Array = npt.NDArray[np.float64]
 

@@ -64,7 +64,7 @@ class Studio:
         self.snapshot: m.Snapshot | None = None
         self.error = ""
         self._loop = Loop(Beginning(scenario, method, dict(numbers or {}), ellipsoids))
-        self.view: View = View(server, scenario, robot, self.send, ellipsoids=ellipsoids)
+        self.view: View = View(server, scenario, robot, self.send)
         self._truth = Truth(self._take_truth)
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()

@@ -11,13 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.obstacles import load_point_cloud, merge_in_voxels
-from sidestep.obstacles.covering import box as box_points
-from sidestep.obstacles.covering import cylinder as cylinder_points
-from sidestep.obstacles.covering import triangles as mesh_points
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import solids
-from sidestep.scenario.scenario import Obstacle, Shape
+from sidestep.scenario.scenario import Obstacle, Shape, Vector3
+from sidestep.scenario.seen import covering
 from sidestep.simulation import SceneObject
 
 Array = npt.NDArray[np.float64]
@@ -108,14 +106,8 @@ class Thing:
 
     @cached_property
     def _surface(self) -> tuple[Array, Array]:
-        shape, spacing = self.obstacle.shape, self.obstacle.spacing
-        if shape.type == "box" and shape.size is not None:
-            points = box_points(shape.size, spacing)
-        elif shape.type == "cylinder":
-            points = cylinder_points(float(shape.radius or 0.0), float(shape.length or 0.0), spacing)
-        else:
-            points = mesh_points(self.solids[0].surface(), spacing)
-        return points, np.full(len(points), spacing)
+        points = covering(self.obstacle, self.solids[0])
+        return points, np.full(len(points), self.obstacle.spacing)
 
     @cached_property
     def size(self) -> float:
@@ -125,14 +117,11 @@ class Thing:
 
     def at(self, pose: Array) -> Thing:
         """The same thing, starting at another pose (4, 4), at rest."""
-        from scipy.spatial.transform import Rotation
-
-        roll, pitch, yaw = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz", degrees=True).round(3)
-        x, y, z = (float(value) for value in np.round(pose[:3, 3], 6))
+        position, rotation_deg = written_pose(pose)
         item = dataclasses.replace(
             self.obstacle,
-            position=(x, y, z),
-            rotation_deg=(float(roll), float(pitch), float(yaw)),
+            position=position,
+            rotation_deg=rotation_deg,
             velocity=(0.0, 0.0, 0.0),
             motion=None,
         )
@@ -184,6 +173,13 @@ def thinned(points: Array) -> Array:
     return thin
 
 
+def written_pose(pose: Array) -> tuple[Vector3, Vector3]:
+    """Position [m] and roll, pitch, yaw [deg] about fixed axes of a pose (4, 4), as files have them."""
+    from scipy.spatial.transform import Rotation
+
+    return _vector(pose[:3, 3]), _vector(Rotation.from_matrix(pose[:3, :3]).as_euler("xyz", degrees=True))
+
+
 def _vector(values: Array) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
+    x, y, z = (float(value) + 0.0 for value in values)  # no minus in front of a zero
     return x, y, z

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, JointType, Obstacles, PoseGoal, is_fallback, rollout
+from sidestep._core import JointType
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
+from sidestep.simulation.pose_aim import Posture
 from sidestep.studio import messages as m
 from sidestep.studio.page.arm import ArmView, reach, short
 from sidestep.studio.page.obstacles import gizmo_pose
@@ -20,22 +21,19 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-GHOST_PERIOD, GHOST_STEPS = 0.02, 300  # [s] and number: how far the ghost follows a pose at a time
 GIZMO_SIZE = 0.22  # of the distance to the farthest link at rest
 
 
 class GoalControl:
     """Where the arm is sent: by sliders to a configuration, by the gizmo to a pose of the tip.
 
-    A pose goes to the system's own pose goal. The ghost then shows where the same system, in flat space, would come
-    to rest at that pose.
+    A pose goes to the system's own pose goal. The ghost then shows the posture for it.
     """
 
     def __init__(
         self, server: viser.ViserServer, robot: Robot, tip: str, send: Callable[[m.Command], None]
     ) -> None:
         self._robot, self._tip, self._send = robot, tip, send
-        self._flat = GeometricSystem([], robot=robot, stiffness=4.0, damping=4.0)
         self.q = np.array(robot.neutral)
         self.ghost = ArmView(server, robot, "/goal", ghost=True)
         self.gizmo = server.scene.add_transform_controls(
@@ -63,19 +61,19 @@ class GoalControl:
         self.gizmo.on_update(self._dragged)
         self._known: tuple[Array | None, Array | None] = (None, None)
 
-    def show(self, goal: Array | None, pose: Array | None) -> None:
+    def show(self, goal: Array | None, pose: Array | None, posture: Posture) -> None:
         """Shows the goal that the loop has, whoever set it; does nothing while it stays the same."""
         if same(goal, self._known[0]) and same(pose, self._known[1]):
             return
         self._known = goal, pose
+        self.q = posture.q
         if goal is not None:
-            self.q = goal
             self._place_gizmo(self._robot.pose(goal, self._tip))
             self.kind.content = "**Goal: a configuration.** Move a slider, or drag the gizmo for a pose."
         elif pose is not None:
-            self.q = self._follow(pose)
             self._place_gizmo(pose)
-            self.kind.content = f"**Goal: a pose** of `{self._tip}`. Drag the gizmo, or move a slider."
+            where = "" if posture.found else " **No posture found for it**: the ghost is as near as it gets."
+            self.kind.content = f"**Goal: a pose** of `{self._tip}`.{where} Drag the gizmo, or move a slider."
         self.ghost.show(self.q)
         for slider, value in zip(self._sliders, self._factors * self.q, strict=True):
             slider.value = float(np.clip(round(float(value), 4), slider.min, slider.max))
@@ -87,23 +85,6 @@ class GoalControl:
     def remove(self) -> None:
         for part in (self.ghost, self.gizmo, self.kind, *self._sliders):
             part.remove()
-
-    def _follow(self, pose: Array) -> Array:
-        aim = PoseGoal(self._robot, self._tip, pose, rest=self.q, posture_stiffness=0.02)
-        motion = rollout(
-            self._flat,
-            self.q,
-            np.zeros_like(self.q),
-            aim,
-            Obstacles.none(),
-            period=GHOST_PERIOD,
-            steps=GHOST_STEPS,
-        )
-        limits = self._robot.limits
-        if is_fallback(motion.statuses[-1]) or not np.isfinite(motion.q[-1]).all():
-            return self.q
-        found: Array = np.clip(motion.q[-1], limits.lower, limits.upper)
-        return found
 
     def _place_gizmo(self, pose: Array) -> None:
         vector = pose_vector(pose)

@@ -35,13 +35,14 @@ class ScenarioPanel:
         gui.add_button("Download").on_click(self._download)
 
     def _load_shipped(self, _: Any) -> None:
-        self._view.load(Scenario.load(str(self._shipped.value)))
+        self._view.load(Scenario.load(str(self._shipped.value)), with_method=False)
 
     def _load_upload(self, event: Any) -> None:
         file = event.target.value
         with self._view.telling(event.client):
             text = file.content.decode("utf-8", errors="replace")
-            self._view.load(Scenario.from_text(text, file=file.name, folder=self._folder))
+            scenario = Scenario.from_text(text, file=file.name, folder=self._folder)
+            self._view.load(scenario, with_method=True)
 
     def _save(self, event: Any) -> None:
         with self._view.telling(event.client):

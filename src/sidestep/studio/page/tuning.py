@@ -86,7 +86,7 @@ class TuningPanel:
         last = self._view.last
         if last is None or event.client is None:
             return
-        code = python_snippet(last.scenario.robot, last.method, last.numbers[last.method])
+        code = python_snippet(last)
         with event.client.gui.add_modal("As Python") as modal:
             event.client.gui.add_markdown(f"```python\n{code}```")
             download = event.client.gui.add_button("Download")

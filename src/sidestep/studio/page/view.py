@@ -15,9 +15,10 @@ import numpy as np
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import coordinates, load_robot
+from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
 from sidestep.simulation.clearance import Clearance
 from sidestep.studio import messages as m
+from sidestep.studio.export import numbers_of
 from sidestep.studio.methods import THESIS_COMPONENTS, method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, BodyView, reach
@@ -30,7 +31,7 @@ from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
-from sidestep.studio.session import tip_of
+from sidestep.studio.tip import tip_of
 
 if TYPE_CHECKING:
     import viser
@@ -52,10 +53,8 @@ class View:
         scenario: Scenario,
         robot: Robot,
         send: Callable[[m.Command], None],
-        *,
-        ellipsoids: int | None,
     ) -> None:
-        self._server, self._send, self._ellipsoids = server, send, ellipsoids
+        self._server, self._send = server, send
         self._lock = threading.RLock()
         self._clearances: tuple[Clearance, ...] = ()
         self._measured = np.nan  # [s] simulated time of the clearances
@@ -100,9 +99,9 @@ class View:
         """Hands a command to the loop."""
         self._send(command)
 
-    def load(self, scenario: Scenario) -> None:
-        """Another scenario for loop and page."""
-        self._send(m.Load(scenario))
+    def load(self, scenario: Scenario, *, with_method: bool) -> None:
+        """Another scenario for loop and page, with the method it asks for, or that which is on."""
+        self._send(m.Load(scenario, numbers_of(scenario)[0] if with_method else None))
 
     @contextlib.contextmanager
     def telling(self, client: Any) -> Iterator[None]:
@@ -124,8 +123,9 @@ class View:
                 self.obstacles.set_things(snapshot.things)
                 self._clearances, self.least_clearance = (), np.inf
                 self.marks.clear_trail()
-            if self._body is None or self.last is None or snapshot.method != self.last.method:
-                self._load_body(snapshot.method)
+            needs = snapshot.method, snapshot.ellipsoids
+            if self._body is None or self.last is None or needs != (self.last.method, self.last.ellipsoids):
+                self._load_body(*needs)
             changed = self.last is None or snapshot.edition != self.last.edition
             self.last = snapshot
             if changed:
@@ -141,7 +141,7 @@ class View:
             self.obstacles.show(snapshot.things, snapshot.poses)
             self.arm.show(snapshot.q)
             self.arm.colour({item.link: item.distance for item in self._clearances})
-            self.goal.show(snapshot.goal, snapshot.goal_pose)
+            self.goal.show(snapshot.goal, snapshot.goal_pose, snapshot.posture)
             self.surface.show(snapshot, self.robot, self._body_now, self._pair())
             self.marks.show_nearest(self._clearances, visible=self._nearest.value)
             self.marks.show_trail(snapshot.q, visible=self._trail.value)
@@ -238,7 +238,8 @@ class View:
 
     def _point_camera(self, scenario: Scenario, robot: Robot) -> None:
         """Where a new window looks from: the arm fills it at start and goal."""
-        ends = [coordinates(state, robot, "state") for state in (scenario.start, scenario.goal)]
+        start = coordinates(scenario.start, robot, "start")
+        ends = [start, goal_posture(scenario, robot, start).q]
         places = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
         middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
         camera = self._server.initial_camera
@@ -282,13 +283,13 @@ class View:
             if part is not None:
                 part.remove()
 
-    def _load_body(self, name: str) -> None:
+    def _load_body(self, name: str, ellipsoids: int | None) -> None:
         """The body of a method; the loop has made it, so it comes from the cache."""
         method = method_named(name)
         if self._body is not None:
             self._body.remove()
         body = (
-            Body.cover(self.robot, components=self._ellipsoids)
+            Body.cover(self.robot, components=ellipsoids)
             if method.covering
             else Body.fit(self.robot, components=THESIS_COMPONENTS)
         )

@@ -1,0 +1,112 @@
+"""Goals that are poses: what draws the arm, and a configuration in which it has the pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import JointGoal, PoseGoal
+from sidestep.pose import rotation_vector
+from sidestep.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+POSITION_SHARE, TURN_SHARE = 2.0, 0.5  # of the joint stiffness, per m^2 and per rad^2
+ENTER = 1e-3, 5e-3  # [m] and [rad] within which the pose itself draws: far inside of what counts as arrived
+LEAVE = 2e-2, 1e-1  # [m] and [rad] beyond which it is the posture again
+ITERATIONS = 50  # from a configuration nearby about ten are enough
+DAMPING = 0.03  # [m | rad] of the inverse: directions in which an arm moves less than this are left alone
+LARGEST_STEP = 0.3  # [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
+ACCURACY = 1e-7  # [m] and [rad]; the frame is at the pose
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """A configuration q (nv,) for a pose; found: the frame is at the pose in it, otherwise as near as was found."""
+
+    q: Array
+    found: bool
+
+
+class PoseAim:
+    """A pose (4, 4) of a frame as the goal: what draws an arm there.
+
+    The pull of a `PoseGoal`, J^T k e, is weak in directions in which the joints move the frame little: the last
+    centimetres of an arm with seven joints take minutes. From afar the arm is therefore drawn to a posture that has
+    the pose; near by to the pose itself, which leaves the joints free that do not move the frame.
+
+    Args:
+        robot, frame, pose: what is to be where, in the world.
+        stiffness: of the system's pull to configurations [1/s^2].
+        posture: for the pose; where none was found, the pose alone draws.
+
+    Raises:
+        ValueError: see `PoseGoal`.
+    """
+
+    def __init__(self, robot: Robot, frame: str, pose: Array, *, stiffness: float, posture: Posture) -> None:
+        self.robot, self.posture = robot, posture
+        self.goal = PoseGoal(
+            robot,
+            frame,
+            pose,
+            position_stiffness=POSITION_SHARE * stiffness,
+            orientation_stiffness=TURN_SHARE * stiffness,
+        )
+        self._there = JointGoal(posture.q)
+        self._near = not posture.found
+
+    def at(self, q: Array) -> JointGoal | PoseGoal:
+        """What draws an arm at q (nv,), which moves on from where it was asked last."""
+        if self.posture.found:
+            distance, angle = self.errors(q)
+            bound = LEAVE if self._near else ENTER
+            self._near = distance < bound[0] and angle < bound[1]
+        return self.goal if self._near else self._there
+
+    def errors(self, q: Array) -> tuple[float, float]:
+        """Distance [m] and angle [rad] of the frame at q (nv,) from the pose."""
+        error = _error(self.robot.pose(q, self.goal.frame), self.goal.pose)
+        return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+
+
+def posture_at(robot: Robot, frame: str, pose: Array, near: Array, *, starts: int = 1) -> Posture:
+    """A configuration within the limits with the frame at the pose, by damped least squares from q = near:
+
+        q <- clip(q + J^T (J J^T + lambda^2 1)^-1 e),    e = (p* - p, log(R* R^T)),
+
+    (Nakamura and Hanafusa 1986), lambda shrinking with the error. Where that does not get there, again from random
+    configurations, the same every time, up to `starts` in all.
+    """
+    lower, upper = robot._finite_interval()
+    rng = np.random.default_rng(0)
+    first = _descend(robot, frame, pose, np.clip(np.array(near, dtype=float), lower, upper))
+    found, tries = first, 1
+    while not found.found and tries < starts:
+        found, tries = _descend(robot, frame, pose, rng.uniform(lower, upper)), tries + 1
+    return found if found.found else first
+
+
+def _descend(robot: Robot, frame: str, pose: Array, q: Array) -> Posture:
+    lower, upper = robot._finite_interval()
+    best, least = q, np.inf
+    for _ in range(ITERATIONS):
+        error = -_error(robot.pose(q, frame), pose)
+        size = float(np.linalg.norm(error))
+        if size < least:
+            best, least = q, size
+        if size < ACCURACY:
+            break
+        J = robot.jacobian(q, frame)
+        damping = min(DAMPING, size) ** 2
+        step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
+        step *= min(1.0, LARGEST_STEP / float(np.abs(step).max(initial=1e-12)))
+        q = np.clip(q + step, lower, upper)
+    return Posture(best, least < ACCURACY)
+
+
+def _error(pose: Array, goal: Array) -> Array:
+    """(6,) from the goal to the pose in the world: displacement [m] and rotation vector [rad]."""
+    return np.concatenate([pose[:3, 3] - goal[:3, 3], rotation_vector(pose[:3, :3] @ goal[:3, :3].T)])

@@ -1,0 +1,79 @@
+"""Poses as goals of runs."""
+
+import numpy as np
+import pytest
+
+from sidestep import GeometricSystem, JointGoal, Obstacles, PoseGoal, Robot
+from sidestep.pose import pose_at
+from sidestep.simulation import Arrival, run_kinematically
+from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
+
+START = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.8])
+TIP = "fr3_hand_tcp"
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return Robot.named("fr3")
+
+
+def target(arm: Robot) -> np.ndarray:
+    """20 cm in front of the start."""
+    return pose_at([0.2, 0.0, 0.0]) @ arm.pose(START, TIP)
+
+
+def test_a_posture_has_the_pose_within_the_limits(arm: Robot) -> None:
+    rng = np.random.default_rng(0)
+    lower, upper = arm.limits.lower, arm.limits.upper
+    for _ in range(20):
+        pose = arm.pose(rng.uniform(lower, upper), TIP)
+        posture = posture_at(arm, TIP, pose, START, starts=40)
+        assert posture.found
+        np.testing.assert_allclose(
+            arm.pose(posture.q, TIP), pose, atol=1e-6
+        )  # accuracy 1e-7, as a rotation too
+        assert ((posture.q >= lower) & (posture.q <= upper)).all()
+
+
+def test_out_of_reach_there_is_no_posture(arm: Robot) -> None:
+    posture = posture_at(arm, TIP, pose_at([3.0, 0.0, 0.5]), START, starts=3)
+    assert not posture.found
+    aim = PoseAim(arm, TIP, pose_at([3.0, 0.0, 0.5]), stiffness=4.0, posture=posture)
+    assert isinstance(aim.at(START), PoseGoal)
+
+
+def test_an_arm_of_seven_joints_comes_to_a_pose_in_seconds(arm: Robot) -> None:
+    """20 cm forwards the joints move the hand little: the pull of the pose alone takes far longer."""
+    system = GeometricSystem([], robot=arm, stiffness=4.0, damping=4.0)
+    pose = target(arm)
+    times = []
+    for posture in (posture_at(arm, TIP, pose, START), Posture(START, False)):
+        aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture)
+        run = run_kinematically(
+            arm,
+            system,
+            START,
+            aim,
+            12.0,
+            Obstacles.none(),
+            timestep=0.01,
+            arrival=Arrival(speed=np.inf, hold=0.0),
+        )
+        times.append(run.time_to_goal)
+    assert times[0] is not None
+    assert times[0] < 5.0  # as a configuration: e(t) = (1 + 2 t) exp(-2 t)
+    assert times[1] is None
+
+
+def test_near_by_the_pose_draws_and_the_elbow_is_free(arm: Robot) -> None:
+    pose = target(arm)
+    posture = posture_at(arm, TIP, pose, START)
+    aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture)
+    far = aim.at(START)
+    assert isinstance(far, JointGoal)
+    np.testing.assert_array_equal(far.position, posture.q)
+    assert aim.at(posture.q) is aim.goal
+    free = np.linalg.svd(arm.jacobian(posture.q, TIP))[2][6]  # moves the elbow alone
+    assert aim.at(posture.q + 0.05 * free) is aim.goal
+    assert isinstance(aim.at(START), JointGoal)  # pushed away
+    assert aim.errors(START) == (pytest.approx(0.2, abs=1e-9), pytest.approx(0.0, abs=1e-7))
