@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from sidestep.studio.page.view import View
 
 HOST, PORT = "127.0.0.1", 8890
-NOTEBOOK_HEIGHT = 720  # [px]
+NOTEBOOK_HEIGHT = 640  # [px]
+NOTEBOOK_SCALE = (
+    0.7  # the output of a cell is narrow: at full size the panels would leave little of the scene
+)
 STEP_OF_TRUTH = 0.05  # [s] between two measurements on the exact meshes, at least
 
 
@@ -82,8 +85,11 @@ class Studio:
 
     def _repr_html_(self) -> str:
         """The page inside a notebook whose browser runs on this machine."""
+        share = 100.0 / NOTEBOOK_SCALE
         return (
-            f'<iframe src="{self.address}" width="100%" height="{NOTEBOOK_HEIGHT}" style="border:0"></iframe>'
+            f'<div style="height:{NOTEBOOK_HEIGHT}px;overflow:hidden"><iframe src="{self.address}" style="border:0;'
+            f"width:{share:.2f}%;height:{NOTEBOOK_HEIGHT / NOTEBOOK_SCALE:.0f}px;transform:scale({NOTEBOOK_SCALE});"
+            'transform-origin:0 0"></iframe></div>'
         )
 
     def send(self, command: m.Command) -> None:
