@@ -1,80 +1,77 @@
 #include "sidestep/embedding/ellipsoid_gap.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include "kernels/gap_kernel.hpp"
+#include "sidestep/embedding/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr int most_steps = 16;
-// Of the slope of φ across n, relative to the lengths in it: n is as good, and h to the square of that.
-constexpr double accuracy = 1e-13;
-constexpr double rounding = 1e-15;  // of φ, relative to the lengths in it
-// Centres closer than this have no direction between them [m]; such ellipsoids overlap deeply anyway.
-constexpr double closest_centres = 1e-6;
-
-/// Two unit vectors across n: one away from the axis that n is nearest to.
-Eigen::Matrix<double, 3, 2> across(const Eigen::Vector3d& n) noexcept {
-  Eigen::Index axis;
-  n.cwiseAbs().minCoeff(&axis);
-  Eigen::Matrix<double, 3, 2> T;
-  T.col(0) = n.cross(Eigen::Vector3d::Unit(axis)).normalized();
-  T.col(1) = n.cross(T.col(0));
-  return T;
+kernels::FindGaps find_gaps() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  switch (instruction_set()) {
+    case InstructionSet::avx512: return kernels::find_gaps_avx512;
+    case InstructionSet::avx2: return kernels::find_gaps_avx2;
+    case InstructionSet::baseline: break;
+  }
+#endif
+  return kernels::find_gaps_baseline;
 }
 
-Eigen::Vector2d solve(const Eigen::Matrix2d& M, const Eigen::Vector2d& b) noexcept {
-  return Eigen::Vector2d(M(1, 1) * b[0] - M(0, 1) * b[1], M(0, 0) * b[1] - M(1, 0) * b[0]) /
-         (M(0, 0) * M(1, 1) - M(0, 1) * M(1, 0));
+constexpr int capacity = EllipsoidPairs::capacity;
+
+void write(const Eigen::Matrix3d& S, double (&columns)[6][capacity], int k) noexcept {
+  int entry = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) {
+      columns[entry++][k] = S(i, j);
+    }
+  }
 }
 
 }  // namespace
 
-Eigen::Vector3d EllipsoidGap::turn(const Eigen::Vector3d& gradient_rate) const noexcept {
-  return tangents * solve(curvature, tangents.transpose() * gradient_rate);
+EllipsoidGaps::EllipsoidGaps(const KinematicState::Link& a, const KinematicState::Link& b) noexcept {
+  RelativeMotion& motion = pairs_.motion;
+  const Eigen::Matrix3d R_AW = a.R_WL.transpose();
+  Eigen::Matrix3d::Map(motion.rotation) = R_AW * b.R_WL;
+  Eigen::Vector3d::Map(motion.position) = R_AW * (b.p_WL - a.p_WL);
+  // Seen from a: V = V_b − V_a, and V' less what a turns it by, A_b − A_a − V_a × V.
+  const Eigen::Vector3d angular = b.velocity.angular - a.velocity.angular;
+  const Eigen::Vector3d linear = b.velocity.linear - a.velocity.linear;
+  const Eigen::Vector3d bias_angular = b.bias.angular - a.bias.angular - a.velocity.angular.cross(angular);
+  const Eigen::Vector3d bias_linear =
+      b.bias.linear - a.bias.linear - a.velocity.angular.cross(linear) - a.velocity.linear.cross(angular);
+  Eigen::Vector3d::Map(motion.angular) = R_AW * angular;
+  Eigen::Vector3d::Map(motion.linear) = R_AW * (linear + angular.cross(a.p_WL));
+  Eigen::Vector3d::Map(motion.bias_angular) = R_AW * bias_angular;
+  Eigen::Vector3d::Map(motion.bias_linear) = R_AW * (bias_linear + bias_angular.cross(a.p_WL));
+}
+
+void EllipsoidGaps::add(const Eigen::Vector3d& centre_a, const Eigen::Matrix3d& S_a, const Eigen::Vector3d& centre_b,
+                        const Eigen::Matrix3d& S_b) noexcept {
+  const int k = pairs_.size++;
+  for (int i = 0; i < 3; ++i) {
+    pairs_.centre_a[i][k] = centre_a[i];
+    pairs_.centre_b[i][k] = centre_b[i];
+  }
+  write(S_a, pairs_.shape_a, k);
+  write(S_b, pairs_.shape_b, k);
+}
+
+void EllipsoidGaps::solve() noexcept { find_gaps()(pairs_); }
+
+EllipsoidGap EllipsoidGaps::operator[](int k) const noexcept {
+  const auto column = [k](const double (&columns)[3][capacity]) {
+    return Eigen::Vector3d(columns[0][k], columns[1][k], columns[2][k]);
+  };
+  return {pairs_.value[k], pairs_.rate[k], pairs_.curvature[k], column(pairs_.normal), column(pairs_.contact)};
 }
 
 EllipsoidGap ellipsoid_gap(const Eigen::Vector3d& d, const Eigen::Matrix3d& S_a, const Eigen::Matrix3d& S_b) noexcept {
-  const double length = d.norm();
-  EllipsoidGap gap;
-  gap.normal = length > closest_centres ? Eigen::Vector3d(d / length) : Eigen::Vector3d::UnitX();
-  Eigen::Vector3d p_a, p_b;
-  double s_a, s_b;
-  const auto phi = [&](const Eigen::Vector3d& n) noexcept {
-    p_a = S_a * n;
-    p_b = S_b * n;
-    s_a = std::sqrt(n.dot(p_a));
-    s_b = std::sqrt(n.dot(p_b));
-    return n.dot(d) - s_a - s_b;
-  };
-  gap.value = phi(gap.normal);
-  for (int step = 0;; ++step) {
-    // Of unit vectors near n: the slope of φ across it, and the second derivative −H − φ I.
-    const Eigen::Matrix<double, 3, 2> T = across(gap.normal);
-    const Eigen::Vector2d slope = T.transpose() * (d - p_a / s_a - p_b / s_b);
-    const Eigen::Vector2d k_a = T.transpose() * p_a / s_a, k_b = T.transpose() * p_b / s_b;
-    Eigen::Matrix2d H = T.transpose() * (S_a / s_a + S_b / s_b).lazyProduct(T);
-    H -= k_a * k_a.transpose() / s_a + k_b * k_b.transpose() / s_b;
-    // Ellipsoids that overlap more deeply than they are curved have no maximum here: a definite matrix leads upwards.
-    const double mean = 0.5 * H.trace(), spread = std::hypot(0.5 * (H(0, 0) - H(1, 1)), H(0, 1));
-    gap.tangents = T;
-    gap.curvature = H + std::max(gap.value, -0.5 * (mean - spread)) * Eigen::Matrix2d::Identity();
-    if (step == most_steps || slope.squaredNorm() <= std::pow(accuracy * (length + s_a + s_b), 2)) {
-      return gap;
-    }
-    const Eigen::Vector3d along = T * solve(gap.curvature, slope);
-    double share = 1.0, value = gap.value;
-    Eigen::Vector3d n = gap.normal;
-    for (int halving = 0; halving < 8; ++halving, share *= 0.5) {
-      n = (gap.normal + share * along).normalized();
-      value = phi(n);
-      if (value >= gap.value - rounding * (length + s_a + s_b)) {  // near the maximum its slope says more than φ
-        break;
-      }
-    }
-    gap.normal = n;
-    gap.value = value;
-  }
+  EllipsoidGaps gaps;
+  gaps.add(Eigen::Vector3d::Zero(), S_a, d, S_b);
+  gaps.solve();
+  return gaps[0];
 }
 
 }  // namespace sidestep

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "sidestep/embedding/ellipsoid_gap.hpp"
 
@@ -14,153 +15,131 @@ constexpr const char* self_owner = "self-collision barrier";
 constexpr const char* plane_owner = "plane barrier";
 constexpr double closest_centres = 1e-6;  // [m] of which a direction is taken
 
-/// An ellipsoid in the world.
-struct Side {
-  const KinematicState::Link* link;
-  const BodyEllipsoid* ellipsoid;
-  Eigen::Vector3d centre;
-
-  Eigen::Matrix3d shape() const noexcept { return link->R_WL * ellipsoid->shape * link->R_WL.transpose(); }
-  double half_width(const Eigen::Vector3d& n) const noexcept {
-    const Eigen::Vector3d m = link->R_WL.transpose() * n;
-    return std::sqrt(m.dot(ellipsoid->shape * m));
-  }
-};
-
-/// The same, with the motion of its centre.
-struct Placed {
-  const KinematicState::Link& link;
-  const BodyEllipsoid& ellipsoid;
-  Eigen::Vector3d centre;
-  PointMotion motion;
-
-  Placed(const KinematicState::Link& l, const BodyEllipsoid& e, const Eigen::Vector3d& c) noexcept
-      : link(l), ellipsoid(e), centre(c), motion(point_motion(l, c)) {}
-  Placed(const KinematicState::Link& l, const BodyEllipsoid& e) noexcept : Placed(l, e, l.p_WL + l.R_WL * e.mean) {}
-  explicit Placed(const Side& side) noexcept : Placed(*side.link, *side.ellipsoid, side.centre) {}
-};
-
-/// Half-width s of an ellipsoid along a unit vector n that moves, with s' and s'' and the vector ∂s/∂n (world).
-struct HalfWidth {
-  double value, rate, curvature;
-  Eigen::Vector3d slope;
-};
-
-HalfWidth half_width(const Placed& p, const Eigen::Vector3d& n, const Eigen::Vector3d& n_dot,
-                     const Eigen::Vector3d& n_ddot) noexcept {
-  // n seen from the link; d/dt (Rᵀ z) = Rᵀ (ż − ω × z), twice.
-  const Eigen::Vector3d& omega = p.link.velocity.angular;
-  const Eigen::Vector3d turning = n_dot - omega.cross(n);
-  const Eigen::Vector3d turning_dot =
-      n_ddot - p.link.bias.angular.cross(n) - omega.cross(n_dot) - omega.cross(turning);
-  const Eigen::Vector3d m = p.link.R_WL.transpose() * n;
-  const Eigen::Vector3d m_dot = p.link.R_WL.transpose() * turning;
-  const Eigen::Vector3d m_ddot = p.link.R_WL.transpose() * turning_dot;
-  const Eigen::Vector3d S_m = p.ellipsoid.shape * m;
-  const double s = std::sqrt(m.dot(S_m));
-  const double rate = S_m.dot(m_dot) / s;
-  return {s, rate, (m_dot.dot(p.ellipsoid.shape * m_dot) + S_m.dot(m_ddot) - rate * rate) / s,
-          p.link.R_WL * S_m / s};
-}
-
-EllipsoidGap gap_between(const Side& a, const Side& b) noexcept {
-  return ellipsoid_gap(b.centre - a.centre, a.shape(), b.shape());
-}
-
-/// The boundary point of an ellipsoid farthest along a fixed unit vector n, from the centre, and how it moves.
-Eigen::Vector3d support_rate(const Placed& p, const Eigen::Vector3d& n) noexcept {
-  const Eigen::Vector3d& omega = p.link.velocity.angular;
-  const Eigen::Vector3d m = p.link.R_WL.transpose() * n;
-  const Eigen::Vector3d m_dot = p.link.R_WL.transpose() * n.cross(omega);
-  const Eigen::Vector3d S_m = p.ellipsoid.shape * m;
-  const double s = std::sqrt(m.dot(S_m));
-  const Eigen::Vector3d k_dot = (p.ellipsoid.shape * m_dot - S_m * (S_m.dot(m_dot) / (s * s))) / s;
-  return omega.cross(p.link.R_WL * S_m / s) + p.link.R_WL * k_dot;
-}
-
-ClearanceSample between(const Placed& a, const Placed& b, const EllipsoidGap& gap) noexcept {
-  const Eigen::Vector3d d = b.centre - a.centre;
-  const Eigen::Vector3d d_dot = b.motion.velocity - a.motion.velocity;
-  const Eigen::Vector3d d_ddot = b.motion.acceleration - a.motion.acceleration;
-  const Eigen::Vector3d& n = gap.normal;
-  // n keeps the slope of φ across it at zero. To first order h does not feel that n turns; n'' counts along n alone.
-  const Eigen::Vector3d n_dot = gap.turn(d_dot - support_rate(a, n) - support_rate(b, n));
-  const Eigen::Vector3d n_ddot = -n_dot.squaredNorm() * n;
-  const HalfWidth s_a = half_width(a, n, n_dot, n_ddot);
-  const HalfWidth s_b = half_width(b, n, n_dot, n_ddot);
-  return {gap.value,
-          n.dot(d_dot) + n_dot.dot(d) - s_a.rate - s_b.rate,
-          n.dot(d_ddot) + 2.0 * n_dot.dot(d_dot) + n_ddot.dot(d) - s_a.curvature - s_b.curvature,
-          {{-(a.centre + s_a.slope).cross(n), -n}, {(b.centre - s_b.slope).cross(n), n}}};
-}
-
-/// The ellipsoids of two links at a state.
+/// The ellipsoids of two links at a state, in the frame of the first.
 class PairOfLinks {
  public:
   template <class Group>
   PairOfLinks(const KinematicState& state, const Group& first, const Group& second) noexcept
-      : first_(ball(state, first)), second_(ball(state, second)) {}
+      : first_(link_or_world(state, first.joint)),
+        second_(link_or_world(state, second.joint)),
+        R_(first_.R_WL.transpose() * second_.R_WL),
+        p_(first_.R_WL.transpose() * (second_.p_WL - first_.p_WL)),
+        a_{first.ellipsoids, first.centre, first.radius},
+        b_{second.ellipsoids, R_ * second.centre + p_, second.radius} {}
 
   /// Calls act(a, b, bound) for pairs of ellipsoids of which a lower bound of the gap is below the limit, which `act` may
   /// lower. Balls are tested from the whole links down: most pairs of links, then of ellipsoids, are too far apart.
   template <class Act>
   void for_each_below(const double& limit, Act&& act) const noexcept {
-    if (!near(first_, second_.centre, second_.radius, limit)) {
+    if (!near(a_.centre, b_.centre, a_.radius + b_.radius + limit)) {
       return;
     }
-    constexpr std::size_t most = 32;  // ellipsoids of the second link that are looked at together
-    const std::vector<BodyEllipsoid>& all = *second_.ellipsoids;
-    for (std::size_t start = 0; start < all.size(); start += most) {
-      std::array<Side, most> sides;
-      std::size_t num = 0;
-      for (std::size_t n = start; n < std::min(start + most, all.size()); ++n) {
-        const Eigen::Vector3d centre = second_.link->p_WL + second_.link->R_WL * all[n].mean;
-        if (near(first_, centre, all[n].extent, limit)) {
-          sides[num++] = {second_.link, &all[n], centre};
-        }
+    for (const BodyEllipsoid& b : b_.ellipsoids) {
+      const Eigen::Vector3d centre = R_ * b.mean + p_;
+      if (!near(a_.centre, centre, a_.radius + b.extent + limit)) {
+        continue;
       }
-      for (std::size_t m = 0; num > 0 && m < first_.ellipsoids->size(); ++m) {
-        const BodyEllipsoid& ellipsoid = (*first_.ellipsoids)[m];
-        const Side a{first_.link, &ellipsoid, first_.link->p_WL + first_.link->R_WL * ellipsoid.mean};
-        if (!near(second_, a.centre, ellipsoid.extent, limit)) {
+      for (const BodyEllipsoid& a : a_.ellipsoids) {
+        const Eigen::Vector3d d = centre - a.mean;
+        if (!near(centre, a.mean, a.extent + b.extent + limit)) {
           continue;
         }
-        for (std::size_t n = 0; n < num; ++n) {
-          const Side& b = sides[n];
-          if (!near(a.centre, b.centre, ellipsoid.extent + b.ellipsoid->extent + limit)) {
-            continue;
-          }
-          const Eigen::Vector3d d = b.centre - a.centre;
-          const double length = std::max(d.norm(), closest_centres);
-          const double bound = length - a.half_width(d / length) - b.half_width(d / length);
-          if (bound < limit) {
-            act(a, b, bound);
-          }
+        const double length = std::max(d.norm(), closest_centres);
+        const Eigen::Vector3d n = d / length, n_b = R_.transpose() * n;
+        const double bound = length - std::sqrt(n.dot(a.shape * n)) - std::sqrt(n_b.dot(b.shape * n_b));
+        if (bound < limit) {
+          act(a, b, bound);
         }
       }
     }
+  }
+
+  EllipsoidGaps gaps() const noexcept { return {first_, second_}; }
+
+  /// With equal and opposite wrenches about the world origin: they act at either end of the gap, along it.
+  ClearanceSample sample(const EllipsoidGap& gap) const noexcept {
+    const Eigen::Vector3d n = first_.R_WL * gap.normal, moment = (first_.R_WL * gap.contact + first_.p_WL).cross(n);
+    return {gap.value, gap.rate, gap.curvature, {{-moment, -n}, {moment, n}}};
   }
 
  private:
-  struct Ball {
-    const KinematicState::Link* link;
-    const std::vector<BodyEllipsoid>* ellipsoids;
-    Eigen::Vector3d centre;
+  struct Ellipsoids {
+    const std::vector<BodyEllipsoid>& ellipsoids;
+    Eigen::Vector3d centre;  // of a ball around them
     double radius;
+
+    auto begin() const noexcept { return ellipsoids.begin(); }
+    auto end() const noexcept { return ellipsoids.end(); }
   };
-  template <class Group>
-  static Ball ball(const KinematicState& state, const Group& group) noexcept {
-    const KinematicState::Link& link = link_or_world(state, group.joint);
-    return {&link, &group.ellipsoids, link.p_WL + link.R_WL * group.centre, group.radius};
-  }
   static bool near(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double distance) noexcept {
     return distance > 0.0 && (b - a).squaredNorm() < distance * distance;
   }
-  static bool near(const Ball& ball, const Eigen::Vector3d& centre, double radius, double limit) noexcept {
-    return near(ball.centre, centre, ball.radius + radius + limit);
+
+  const KinematicState::Link &first_, &second_;
+  Eigen::Matrix3d R_;
+  Eigen::Vector3d p_;
+  Ellipsoids a_, b_;
+};
+
+/// The mean of the gaps of two links, from pairs of ellipsoids that come in any order.
+class MeanGap {
+ public:
+  MeanGap(const PairOfLinks& links, double temperature) noexcept
+      : links_(links), mean_(temperature), gaps_(links.gaps()) {}
+
+  void add(const BodyEllipsoid& a, const BodyEllipsoid& b) noexcept {
+    if (gaps_.full()) {
+      flush();
+    }
+    components_[static_cast<std::size_t>(gaps_.size())] = b.component;
+    gaps_.add(a.mean, a.shape, b.mean, b.shape);
   }
 
-  Ball first_, second_;
+  /// With what was added so far; not to be called before.
+  ClearanceSample result() noexcept {
+    flush();
+    return mean_.result();
+  }
+
+  /// Of the second link, as of the result.
+  int nearest() const noexcept { return nearest_; }
+
+ private:
+  void flush() noexcept {
+    gaps_.solve();
+    for (int k = 0; k < gaps_.size(); ++k) {
+      if (mean_.matters(gaps_.value(k)) && mean_.add(links_.sample(gaps_[k]))) {
+        nearest_ = components_[static_cast<std::size_t>(k)];
+      }
+    }
+    gaps_.clear();
+  }
+
+  const PairOfLinks& links_;
+  BoltzmannMean mean_;
+  EllipsoidGaps gaps_;
+  std::array<int, EllipsoidPairs::capacity> components_;  // of the second link
+  int nearest_ = -1;
+};
+
+/// Half-width s of a link's ellipsoid along a unit vector n that stands still, with s' and s'' at q̈ = 0.
+struct Support {
+  double value, rate, curvature;
+  Eigen::Vector3d point;  ///< of the boundary farthest along n, from the centre (world)
+
+  Support(const KinematicState::Link& link, const BodyEllipsoid& ellipsoid, const Eigen::Vector3d& n) noexcept {
+    // n seen from the link; d/dt (Rᵀ z) = Rᵀ (ż − ω × z), twice.
+    const Eigen::Vector3d& omega = link.velocity.angular;
+    const Eigen::Vector3d turning = n.cross(omega);
+    const Eigen::Vector3d m = link.R_WL.transpose() * n;
+    const Eigen::Vector3d m_dot = link.R_WL.transpose() * turning;
+    const Eigen::Vector3d m_ddot = link.R_WL.transpose() * (n.cross(link.bias.angular) - omega.cross(turning));
+    const Eigen::Vector3d S_m = ellipsoid.shape * m;
+    value = std::sqrt(m.dot(S_m));
+    rate = S_m.dot(m_dot) / value;
+    curvature = (m_dot.dot(ellipsoid.shape * m_dot) + S_m.dot(m_ddot) - rate * rate) / value;
+    point = link.R_WL * S_m / value;
+  }
 };
 
 void write(const ClearanceSample& sample, int nearest, const KinematicState& state, int joint_a, int joint_b,
@@ -243,38 +222,28 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
   const double window = BoltzmannMean::window * temperature_;
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
-    // The smallest gap first, from that with the smallest bound: most pairs of links end here, and of the others only
-    // what lies near it matters.
+    // Most pairs of links end here. Of the others, what lies near the gap of the smallest bound matters, which is no
+    // smaller than the smallest.
     const double reach = reach_ + pairs_[i].contact;  // of the gap
     double least_bound = reach;
-    Side first, second;
-    pair.for_each_below(least_bound, [&](const Side& a, const Side& b, double bound) {
-      first = a, second = b;
+    const BodyEllipsoid *first = nullptr, *second = nullptr;
+    pair.for_each_below(least_bound, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double bound) {
+      first = &a, second = &b;
       least_bound = bound;
     });
-    if (!(least_bound < reach)) {
+    if (first == nullptr) {
       continue;
     }
-    double smallest = std::min(reach, gap_between(first, second).value);
-    pair.for_each_below(smallest, [&](const Side& a, const Side& b, double /*bound*/) {
-      smallest = std::min(smallest, gap_between(a, b).value);
-    });
-    if (!(smallest < reach)) {
-      continue;
-    }
-    BoltzmannMean mean(temperature_);
-    int nearest = -1;
-    const double limit = smallest + window;
-    pair.for_each_below(limit, [&](const Side& a, const Side& b, double /*bound*/) {
-      const EllipsoidGap gap = gap_between(a, b);
-      if (gap.value < limit && mean.add(between(Placed(a), Placed(b), gap))) {
-        nearest = b.ellipsoid->component;
-      }
-    });
+    EllipsoidGaps likely = pair.gaps();
+    likely.add(first->mean, first->shape, second->mean, second->shape);
+    likely.solve();
+    const double limit = std::min(reach, likely.value(0)) + window;
+    MeanGap mean(pair, temperature_);
+    pair.for_each_below(limit, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double) { mean.add(a, b); });
     ClearanceSample result = mean.result();
     result.value -= pairs_[i].contact;
     if (result.value < reach_) {
-      write(result, nearest, state, pairs_[i].first.joint, pairs_[i].second.joint, static_cast<Eigen::Index>(i),
+      write(result, mean.nearest(), state, pairs_[i].first.joint, pairs_[i].second.joint, static_cast<Eigen::Index>(i),
             out.clearances);
     }
   }
@@ -319,22 +288,22 @@ CoordinateLabel PlaneBarrier::label(int k) const {
 
 void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
                           const Obstacles& /*obstacles*/) const noexcept {
-  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     BoltzmannMean mean(temperature_);
     int nearest = -1;
     for (const BodyEllipsoid& ellipsoid : links_[i]) {
-      const Placed placed(link_or_world(state, ellipsoid.joint), ellipsoid);
-      const HalfWidth s = half_width(placed, normal_, zero, zero);
-      const double value = normal_.dot(placed.centre) - offset_ - s.value;
+      const KinematicState::Link& link = link_or_world(state, ellipsoid.joint);
+      const Eigen::Vector3d centre = link.p_WL + link.R_WL * ellipsoid.mean;
+      const Support support(link, ellipsoid, normal_);
+      const double value = normal_.dot(centre) - offset_ - support.value;
       if (!(value < reach_ + BoltzmannMean::window * temperature_) || !mean.matters(value)) {
         continue;
       }
-      // δh = normal·δp + δθ·(normal × slope).
-      const SpatialForce wrench{placed.centre.cross(normal_) + normal_.cross(s.slope), normal_};
-      if (mean.add({value, normal_.dot(placed.motion.velocity) - s.rate,
-                    normal_.dot(placed.motion.acceleration) - s.curvature, {wrench, {}}})) {
+      const PointMotion motion = point_motion(link, centre);
+      const SpatialForce wrench{(centre - support.point).cross(normal_), normal_};
+      if (mean.add({value, normal_.dot(motion.velocity) - support.rate,
+                    normal_.dot(motion.acceleration) - support.curvature, {wrench, {}}})) {
         nearest = ellipsoid.component;
       }
     }

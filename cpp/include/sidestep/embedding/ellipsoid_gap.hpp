@@ -2,9 +2,12 @@
 
 #include <Eigen/Core>
 
+#include "sidestep/embedding/body_ellipsoid.hpp"
+#include "sidestep/embedding/ellipsoid_pairs.hpp"
+
 namespace sidestep {
 
-/// The gap between two ellipsoids and the unit vector along it.
+/// The gap between two ellipsoids and how it changes.
 ///
 /// With centres d apart and half-widths s(n) = √(nᵀ S n) the gap is
 ///
@@ -12,19 +15,42 @@ namespace sidestep {
 ///
 /// the distance of ellipsoids that are apart. Of those that overlap it is less than zero: minus the depth, or where d is
 /// much shorter than the semi-axes, that of a maximum near the line of centres. φ of any n is a lower bound of h.
+///
+/// Seen from a, whose half-widths rest, h' and h'' are those of φ with n held, plus what n gains by following the maximum,
+///
+///     h' = φ',   h'' = φ'' + gᵀ (−∂²φ)⁻¹ g,   g = (∂φ)' across n.
 struct EllipsoidGap {
-  double value;            ///< h [m]
-  Eigen::Vector3d normal;  ///< n, from a to b
-
-  Eigen::Matrix<double, 3, 2> tangents;  ///< two unit vectors across n
-  Eigen::Matrix2d curvature;             ///< −∂²φ across n: positive definite
-
-  /// How n moves (3) where ∂φ across n moves by `gradient_rate` (3).
-  Eigen::Vector3d turn(const Eigen::Vector3d& gradient_rate) const noexcept;
+  double value, rate, curvature;  ///< h [m], h', and h'' at q̈ = 0
+  Eigen::Vector3d normal;         ///< n, from a to b
+  Eigen::Vector3d contact;        ///< the point of b nearest to a [m]: b moved by v there, the gap grows by n·v
 };
 
-/// Newton's method on the sphere, from the line of centres: d (3), and S_a and S_b (3 × 3), positive definite, in one
-/// frame [m, m²]. Ends after 16 steps at most.
+/// Gaps between ellipsoids of two links that are asked together, by Newton's method on the sphere from the line of
+/// centres, in 16 steps at most.
+class EllipsoidGaps {
+ public:
+  /// Vectors and gaps are in the frame of a, or of the world if none is given.
+  EllipsoidGaps() noexcept = default;
+  EllipsoidGaps(const KinematicState::Link& a, const KinematicState::Link& b) noexcept;
+
+  bool full() const noexcept { return pairs_.size == EllipsoidPairs::capacity; }
+  int size() const noexcept { return pairs_.size; }
+  void clear() noexcept { pairs_.size = 0; }
+
+  /// Of a and b, each in its frame: centres (3) [m], and S (3 × 3), positive definite [m²]. Not to be called when full.
+  void add(const Eigen::Vector3d& centre_a, const Eigen::Matrix3d& S_a, const Eigen::Vector3d& centre_b,
+           const Eigen::Matrix3d& S_b) noexcept;
+  /// To be called before gaps are read.
+  void solve() noexcept;
+
+  double value(int k) const noexcept { return pairs_.value[k]; }
+  EllipsoidGap operator[](int k) const noexcept;
+
+ private:
+  EllipsoidPairs pairs_;
+};
+
+/// The gap of one pair at rest, with centres d apart.
 EllipsoidGap ellipsoid_gap(const Eigen::Vector3d& d, const Eigen::Matrix3d& S_a, const Eigen::Matrix3d& S_b) noexcept;
 
 }  // namespace sidestep
