@@ -135,14 +135,26 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     const Lanes y = load(points.position[1] + n) - group.centre[1][k];
     const Lanes z = load(points.position[2] + n) - group.centre[2][k];
     const Lanes radius = load(points.radius + n);
+    const Lanes span = group.limit[k] + group.extent[k] + radius;  // to where the ball around the ellipsoid matters
+    if (below(x * x + y * y + z * z, span > 0.0 ? span * span : Lanes{}) == 0) {
+      continue;
+    }
     Lanes e[3];  // the offset in principal axes
     for (int i = 0; i < 3; ++i) {
       e[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
     }
 
-    // t from below. Newton's iteration on 1/√S − 1, which is concave in t, stays below; and so does t |w| below h.
+    // t from below. Newton's iteration on 1/√S − 1, which is concave in t, stays below; and so does t |w| below h. It begins
+    // at the best of where it comes to from infinity and, along every axis, of that axis alone.
     Outside out;
-    out.t = Lanes{};
+    Lanes second = {}, fourth = {};
+    for (int i = 0; i < 3; ++i) {
+      const Lanes term = A[i] * e[i] * e[i];
+      second += term;
+      fourth += A[i] * term;
+    }
+    const Lanes from_infinity = root(second) - fourth / second;  // not a number at the centre
+    out.t = from_infinity > 0.0 ? from_infinity : Lanes{};
     for (int i = 0; i < 3; ++i) {
       const Lanes least = query.semi_axes[i] * magnitude(e[i]) - A[i];
       out.t = least > out.t ? least : out.t;
@@ -174,7 +186,7 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     }
     for (int i = 0; i < most_iterations; ++i) {
       const Lanes root_S = root(S);
-      if (below(all(converged), root_S) == 0) {
+      if ((below(all(converged), root_S) & (below(h, limit) | any_inside)) == 0) {
         break;
       }
       const Lanes step = S * (root_S - 1.0) / out.flatness;
