@@ -7,6 +7,7 @@ the triangles of the collision meshes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from sidestep._core import JointType
 from sidestep.pose import from_quaternion, moved, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.scene import SceneObject, check_scene
-from sidestep.simulation.solid import POINT_RADIUS, Solid, contains, mesh_solid, object_solid, penetration
+from sidestep.simulation.solid import POINT_RADIUS, Solid, mesh_solid, object_solid, penetration
 
 Array = npt.NDArray[np.float64]
 
@@ -53,7 +54,7 @@ class PathClearance:
         clearance: the closest pair at the sample found to be worst.
         sample: its position along the trajectory, in samples (4.25: a quarter of the way from 4 to 5).
         lower_bound: [m] no moment of the motion has a smaller clearance than this.
-        checks: number of distance computations that this took.
+        checks: number of looks at a pair that this took.
         tolerance: [m] the one asked for, or a larger one after `FINE_CHECKS` (a run that diverged).
     """
 
@@ -120,9 +121,8 @@ class ExactClearance:
         for i, link in enumerate(self._links):
             X_WL = self.robot.pose(q, link.name)
             for j in range(len(self._objects)):
-                centers_apart = float(np.linalg.norm(X_WL[:3, 3] - poses[j, :3]))
-                if centers_apart - link.bounding_radius - self._objects[j].bounding_radius >= best.distance:
-                    continue  # even their bounding balls are farther apart than the closest pair so far
+                if self._balls_apart(i, j, X_WL, poses[j]) >= best.distance:
+                    continue
                 found = self._pair(i, j, X_WL, poses[j])
                 if found.distance < best.distance:
                     best = found
@@ -189,13 +189,17 @@ class ExactClearance:
             s = 0.0
             while True:
                 q, pose = _interpolate(path, s), _interpolate_pose(poses[:, j], s)
-                found = self._pair(i, j, self.robot.pose(q, self._links[i].name), pose)
+                X_WL = self.robot.pose(q, self._links[i].name)
+                at_least = self._balls_apart(i, j, X_WL, pose)
+                if at_least <= best.distance:
+                    found = self._pair(i, j, X_WL, pose)
+                    at_least = found.distance
+                    if found.distance < best.distance:
+                        best, where = found, s
                 checks += 1
-                if found.distance < best.distance:
-                    best, where = found, s
                 if checks >= FINE_CHECKS:
                     tolerance = coarse
-                following = _advance(so_far, s, found.distance - best.distance + tolerance)
+                following = _advance(so_far, s, at_least - best.distance + tolerance)
                 if following is None:
                     break
                 s = following
@@ -272,6 +276,11 @@ class ExactClearance:
     def _start_poses(self) -> Array:
         return np.array([pose_vector(item.pose) for item in self.objects]).reshape(-1, 7)
 
+    def _balls_apart(self, i: int, j: int, X_WL: Array, pose: Array) -> float:
+        """The gap between the bounding balls of a link and an object: no more than their distance."""
+        radii = self._links[i].bounding_radius + self._objects[j].bounding_radius
+        return math.dist(X_WL[:3, 3], pose[:3]) - radii
+
     def _pair(self, i: int, j: int, X_WL: Array, pose: Array) -> Clearance:
         """One link, with its frame at X_WL (4, 4), and one object at `pose` (7,)."""
         link, item = self._links[i], self._objects[j]
@@ -284,7 +293,7 @@ class ExactClearance:
         value = coal.distance(link.shape, X_link, item.shape, X_item, request, result)
         on_link, on_item = np.array(result.getNearestPoint1()), np.array(result.getNearestPoint2())
         reference_L = X_WL[:3, :3].T @ (R @ item.reference + p - X_WL[:3, 3])
-        inside = link.surface is not None and contains(link.surface, reference_L)
+        inside = link.surface is not None and link.surface.contains(reference_L)
         if item.radius > 0.0:  # a ball, measured from its centre
             depth = value + POINT_RADIUS
             value = (-depth if inside else depth) - item.radius
@@ -295,7 +304,7 @@ class ExactClearance:
         elif value <= 0.0:
             value = min(value, -penetration(link.shape, X_link, item.shape, X_item))
         elif inside or (
-            item.surface is not None and contains(item.surface, R.T @ (_world(X_WL, link.reference) - p))
+            item.surface is not None and item.surface.contains(R.T @ (_world(X_WL, link.reference) - p))
         ):
             value = -value
         return Clearance(float(value), link.name, item.name, on_link, on_item)

@@ -17,6 +17,25 @@ POINT_RADIUS = 1e-9  # [m] Coal has no point; a sphere this small stands for the
 MAX_CONTACTS = 10_000  # contacts kept for a penetration depth: more than the triangles of any overlap
 
 
+class Surface:
+    """A closed surface of triangles (F, 3, 3)."""
+
+    def __init__(self, triangles: Array) -> None:
+        self._triangles = triangles
+        self._low, self._high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+
+    def contains(self, point: Array) -> bool:
+        """Whether a point (3,) is inside: its winding number (van Oosterom, Strackee 1983) exceeds one half."""
+        if (point < self._low).any() or (point > self._high).any():
+            return False
+        a, b, c = (self._triangles[:, k] - point for k in range(3))
+        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        dots = [np.einsum("ij,ij->i", u, w) for u, w in ((a, b), (b, c), (c, a))]
+        solid_angles = 2.0 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
+        return bool(abs(solid_angles.sum()) > 2.0 * np.pi)
+
+
 @dataclass(frozen=True, eq=False)
 class Solid:
     """A rigid shape for Coal. A ball is kept as its centre and `radius` is subtracted afterwards."""
@@ -24,7 +43,7 @@ class Solid:
     name: str
     shape: coal.CollisionGeometry
     radius: float
-    surface: Array | None  # (F, 3, 3) triangles, hollow for Coal; None for primitives, which are solid
+    surface: Surface | None  # hollow for Coal; None for primitives, which are solid
     reference: Array  # (3,) a point of the shape, in its frame
     bounding_radius: float
 
@@ -46,7 +65,7 @@ def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
 def mesh_solid(name: str, mesh: trimesh.Trimesh) -> Solid:
     radius = float(np.linalg.norm(mesh.vertices, axis=1).max())
     triangles = np.array(mesh.triangles, dtype=float)
-    return Solid(name, mesh_model(mesh), 0.0, triangles, triangles[0, 0], radius)
+    return Solid(name, mesh_model(mesh), 0.0, Surface(triangles), triangles[0, 0], radius)
 
 
 def object_solid(item: SceneObject) -> Solid:
@@ -66,16 +85,3 @@ def penetration(
     coal.collide(a, X_a, b, X_b, request, result)
     depths = [abs(result.getContact(k).penetration_depth) for k in range(result.numContacts())]
     return float(max(depths, default=0.0))
-
-
-def contains(surface: Array, point: Array) -> bool:
-    """Whether a point is inside a surface: its winding number (van Oosterom, Strackee 1983) exceeds one
-    half."""
-    if np.any(point < surface.min(axis=(0, 1))) or np.any(point > surface.max(axis=(0, 1))):
-        return False
-    a, b, c = (surface[:, k] - point for k in range(3))
-    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = [np.einsum("ij,ij->i", u, w) for u, w in ((a, b), (b, c), (c, a))]
-    solid_angles = 2.0 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
-    return bool(abs(solid_angles.sum()) > 2.0 * np.pi)
