@@ -1,4 +1,4 @@
-"""Makes the covering bodies that come with Sidestep (src/sidestep/body/covers), one minute each.
+"""Makes the covering bodies and pairs of links that come with Sidestep, in src/sidestep/body/covers; a minute each.
 
     python benchmarks/ship_covers.py
 
@@ -13,6 +13,7 @@ import shutil
 from sidestep import Body, Robot
 from sidestep.body import cache
 from sidestep.body.cover import CoverSettings
+from sidestep.link_pairs import barrier_pairs, stored_at
 
 ROBOTS = ("fr3", "fr3_arm", "panda", "ur10", "xarm7", "iiwa", "planar3")
 
@@ -22,10 +23,11 @@ def main() -> None:
     cache.SHIPPED.mkdir()
     for name in ROBOTS:
         robot = Robot.named(name)
-        Body.cover(robot)
-        path = cache.cache_path(robot, CoverSettings())
-        shutil.copy(path, cache.SHIPPED / path.name)
-        print(f"{name}: {path.name}")
+        body = Body.cover(robot)
+        barrier_pairs(robot, body)
+        for path in (cache.cache_path(robot, CoverSettings()), stored_at(robot, body)):
+            shutil.copy(path, cache.SHIPPED / path.name)
+            print(f"{name}: {path.name}")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sidestep import Body, Obstacles, Robot, SelfCollision, SelfCollisionBarrier
-from sidestep.link_pairs import NEAR, barrier_pairs
+from sidestep.body.cache import SHIPPED
+from sidestep.link_pairs import NEAR, barrier_pairs, stored_at
 
 
 @pytest.fixture(autouse=True)
@@ -64,3 +65,23 @@ def test_a_contact_moves_the_clearance_by_as_much() -> None:
     np.testing.assert_allclose(moved.clearance_rates, plain.clearance_rates, atol=1e-15)
     with pytest.raises(ValueError, match="'link1' and 'link3' is nan m, must be finite"):
         SelfCollisionBarrier(robot, body, [("link1", "link3", float("nan"))])
+
+
+def test_pairs_are_kept_and_made_again_where_they_cannot_be_read() -> None:
+    robot = Robot.named("planar3")
+    body = Body.cover(robot, components=4)
+    pairs = barrier_pairs(robot, body)
+    path = stored_at(robot, body)
+    path.write_text('[["link1", "link3", -0.25]]')
+    assert barrier_pairs(robot, body) == (("link1", "link3", -0.25),)  # it is read
+    path.write_text("[[")
+    with pytest.warns(RuntimeWarning, match="is unreadable and is made again"):
+        assert barrier_pairs(robot, body) == pairs
+    assert barrier_pairs(robot, body) == pairs  # and written again
+    assert stored_at(robot, Body.cover(robot, components=5)) != path
+
+
+@pytest.mark.parametrize("name", ["fr3", "fr3_arm", "panda", "ur10", "xarm7", "iiwa", "planar3"])
+def test_pairs_of_covers_that_come_along_come_along(name: str) -> None:
+    robot = Robot.named(name)
+    assert (SHIPPED / stored_at(robot, Body.cover(robot)).name).is_file()

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from sidestep.robot import Robot
 
 CACHE_VARIABLE = "SIDESTEP_CACHE_DIR"
-SHIPPED = (
-    Path(__file__).parent / "covers"
-)  # made by benchmarks/ship_covers.py, under the names of `cache_path`
+SHIPPED = Path(__file__).parent / "covers"  # made by benchmarks/ship_covers.py, under the names of the cache
 
 
 def cache_directory() -> Path:

@@ -68,8 +68,7 @@ class BodyContents:
 
 
 def write(path: str | Path, contents: BodyContents) -> None:
-    """Writes a body file in one piece: a reader sees the old file or the new one, never a part."""
-    path = Path(path)
+    """Writes a body file, in one piece."""
     document = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -78,11 +77,15 @@ def write(path: str | Path, contents: BodyContents) -> None:
         "settings": asdict(contents.settings),
         "links": [_link_document(link) for link in contents.links],
     }
-    text = json.dumps(document, indent=1, allow_nan=False)
+    write_text(Path(path), json.dumps(document, indent=1, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a file in one piece: a reader sees the old file or the new one, never a part."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text + "\n")
+            stream.write(text)
         Path(name).chmod(0o644)  # mkstemp makes files that only their owner reads
         os.replace(name, path)
     except BaseException:

@@ -101,6 +101,7 @@ class SelfCollision:
                     travel += travel_per_joint(robot, name, mesh, beyond=shared)
                 self._pairs.append(_PairOfLinks(i, j, travel))
         self._leave_out_what_always_touches(samples, np.random.default_rng(seed))
+        self._by_name = {self._name(pair): pair for pair in self._pairs}
 
     @classmethod
     def from_srdf(
@@ -210,9 +211,9 @@ class SelfCollision:
         self._pairs = [pair for pair in self._pairs if self._name(pair) not in self.left_out]
 
     def _find(self, first: str, second: str) -> _PairOfLinks:
-        for pair in self._pairs:
-            if {first, second} == set(self._name(pair)):
-                return pair
+        for a, b in ((first, second), (second, first)):
+            if (a, b) in self._by_name:
+                return self._by_name[a, b]
         raise ValueError(f"the pair ({first}, {second}) is not checked; see `pairs` and `left_out`")
 
     def _name(self, pair: _PairOfLinks) -> Pair:
