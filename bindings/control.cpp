@@ -138,7 +138,7 @@ void bind_safety(nb::module_& m) {
       .def(
           "__init__",
           [](Clearances* self, const ArrayLike& values, const ArrayLike& rates, const ArrayLike& curvatures,
-             const ArrayLike& gradients, const std::vector<int>& nearest, const std::optional<ArrayLike>& mixing) {
+             const ArrayLike& gradients, const std::vector<int>& nearest) {
             const auto num = static_cast<Eigen::Index>(nearest.size());
             const Array rows = as_array(gradients, "gradients");
             if (rows.ndim() != 2) {
@@ -151,21 +151,21 @@ void bind_safety(nb::module_& m) {
             result.curvatures = as_vector(curvatures, "curvatures", num);
             result.gradients = as_matrix(gradients, "gradients", num, nv).transpose();
             result.nearest = Eigen::Map<const Eigen::VectorXi>(nearest.data(), num);
-            if (mixing) {
-              result.mixing = as_vector(*mixing, "mixing", num);
-            }
+            result.mind_nearest();
             new (self) Clearances(std::move(result));
           },
           nb::kw_only(), nb::arg("values"), nb::arg("rates"), nb::arg("curvatures"), nb::arg("gradients"),
-          nb::arg("nearest"), nb::arg("mixing") = nb::none())
+          nb::arg("nearest"))
       .def_prop_ro("values", [](const Clearances& c) { return to_numpy(c.values); },
                    "h (m,) [m]; inf beyond the reach, where the rest has no meaning.")
       .def_prop_ro("rates", [](const Clearances& c) { return to_numpy(c.rates); },
                    "dh/dt (m,) [m/s], obstacle velocities included.")
       .def_prop_ro("curvatures", [](const Clearances& c) { return to_numpy(c.curvatures); },
                    "d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity.")
-      .def_prop_ro("mixing", [](const Clearances& c) { return to_numpy(c.mixing); },
-                   "What of the curvatures is the mean going over from point to point (m,) [m/s^2].")
+      .def_prop_ro("approach_values", [](const Clearances& c) { return to_numpy(c.approach.values); },
+                   "h (m,) [m] of what the arm has to mind where it moves: that with the least room after a stop.")
+      .def_prop_ro("approach_rates", [](const Clearances& c) { return to_numpy(c.approach.rates); },
+                   "Its dh/dt (m,) [m/s].")
       .def_prop_ro("gradients", [](const Clearances& c) { return to_numpy_matrix(c.gradients.transpose()); },
                    "dh/dq (m, nv) [m/rad].")
       .def_prop_ro("nearest",
@@ -180,29 +180,27 @@ void bind_safety(nb::module_& m) {
       "What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing\n"
       "speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest\n"
       "one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;\n"
-      "lookahead [s] and max_rows: when more clearances are active, those with the smallest room predicted that far\n"
-      "ahead are kept. Raises ValueError that names the setting.")
+      "max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises ValueError that names the setting.")
       .def(
           "__init__",
           [](SafetySettings* self, double margin, double rate, double braking_fraction, double correction,
-             double lookahead, int max_rows) {
-            const SafetySettings settings{margin, rate, braking_fraction, correction, lookahead, max_rows};
+             int max_rows) {
+            const SafetySettings settings{margin, rate, braking_fraction, correction, max_rows};
             settings.validate();
             new (self) SafetySettings(settings);
           },
           nb::kw_only(), nb::arg("margin") = defaults.margin, nb::arg("rate") = defaults.rate,
           nb::arg("braking_fraction") = defaults.braking_fraction, nb::arg("correction") = defaults.correction,
-          nb::arg("lookahead") = defaults.lookahead, nb::arg("max_rows") = defaults.max_rows)
+          nb::arg("max_rows") = defaults.max_rows)
       .def_ro("margin", &SafetySettings::margin)
       .def_ro("rate", &SafetySettings::rate)
       .def_ro("braking_fraction", &SafetySettings::braking_fraction)
       .def_ro("correction", &SafetySettings::correction)
-      .def_ro("lookahead", &SafetySettings::lookahead)
       .def_ro("max_rows", &SafetySettings::max_rows)
       .def("__repr__", [](const SafetySettings& s) {
         return "SafetySettings(margin=" + std::to_string(s.margin) + ", rate=" + std::to_string(s.rate) +
                ", braking_fraction=" + std::to_string(s.braking_fraction) + ", correction=" +
-               std::to_string(s.correction) + ", lookahead=" + std::to_string(s.lookahead) + ", max_rows=" +
+               std::to_string(s.correction) + ", max_rows=" +
                std::to_string(s.max_rows) + ")";
       });
 }

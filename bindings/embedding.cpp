@@ -54,8 +54,6 @@ void bind_embedding(nb::module_& m) {
       .def_prop_ro("clearance_curvatures",
                    [](const EmbeddingEvaluation& e) { return to_numpy(e.clearances.curvatures); },
                    "d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity.")
-      .def_prop_ro("clearance_mixing", [](const EmbeddingEvaluation& e) { return to_numpy(e.clearances.mixing); },
-                   "What of it is the mean over points going over from one to another (m,) [m/s^2].")
       .def_prop_ro("clearance_gradients",
                    [](const EmbeddingEvaluation& e) { return to_numpy_matrix(e.clearances.gradients.transpose()); },
                    "dh/dq (m, nv) [m/rad].");

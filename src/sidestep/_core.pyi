@@ -228,12 +228,6 @@ class EmbeddingEvaluation:
         """d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity."""
 
     @property
-    def clearance_mixing(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        What of it is the mean over points going over from one to another (m,) [m/s^2].
-        """
-
-    @property
     def clearance_gradients(self) -> numpy.typing.NDArray[numpy.float64]:
         """dh/dq (m, nv) [m/rad]."""
 
@@ -970,7 +964,7 @@ class Clearances:
     Clearances h(q, t) of parts of an arm with what their motion needs; arrays are copies.
     """
 
-    def __init__(self, *, values: numpy.typing.ArrayLike, rates: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike, gradients: numpy.typing.ArrayLike, nearest: Sequence[int], mixing: numpy.typing.ArrayLike | None = None) -> None: ...
+    def __init__(self, *, values: numpy.typing.ArrayLike, rates: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike, gradients: numpy.typing.ArrayLike, nearest: Sequence[int]) -> None: ...
 
     @property
     def values(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -985,10 +979,14 @@ class Clearances:
         """d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity."""
 
     @property
-    def mixing(self) -> numpy.typing.NDArray[numpy.float64]:
+    def approach_values(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        What of the curvatures is the mean going over from point to point (m,) [m/s^2].
+        h (m,) [m] of what the arm has to mind where it moves: that with the least room after a stop.
         """
+
+    @property
+    def approach_rates(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Its dh/dt (m,) [m/s]."""
 
     @property
     def gradients(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1003,11 +1001,10 @@ class SafetySettings:
     What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing
     speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest
     one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;
-    lookahead [s] and max_rows: when more clearances are active, those with the smallest room predicted that far
-    ahead are kept. Raises ValueError that names the setting.
+    max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises ValueError that names the setting.
     """
 
-    def __init__(self, *, margin: float = 0.005, rate: float = 20.0, braking_fraction: float = 0.5, correction: float = 0.5, lookahead: float = 0.1, max_rows: int = 32) -> None: ...
+    def __init__(self, *, margin: float = 0.005, rate: float = 20.0, braking_fraction: float = 0.5, correction: float = 0.5, max_rows: int = 32) -> None: ...
 
     @property
     def margin(self) -> float: ...
@@ -1020,9 +1017,6 @@ class SafetySettings:
 
     @property
     def correction(self) -> float: ...
-
-    @property
-    def lookahead(self) -> float: ...
 
     @property
     def max_rows(self) -> int: ...

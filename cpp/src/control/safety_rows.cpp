@@ -61,7 +61,6 @@ void SafetySettings::validate() const {
   check(rate > 0.0 && rate < infinity, "rate", rate, "finite and positive");
   check(braking_fraction > 0.0 && braking_fraction <= 1.0, "braking_fraction", braking_fraction, "in (0, 1]");
   check(correction > 0.0 && correction <= 1.0, "correction", correction, "in (0, 1]");
-  check(lookahead >= 0.0 && lookahead < infinity, "lookahead", lookahead, "finite and >= 0");
   check(max_rows >= 0, "max_rows", max_rows, ">= 0");
 }
 
@@ -77,16 +76,17 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
 
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
-  if (clearances.values.size() != num || clearances.rates.size() != num || clearances.curvatures.size() != num ||
-      clearances.mixing.size() != num || clearances.gradients.rows() != normals.cols() ||
-      clearances.gradients.cols() != num) {
+  const ClearanceState& approach = clearances.approach;
+  if (clearances.curvatures.size() != num || approach.values.size() != num || approach.rates.size() != num ||
+      approach.curvatures.size() != num || approach.gradients.rows() != normals.cols() ||
+      approach.gradients.cols() != num) {
     return false;
   }
   for (Eigen::Index k = 0; k < num; ++k) {
     if (clearances.nearest[k] >= 0 &&
-        !(std::isfinite(clearances.values[k]) && std::isfinite(clearances.rates[k]) &&
-          std::isfinite(clearances.curvatures[k]) && std::isfinite(clearances.mixing[k]) &&
-          clearances.gradients.col(k).allFinite())) {
+        !(std::isfinite(clearances.curvatures[k]) && std::isfinite(approach.values[k]) &&
+          std::isfinite(approach.rates[k]) && std::isfinite(approach.curvatures[k]) &&
+          approach.gradients.col(k).allFinite())) {
       return false;
     }
   }
@@ -118,15 +118,15 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
                         double period, const BrakingTorque* torque) noexcept {
   const double stop_time = v.cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
   const double rate = stop_time * settings_.rate > 1.0 ? 1.0 / stop_time : settings_.rate;
+  const ClearanceState& approach = clearances.approach;
   // Insert into the list of the most critical, which is kept sorted; it is short.
   size_ = 0;
   for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
     if (clearances.nearest[k] < 0 || max_size() == 0 ||
-        !(clearances.gradients.col(k).norm() > shortest_gradient)) {
+        !(approach.gradients.col(k).norm() > shortest_gradient)) {
       continue;
     }
-    const double room = clearances.values[k] - settings_.margin;
-    const double urgency = room + settings_.lookahead * clearances.rates[k];
+    const double urgency = approach.values[k] - settings_.margin + approach.rates[k] / rate;
     if (size_ == max_size() && urgency >= urgency_[size_ - 1]) {
       continue;
     }
@@ -140,16 +140,16 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
   }
   for (int row = 0; row < size_; ++row) {
     const int k = coordinates[static_cast<std::size_t>(row)];
-    const auto gradient = clearances.gradients.col(k);
+    const auto gradient = approach.gradients.col(k);
     const double hardest = std::max(hardest_deceleration(gradient, limits, torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,
                                 rate, settings_.correction};
     const double demand =
-        demanded_deceleration(clearances.values[k] - settings_.margin, -clearances.rates[k], closing, period);
+        demanded_deceleration(approach.values[k] - settings_.margin, -approach.rates[k], closing, period);
     const double length = gradient.norm();
     normals.row(row) = gradient.transpose() / length;
     // Of the points, but no more than the mean where it says that a surface recedes: see the header.
-    const double c = std::min(clearances.curvatures[k] - clearances.mixing[k], std::max(clearances.curvatures[k], 0.0));
+    const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
     lower[row] = (demand - c) / length;
     lengths[row] = length;
     nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];

@@ -12,8 +12,6 @@ bool BoltzmannMean::add(const ClearanceSample& sample) noexcept {
       sums_.s1 = decay * (sums_.s1 + shift * sums_.s0);
       sums_.s1_dot = decay * (sums_.s1_dot + shift * sums_.s0_dot);
       sums_.s1_ddot = decay * (sums_.s1_ddot + shift * sums_.s0_ddot);
-      sums_.c1 = decay * (sums_.c1 + shift * sums_.c0);
-      sums_.c0 *= decay;
       g1_.add(shift, g0_);
       g1_.scale(decay);
       sums_.s0 *= decay, sums_.s0_dot *= decay, sums_.s0_ddot *= decay;
@@ -29,8 +27,6 @@ bool BoltzmannMean::add(const ClearanceSample& sample) noexcept {
   sums_.s0_dot += w_dot;
   sums_.s0_ddot += w_ddot;
   sums_.s1 += w * above;
-  sums_.c0 += w * sample.curvature;
-  sums_.c1 += w * above * sample.curvature;
   sums_.s1_dot += w_dot * above + w * sample.rate;
   sums_.s1_ddot += w_ddot * above + 2.0 * w_dot * sample.rate + w * sample.curvature;
   g0_.add(-w * inverse_T_, sample.gradient);
@@ -39,7 +35,7 @@ bool BoltzmannMean::add(const ClearanceSample& sample) noexcept {
 }
 
 ClearanceSample BoltzmannMean::result() const noexcept {
-  ClearanceSample mean = sums_.mean(inverse_T_);
+  ClearanceSample mean = sums_.mean();
   mean.gradient = g1_;
   mean.gradient.add(-mean.value, g0_);
   mean.gradient.scale(1.0 / sums_.s0);

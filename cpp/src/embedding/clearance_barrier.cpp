@@ -20,7 +20,7 @@ ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, Barrier
 
 void ClearanceBarrier::add_to(EmbeddingView out, const KinematicState& state,
                               const Obstacles& obstacles) const noexcept {
-  field_.evaluate(state, obstacles, reach_, out.clearances);
+  field_.evaluate(state, obstacles, reach_, horizon(state), out.clearances);
   add_barriers(out);
 }
 

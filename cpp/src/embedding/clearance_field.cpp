@@ -47,21 +47,36 @@ kernels::Points points_of(const PointTree& tree) noexcept {
   return points;
 }
 
-/// The mean of a query's points, with a wrench about the world origin.
-ClearanceSample mean_of(const kernels::Query& query, const Eigen::Vector3d& centre, double inverse_T) noexcept {
-  double s[kernels::sums];
-  for (int i = 0; i < kernels::sums; ++i) {
-    s[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
+/// The means of a query's points, with wrenches about the world origin.
+struct Means {
+  ClearanceSample nearest, approach;
+
+  Means(const kernels::Query& query, const Eigen::Vector3d& centre) noexcept {
+    double s[kernels::sums];
+    for (int i = 0; i < kernels::sums; ++i) {
+      s[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
+    }
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query.axes);
+    const auto wrench = [&](const Eigen::Matrix<double, 6, 1>& gradient) -> WrenchPair {
+      const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
+      return {{centre.cross(force) - axes.transpose() * gradient.tail<3>(), force}, {}};
+    };
+    const auto gradient = [&](int first) { return Eigen::Map<const Eigen::Matrix<double, 6, 1>>(s + first); };
+    nearest = BoltzmannMean::Sums{s[0], s[1], s[2], s[3], s[4], s[5]}.mean();
+    nearest.gradient = wrench((gradient(12) - nearest.value * gradient(6)) / s[0]);
+    nearest.value += query.reference;
+    const double* a = s + kernels::approach;
+    approach = {a[1] / a[0], a[2] / a[0], a[3] / a[0], wrench(gradient(kernels::approach + 4) / a[0])};
   }
-  ClearanceSample mean = BoltzmannMean::Sums{s[0], s[1], s[2], s[3], s[4], s[5], s[18], s[19]}.mean(inverse_T);
-  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> zeroth(s + 6), first(s + 12);
-  const Eigen::Matrix<double, 6, 1> gradient = (first - mean.value * zeroth) / s[0];
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query.axes);
-  const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
-  const Eigen::Vector3d moment = centre.cross(force) - axes.transpose() * gradient.tail<3>();
-  mean.gradient = {{moment, force}, {}};
-  mean.value += query.reference;
-  return mean;
+};
+
+void write(const ClearanceSample& sample, const KinematicState& state, int joint, Eigen::Index at,
+           ClearanceStateView& out) noexcept {
+  out.values[at] = sample.value;
+  out.rates[at] = sample.rate;
+  out.curvatures[at] = sample.curvature;
+  out.gradients.col(at).setZero();
+  accumulate_generalised_force(state, joint, sample.gradient.first, out.gradients.col(at));
 }
 
 }  // namespace
@@ -102,18 +117,24 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
 }
 
 void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
-                              ClearanceView out) const noexcept {
+                              const Horizon& horizon, ClearanceView out) const noexcept {
   const PointTree& tree = obstacles.tree();
   const kernels::Points points = points_of(tree);
   const kernels::AddLeaf add = add_leaf();
   kernels::QueryGroup group;
   group.inverse_T = 1.0 / temperature_;
   group.window = BoltzmannMean::window * temperature_;
+  group.horizon = horizon.time;
   for (const Cluster& cluster : clusters_) {
     const int joint = ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint;
     const KinematicState::Link& link = state.link(joint);
     const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
-    double limit = reach + group.window;  // the largest of the group
+    // No point of the cluster moves faster along a normal, wherever the obstacle is.
+    const double speed = (link.velocity.linear + link.velocity.angular.cross(centre)).norm() +
+                         link.velocity.angular.norm() * cluster.radius + tree.fastest();
+    group.closing = horizon.time * speed;
+    const double far = std::max(reach, horizon.distance + group.closing);
+    double limit = far + group.window;  // the largest of the group
     const auto near = [&](const PointTree::Ball& ball) {
       const double distance = (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).norm();
       return distance - cluster.radius - ball.radius < limit;
@@ -135,7 +156,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
         group.limit[k] = used ? limit : -infinity;
         group.axes_T[k] = ellipsoid.axes_T.data();
         group.semi_axes[k] = ellipsoid.semi_axes.data();
-        group.queries[k].reference = infinity;
+        group.queries[k].reference = group.queries[k].ahead = infinity;
         group.queries[k].ready = false;
       }
       placed = true;
@@ -153,17 +174,12 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       if (!(query.reference < infinity)) {
         continue;
       }
-      const ClearanceSample mean =
-          mean_of(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]}, group.inverse_T);
-      if (mean.value < reach) {
+      const Means means(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]});
+      if (means.nearest.value < far) {
         const Eigen::Index at = cluster.first + k;
-        out.values[at] = mean.value;
-        out.rates[at] = mean.rate;
-        out.curvatures[at] = mean.curvature;
-        out.mixing[at] = mean.mixing;
+        write(means.nearest, state, joint, at, out);
+        write(means.approach, state, joint, at, out.approach);
         out.nearest[at] = tree.order()[static_cast<std::size_t>(query.nearest)];
-        out.gradients.col(at).setZero();
-        accumulate_generalised_force(state, joint, mean.gradient.first, out.gradients.col(at));
       }
     }
   }

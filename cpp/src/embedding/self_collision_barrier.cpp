@@ -56,6 +56,13 @@ class PairOfLinks {
 
   EllipsoidGaps gaps() const noexcept { return {first_, second_}; }
 
+  /// No gap shrinks faster [m/s].
+  double closing_speed() const noexcept {
+    const Eigen::Vector3d omega = second_.velocity.angular - first_.velocity.angular;
+    const Eigen::Vector3d centre = first_.R_WL * b_.centre + first_.p_WL;
+    return (second_.velocity.linear - first_.velocity.linear + omega.cross(centre)).norm() + omega.norm() * b_.radius;
+  }
+
   /// With equal and opposite wrenches about the world origin: they act at either end of the gap, along it.
   ClearanceSample sample(const EllipsoidGap& gap) const noexcept {
     const Eigen::Vector3d n = first_.R_WL * gap.normal, moment = (first_.R_WL * gap.contact + first_.p_WL).cross(n);
@@ -81,11 +88,11 @@ class PairOfLinks {
   Ellipsoids a_, b_;
 };
 
-/// The mean of the gaps of two links, from pairs of ellipsoids that come in any order.
+/// The means of the gaps of two links, from pairs of ellipsoids that come in any order.
 class MeanGap {
  public:
-  MeanGap(const PairOfLinks& links, double temperature) noexcept
-      : links_(links), mean_(temperature), gaps_(links.gaps()) {}
+  MeanGap(const PairOfLinks& links, double temperature, double horizon) noexcept
+      : links_(links), mean_(temperature), approach_(temperature, horizon), gaps_(links.gaps()) {}
 
   void add(const BodyEllipsoid& a, const BodyEllipsoid& b) noexcept {
     if (gaps_.full()) {
@@ -95,28 +102,28 @@ class MeanGap {
     gaps_.add(a.mean, a.shape, b.mean, b.shape);
   }
 
-  /// With what was added so far; not to be called before.
-  ClearanceSample result() noexcept {
-    flush();
-    return mean_.result();
-  }
-
-  /// Of the second link, as of the result.
-  int nearest() const noexcept { return nearest_; }
-
- private:
+  /// To be called after all have been added, and before what follows.
   void flush() noexcept {
     gaps_.solve();
     for (int k = 0; k < gaps_.size(); ++k) {
-      if (mean_.matters(gaps_.value(k)) && mean_.add(links_.sample(gaps_[k]))) {
+      const ClearanceSample sample = links_.sample(gaps_[k]);
+      approach_.add(sample);
+      if (mean_.matters(sample.value) && mean_.add(sample)) {
         nearest_ = components_[static_cast<std::size_t>(k)];
       }
     }
     gaps_.clear();
   }
 
+  ClearanceSample mean() const noexcept { return mean_.result(); }
+  ClearanceSample approach() const noexcept { return approach_.result(); }
+  int nearest() const noexcept { return nearest_; }  ///< of the second link
+
+ private:
+
   const PairOfLinks& links_;
   BoltzmannMean mean_;
+  ApproachMean approach_;
   EllipsoidGaps gaps_;
   std::array<int, EllipsoidPairs::capacity> components_;  // of the second link
   int nearest_ = -1;
@@ -142,13 +149,11 @@ struct Support {
   }
 };
 
-void write(const ClearanceSample& sample, int nearest, const KinematicState& state, int joint_a, int joint_b,
-           Eigen::Index k, ClearanceView& out) noexcept {
+void write(const ClearanceSample& sample, const KinematicState& state, int joint_a, int joint_b, Eigen::Index k,
+           ClearanceStateView& out) noexcept {
   out.values[k] = sample.value;
   out.rates[k] = sample.rate;
   out.curvatures[k] = sample.curvature;
-  out.mixing[k] = sample.mixing;
-  out.nearest[k] = nearest;
   out.gradients.col(k).setZero();
   accumulate_generalised_force(state, joint_a, sample.gradient.first, out.gradients.col(k));
   accumulate_generalised_force(state, joint_b, sample.gradient.second, out.gradients.col(k));
@@ -220,12 +225,14 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
 void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state,
                                   const Obstacles& /*obstacles*/) const noexcept {
   const double window = BoltzmannMean::window * temperature_;
+  const Horizon ahead = horizon(state);
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
     // Most pairs of links end here. Of the others, what lies near the gap of the smallest bound matters, which is no
     // smaller than the smallest.
-    const double reach = reach_ + pairs_[i].contact;  // of the gap
-    double least_bound = reach;
+    const double closing = ahead.time * pair.closing_speed();
+    const double reach = std::max(reach_, ahead.distance + closing);
+    double least_bound = reach + pairs_[i].contact;  // of the gap
     const BodyEllipsoid *first = nullptr, *second = nullptr;
     pair.for_each_below(least_bound, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double bound) {
       first = &a, second = &b;
@@ -237,14 +244,21 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     EllipsoidGaps likely = pair.gaps();
     likely.add(first->mean, first->shape, second->mean, second->shape);
     likely.solve();
-    const double limit = std::min(reach, likely.value(0)) + window;
-    MeanGap mean(pair, temperature_);
-    pair.for_each_below(limit, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double) { mean.add(a, b); });
-    ClearanceSample result = mean.result();
-    result.value -= pairs_[i].contact;
-    if (result.value < reach_) {
-      write(result, mean.nearest(), state, pairs_[i].first.joint, pairs_[i].second.joint, static_cast<Eigen::Index>(i),
-            out.clearances);
+    const EllipsoidGap gap = likely[0];
+    const double limit = window + std::max(std::min(reach + pairs_[i].contact, gap.value),
+                                           gap.value + ahead.time * gap.rate + closing);
+    MeanGap gaps(pair, temperature_, ahead.time);
+    pair.for_each_below(limit, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double) { gaps.add(a, b); });
+    gaps.flush();
+    ClearanceSample mean = gaps.mean(), approach = gaps.approach();
+    mean.value -= pairs_[i].contact;
+    approach.value -= pairs_[i].contact;
+    if (mean.value < reach) {
+      const int first_joint = pairs_[i].first.joint, second_joint = pairs_[i].second.joint;
+      const auto k = static_cast<Eigen::Index>(i);
+      write(mean, state, first_joint, second_joint, k, out.clearances);
+      write(approach, state, first_joint, second_joint, k, out.clearances.approach);
+      out.clearances.nearest[k] = gaps.nearest();
     }
   }
   add_barriers(out);
@@ -288,30 +302,32 @@ CoordinateLabel PlaneBarrier::label(int k) const {
 
 void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
                           const Obstacles& /*obstacles*/) const noexcept {
+  const Horizon ahead = horizon(state);
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     BoltzmannMean mean(temperature_);
+    ApproachMean approach(temperature_, ahead.time);
     int nearest = -1;
     for (const BodyEllipsoid& ellipsoid : links_[i]) {
       const KinematicState::Link& link = link_or_world(state, ellipsoid.joint);
       const Eigen::Vector3d centre = link.p_WL + link.R_WL * ellipsoid.mean;
       const Support support(link, ellipsoid, normal_);
       const double value = normal_.dot(centre) - offset_ - support.value;
-      if (!(value < reach_ + BoltzmannMean::window * temperature_) || !mean.matters(value)) {
-        continue;
-      }
       const PointMotion motion = point_motion(link, centre);
       const SpatialForce wrench{(centre - support.point).cross(normal_), normal_};
-      if (mean.add({value, normal_.dot(motion.velocity) - support.rate,
-                    normal_.dot(motion.acceleration) - support.curvature, {wrench, {}}})) {
+      const ClearanceSample sample{value, normal_.dot(motion.velocity) - support.rate,
+                                   normal_.dot(motion.acceleration) - support.curvature, {wrench, {}}};
+      approach.add(sample);
+      if (mean.matters(value) && mean.add(sample)) {
         nearest = ellipsoid.component;
       }
     }
-    if (!mean.empty()) {
-      const ClearanceSample result = mean.result();
-      if (result.value < reach_) {
-        write(result, nearest, state, links_[i].front().joint, -1, k, out.clearances);
-      }
+    const ClearanceSample result = mean.result(), minded = approach.result();
+    if (std::min(result.value, minded.value + ahead.time * minded.rate - ahead.distance) < reach_) {
+      const int joint = links_[i].front().joint;
+      write(result, state, joint, -1, k, out.clearances);
+      write(minded, state, joint, -1, k, out.clearances.approach);
+      out.clearances.nearest[k] = nearest;
     }
   }
   add_barriers(out);

@@ -49,7 +49,7 @@ std::size_t groups(std::size_t count, int of) { return (count + static_cast<std:
 }  // namespace
 
 PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities)
-    : order_(morton_order(points)), moves_((velocities.array() != 0.0).any()) {
+    : order_(morton_order(points)), fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
   if (order_.empty()) {
     return;
   }
@@ -114,7 +114,7 @@ void PointTree::refit() noexcept {
 }
 
 void PointTree::advance(double duration) noexcept {
-  if (!moves_) {
+  if (!moves()) {
     return;
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -126,7 +126,7 @@ void PointTree::advance(double duration) noexcept {
 }
 
 void PointTree::freeze() noexcept {
-  moves_ = false;
+  fastest_ = 0.0;
   for (std::size_t axis = 4; axis < 7; ++axis) {
     std::fill(columns_[axis].begin(), columns_[axis].end(), 0.0);
   }

@@ -33,6 +33,7 @@ struct Walls {
     clearances.rates = normals.transpose() * v + speeds;
     clearances.gradients = normals;
     clearances.nearest.setLinSpaced(num, 0, num - 1);
+    clearances.mind_nearest();
     return clearances;
   }
 
@@ -105,6 +106,7 @@ BOOST_AUTO_TEST_CASE(joint_limits_stand_above_clearances) {
   clearances.rates[1] = -1.0;  // 1 m/s, 5 mm before the margin
   clearances.curvatures[1] = -1.0;
   clearances.gradients(2, 1) = 0.5;
+  clearances.mind_nearest();
   Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;
   v[2] = -2.0;
   BOOST_TEST((filter.apply(q, v, a, &clearances, solution) == TorqueStatus::relaxed_safety));
@@ -144,7 +146,7 @@ BOOST_AUTO_TEST_CASE(whatever_comes_in_the_acceleration_is_finite_and_nothing_is
       case 0: q[1] = not_a_number; break;
       case 1: v[1] = not_a_number; break;
       case 2: a[1] = not_a_number; break;
-      case 3: clearances.gradients.setConstant(not_a_number); break;
+      case 3: clearances.approach.gradients.setConstant(not_a_number); break;
       default: break;
     }
     BOOST_REQUIRE_EQUAL(

@@ -37,6 +37,7 @@ Clearances linear_clearances(Random& random, int nv, int num) {
     clearances.curvatures[k] = random.uniform(-1.0, 1.0);
     clearances.nearest[k] = k;
   }
+  clearances.mind_nearest();
   return clearances;
 }
 
@@ -135,9 +136,10 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   clearances.nearest << -1, 7, -1;
   clearances.values[1] = 0.105;
   clearances.rates[1] = -0.4;
-  clearances.curvatures[1] = -5.7;
-  clearances.mixing[1] = -5.0;  // -0.7 of the point
   clearances.gradients.col(1) << 0.3, -0.4;
+  clearances.mind_nearest();
+  clearances.curvatures[1] = -5.7;
+  clearances.approach.curvatures[1] = -0.7;
   SafetyRows rows(2, {});
   Eigen::VectorXd v = Eigen::VectorXd::Zero(2);
   rows.update(clearances, v, limits, 0.001);
@@ -199,11 +201,12 @@ BOOST_AUTO_TEST_CASE(the_most_critical_are_kept_in_order) {
         ++within_reach;
       }
     }
+    clearances.mind_nearest();
     SafetyRows rows(5, settings);
     BOOST_REQUIRE(rows.usable(clearances));
     rows.update(clearances, v, limits, 0.001);
     BOOST_REQUIRE_EQUAL(rows.size(), std::min(within_reach, 6));
-    const auto urgency = [&](int k) { return clearances.values[k] + settings.lookahead * clearances.rates[k]; };
+    const auto urgency = [&](int k) { return clearances.values[k] + clearances.rates[k] / settings.rate; };
     for (int row = 1; row < rows.size(); ++row) {
       BOOST_REQUIRE_LE(urgency(rows.coordinates[static_cast<std::size_t>(row) - 1]),
                        urgency(rows.coordinates[static_cast<std::size_t>(row)]));
@@ -226,19 +229,21 @@ BOOST_AUTO_TEST_CASE(unusable_clearances_are_noticed) {
   BOOST_TEST(!rows.usable(linear_clearances(random, 3, 3)));
   for (const double bad : {infinity, std::numeric_limits<double>::quiet_NaN()}) {
     Clearances c = good;
-    c.values[1] = bad;
+    c.approach.values[1] = bad;
     BOOST_TEST(!rows.usable(c));
-    c = good, c.rates[1] = bad;
+    c = good, c.approach.rates[1] = bad;
+    BOOST_TEST(!rows.usable(c));
+    c = good, c.approach.curvatures[1] = bad;
     BOOST_TEST(!rows.usable(c));
     c = good, c.curvatures[1] = bad;
     BOOST_TEST(!rows.usable(c));
-    c = good, c.gradients(2, 1) = bad;
+    c = good, c.approach.gradients(2, 1) = bad;
     BOOST_TEST(!rows.usable(c));
     c.nearest[1] = -1;
     BOOST_TEST(rows.usable(c));
   }
   Clearances short_of_rates = good;
-  short_of_rates.rates.resize(2);
+  short_of_rates.approach.rates.resize(2);
   BOOST_TEST(!rows.usable(short_of_rates));
 }
 
@@ -259,7 +264,6 @@ BOOST_AUTO_TEST_CASE(settings_are_checked) {
   BOOST_TEST(message_of([](S& s) { s.rate = 0.0; }).find("rate is 0") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.braking_fraction = 1.5; }).find("in (0, 1]") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.correction = 0.0; }).find("correction") != std::string::npos);
-  BOOST_TEST(message_of([](S& s) { s.lookahead = infinity; }).find("lookahead") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.max_rows = -1; }).find("max_rows") != std::string::npos);
 }
 
@@ -290,18 +294,19 @@ BOOST_AUTO_TEST_CASE(changing_points_never_make_a_surface_recede) {
   clearances.values << 0.105;
   clearances.rates << -0.4;
   clearances.gradients << 1.0;
+  clearances.mind_nearest();
   SafetyRows rows(1, {});
   const double demand = demanded_deceleration(0.1, 0.4, {5.0, 10.0, 20.0, 0.5}, 0.001);
-  const auto lower = [&](double curvature, double mixing) {
-    clearances.curvatures << curvature;
-    clearances.mixing << mixing;
+  const auto lower = [&](double of_nearest, double of_points) {
+    clearances.curvatures << of_nearest;
+    clearances.approach.curvatures << of_points;
     rows.update(clearances, Eigen::VectorXd::Zero(1), limits, 0.001);
     return rows.lower[0] - demand;
   };
   const auto close = boost::test_tools::tolerance(1e-9);
-  BOOST_TEST(lower(-430.0, -432.0) == 0.0, close);  // going over to another point, while each recedes
-  BOOST_TEST(lower(-430.0, -427.0) == 3.0, close);  // while each comes
-  BOOST_TEST(lower(0.0, -14.0) == 0.0, close);      // sliding along a flat wall of points
-  BOOST_TEST(lower(-3.0, -14.0) == 0.0, close);     // along a hollow one
-  BOOST_TEST(lower(9.0, 0.0) == -9.0, close);       // past one point
+  BOOST_TEST(lower(-430.0, 2.0) == 0.0, close);   // going over to another point, while each recedes
+  BOOST_TEST(lower(-430.0, -3.0) == 3.0, close);  // while each comes
+  BOOST_TEST(lower(0.0, 14.0) == 0.0, close);     // sliding along a flat wall of points
+  BOOST_TEST(lower(-3.0, 11.0) == 0.0, close);    // along a hollow one
+  BOOST_TEST(lower(9.0, 9.0) == -9.0, close);     // past one point
 }

@@ -4,6 +4,7 @@
 #include <boost/test/unit_test.hpp>
 #include <memory>
 
+#include "sidestep/embedding/approach_mean.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
 #include "sidestep/embedding/collision_density.hpp"
 #include "sidestep/embedding/joint_limit_potential.hpp"
@@ -78,14 +79,48 @@ BOOST_AUTO_TEST_CASE(wrong_arguments_are_named) {
   BOOST_CHECK_THROW(Sum({}), std::invalid_argument);
 }
 
-BOOST_AUTO_TEST_CASE(the_mean_tells_what_changing_weights_add_to_its_curvature) {
-  // h = t / (1 + exp(t/T)) + const, of two samples that are equal at t = 0, one at rest: h'' = -1/(2T).
+BOOST_AUTO_TEST_CASE(the_mean_goes_over_from_sample_to_sample) {
+  // h = t / (1 + exp(t/T)) + const, of two samples that are equal at t = 0, one at rest: h'' = -1/(2T), and 4 of theirs.
   constexpr double T = 0.002;
   BoltzmannMean mean(T);
   mean.add({0.1, 0.0, 3.0, {}});
   mean.add({0.1, 1.0, 5.0, {}});
   const ClearanceSample result = mean.result();
   BOOST_TEST(result.rate == 0.5, boost::test_tools::tolerance(1e-14));
-  BOOST_TEST(result.mixing == -1.0 / (2.0 * T), boost::test_tools::tolerance(1e-12));
-  BOOST_TEST(result.curvature - result.mixing == 4.0, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(result.curvature == 4.0 - 1.0 / (2.0 * T), boost::test_tools::tolerance(1e-12));
+}
+
+BOOST_AUTO_TEST_CASE(what_is_ahead_comes_before_what_is_beside) {
+  constexpr double T = 0.002;
+  const ClearanceSample beside{0.05, 0.0, 1.0, {{}, {{}, Eigen::Vector3d::UnitX()}}};
+  const ClearanceSample ahead{0.3, -1.0, 2.0, {{}, {{}, Eigen::Vector3d::UnitY()}}};
+  const auto mean_of = [](double horizon, const ClearanceSample& first, const ClearanceSample& second) {
+    ApproachMean mean(T, horizon);
+    mean.add(first);
+    mean.add(second);
+    return mean.result();
+  };
+  for (const ClearanceSample& found : {mean_of(0.32, beside, ahead), mean_of(0.32, ahead, beside)}) {
+    // 0.05 against -0.02, 35 T apart: the other weighs e^-35.
+    BOOST_TEST(found.value == 0.3, boost::test_tools::tolerance(1e-13));
+    BOOST_TEST(found.rate == -1.0, boost::test_tools::tolerance(1e-13));
+    BOOST_TEST(found.curvature == 2.0, boost::test_tools::tolerance(1e-13));
+    BOOST_TEST((found.gradient.second.linear - Eigen::Vector3d::UnitY()).norm() < 1e-13);
+  }
+  BOOST_TEST(mean_of(0.1, beside, ahead).value == 0.05);
+  // Two that are equal after a stop, halves of either; without the speed at which weights change.
+  const ClearanceSample between = mean_of(0.25, beside, ahead);
+  BOOST_TEST(between.value == 0.175, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(between.rate == -0.5, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(between.curvature == 1.5, boost::test_tools::tolerance(1e-12));
+}
+
+BOOST_AUTO_TEST_CASE(the_stop_time_is_that_of_the_slowest_joint) {
+  JointLimits limits = JointLimits::unlimited(2);
+  limits.acceleration << 10.0, 5.0;
+  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(-2.0, 0.5), limits) == 0.2);
+  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(1.0, -1.5), limits) == 0.3);
+  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(0.0, 0.0), limits) == Horizon::shortest);
+  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(0.0, 1e6), limits) == Horizon::longest);
+  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(5.0, 5.0), JointLimits::unlimited(2)) == Horizon::shortest);
 }

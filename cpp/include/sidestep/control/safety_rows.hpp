@@ -22,10 +22,9 @@ struct ClosingLimits {
 // q̈ = 0 and the acceleration a held for one period T, the closing speed is  w = u − (c + ∇h·a) T  afterwards, up to
 // terms of order T². So a bound w ≤ w_max is one linear inequality,
 //     ∇h·a ≥ (u − w_max)/T − c.
-// c is that of the points now nearest, without the clearances' `mixing`: when the mean over points goes over to one that
-// comes faster, u soon is that point's closing speed, and no more, whatever the mean's second derivative says meanwhile.
-// But along a sampled surface the nearest point changes all the time, and what each point recedes the mixing takes back:
-// where c of the points is positive, it counts only as far as the mean's own is.
+// h, u and c are those of what approaches most (Clearances::approach), not of what is nearest: a point ahead counts before
+// one beside. But along a sampled surface the points change all the time, so that it does not recede as each of them does:
+// where c is positive, it counts only as far as that of the nearest clearance is.
 //
 // Which closing speeds leave enough room? Close to the margin γ s, so that the room shrinks at most exponentially; the
 // deceleration along that line is γ u, which a fast approach could not deliver. So from u = A/γ on, the parabola of
@@ -68,10 +67,7 @@ struct SafetySettings {
   double braking_fraction = 0.5;
   /// Fraction of an excess of closing speed that is taken away per period [-].
   double correction = 0.5;
-  /// When more clearances are active than `max_rows`, those with the smallest room predicted this far ahead are kept,
-  /// s − u lookahead [s].
-  double lookahead = 0.1;
-  /// Room for that many rows [-].
+  /// When more clearances are active, those are kept of which s − u/γ is smallest [-].
   int max_rows = 32;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.

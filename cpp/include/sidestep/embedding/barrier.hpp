@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "sidestep/embedding/approach_mean.hpp"
 #include "sidestep/embedding/barrier_function.hpp"
 #include "sidestep/embedding/embedding.hpp"
 
@@ -33,6 +34,11 @@ class Barrier : public Embedding {
   Barrier(Robot robot, const BarrierFunction& function, const char* owner);
 
   void set_num_coordinates(int num) { activations_.setConstant(num, function_.activation); }
+
+  /// Within which what approaches is looked for: the activation distance beyond what can be closed while the arm stops.
+  Horizon horizon(const KinematicState& state) const noexcept {
+    return {Horizon::stop_time(state.v(), robot().limits()), function_.activation};
+  }
 
   /// Adds ψ_k = f(h_k) with its derivatives, for every clearance that `out.clearances` holds.
   void add_barriers(EmbeddingView out) const noexcept;

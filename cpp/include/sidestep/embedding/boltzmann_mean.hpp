@@ -27,7 +27,6 @@ struct WrenchPair {
 struct ClearanceSample {
   double value, rate, curvature;
   WrenchPair gradient;
-  double mixing = 0.0;  ///< what of the curvature comes of weights that change, see BoltzmannMean
 };
 
 /// Reduces clearances h_n to one by the Boltzmann mean with temperature T, and carries its derivatives:
@@ -37,22 +36,16 @@ struct ClearanceSample {
 /// It is smooth, does not depend on how densely a surface is sampled (unlike a soft minimum, which is low by up to
 /// T log N), and exceeds the smallest clearance by about T at most where many are about equally small. Samples may come
 /// in any order: the sums are kept relative to the smallest clearance so far.
-///
-/// Of the second derivative, Σ_n ∂h/∂h_n h_n'' is what the samples do. The rest, about −Var(h_n')/T, is the mean going over
-/// from one sample to another (`mixing`): it is as large as the samples' rates differ, but over once the other is
-/// the smallest, so that it says nothing about the rate after more than a moment.
 class BoltzmannMean {
  public:
-  /// What a mean is made of, relative to a reference: sums of w and w (h − reference) with their time derivatives, and of
-  /// w h'' and w (h − reference) h''.
+  /// What a mean is made of, relative to a reference: sums of w and w (h − reference) with their time derivatives.
   struct Sums {
-    double s0 = 0.0, s0_dot = 0.0, s0_ddot = 0.0, s1 = 0.0, s1_dot = 0.0, s1_ddot = 0.0, c0 = 0.0, c1 = 0.0;
+    double s0 = 0.0, s0_dot = 0.0, s0_ddot = 0.0, s1 = 0.0, s1_dot = 0.0, s1_ddot = 0.0;
 
     /// The mean, less the reference, and without its gradient.
-    ClearanceSample mean(double inverse_T) const noexcept {
+    ClearanceSample mean() const noexcept {
       const double above = s1 / s0, rate = (s1_dot - above * s0_dot) / s0;
-      const double curvature = (s1_ddot - 2.0 * rate * s0_dot - above * s0_ddot) / s0;
-      return {above, rate, curvature, {}, curvature - (c0 - (c1 - above * c0) * inverse_T) / s0};
+      return {above, rate, (s1_ddot - 2.0 * rate * s0_dot - above * s0_ddot) / s0, {}};
     }
   };
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sidestep/body/body.hpp"
+#include "sidestep/embedding/approach_mean.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
 #include "sidestep/embedding/clearances.hpp"
 #include "sidestep/kinematics/kinematic_state.hpp"
@@ -32,8 +33,9 @@ class ClearanceField {
 
   int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
 
-  /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared. No allocation.
-  void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
+  /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared; of what moves fast
+  /// enough, farther, as the horizon says. No allocation.
+  void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
                 ClearanceView out) const noexcept;
 
   /// Which component of the body ellipsoid k came from.

@@ -5,39 +5,56 @@
 
 namespace sidestep {
 
-/// Where an embedding that is a barrier of clearances h writes them, one entry per coordinate.
-struct ClearanceView {
-  Eigen::Ref<Eigen::VectorXd> values;      ///< h (m) [m], signed; +inf beyond the reach
+/// Where a clearance is and goes, one entry per coordinate.
+struct ClearanceStateView {
+  Eigen::Ref<Eigen::VectorXd> values;      ///< h (m) [m], signed
   Eigen::Ref<Eigen::VectorXd> rates;       ///< dh/dt (m) [m/s], obstacle velocities included
   Eigen::Ref<Eigen::VectorXd> curvatures;  ///< d²h/dt² at q̈ = 0 (m) [m/s²]
-  Eigen::Ref<Eigen::VectorXd> mixing;      ///< what of it is the mean going over to other points (m), see BoltzmannMean
   Eigen::Ref<Eigen::MatrixXd> gradients;   ///< ∂h/∂q as columns (nv × m) [m/rad]
-  Eigen::Ref<Eigen::VectorXi> nearest;     ///< (m) index of the nearest obstacle point, -1 where there is none
 };
 
-/// The room such views look into. Where the clearance is +inf the other entries have no meaning.
-struct Clearances {
-  Clearances(int nv, int num)
+/// Where an embedding that is a barrier of clearances writes them.
+struct ClearanceView : ClearanceStateView {
+  Eigen::Ref<Eigen::VectorXi> nearest;  ///< (m) index of the nearest obstacle point, -1 where there is none
+  ClearanceStateView approach;          ///< of what the arm has to mind where it moves, see approach_mean.hpp
+};
+
+/// The room such views look into.
+struct ClearanceState {
+  ClearanceState(int nv, int num)
       : values(Eigen::VectorXd::Constant(num, std::numeric_limits<double>::infinity())),
         rates(Eigen::VectorXd::Zero(num)),
         curvatures(Eigen::VectorXd::Zero(num)),
-        mixing(Eigen::VectorXd::Zero(num)),
-        gradients(Eigen::MatrixXd::Zero(nv, num)),
-        nearest(Eigen::VectorXi::Constant(num, -1)) {}
+        gradients(Eigen::MatrixXd::Zero(nv, num)) {}
+
+  ClearanceStateView state_view(Eigen::Index start, Eigen::Index num) noexcept {
+    return {values.segment(start, num), rates.segment(start, num), curvatures.segment(start, num),
+            gradients.middleCols(start, num)};
+  }
+
+  Eigen::VectorXd values, rates, curvatures;
+  Eigen::MatrixXd gradients;
+};
+
+/// The clearances, +inf beyond the reach, and what approaches. Where `nearest` is -1 the other entries have no meaning.
+struct Clearances : ClearanceState {
+  Clearances(int nv, int num)
+      : ClearanceState(nv, num), nearest(Eigen::VectorXi::Constant(num, -1)), approach(nv, num) {}
 
   /// Forgets everything: nothing is within reach.
   void clear() noexcept {
     values.setConstant(std::numeric_limits<double>::infinity());
     nearest.setConstant(-1);
   }
+  /// Lets what is nearest be what approaches.
+  void mind_nearest() { approach = *this; }
+
   ClearanceView view(Eigen::Index start, Eigen::Index num) noexcept {
-    return {values.segment(start, num), rates.segment(start, num), curvatures.segment(start, num),
-            mixing.segment(start, num), gradients.middleCols(start, num), nearest.segment(start, num)};
+    return {state_view(start, num), nearest.segment(start, num), approach.state_view(start, num)};
   }
 
-  Eigen::VectorXd values, rates, curvatures, mixing;
-  Eigen::MatrixXd gradients;
   Eigen::VectorXi nearest;
+  ClearanceState approach;
 };
 
 }  // namespace sidestep

@@ -32,7 +32,8 @@ class PointTree {
   PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities);
 
   int size() const noexcept { return static_cast<int>(order_.size()); }
-  bool moves() const noexcept { return moves_; }
+  bool moves() const noexcept { return fastest_ > 0.0; }
+  double fastest() const noexcept { return fastest_; }  ///< speed of any point [m/s], at most
   const std::vector<int>& order() const noexcept { return order_; }
 
   /// Coordinates [m], radii [m] and velocities [m/s] in tree order; points that fill up the last leaf lie at `padding`.
@@ -154,7 +155,7 @@ class PointTree {
   std::vector<int> order_;
   std::array<std::vector<double>, 7> columns_;  // x, y, z, radius, velocity
   std::vector<Level> levels_;                   // leaves first, one node last
-  bool moves_ = false;
+  double fastest_ = 0.0;
 };
 
 }  // namespace sidestep

@@ -17,10 +17,12 @@ struct LinkMotion {
   double angular[3], linear[3], bias_angular[3], bias_linear[3];
 };
 
-inline constexpr int sums = 20;       // s0, ṡ0, s̈0, s1, ṡ1, s̈1, two gradients of force and moment, c0, c1
+// Of the Boltzmann mean s0, ṡ0, s̈0, s1, ṡ1, s̈1 and two gradients of force and moment; from `approach` on, of the
+// mean of what approaches: the weight, h, h', h'' and a gradient.
+inline constexpr int approach = 18, sums = 28;
 inline constexpr int most_lanes = 8;  // doubles in the widest register
 
-/// An ellipsoid at a state, with the sums of the Boltzmann mean over the points so far, lane by lane.
+/// An ellipsoid at a state, with the sums of its means over the points so far, lane by lane.
 struct Query {
   alignas(64) double lane_sums[sums][most_lanes];
   double axes[9];                           // world to principal axes, by rows
@@ -28,6 +30,7 @@ struct Query {
   double linear[3], angular[3];             // velocity of the centre and of the axes, in principal axes
   double bias_linear[3], bias_angular[3];   // the same for the bias
   double reference;                         // smallest clearance so far; sums are relative to it
+  double ahead;                             // smallest h + τ h' so far
   int nearest;                              // its point
   int shortest;                             // the axis of the smallest a
   bool ready;                               // whether all but the centre has been set
@@ -46,6 +49,8 @@ struct QueryGroup {
   const LinkMotion* link;
   double inverse_T;
   double window;                               // samples so much above the smallest do not matter [m]
+  double horizon;                              // τ [s]
+  double closing;                              // τ times the speed at which a point may come, at most [m]
   Query queries[most_queries];
 };
 

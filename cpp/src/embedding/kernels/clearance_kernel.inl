@@ -55,14 +55,19 @@ void prepare(QueryGroup& group, int k) noexcept {
   query.ready = true;
 }
 
+/// Old weights are smaller by the exponential of this.
+Lanes decay(double shift, double inverse_T) noexcept {
+  return exponential(all(shift * inverse_T < 690.0 ? -shift * inverse_T : -690.0));
+}
+
 /// Measured from a smaller reference, the old values are larger by `shift` and the old weights smaller.
 void rescale(Query& query, double shift, double inverse_T) noexcept {
-  const Lanes decay = exponential(all(shift * inverse_T < 690.0 ? -shift * inverse_T : -690.0));
-  const auto move = [&query, decay, shift](int zeroth, int first) {
+  const Lanes factor = decay(shift, inverse_T);
+  const auto move = [&query, factor, shift](int zeroth, int first) {
     double* s0 = query.lane_sums[zeroth];
     double* s1 = query.lane_sums[first];
-    store(s1, decay * (load(s1) + shift * load(s0)));
-    store(s0, decay * load(s0));
+    store(s1, factor * (load(s1) + shift * load(s0)));
+    store(s0, factor * load(s0));
   };
   for (int i = 0; i < 3; ++i) {
     move(i, 3 + i);
@@ -70,7 +75,6 @@ void rescale(Query& query, double shift, double inverse_T) noexcept {
   for (int i = 6; i < 12; ++i) {
     move(i, 6 + i);
   }
-  move(18, 19);
 }
 
 /// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where Σ A w² = 1.
@@ -221,8 +225,6 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
       if (before < __builtin_inf()) {
         rescale(query, before - query.reference, group.inverse_T);
       }
-      const double lower = query.reference + group.window;
-      group.limit[k] = lower < group.limit[k] ? lower : group.limit[k];
     }
 
     // Velocity and acceleration of the point in the ellipsoid's moving axes.
@@ -257,10 +259,27 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     }
     const Lanes curvature = g[0] * a[0] + g[1] * a[1] + g[2] * a[2] + bend;
 
-    // Weights; those beyond the limit, and the padding, are zero.
     const double inverse_T = group.inverse_T;
+    const Lanes ahead = h + group.horizon * rate;
+    if (below(ahead, all(query.ahead)) != 0) {
+      const double before = query.ahead;
+      for (int i = 0; i < width; ++i) {
+        query.ahead = ahead[i] < query.ahead ? ahead[i] : query.ahead;
+      }
+      if (before < __builtin_inf()) {
+        const Lanes factor = decay(before - query.ahead, inverse_T);
+        for (int i = approach; i < sums; ++i) {
+          store(query.lane_sums[i], factor * load(query.lane_sums[i]));
+        }
+      }
+    }
+    const double nearest = query.reference + group.window, approaching = query.ahead + group.window + group.closing;
+    const double lower = nearest > approaching ? nearest : approaching;
+    group.limit[k] = lower < group.limit[k] ? lower : group.limit[k];
+
+    // Weights; those beyond the window, and the padding, are zero.
     const Lanes above = h - query.reference;
-    const auto matters = h < group.limit[k];
+    const auto matters = above < group.window;
     const Lanes weight = matters ? exponential(matters ? -inverse_T * above : Lanes{}) : Lanes{};
     const Lanes over = matters ? above : Lanes{};
     const Lanes weight_dot = -inverse_T * weight * rate;
@@ -275,8 +294,13 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     add(3, weight * over);
     add(4, weight_dot * over + weight * rate);
     add(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * curvature);
-    add(18, weight * curvature);
-    add(19, weight * curvature * over);
+    const Lanes above_ahead = ahead - query.ahead;
+    const auto is_minded = above_ahead < group.window;
+    const Lanes minded = is_minded ? exponential(is_minded ? -inverse_T * above_ahead : Lanes{}) : Lanes{};
+    add(approach, minded);
+    add(approach + 1, minded * (is_minded ? h : Lanes{}));
+    add(approach + 2, minded * (is_minded ? rate : Lanes{}));
+    add(approach + 3, minded * (is_minded ? curvature : Lanes{}));
     const Lanes zeroth = -inverse_T * weight;
     const Lanes first = weight + zeroth * over;
     for (int i = 0; i < 3; ++i) {
@@ -286,6 +310,8 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
       add(9 + i, zeroth * moment);
       add(12 + i, first * g[i]);
       add(15 + i, first * moment);
+      add(approach + 4 + i, minded * g[i]);
+      add(approach + 7 + i, minded * moment);
     }
   }
 }

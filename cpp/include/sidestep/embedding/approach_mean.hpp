@@ -1,0 +1,53 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sidestep/embedding/boltzmann_mean.hpp"
+#include "sidestep/kinematics/robot.hpp"
+
+namespace sidestep {
+
+/// How far ahead what approaches is looked for.
+///
+/// An arm that stops in the time τ, every closing speed falling in proportion, comes no closer to a sample than
+/// h + τ h'. The sample by which that is smallest is what it has to mind: not always the nearest, past which it may move.
+struct Horizon {
+  double time = 0.0;      ///< τ [s]
+  double distance = 0.0;  ///< [m] that is looked beyond what can be closed within τ
+
+  static constexpr double shortest = 0.05, longest = 1.0;  ///< [s] whatever the limits
+
+  /// τ = max_j |v_j| / (acceleration limit)_j, the time in which the arm stops along its path.
+  static double stop_time(const Eigen::VectorXd& v, const JointLimits& limits) noexcept {
+    double time = shortest;
+    for (Eigen::Index j = 0; j < v.size(); ++j) {
+      time = std::max(time, std::abs(v[j]) / limits.acceleration[j]);  // keeps `time` if not a number
+    }
+    return std::min(time, longest);
+  }
+};
+
+/// Reduces samples of a clearance to the one that an arm has to mind, see Horizon: the means of h, h', h'' and ∂h, with
+/// weights exp(−(h + τ h')/T).
+class ApproachMean {
+ public:
+  ApproachMean(double temperature, double horizon) noexcept : inverse_T_(1.0 / temperature), horizon_(horizon) {}
+
+  /// Samples from this h + τ h' on would not change the mean.
+  double limit() const noexcept { return reference_ + BoltzmannMean::window / inverse_T_; }
+
+  void add(const ClearanceSample& sample) noexcept;
+
+  /// The mean of what was added; not to be called before.
+  ClearanceSample result() const noexcept;
+
+ private:
+  double inverse_T_, horizon_;
+  double reference_ = std::numeric_limits<double>::infinity();
+  double weight_ = 0.0;
+  ClearanceSample sum_{};
+};
+
+}  // namespace sidestep
