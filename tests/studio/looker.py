@@ -13,25 +13,31 @@ from PIL import Image
 from sidestep.pose import from_quaternion
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
-from sidestep.studio.headless import Window, open_page, picture
+from sidestep.studio.headless import Window, go_to, picture
+from sidestep.studio.page.view import MAIN_WIDTH, PLOT_WIDTH
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
 
-PATIENCE = 120.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
+PATIENCE = 60.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
 PASSIVE = "Unable to preventDefault inside passive event listener"  # the browser's own note on viser's lists
 WINDOW = Window(1080, 560)
+PANELS = PLOT_WIDTH + 10, MAIN_WIDTH + 10  # [px] at the sides of a scene
 
 
 class Looker:
-    """A browser window on the studio, and what went wrong in it."""
+    """A browser window on the studio, what went wrong in it and what it asked for, from before the page is loaded."""
 
-    def __init__(self, chromium: Any, studio: Studio) -> None:
+    def __init__(self, chromium: Any, studio: Studio, window: Window = WINDOW) -> None:
         self.errors: list[str] = []
+        self.asked: list[str] = []
         self.studio = studio
-        self.page = open_page(chromium, studio.address, WINDOW)
+        self.page = chromium.new_page(viewport={"width": window.width, "height": window.height})
         self.page.set_default_timeout(1e3 * PATIENCE)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", self._hear)
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("websocket", lambda socket: self.asked.append(socket.url))
+        go_to(self.page, studio.address)
 
     def _hear(self, said: Any) -> None:
         if said.type == "error" and PASSIVE not in said.text:
@@ -103,6 +109,10 @@ class Looker:
         focal = 0.5 * box["height"] / np.tan(0.5 * camera.fov)
         return box["x"] + 0.5 * box["width"] + focal * x / z, box["y"] + 0.5 * box["height"] + focal * y / z
 
+    def scene(self) -> np.ndarray:
+        """The picture without the panels at its sides."""
+        return self.image()[:, round(PANELS[0]) : round(WINDOW.width - PANELS[1])]
+
     def image(self) -> np.ndarray:
         return np.asarray(Image.open(io.BytesIO(picture(self.studio, self.page))).convert("RGB"), dtype=int)
 
@@ -121,7 +131,8 @@ def last(studio: Studio) -> m.Snapshot:
 
 
 def reset(studio: Studio) -> None:
-    """Puts planar2 at its start, paused, with one ball."""
+    """Puts planar2 at its start, paused, with one ball, shown live."""
+    studio.view.recorder.show_live()
     studio.send(m.Load(scenario_of(RobotChoice(name="planar2"))))
     studio.send(m.Restart(until=0.0))
     until(lambda: len(last(studio).things) == 1 and last(studio).time == 0.0, "the start")

@@ -1,19 +1,25 @@
-"""The page in a real browser, without a display."""
+"""The page in a real browser, without a display. One browser and one studio serve all tests: each starts slowly."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from sidestep import ExactClearance, Scenario
 from sidestep.studio import messages as m
-from sidestep.studio.headless import find_chromium
+from sidestep.studio.export import python_snippet
+from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, film, find_chromium
+from sidestep.studio.methods import METHODS
+from sidestep.studio.page.obstacles import gizmo_pose
+from sidestep.studio.page.surface import on_surface
 from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses
-from studio.looker import Looker, differ, last, reset, until
+from studio.looker import PATIENCE, WINDOW, Looker, differ, last, reset, until
 
 pytestmark = pytest.mark.skipif(
     find_chromium() is None,
@@ -21,10 +27,16 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module", autouse=True)
+@pytest.fixture(autouse=True)
 def at_the_start(studio: Studio) -> None:
-    """The first test begins with the arm at its start; each goes on where the one before it ended."""
+    """Each test begins with the arm at its start, paused, and one ball."""
     reset(studio)
+
+
+def run_to(studio: Studio, time: float) -> m.Snapshot:
+    studio.send(m.SetRunning(True, until=time))
+    until(lambda: not last(studio).running and last(studio).time > time - 0.01, f"{time} s")
+    return last(studio)
 
 
 def test_the_arm_is_on_the_page(studio: Studio, looker: Looker) -> None:
@@ -52,7 +64,8 @@ def test_a_goal_set_on_the_page_is_reached(studio: Studio, looker: Looker) -> No
 
 def test_an_obstacle_dragged_into_the_way_is_not_touched(studio: Studio, looker: Looker) -> None:
     studio.send(m.SetRecording(True))
-    until(lambda: last(studio).recording, "recording")
+    studio.send(m.SetRunning(True))
+    until(lambda: last(studio).recording and last(studio).running, "recording")
     before = last(studio)
     ball = before.poses[0][:3, 3]
     # The goal first, then the ball from its place to where the tip passes: the plane of the drag faces the camera.
@@ -77,15 +90,26 @@ def test_an_obstacle_dragged_into_the_way_is_not_touched(studio: Studio, looker:
 
 
 def test_the_method_is_switched_on_the_page(studio: Studio, looker: Looker) -> None:
+    """While the arm moves, and it goes on from where it is."""
     assert last(studio).method == "barrier"
     looker.tab("Method")
-    looker.choose("method", "thesis: unswitched")
-    until(lambda: last(studio).method == "unswitched", "the method")
     studio.send(m.SetRunning(True))
-    until(lambda: len(last(studio).values) == 1, "its one density")
+    for name in ("thesis", "guided", "unswitched", "barrier"):
+        before = last(studio)
+        looker.choose("method", METHODS[name].label)
+        until(lambda name=name: last(studio).method == name, "the method")  # type: ignore[misc]
+        changed = last(studio)
+        densities = 0 if METHODS[name].covering else 1
+        until(lambda t=changed.time: last(studio).time > t + 0.1, "its steps")  # type: ignore[misc]
+        after = last(studio)
+        assert after.running
+        assert (len(after.values) == 1) == bool(densities)  # one density, or one barrier for each part
+        assert after.words.startswith("guide: ") == METHODS[name].guided
+        elapsed = changed.time - before.time
+        assert elapsed > 0.0
+        fastest = studio.view.robot.limits.velocity
+        assert (np.abs(changed.q - before.q) <= fastest * elapsed + 1e-9).all()  # no jump
     studio.send(m.SetRunning(False))
-    looker.choose("method", "barriers (recommended)")
-    until(lambda: last(studio).method == "barrier", "the method")
 
 
 def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Looker, folder: Path) -> None:
@@ -97,8 +121,8 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
     looker.press("Save")
     until((folder / "kept.yaml").is_file, "the file")
     saved = Scenario.load(folder / "kept.yaml")
-    np.testing.assert_allclose(saved.start.position, before.q, atol=1e-5)  # the file has six digits
-    np.testing.assert_allclose(saved.obstacles[0].position, before.poses[0][:3, 3], atol=1e-5)
+    np.testing.assert_allclose(saved.start.position, before.q, atol=1e-12)
+    np.testing.assert_allclose(saved.obstacles[0].position, before.poses[0][:3, 3], atol=1e-12)
     studio.send(m.RemoveThing("ball"))
     until(lambda: not last(studio).things, "the removal")
     with looker.page.expect_file_chooser() as chooser:
@@ -107,25 +131,203 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
     until(lambda: last(studio).scenario.name == "kept", "the loaded scenario")
     again = last(studio)
     assert [thing.name for thing in again.things] == ["ball"]
-    np.testing.assert_allclose(again.poses[0], before.poses[0], atol=1e-5)
+    np.testing.assert_allclose(again.poses[0], before.poses[0], atol=1e-12)
 
 
-def test_a_second_browser_sees_the_same(studio: Studio, looker: Looker, chromium: Any) -> None:
-    studio.send(m.SetRunning(False))
-    # A moving scene would leave the machine no time to load the page.
-    until(lambda: not last(studio).running, "the pause")
+def test_three_browsers_see_the_same_one_of_them_in_a_notebook(
+    studio: Studio, looker: Looker, chromium: Any
+) -> None:
     second = Looker(chromium, studio)
-    looker.tab("Goal")
-    second.tab("Goal")
-    looker.type("joint2 [°]", "25")
-    until(lambda: bool(np.isclose(last(studio).goal[1], np.deg2rad(25.0))), "the goal")  # type: ignore[index]
-    field = "xpath=//label[normalize-space()='joint2 [°]']/following::input[not(@type='hidden')][1]"
-    until(
-        lambda: second.page.locator(field).first.input_value() == "25", "the same field in the other window"
+    notebook = chromium.new_page(viewport={"width": 1000, "height": 760})
+    notebook.set_default_timeout(1e3 * PATIENCE)
+    try:
+        notebook.set_content(f"<h1>A notebook</h1>{studio._repr_html_()}")
+        frame = notebook.frame_locator("iframe")
+        frame.locator("#words").wait_for()
+        frame.locator("canvas").first.wait_for()
+        assert len(studio.server.get_clients()) == 3
+        looker.tab("Goal")
+        looker.type("joint2 [°]", "25")
+        until(lambda: bool(np.isclose(last(studio).goal[1], np.deg2rad(25.0))), "the goal")  # type: ignore[index]
+        field = "xpath=//label[normalize-space()='joint2 [°]']/following::input[not(@type='hidden')][1]"
+        for window in (looker.page, second.page, frame):
+            value = window.locator(field).first.input_value
+            until(lambda value=value: value() == "25", "the same field in every window")  # type: ignore[misc]
+        before = second.scene()
+        assert differ(looker.scene(), before).mean() < 0.01  # up to the edges of what is drawn
+        run_to(studio, 0.5)
+        until(lambda: studio.view.shown[0] > 0.49, "the end of the motion")
+        after = second.scene()
+        assert differ(before, after).sum() > 1000  # [px] of the arm that moves
+        assert differ(looker.scene(), after).mean() < 0.01
+        words = second.page.locator("#words").inner_text()
+        assert "0.5 s" in words
+        assert looker.page.locator("#words").inner_text() == words
+        until(lambda: frame.locator("#words").inner_text() == words, "the words in the notebook")
+        assert second.errors == []
+    finally:
+        second.page.close()
+        notebook.close()
+
+
+def test_the_curved_space_is_drawn_with_the_way_on_it(studio: Studio, looker: Looker) -> None:
+    looker.tab("Show")
+    without = looker.image()
+    looker.check("curved space")
+    surface = studio.view.surface
+    until(lambda: surface.heights is not None, "the surface")
+    assert differ(without, looker.image()).sum() > 1500  # [px] of a square of 1.2 m
+    end = run_to(studio, 1.0)
+    until(lambda: studio.view.shown[0] == end.time, "the end")
+    robot, heights = studio.view.robot, surface.heights
+    assert heights is not None
+    here = on_surface(robot, (0, 1), end.q, heights)
+    way = np.array(surface.trail)
+    np.testing.assert_allclose(way[-1], here, atol=0.006)  # [m] points of the way are 5 mm apart
+    np.testing.assert_allclose(surface.place_of("state"), here, atol=1e-9)
+    assert end.goal is not None
+    np.testing.assert_allclose(
+        surface.place_of("goal"), on_surface(robot, (0, 1), end.goal, heights), atol=1e-9
     )
-    assert differ(looker.image(), second.image()).mean() < 0.02  # up to a cursor and a hover in the panels
-    assert second.errors == []
-    second.page.close()
+    looker.check("curved space")
+    until(lambda: surface.heights is None, "the end of the surface")
+
+
+def test_the_metric_is_drawn_at_the_tip(studio: Studio, looker: Looker) -> None:
+    run_to(studio, 0.5)
+    looker.tab("Show")
+    without = looker.image()
+    looker.check("metric")
+    until(lambda: studio.view.marks.metric.visible, "the metric")
+    changed = differ(without, looker.image())
+    x, y = looker.on_screen(studio.view.robot.pose(last(studio).q, studio.view.tip)[:3, 3])
+    assert changed[round(y) - 25 : round(y) + 25, round(x) - 25 : round(x) + 25].any()
+    looker.check("metric")
+    until(lambda: not studio.view.marks.metric.visible, "the end of the metric")
+
+
+def test_a_cloud_is_added_dragged_thrown_and_removed(studio: Studio, looker: Looker) -> None:
+    looker.tab("Obstacles")
+    looker.choose("new", "cloud")
+    looker.type("size [cm]", "20")
+    without = looker.image()
+    looker.press("Add")
+    until(lambda: len(last(studio).things) == 2, "the cloud")
+    thing = last(studio).things[1]
+    assert thing.cloud is not None
+    assert len(thing.cloud) == 64  # a plate of 20 cm with a point every 2.5 cm
+    until(lambda: thing.name in studio.view.obstacles.names, "its picture")
+    assert differ(without, looker.image()).sum() > 200  # [px]
+    before = last(studio).poses[1][:3, 3]
+    to = before + np.array([0.0, 0.3, 0.0])
+    studio.send(m.SetRunning(True))
+    looker.drag(before + thing.cloud[np.abs(thing.cloud).sum(axis=1).argmin()], to)
+    until(lambda: float(np.linalg.norm(last(studio).poses[1][:3, 3] - before)) > 0.1, "the drag")
+    looker.choose("obstacle", thing.name)
+    looker.press("Throw at the arm")
+    until(lambda: bool(np.linalg.norm(last(studio).velocities[1]) > 0.4), "the throw")  # at 0.5 m/s
+    looker.press("Remove")
+    until(lambda: [thing.name for thing in last(studio).things] == ["ball"], "the removal")
+
+
+def test_a_cloud_file_is_added(studio: Studio, looker: Looker, tmp_path: Path) -> None:
+    points = np.random.default_rng(0).uniform(-0.1, 0.1, (30, 3)) + np.array([-0.8, 0.0, 0.0])
+    np.save(tmp_path / "wall.npy", points)
+    looker.tab("Obstacles")
+    with looker.page.expect_file_chooser() as chooser:
+        looker.press("Add a point cloud file …")
+    chooser.value.set_files(tmp_path / "wall.npy")
+    until(lambda: len(last(studio).things) == 2, "the cloud")
+    np.testing.assert_array_equal(last(studio).things[1].cloud, points)
+
+
+def test_a_ball_is_thrown_with_the_mouse(studio: Studio, looker: Looker) -> None:
+    ball = last(studio).poses[0][:3, 3]
+    studio.send(m.SetRunning(True))
+    looker.drag(ball, ball + np.array([0.0, 0.3, 0.1]), key="Shift")
+    until(
+        lambda: float(np.linalg.norm(last(studio).poses[0][:3, 3] - ball)) > 0.5, "the flight"
+    )  # [m] the hand let go after 0.3
+
+
+def test_a_motion_is_recorded_and_replayed(studio: Studio, looker: Looker) -> None:
+    recorder, view = studio.view.recorder, studio.view
+    looker.tab("Scenario")
+    looker.press("Record")
+    until(lambda: last(studio).recording and last(studio).time > 1.0, "a second of motion")
+    looker.press("Stop")
+    until(lambda: not last(studio).recording, "the end of the recording")
+    rows = recorder.rows
+    np.testing.assert_allclose(np.diff([row.time for row in rows]), 0.005, atol=1e-9)
+    run_to(studio, last(studio).time + 0.5)  # the arm is elsewhere now
+    looker.press("Play")
+    until(lambda: recorder.replaying and np.array_equal(view.arm.q, rows[-1].q), "the replay's end")
+    looker.type("moment [s]", "0.5")
+    shown = rows[int(np.searchsorted([row.time for row in rows], rows[0].time + 0.5))]
+    until(lambda: np.array_equal(view.arm.q, shown.q), "the moment")
+    with looker.page.expect_download() as download:
+        looker.press("Download recording")
+    kept = np.load(download.value.path())
+    np.testing.assert_array_equal(kept["q"], [row.q for row in rows])
+    looker.press("Live")
+    until(lambda: np.array_equal(view.arm.q, last(studio).q), "the live state")
+    assert not recorder.replaying
+
+
+def test_the_gizmo_sets_a_pose_goal(studio: Studio, looker: Looker) -> None:
+    gizmo = studio.view.goal.gizmo
+    before = gizmo_pose(gizmo)
+    arrow = before[:3, :3] @ np.array([0.9 * gizmo.scale, 0.0, 0.0])
+    looker.drag(before[:3, 3] + arrow, before[:3, 3] + arrow - before[:3, :3] @ np.array([0.2, 0.0, 0.0]))
+    until(lambda: last(studio).goal_pose is not None, "a pose goal")
+    until(lambda: np.allclose(last(studio).goal_pose, gizmo_pose(gizmo)), "the gizmo's pose")  # type: ignore[arg-type]
+    pose = last(studio).goal_pose
+    assert pose is not None
+    moved = before[:3, :3].T @ (pose[:3, 3] - before[:3, 3])
+    assert moved[0] == pytest.approx(
+        -0.2, abs=0.08
+    )  # as far as the mouse, up to perspective and a first pixel
+    np.testing.assert_allclose(moved[1:], 0.0, atol=1e-6)  # the arrow moves it along its axis
+    until(lambda: studio.view.goal.kind.content.startswith("**Goal: a pose**"), "the words")
+
+
+def test_a_shipped_scenario_is_one_click_away(studio: Studio, looker: Looker) -> None:
+    looker.tab("Scenario")
+    looker.choose("shipped", "planar-one-obstacle")
+    looker.press("Load")
+    until(lambda: last(studio).scenario.name == "planar-one-obstacle", "the scenario")
+
+
+def test_pictures_show_the_motion(studio: Studio, looker: Looker, tmp_path: Path) -> None:
+    end, way = tmp_path / "end.png", tmp_path / "way.gif"
+    film(studio, looker.page, duration=2 * FRAME, screenshot=end, video=way)
+    assert last(studio).time == pytest.approx(2 * FRAME, abs=1e-3)  # one period
+    assert Image.open(end).size == (WINDOW.width, WINDOW.height)
+    animation = Image.open(way)
+    assert animation.n_frames == 2  # type: ignore[attr-defined]
+    assert animation.info["duration"] == 1e3 * FRAME
+    assert animation.width == ANIMATION_WIDTH
+
+
+def test_everything_comes_from_this_machine(studio: Studio, looker: Looker) -> None:
+    """All that the browser asked for since before the page was loaded: files and the websocket."""
+    places = {(url.scheme, url.netloc) for url in map(urlsplit, looker.asked)}
+    here = urlsplit(studio.address).netloc
+    assert ("http", here) in places
+    assert ("ws", here) in places
+    assert {netloc for scheme, netloc in places if scheme not in ("blob", "data")} == {here}
+
+
+def test_the_system_is_exported_as_python(studio: Studio, looker: Looker) -> None:
+    now = last(studio)
+    looker.tab("Method")
+    looker.press("Export as Python")
+    with looker.page.expect_download() as download:
+        looker.click("[role=dialog] button:has-text('Download')")
+    code = download.value.path().read_text()
+    assert code == python_snippet(now)
+    looker.click("[role=dialog] button:has-text('Close')")
+    looker.page.locator("[role=dialog]").wait_for(state="detached")
 
 
 def test_nothing_went_wrong_in_the_browser(looker: Looker) -> None:

@@ -91,10 +91,15 @@ def browser() -> Iterator[Any]:
 def open_page(chromium: Any, address: str, window: Window = Window()) -> Page:
     """The page in a new window, once the scene is shown."""
     page: Page = chromium.new_page(viewport={"width": window.width, "height": window.height})
+    go_to(page, address)
+    return page
+
+
+def go_to(page: Page, address: str) -> None:
+    """Loads the page and waits for the scene."""
     page.goto(address, timeout=1e3 * LOAD_TIME)
     page.wait_for_selector("canvas", timeout=1e3 * LOAD_TIME)
     page.wait_for_selector("#words", timeout=1e3 * LOAD_TIME)
-    return page
 
 
 def take_pictures(

@@ -316,6 +316,7 @@ class Session:
         self._rows = []
         self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(self._start, np.zeros_like(self._start))
+        self._begin_pursuit()  # what was stuck before is so no longer
 
     def _set_goal(self, pose: Array | None, posture: Posture) -> None:
         self._pose, self._posture = pose, posture

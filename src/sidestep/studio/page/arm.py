@@ -118,7 +118,7 @@ class BodyView:
                     batched_positions=vectors[:, :3],
                     batched_scales=np.array(scales),
                     batched_colors=colours.rgb(colours.BODY),
-                    opacity=0.35,
+                    opacity=0.6,
                     cast_shadow=False,
                     receive_shadow=False,
                     visible=visible,

@@ -70,13 +70,13 @@ class Recorder:
         recording = event.target.value == "Record"
         if recording:
             self.rows = []
-            self._live()
+            self.show_live()
             self._view.send(m.SetRunning(True))
         self._view.send(m.SetRecording(recording))
 
     def _on_replay(self, event: Any) -> None:
         if event.target.value == "Live":
-            self._live()
+            self.show_live()
         elif len(self.rows) > 1:
             self._slider.max = max(round(self.rows[-1].time - self.rows[0].time, 2), 0.01)
             self._slider.disabled = False
@@ -91,7 +91,8 @@ class Recorder:
         if self.rows and event.client is not None:
             event.client.send_file_download("recording.npz", as_npz(self.rows), save_immediately=True)
 
-    def _live(self) -> None:
+    def show_live(self) -> None:
+        """Ends a replay."""
         self._replaying, self._slider.disabled = False, True
 
 
