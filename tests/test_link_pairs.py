@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from sidestep import Body, Obstacles, Robot, SelfCollision, SelfCollisionBarrier
-from sidestep.body.cache import SHIPPED
 from sidestep.link_pairs import NEAR, barrier_pairs, stored_at
 
 
@@ -79,9 +78,3 @@ def test_pairs_are_kept_and_made_again_where_they_cannot_be_read() -> None:
         assert barrier_pairs(robot, body) == pairs
     assert barrier_pairs(robot, body) == pairs  # and written again
     assert stored_at(robot, Body.cover(robot, components=5)) != path
-
-
-@pytest.mark.parametrize("name", ["fr3", "fr3_arm", "panda", "ur10", "xarm7", "iiwa", "planar3"])
-def test_pairs_of_covers_that_come_along_come_along(name: str) -> None:
-    robot = Robot.named(name)
-    assert (SHIPPED / stored_at(robot, Body.cover(robot)).name).is_file()
