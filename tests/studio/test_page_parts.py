@@ -29,6 +29,7 @@ from sidestep.studio.page.surface import (
     open_faces,
     seen,
 )
+from sidestep.studio.page.view import begun
 from sidestep.studio.session import Session
 from sidestep.studio.truth import solid_poses
 
@@ -158,3 +159,9 @@ def test_the_nearest_of_each_link_agrees_with_the_nearest_of_all(
     each = exact.of_links(snapshot.q, poses)
     assert [item.link for item in each] == ["link1", "link2"]
     assert min(item.distance for item in each) == exact.distance(snapshot.q, poses).distance
+
+
+def test_a_sentence_begins_large_but_a_name_stays_as_it_is() -> None:
+    assert begun("on the way, 0.3 rad from the goal") == "On the way, 0.3 rad from the goal"
+    assert begun("fr3_link5 slides along ball3, 53 mm away") == "fr3_link5 slides along ball3, 53 mm away"
+    assert begun("guide: idle; arriving") == "Guide: idle; arriving"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -207,3 +208,26 @@ def test_the_thesis_is_told_of_centres_and_barriers_of_balls(make_session: MakeS
 
 def test_the_tip_is_the_last_link_of_the_last_joint(make_session: MakeSession, scenario: Scenario) -> None:
     assert tip_of(make_session(scenario).robot) == "tip"
+
+
+def test_a_density_does_not_tell_what_is_in_the_way(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="unswitched")
+    here = session.stage.state()[0]
+    tip = session.robot.pose(here, session.tip)[:3, 3]
+    session.handle(m.AddThing(ball("second", tip + np.array([-0.1, 0.15, 0.0]), 0.03)))
+    session.handle(m.SetJointGoal(here + np.array([1.0, 0.0])))
+    words = run(session, 0.3).words
+    assert words == "the arm slides along an obstacle or a limit (a density does not tell which)"
+
+
+def test_a_diagnosis_names_links_and_obstacles(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="reactive")
+    here = session.stage.state()[0]
+    session.handle(m.SetJointGoal(here))
+    middle = session.robot.pose(here + np.array([0.5, 0.0]), session.tip)[:3, 3]
+    session.handle(m.DragThing("ball", pose_at(0.8 * middle)))
+    run(session, 1.5)
+    session.handle(m.SetJointGoal(here + np.array([1.0, 0.0])))
+    words = run(session, 3.0).words
+    assert words.startswith("stuck ")
+    assert re.search(r": link2 against ball, \d+ mm away$", words)

@@ -17,6 +17,7 @@ POSITION_SHARE, TURN_SHARE = 2.0, 0.5  # of the joint stiffness, per m^2 and per
 ENTER = 1e-3, 5e-3  # [m] and [rad] within which the pose itself draws: far inside of what counts as arrived
 LEAVE = 2e-2, 1e-1  # [m] and [rad] beyond which it is the posture again
 ITERATIONS = 50  # from a configuration nearby about ten are enough
+FRUITLESS = 8  # iterations in a row that come no nearer: the pose is out of reach from here
 DAMPING = 0.03  # [m | rad] of the inverse: directions in which an arm moves less than this are left alone
 LARGEST_STEP = 0.3  # [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
 ACCURACY = 1e-7  # [m] and [rad]; the frame is at the pose
@@ -33,9 +34,9 @@ class Posture:
 class PoseAim:
     """A pose (4, 4) of a frame as the goal: what draws an arm there.
 
-    The pull of a `PoseGoal`, J^T k e, is weak in directions in which the joints move the frame little: the last
-    centimetres of an arm with seven joints take minutes. From afar the arm is therefore drawn to a posture that has
-    the pose; near by to the pose itself, which leaves the joints free that do not move the frame.
+    The pull of a `PoseGoal`, J^T k e, is weak in directions in which the joints move the frame little: an arm with
+    seven joints may be centimetres away after many seconds. From afar it is therefore drawn to a posture that has the
+    pose; near by to the pose itself, which leaves the joints free that do not move the frame.
 
     Args:
         robot, frame, pose: what is to be where, in the world.
@@ -91,13 +92,14 @@ def posture_at(robot: Robot, frame: str, pose: Array, near: Array, *, starts: in
 
 def _descend(robot: Robot, frame: str, pose: Array, q: Array) -> Posture:
     lower, upper = robot._finite_interval()
-    best, least = q, np.inf
+    best, least, fruitless = q, np.inf, 0
     for _ in range(ITERATIONS):
         error = -_error(robot.pose(q, frame), pose)
         size = float(np.linalg.norm(error))
+        fruitless = fruitless + 1 if size > 0.99 * least else 0
         if size < least:
             best, least = q, size
-        if size < ACCURACY:
+        if size < ACCURACY or fruitless == FRUITLESS:
             break
         J = robot.jacobian(q, frame)
         damping = min(DAMPING, size) ** 2

@@ -47,7 +47,7 @@ class Plots:
                     ({"label": "t"}, {"label": title, "stroke": colour, "width": 2}),
                     title=title,
                     scales={"x": {"time": False, "range": (-SPAN, 0.0)}},
-                    axes=({"show": False}, {"size": 54, "space": 22}),
+                    axes=({"show": False}, {"size": 54, "space": 18}),
                     legend={"show": False},
                     cursor={"show": False},
                     height=HEIGHT,

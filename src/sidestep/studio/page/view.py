@@ -196,7 +196,7 @@ class View:
         if now - self._told < WORDS_EVERY:
             return
         self._told = now
-        words = snapshot.words[:1].upper() + snapshot.words[1:]
+        words = begun(snapshot.words)
         facts = []
         if self._clearances:
             first = self._clearances[0]
@@ -325,6 +325,12 @@ def in_box(words: str, facts: str = "") -> str:
         f'<div style="font-size:15px;font-weight:600">{words}</div>'
         f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
     )
+
+
+def begun(words: str) -> str:
+    """A sentence with its first letter large, unless it begins with the name of a link."""
+    first = words.split(" ", 1)[0].rstrip(":,")
+    return words[:1].upper() + words[1:] if first.isalpha() else words
 
 
 def stamped(text: str, stamp: int) -> str:
