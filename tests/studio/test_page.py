@@ -298,6 +298,41 @@ def test_a_shipped_scenario_is_one_click_away(studio: Studio, looker: Looker) ->
     until(lambda: last(studio).scenario.name == "planar-one-obstacle", "the scenario")
 
 
+def test_the_thesis_is_one_click_away(
+    studio: Studio, looker: Looker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Up to where it is loaded: its arm has a body that takes long to make."""
+    loaded: list[Scenario] = []
+    monkeypatch.setattr(studio.view, "load", lambda scenario, **_: loaded.append(scenario))
+    looker.tab("Scenario")
+    looker.press("6.2.3")
+    until(lambda: len(loaded) == 1, "the scenario")
+    assert loaded == [Scenario.load("thesis-6.2.3")]
+
+
+def test_a_pose_goal_is_saved_and_loaded_on_the_page(studio: Studio, looker: Looker, folder: Path) -> None:
+    robot, tip = studio.view.robot, studio.view.tip
+    aim = robot.pose(np.array([0.3, 0.9]), tip)
+    studio.send(m.SetPoseGoal(aim))
+    until(lambda: last(studio).goal_pose is not None, "the pose")
+    looker.tab("Scenario")
+    looker.type("name", "pose")
+    looker.press("Save")
+    until((folder / "pose.yaml").is_file, "the file")
+    studio.send(m.SetJointGoal(np.zeros(2)))
+    studio.send(m.SetMethod("unswitched"))
+    until(lambda: last(studio).goal is not None and last(studio).method == "unswitched", "another goal")
+    with looker.page.expect_file_chooser() as chooser:
+        looker.press("Load a file …")
+    chooser.value.set_files(folder / "pose.yaml")
+    until(lambda: last(studio).scenario.name == "pose", "the loaded scenario")
+    assert last(studio).method == "barrier"  # a file brings its method
+    np.testing.assert_allclose(last(studio).goal_pose, aim, atol=1e-12)  # type: ignore[arg-type]
+    studio.send(m.SetRunning(True, until=4.0))
+    until(lambda: last(studio).time > 3.99, "the motion")
+    np.testing.assert_allclose(robot.pose(last(studio).q, tip), aim, atol=0.01)  # [m] counts as arrived
+
+
 def test_pictures_show_the_motion(studio: Studio, looker: Looker, tmp_path: Path) -> None:
     end, way = tmp_path / "end.png", tmp_path / "way.gif"
     film(studio, looker.page, duration=2 * FRAME, screenshot=end, video=way)

@@ -17,12 +17,17 @@ if TYPE_CHECKING:
     from sidestep.studio.page.view import View
 
 
+THESIS = tuple(name.removeprefix("thesis-") for name in shipped_scenarios() if name.startswith("thesis-"))
+
+
 class ScenarioPanel:
     """Loads scenarios, and saves the present state as one into the folder where the studio was started."""
 
     def __init__(self, server: viser.ViserServer, view: View, folder: Path) -> None:
         self._view, self._folder = view, folder
         gui = server.gui
+        thesis = gui.add_button_group("thesis", THESIS, hint="Scenarios of the thesis, by section.")
+        thesis.on_click(self._load_thesis)
         self._shipped: Any = gui.add_dropdown("shipped", shipped_scenarios())
         gui.add_button("Load").on_click(self._load_shipped)
         self._upload: Any = gui.add_upload_button("Load a file …", mime_type=".yaml,.yml")
@@ -33,6 +38,9 @@ class ScenarioPanel:
             self._save
         )
         gui.add_button("Download").on_click(self._download)
+
+    def _load_thesis(self, event: Any) -> None:
+        self._view.load(Scenario.load(f"thesis-{event.target.value}"), with_method=False)
 
     def _load_shipped(self, _: Any) -> None:
         self._view.load(Scenario.load(str(self._shipped.value)), with_method=False)
