@@ -125,19 +125,24 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
   group.inverse_T = 1.0 / temperature_;
   group.window = BoltzmannMean::window * temperature_;
   group.horizon = horizon.time;
+  group.fastest = tree.fastest();
   for (const Cluster& cluster : clusters_) {
     const int joint = ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint;
     const KinematicState::Link& link = state.link(joint);
     const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
-    // No point of the cluster moves faster along a normal, wherever the obstacle is.
-    const double speed = (link.velocity.linear + link.velocity.angular.cross(centre)).norm() +
-                         link.velocity.angular.norm() * cluster.radius + tree.fastest();
-    group.closing = horizon.time * speed;
-    const double far = std::max(reach, horizon.distance + group.closing);
-    double limit = far + group.window;  // the largest of the group
-    const auto near = [&](const PointTree::Ball& ball) {
-      const double distance = (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).norm();
-      return distance - cluster.radius - ball.radius < limit;
+    const double turning = link.velocity.angular.norm();
+    double near = reach + group.window, ahead = horizon.distance + group.window;  // the largest of the group
+    const auto matters = [&](const PointTree::Ball& ball) {
+      const Eigen::Vector3d at(ball.x, ball.y, ball.z), x = at - centre;
+      const double distance = x.norm(), radius = cluster.radius + ball.radius;
+      const double bound = distance - radius;
+      if (bound < near) {
+        return true;
+      }
+      const Eigen::Vector3d v = link.velocity.linear + link.velocity.angular.cross(at);
+      const double closing =
+          Horizon::closing_speed(x.dot(v), distance, radius, v.norm()) + turning * ball.radius + tree.fastest();
+      return bound - horizon.time * closing < ahead;
     };
     bool placed = false;
     kernels::LinkMotion motion;
@@ -153,7 +158,8 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
           group.centre[axis][k] = p[axis];
         }
         group.extent[k] = ellipsoid.body.extent;
-        group.limit[k] = used ? limit : -infinity;
+        group.near[k] = used ? near : -infinity;
+        group.ahead[k] = used ? ahead : -infinity;
         group.axes_T[k] = ellipsoid.axes_T.data();
         group.semi_axes[k] = ellipsoid.semi_axes.data();
         group.queries[k].reference = group.queries[k].ahead = infinity;
@@ -161,12 +167,13 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       }
       placed = true;
     };
-    tree.visit(centre, near, [&](int first, int count, const PointTree::Ball& ball) {
+    tree.visit(centre, matters, [&](int first, int count, const PointTree::Ball& ball) {
       if (!placed) {
         place();
       }
       if (add(group, points, {first, count, ball.x, ball.y, ball.z, ball.radius})) {
-        limit = *std::max_element(group.limit, group.limit + cluster.size);
+        near = *std::max_element(group.near, group.near + cluster.size);
+        ahead = *std::max_element(group.ahead, group.ahead + cluster.size);
       }
     });
     for (int k = 0; placed && k < cluster.size; ++k) {
@@ -175,9 +182,10 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
         continue;
       }
       const Means means(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]});
-      if (means.nearest.value < far) {
+      const bool within = means.nearest.value < reach;
+      if (within || query.ahead < horizon.distance) {
         const Eigen::Index at = cluster.first + k;
-        write(means.nearest, state, joint, at, out);
+        write(within ? means.nearest : means.approach, state, joint, at, out);
         write(means.approach, state, joint, at, out.approach);
         out.nearest[at] = tree.order()[static_cast<std::size_t>(query.nearest)];
       }

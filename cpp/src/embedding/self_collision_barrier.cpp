@@ -24,6 +24,9 @@ class PairOfLinks {
         second_(link_or_world(state, second.joint)),
         R_(first_.R_WL.transpose() * second_.R_WL),
         p_(first_.R_WL.transpose() * (second_.p_WL - first_.p_WL)),
+        omega_(first_.R_WL.transpose() * (second_.velocity.angular - first_.velocity.angular)),
+        velocity_(first_.R_WL.transpose() * (second_.velocity.linear - first_.velocity.linear) +
+                  omega_.cross(first_.R_WL.transpose() * first_.p_WL)),
         a_{first.ellipsoids, first.centre, first.radius},
         b_{second.ellipsoids, R_ * second.centre + p_, second.radius} {}
 
@@ -57,10 +60,10 @@ class PairOfLinks {
   EllipsoidGaps gaps() const noexcept { return {first_, second_}; }
 
   /// No gap shrinks faster [m/s].
-  double closing_speed() const noexcept {
-    const Eigen::Vector3d omega = second_.velocity.angular - first_.velocity.angular;
-    const Eigen::Vector3d centre = first_.R_WL * b_.centre + first_.p_WL;
-    return (second_.velocity.linear - first_.velocity.linear + omega.cross(centre)).norm() + omega.norm() * b_.radius;
+  double closing_speed() const noexcept { return closing_speed(a_.centre, a_.radius, b_.centre, b_.radius); }
+  /// Nor that of a and b.
+  double closing_speed(const BodyEllipsoid& a, const BodyEllipsoid& b) const noexcept {
+    return closing_speed(a.mean, a.extent, R_ * b.mean + p_, b.extent);
   }
 
   /// With equal and opposite wrenches about the world origin: they act at either end of the gap, along it.
@@ -78,13 +81,19 @@ class PairOfLinks {
     auto begin() const noexcept { return ellipsoids.begin(); }
     auto end() const noexcept { return ellipsoids.end(); }
   };
+  /// Of balls.
+  double closing_speed(const Eigen::Vector3d& a, double radius_a, const Eigen::Vector3d& b,
+                       double radius_b) const noexcept {
+    const Eigen::Vector3d d = a - b, v = velocity_ + omega_.cross(b);
+    return Horizon::closing_speed(d.dot(v), d.norm(), radius_a + radius_b, v.norm()) + omega_.norm() * radius_b;
+  }
   static bool near(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double distance) noexcept {
     return distance > 0.0 && (b - a).squaredNorm() < distance * distance;
   }
 
   const KinematicState::Link &first_, &second_;
   Eigen::Matrix3d R_;
-  Eigen::Vector3d p_;
+  Eigen::Vector3d p_, omega_, velocity_;  // of the second, seen from the first, at its origin
   Ellipsoids a_, b_;
 };
 
@@ -245,10 +254,15 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     likely.add(first->mean, first->shape, second->mean, second->shape);
     likely.solve();
     const EllipsoidGap gap = likely[0];
-    const double limit = window + std::max(std::min(reach + pairs_[i].contact, gap.value),
-                                           gap.value + ahead.time * gap.rate + closing);
+    const double near = std::min(reach + pairs_[i].contact, gap.value) + window;
+    const double minded = std::min(ahead.distance, gap.value + ahead.time * gap.rate) + window;
+    const double limit = std::max(near, minded + closing);
     MeanGap gaps(pair, temperature_, ahead.time);
-    pair.for_each_below(limit, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double) { gaps.add(a, b); });
+    pair.for_each_below(limit, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double bound) {
+      if (bound < near || bound - ahead.time * pair.closing_speed(a, b) < minded) {
+        gaps.add(a, b);
+      }
+    });
     gaps.flush();
     ClearanceSample mean = gaps.mean(), approach = gaps.approach();
     mean.value -= pairs_[i].contact;

@@ -124,3 +124,20 @@ BOOST_AUTO_TEST_CASE(the_stop_time_is_that_of_the_slowest_joint) {
   BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(0.0, 1e6), limits) == Horizon::longest);
   BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(5.0, 5.0), JointLimits::unlimited(2)) == Horizon::shortest);
 }
+
+BOOST_AUTO_TEST_CASE(nothing_in_a_ball_closes_faster_than_the_bound) {
+  Random random(5);
+  double closest = 1.0;  // of bound to what was found, relative
+  for (int trial = 0; trial < 300; ++trial) {
+    const Eigen::Vector3d x = random.uniform(0.05, 0.5) * random.vector(3).normalized(), v = random.vector(3);
+    const double radius = random.uniform(0.0, 0.3);
+    const double bound = Horizon::closing_speed(x.dot(v), x.norm(), radius, v.norm());
+    double fastest = -v.norm();
+    for (int sample = 0; sample < 3000; ++sample) {
+      fastest = std::max(fastest, v.dot((x - radius * random.vector(3).normalized()).normalized()));
+    }
+    BOOST_TEST(fastest <= bound + 1e-14);
+    closest = std::min(closest, (bound - fastest) / v.norm());
+  }
+  BOOST_TEST(closest < 1e-3);  // and it is no larger than it must be
+}

@@ -15,7 +15,7 @@ namespace sidestep {
 /// h + τ h'. The sample by which that is smallest is what it has to mind: not always the nearest, past which it may move.
 struct Horizon {
   double time = 0.0;      ///< τ [s]
-  double distance = 0.0;  ///< [m] that is looked beyond what can be closed within τ
+  double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
 
   static constexpr double shortest = 0.05, longest = 1.0;  ///< [s] whatever the limits
 
@@ -26,6 +26,17 @@ struct Horizon {
       time = std::max(time, std::abs(v[j]) / limits.acceleration[j]);  // keeps `time` if not a number
     }
     return std::min(time, longest);
+  }
+
+  /// The speed at which what moves with v may close in on what is seen at x from it, at most: n·v, where the unit vector n
+  /// goes from somewhere in a ball to somewhere x away in it. Given along = x·v, |x|, the ball's radius and |v|.
+  static double closing_speed(double along, double distance, double radius, double speed) noexcept {
+    const double sine = radius / distance, component = along / distance;
+    const double cosine = std::sqrt(std::max(0.0, 1.0 - sine * sine));
+    if (!(sine < 1.0) || component >= speed * cosine) {
+      return speed;
+    }
+    return component * cosine + std::sqrt(std::max(0.0, speed * speed - component * component)) * sine;
   }
 };
 

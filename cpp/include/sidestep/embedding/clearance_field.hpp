@@ -33,8 +33,8 @@ class ClearanceField {
 
   int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
 
-  /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared; of what moves fast
-  /// enough, farther, as the horizon says. No allocation.
+  /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared, and what approaches: of
+  /// points of which the room after a stop is below that of the horizon, wherever they are. No allocation.
   void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
                 ClearanceView out) const noexcept;
 

@@ -43,14 +43,15 @@ struct QueryGroup {
   int size;
   alignas(64) double centre[3][most_queries];  // world
   alignas(64) double extent[most_queries];     // longest semi-axis
-  alignas(64) double limit[most_queries];      // clearances from here on do not matter
+  alignas(64) double near[most_queries];       // clearances from here on do not matter,
+  alignas(64) double ahead[most_queries];      // unless h + τ h' is below this
   const double* axes_T[most_queries];          // 3 × 3 by columns: link frame to principal axes
   const double* semi_axes[most_queries];       // [m]
   const LinkMotion* link;
   double inverse_T;
   double window;                               // samples so much above the smallest do not matter [m]
   double horizon;                              // τ [s]
-  double closing;                              // τ times the speed at which a point may come, at most [m]
+  double fastest;                              // speed of any point [m/s], at most
   Query queries[most_queries];
 };
 
@@ -60,7 +61,7 @@ struct Leaf {
   double x, y, z, radius;
 };
 
-/// Adds the points of a leaf to every query of the group that they matter to. Returns whether a limit fell.
+/// Adds the points of a leaf to every query of the group that they matter to. Returns whether `near` or `ahead` fell.
 using AddLeaf = bool (*)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
 
 bool add_leaf_baseline(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;

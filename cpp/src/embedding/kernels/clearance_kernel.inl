@@ -77,6 +77,15 @@ void rescale(Query& query, double shift, double inverse_T) noexcept {
   }
 }
 
+/// As Horizon::closing_speed: the angle of n to x is within that of the ball, asin(radius/|x|).
+inline Lanes closing_speed(Lanes along, Lanes distance, Lanes radius, Lanes speed) noexcept {
+  const Lanes inverse = 1.0 / distance, sine = radius * inverse;
+  const Lanes squared = 1.0 - sine * sine, cosine = root(squared > 0.0 ? squared : Lanes{});
+  const Lanes component = along * inverse, across = speed * speed - component * component;
+  const Lanes turned = component * cosine + root(across > 0.0 ? across : Lanes{}) * sine;
+  return sine < 1.0 ? (component < speed * cosine ? turned : speed) : speed;
+}
+
 /// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where Σ A w² = 1.
 struct Outside {
   Lanes t, inverse[3], w[3], flatness, inverse_norm;  // 1 / (A + t), Σ A w² / (A + t), 1 / |w|
@@ -139,13 +148,32 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     const Lanes y = load(points.position[1] + n) - group.centre[1][k];
     const Lanes z = load(points.position[2] + n) - group.centre[2][k];
     const Lanes radius = load(points.radius + n);
-    const Lanes span = group.limit[k] + group.extent[k] + radius;  // to where the ball around the ellipsoid matters
-    if (below(x * x + y * y + z * z, span > 0.0 ? span * span : Lanes{}) == 0) {
-      continue;
-    }
-    Lanes e[3];  // the offset in principal axes
+    Lanes e[3], s[3], v[3];  // the offset in principal axes, and the velocities of the point, there and in moving axes
     for (int i = 0; i < 3; ++i) {
       e[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
+    }
+    const double* W = query.angular;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      v[i] = -query.linear[i] - (W[j] * e[l] - W[l] * e[j]);
+    }
+    if (moving) {
+      const Lanes vx = load(points.velocity[0] + n), vy = load(points.velocity[1] + n), vz = load(points.velocity[2] + n);
+      for (int i = 0; i < 3; ++i) {
+        s[i] = R[3 * i] * vx + R[3 * i + 1] * vy + R[3 * i + 2] * vz;
+        v[i] += s[i];
+      }
+    }
+    // From below: the clearance of the ball around the ellipsoid, and what may be closed within the horizon.
+    const Lanes distance = root(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+    const Lanes speed = root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    const Lanes along = -(e[0] * v[0] + e[1] * v[1] + e[2] * v[2]);
+    const Lanes closing = group.horizon * closing_speed(along, distance, all(group.extent[k]), speed);
+    const auto matter = [&](Lanes clearance) noexcept {
+      return below(clearance, all(group.near[k])) | below(clearance - closing, all(group.ahead[k]));
+    };
+    if (matter(distance - group.extent[k] - radius) == 0) {
+      continue;
     }
 
     // t from below. Newton's iteration on 1/√S − 1, which is concave in t, stays below; and so does t |w| below h. It begins
@@ -184,13 +212,12 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     const Lanes S_if_inside = out.t > 0.0 ? all(1.0) : S;
     const auto inside = S_if_inside < 1.0;
     const unsigned any_inside = below(S_if_inside, all(1.0));
-    const Lanes limit = all(group.limit[k]);
-    if ((any_inside | below(h, limit)) == 0) {
+    if ((any_inside | matter(h)) == 0) {
       continue;
     }
     for (int i = 0; i < most_iterations; ++i) {
       const Lanes root_S = root(S);
-      if ((below(all(converged), root_S) & (below(h, limit) | any_inside)) == 0) {
+      if ((below(all(converged), root_S) & (matter(h) | any_inside)) == 0) {
         break;
       }
       const Lanes step = S * (root_S - 1.0) / out.flatness;
@@ -210,7 +237,7 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
         g[i] = inside ? in.gradient[i] : g[i];
       }
     }
-    if (below(h, limit) == 0) {
+    if (matter(h) == 0) {
       continue;
     }
     if (below(h, all(query.reference)) != 0) {
@@ -227,21 +254,9 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
       }
     }
 
-    // Velocity and acceleration of the point in the ellipsoid's moving axes.
-    Lanes s[3], v[3], a[3];
-    const double* W = query.angular;
+    // The acceleration of the point in the ellipsoid's moving axes.
+    Lanes a[3];
     const double* B = query.bias_angular;
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, l = (i + 2) % 3;
-      v[i] = -query.linear[i] - (W[j] * e[l] - W[l] * e[j]);
-    }
-    if (moving) {
-      const Lanes vx = load(points.velocity[0] + n), vy = load(points.velocity[1] + n), vz = load(points.velocity[2] + n);
-      for (int i = 0; i < 3; ++i) {
-        s[i] = R[3 * i] * vx + R[3 * i + 1] * vy + R[3 * i + 2] * vz;
-        v[i] += s[i];
-      }
-    }
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
       a[i] = -query.bias_linear[i] - (B[j] * e[l] - B[l] * e[j]) - (W[j] * v[l] - W[l] * v[j]);
@@ -273,9 +288,9 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
         }
       }
     }
-    const double nearest = query.reference + group.window, approaching = query.ahead + group.window + group.closing;
-    const double lower = nearest > approaching ? nearest : approaching;
-    group.limit[k] = lower < group.limit[k] ? lower : group.limit[k];
+    const double near = query.reference + group.window, minded_below = query.ahead + group.window;
+    group.near[k] = near < group.near[k] ? near : group.near[k];
+    group.ahead[k] = minded_below < group.ahead[k] ? minded_below : group.ahead[k];
 
     // Weights; those beyond the window, and the padding, are zero.
     const Lanes above = h - query.reference;
@@ -318,20 +333,31 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
 
 bool add_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
   bool lower = false;
+  // The link's point at the centre of the leaf moves by v, at others of the leaf by a little more.
+  const LinkMotion& link = *group.link;
+  const double v[3] = {link.linear[0] + link.angular[1] * leaf.z - link.angular[2] * leaf.y,
+                       link.linear[1] + link.angular[2] * leaf.x - link.angular[0] * leaf.z,
+                       link.linear[2] + link.angular[0] * leaf.y - link.angular[1] * leaf.x};
+  const auto norm = [](const double* a) noexcept { return __builtin_sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); };
+  const double speed = norm(v), more = norm(link.angular) * leaf.radius + group.fastest;
   for (int first = 0; first < group.size; first += width) {
-    const Lanes x = load(group.centre[0] + first) - leaf.x;
-    const Lanes y = load(group.centre[1] + first) - leaf.y;
-    const Lanes z = load(group.centre[2] + first) - leaf.z;
-    const Lanes bound = root(x * x + y * y + z * z) - load(group.extent + first) - leaf.radius;
-    unsigned near = below(bound, load(group.limit + first));
+    const Lanes x = leaf.x - load(group.centre[0] + first);
+    const Lanes y = leaf.y - load(group.centre[1] + first);
+    const Lanes z = leaf.z - load(group.centre[2] + first);
+    const Lanes distance = root(x * x + y * y + z * z);
+    const Lanes radius = load(group.extent + first) + leaf.radius;
+    const Lanes bound = distance - radius;
+    const Lanes closing = closing_speed(x * v[0] + y * v[1] + z * v[2], distance, radius, all(speed)) + more;
+    unsigned near = below(bound, load(group.near + first)) |
+                    below(bound - group.horizon * closing, load(group.ahead + first));
     for (int k = first; near != 0; ++k, near >>= 1) {
       if ((near & 1u) != 0 && k < group.size) {
         if (!group.queries[k].ready) {
           prepare(group, k);
         }
-        const double limit = group.limit[k];
+        const double near_before = group.near[k], ahead_before = group.ahead[k];
         add_points(group, k, points, leaf);
-        lower = lower || group.limit[k] < limit;
+        lower = lower || group.near[k] < near_before || group.ahead[k] < ahead_before;
       }
     }
   }
