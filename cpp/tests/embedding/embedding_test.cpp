@@ -115,14 +115,14 @@ BOOST_AUTO_TEST_CASE(what_is_ahead_comes_before_what_is_beside) {
   BOOST_TEST(between.curvature == 1.5, boost::test_tools::tolerance(1e-12));
 }
 
-BOOST_AUTO_TEST_CASE(the_stop_time_is_that_of_the_slowest_joint) {
+BOOST_AUTO_TEST_CASE(the_horizon_is_half_the_time_in_which_the_slowest_joint_stops) {
   JointLimits limits = JointLimits::unlimited(2);
   limits.acceleration << 10.0, 5.0;
-  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(-2.0, 0.5), limits) == 0.2);
-  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(1.0, -1.5), limits) == 0.3);
-  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(0.0, 0.0), limits) == Horizon::shortest);
-  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(0.0, 1e6), limits) == Horizon::longest);
-  BOOST_TEST(Horizon::stop_time(Eigen::Vector2d(5.0, 5.0), JointLimits::unlimited(2)) == Horizon::shortest);
+  BOOST_TEST(Horizon::of_stop(Eigen::Vector2d(-2.0, 0.5), limits) == 0.1);
+  BOOST_TEST(Horizon::of_stop(Eigen::Vector2d(1.0, -1.5), limits) == 0.15);
+  BOOST_TEST(Horizon::of_stop(Eigen::Vector2d(0.0, 0.0), limits) == 0.0);
+  BOOST_TEST(Horizon::of_stop(Eigen::Vector2d(0.0, 1e6), limits) == Horizon::longest);
+  BOOST_TEST(Horizon::of_stop(Eigen::Vector2d(5.0, 5.0), JointLimits::unlimited(2)) == 0.0);
 }
 
 BOOST_AUTO_TEST_CASE(nothing_in_a_ball_closes_faster_than_the_bound) {

@@ -11,19 +11,20 @@ namespace sidestep {
 
 /// How far ahead what approaches is looked for.
 ///
-/// An arm that stops in the time τ, every closing speed falling in proportion, comes no closer to a sample than
-/// h + τ h'. The sample by which that is smallest is what it has to mind: not always the nearest, past which it may move.
+/// An arm that stops along its path in the time 2τ, every closing speed falling in proportion to time, comes to a clearance
+/// of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is smallest is
+/// what it has to mind: not always the nearest, past which it may move.
 struct Horizon {
   double time = 0.0;      ///< τ [s]
   double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
 
-  static constexpr double shortest = 0.05, longest = 1.0;  ///< [s] whatever the limits
+  static constexpr double longest = 0.5;  ///< τ [s] at most, whatever the limits
 
-  /// τ = max_j |v_j| / (acceleration limit)_j, the time in which the arm stops along its path.
-  static double stop_time(const Eigen::VectorXd& v, const JointLimits& limits) noexcept {
-    double time = shortest;
+  /// τ = max_j |v_j| / (acceleration limit)_j / 2.
+  static double of_stop(const Eigen::VectorXd& v, const JointLimits& limits) noexcept {
+    double time = 0.0;
     for (Eigen::Index j = 0; j < v.size(); ++j) {
-      time = std::max(time, std::abs(v[j]) / limits.acceleration[j]);  // keeps `time` if not a number
+      time = std::max(time, 0.5 * std::abs(v[j]) / limits.acceleration[j]);  // keeps `time` if not a number
     }
     return std::min(time, longest);
   }

@@ -37,7 +37,7 @@ class Barrier : public Embedding {
 
   /// Within which what approaches is looked for: the activation distance beyond what can be closed while the arm stops.
   Horizon horizon(const KinematicState& state) const noexcept {
-    return {Horizon::stop_time(state.v(), robot().limits()), function_.activation};
+    return {Horizon::of_stop(state.v(), robot().limits()), function_.activation};
   }
 
   /// Adds ψ_k = f(h_k) with its derivatives, for every clearance that `out.clearances` holds.
