@@ -157,3 +157,4 @@ def test_a_pose_out_of_reach_is_said() -> None:
     assert not result.success
     assert "mm and" in result.sentence()
     assert "from the goal, which it does not reach" in result.sentence()
+    assert (result.stop or "").startswith("out of reach: the nearest posture found is ")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sidestep import GeometricSystem, JointGoal, Obstacles, PoseGoal, Robot
+from sidestep import GeometricSystem, JointGoal, Obstacles, Robot
 from sidestep.pose import pose_at
 from sidestep.simulation import Arrival, run_kinematically
 from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
@@ -35,34 +35,48 @@ def test_a_posture_has_the_pose_within_the_limits(arm: Robot) -> None:
         assert ((posture.q >= lower) & (posture.q <= upper)).all()
 
 
-def test_out_of_reach_there_is_no_posture(arm: Robot) -> None:
-    posture = posture_at(arm, TIP, pose_at([3.0, 0.0, 0.5]), START, starts=3)
+def test_out_of_reach_the_nearest_posture_draws_and_what_lacks_is_said(arm: Robot) -> None:
+    pose = pose_at([3.0, 0.0, 0.5]) @ arm.pose(START, TIP)
+    posture = posture_at(arm, TIP, pose, START, starts=3)
     assert not posture.found
-    aim = PoseAim(arm, TIP, pose_at([3.0, 0.0, 0.5]), stiffness=4.0, posture=posture)
-    assert isinstance(aim.at(START), PoseGoal)
+    assert 2.0 < posture.distance < 3.0  # [m] the arm is 0.86 m long, and was half stretched
+    aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture)
+    assert aim.errors(posture.q) == (
+        pytest.approx(posture.distance, abs=1e-9),
+        pytest.approx(posture.angle, abs=1e-7),  # an angle by its cosine, near zero
+    )
+    for q in (START, posture.q):
+        drawn = aim.at(q)
+        assert isinstance(drawn, JointGoal)
+        np.testing.assert_array_equal(drawn.position, posture.q)
+    assert posture.in_words("on the way, 1.00 rad from the goal") == (
+        f"out of reach: the nearest posture found is {100 * posture.distance:.1f} cm and "
+        f"{np.rad2deg(posture.angle):.0f}° from the pose; on the way, 1.00 rad from there"
+    )
+    assert Posture(START).in_words("arriving") == "arriving"
+
+
+def test_a_posture_that_is_not_free_is_taken_only_where_there_is_no_other(arm: Robot) -> None:
+    pose = target(arm)
+    first = posture_at(arm, TIP, pose, START, starts=20)
+    other = posture_at(
+        arm, TIP, pose, START, starts=20, free=lambda q: float(np.abs(q - first.q).max()) > 0.1
+    )
+    assert other.found
+    assert np.abs(other.q - first.q).max() > 0.1  # [rad]
+    none = posture_at(arm, TIP, pose, START, starts=20, free=lambda _: False)
+    assert none.found
 
 
 def test_an_arm_of_seven_joints_comes_to_a_pose_in_seconds(arm: Robot) -> None:
-    """20 cm forwards the joints move the hand little: the pull of the pose alone takes far longer."""
+    """20 cm forwards the joints move the hand little: the pull of the pose alone takes over 12 s."""
     system = GeometricSystem([], robot=arm, stiffness=4.0, damping=4.0)
     pose = target(arm)
-    times = []
-    for posture in (posture_at(arm, TIP, pose, START), Posture(START, False)):
-        aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture)
-        run = run_kinematically(
-            arm,
-            system,
-            START,
-            aim,
-            12.0,
-            Obstacles.none(),
-            timestep=0.01,
-            arrival=Arrival(speed=np.inf, hold=0.0),
-        )
-        times.append(run.time_to_goal)
-    assert times[0] is not None
-    assert times[0] < 5.0  # as a configuration: e(t) = (1 + 2 t) exp(-2 t)
-    assert times[1] is None
+    aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture_at(arm, TIP, pose, START))
+    arrival = Arrival(speed=np.inf, hold=0.0)
+    run = run_kinematically(arm, system, START, aim, 12.0, Obstacles.none(), timestep=0.01, arrival=arrival)
+    assert run.time_to_goal is not None
+    assert run.time_to_goal < 5.0  # as a configuration: e(t) = (1 + 2 t) exp(-2 t)
 
 
 def test_near_by_the_pose_draws_and_the_elbow_is_free(arm: Robot) -> None:

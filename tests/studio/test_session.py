@@ -113,6 +113,41 @@ def test_a_pose_goal_is_reached(make_session: MakeSession) -> None:
     np.testing.assert_allclose(session.robot.pose(last.q, session.tip), aim, atol=1e-3)
 
 
+def test_a_pose_out_of_reach_is_approached_and_said(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(replace(scenario, obstacles=()))
+    aim = session.robot.pose(np.array([0.3, 0.0]), session.tip)
+    aim[:2, 3] *= 1.2  # the arm of one metre is stretched already
+    session.handle(m.SetPoseGoal(aim))
+    last = run(session, 6.0)
+    tip = session.robot.pose(last.q, session.tip)
+    np.testing.assert_allclose(tip[:3, 3], aim[:3, 3] / 1.2, atol=0.01)  # [m] e(t) = (1 + 2 t) exp(-2 t)
+    np.testing.assert_allclose(tip[:3, :3], aim[:3, :3], atol=0.01)
+    assert last.words == (
+        "out of reach: the nearest posture found is 20.0 cm and 0° from the pose; at rest, 0.00 rad from there"
+    )
+    assert not last.posture.found
+
+
+def test_a_goal_that_is_itself_blocked_is_said_and_the_arm_rests(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario)
+    goal = session.stage.state()[0] + np.array([1.0, 0.0])
+    session.handle(m.SetJointGoal(goal))
+    session.handle(m.DragThing("ball", session.robot.pose(goal, session.tip)))
+    last = run(session, 6.0)
+    found = re.fullmatch(
+        r"stopped (\d\.\d\d) rad from the goal, which is itself blocked: link2 against ball, (\d+) mm deep",
+        last.words,
+    )
+    assert found is not None
+    assert float(found[1]) == pytest.approx(np.abs(last.q - goal).max(), abs=0.006)  # of two digits
+    assert int(found[2]) > 50  # [mm] the ball's radius and more
+    again = run(session, 3.0)
+    np.testing.assert_allclose(again.q, last.q, atol=0.02)  # [rad] no sub-goals: none leads anywhere
+    assert again.touched == 0
+
+
 def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
     assert len(run(session, 0.1).values) > 1  # one coordinate per barrier

@@ -121,14 +121,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         )
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
     system = _at("barriers" if barrier else "system", scenario, partial(_system, scenario, robot, body))
-    leads = guided and posture.found
-    if (
-        barrier
-        and not leads
-        and posture.found
-        and isinstance(seen, Obstacles)
-        and not np.any(seen.velocities)
-    ):
+    if barrier and not guided and isinstance(seen, Obstacles) and not np.any(seen.velocities):
         system = system.relaxed_at(posture.q, seen)
     return Assembly(
         robot=robot,
@@ -140,8 +133,8 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         goal=posture.q,
         seen=seen,
         safe=barrier,
-        escape=Escape(robot) if scenario.method == "barrier" and posture.found else None,
-        guide=GuidedMotion(robot, body, system=system, synchronous=True) if leads else None,
+        escape=Escape(robot) if scenario.method == "barrier" else None,
+        guide=GuidedMotion(robot, body, system=system, synchronous=True) if guided else None,
         pose=_pose_aim(scenario, robot, posture),
     )
 
@@ -153,12 +146,12 @@ def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> Posture:
     """
     choice = scenario.goal
     if isinstance(choice, JointState):
-        return Posture(coordinates(choice, robot, "goal.position"), True)
+        return Posture(coordinates(choice, robot, "goal.position"))
     links = [frame.name for frame in robot.frames if frame.joint >= 0]
     if choice.frame not in links:
         raise ValueError(f"goal.frame is {choice.frame!r}; allowed: {', '.join(links)}")
     if choice.posture is not None:
-        return Posture(coordinates(choice.posture, robot, "goal.posture.position"), True)
+        return Posture(coordinates(choice.posture, robot, "goal.posture.position"))
     return posture_at(robot, choice.frame, pose_of(choice), start, starts=POSTURE_STARTS)
 
 

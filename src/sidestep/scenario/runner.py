@@ -69,8 +69,9 @@ def run_scenario(
 
 def _reason(parts: Assembly, run: Run) -> str:
     seen = obstacles_over_time(parts.seen)(float(run.time[-1]))
-    goal = parts.goal if parts.pose is None else parts.pose.goal
-    return parts.system.diagnose(run.q[-1], run.v[-1], goal, seen).describe()
+    goal = parts.goal if parts.pose is None else parts.pose.at(run.q[-1])
+    words = parts.system.diagnose(run.q[-1], run.v[-1], goal, seen).describe()
+    return words if parts.pose is None else parts.pose.posture.in_words(words)
 
 
 def _arrival(scenario: Scenario) -> Arrival:

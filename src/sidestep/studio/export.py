@@ -163,7 +163,7 @@ def python_snippet(snapshot: Snapshot) -> str:
             f"system = ss.GeometricSystem([psi], {spring}, switch={_switch_code(method, numbers)})",
         ]
     lines += _goal_code(snapshot)
-    if METHODS[method].covering and snapshot.posture.found:
+    if METHODS[method].covering:
         place = "goal" if snapshot.goal_pose is None else "posture"
         lines += [f"# among obstacles at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]
     return "\n".join(lines) + "\n"
@@ -197,12 +197,10 @@ def _goal_code(snapshot: Snapshot) -> list[str]:
         f"pose = {snapshot.goal_pose.tolist()}",
         f"goal = ss.PoseGoal(robot, {snapshot.tip!r}, pose, {pull})",
     ]
-    if snapshot.posture.found:
-        within = f"{1e3 * ENTER[0]:g} mm and {ENTER[1]:g} rad"
-        lines += [
-            f"posture = {posture}  # that has the pose: the goal until the tip is within {within} of it"
-        ]
-    return lines
+    says = f"that has the pose: the goal until the tip is within {1e3 * ENTER[0]:g} mm and {ENTER[1]:g} rad of it"
+    if not snapshot.posture.found:
+        says = "the nearest found to the pose, which is out of reach: the goal"
+    return [*lines, f"posture = {posture}  # {says}"]
 
 
 def _switch_code(method: str, numbers: Mapping[str, float]) -> str:

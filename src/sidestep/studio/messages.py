@@ -25,9 +25,11 @@ class SetJointGoal:
 
 @dataclass(frozen=True)
 class SetPoseGoal:
-    """The pose (4, 4) of the tip in the world to go to."""
+    """The pose (4, 4) of the tip in the world to go to; thorough: a posture for it is searched from everywhere, not
+    only from the last one."""
 
     pose: Array
+    thorough: bool = True
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,20 @@ It knows nothing of the page. `loop` runs it in a process of its own, tests call
 
 from __future__ import annotations
 
-import re
 import time as clock
 from collections import deque
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import (
+    Diagnosis,
     Escape,
     GeometricSystem,
     JointGoal,
+    MotionState,
     Obstacles,
     PoseGoal,
     Step,
@@ -27,7 +29,7 @@ from sidestep.body import Body
 from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
+from sidestep.scenario.assembly import POSTURE_STARTS, coordinates, goal_posture, load_robot
 from sidestep.scenario.scenario import JointState
 from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
 from sidestep.simulation.run import status_name
@@ -35,8 +37,9 @@ from sidestep.studio import messages as m
 from sidestep.studio.export import numbers_of
 from sidestep.studio.methods import METHODS, Method, Numbers, build_system, check_numbers, method_named
 from sidestep.studio.stage import Actor, Stage
-from sidestep.studio.things import Thing, things_of
+from sidestep.studio.things import things_of
 from sidestep.studio.tip import at_tip, tip_of
+from sidestep.studio.words import in_words
 
 Array = npt.NDArray[np.float64]
 Prepare = Callable[[Robot, Method, int | None], Body]
@@ -44,6 +47,8 @@ Prepare = Callable[[Robot, Method, int | None], Body]
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
 STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
+REST = 0.5  # [s] for which all joints have been slower than `SLOW`: the arm rests
+SLOW = 0.02  # [rad/s | m/s]
 
 
 class Session:
@@ -69,21 +74,15 @@ class Session:
     period: float
     time: float
     running: bool
-    _until: float
     _bodies: dict[bool, Body]
     _system: GeometricSystem
     _controller: TorqueController
-    _start: Array
-    _pose: Array | None
     _posture: Posture
     _ellipsoids: int | None
     _relaxed: GeometricSystem | None
     _aim: JointGoal | PoseAim
     _guide: GuidedMotion | None
-    _guide_time: float
-    _guide_says: str
     _escape: Escape | None
-    _potential: float
     _step: Step | None
     _solution: TorqueSolution | None
     _contacts: tuple[str, ...]
@@ -113,21 +112,25 @@ class Session:
         """Does what a command says; raises ValueError or OSError, and stays as it was, where it cannot."""
         match command:
             case m.SetJointGoal(position):
-                self._set_goal(None, Posture(self.robot.check_configuration(position, "goal"), True))
-            case m.SetPoseGoal(pose):
+                self._set_goal(None, Posture(self.robot.check_configuration(position, "goal")))
+            case m.SetPoseGoal(pose, thorough):
                 target = np.array(pose, dtype=float)
                 near = self.stage.state()[0] if self._pose is None else self._posture.q
-                self._set_goal(target, posture_at(self.robot, self.tip, target, near))
+                starts = POSTURE_STARTS if thorough else 1
+                free = partial(self._is_free, self._obstacles())
+                self._set_goal(
+                    target, posture_at(self.robot, self.tip, target, near, starts=starts, free=free)
+                )
             case m.AddThing(thing):
                 self._set_actors([*self.stage.actors, Actor(thing)])
             case m.RemoveThing(name):
                 gone = self.actor(name)
                 self._set_actors([actor for actor in self.stage.actors if actor is not gone])
-            case m.DragThing(name, target):
+            case m.DragThing(name, place):
                 actor = self.actor(name)
-                actor.target = None if target is None else np.array(target, dtype=float)
+                actor.target = None if place is None else np.array(place, dtype=float)
                 actor.touched = True
-                if target is None:
+                if place is None:
                     self.stage.throw(actor, np.zeros(3))
             case m.ThrowThing(name, velocity):
                 self.stage.throw(self.actor(name), velocity)
@@ -160,6 +163,8 @@ class Session:
         """
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
+        if np.abs(v).max() > SLOW:
+            self._moved = self.time
         obstacles = self._obstacles()
         goal = self._attractor(q, obstacles)
         step = self._moving_by(obstacles).acceleration(q, v, goal, obstacles)
@@ -195,11 +200,13 @@ class Session:
         if self._step is not None and self._solution is not None:
             step = self._step
             diagnosis = step.diagnosis
-            words = in_words(diagnosis.describe(), self._owners, self._things)
-            if self._led:
+            there = None if self.time - self._moved < REST else self._at_goal(self._obstacles())
+            words = in_words(diagnosis, there, owners=self._owners, things=self._things)
+            if self._guide is not None:
                 words = f"guide: {self._guide_says}; {words}"
             if self._escape is not None and self._escape.escaping:
                 words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
+            words = self._posture.in_words(words)
             status = status_name(step.status), status_name(self._solution.status)
             values, metric = np.array(step.values), np.array(step.metric)
             clearances = np.asarray(step.clearances.values)
@@ -237,11 +244,6 @@ class Session:
             rows=rows,
         )
 
-    @property
-    def step_seconds(self) -> Array:
-        """Wall time [s] of each of the last steps."""
-        return np.array(self._times)
-
     def actor(self, name: str) -> Actor:
         """The obstacle called `name`; raises ValueError that lists them."""
         for actor in self.stage.actors:
@@ -255,26 +257,36 @@ class Session:
     def _attractor(self, q: Array, obstacles: Obstacles) -> JointGoal | PoseGoal:
         """What the system is drawn to now: the goal, a sub-goal, or a place on the guide's path."""
         self._guide_time += self.period
-        if self._led and self._guide is not None:
+        if self._guide is not None:
             guidance = self._guide.lead(q, obstacles, self._guide_time)
             self._guide_says = guidance.status.name.replace("_", " ")
             return guidance.goal
         aim = self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
-        if self._escape is not None and isinstance(aim, JointGoal):
-            return self._escape.pursue(aim, q, self._potential, self.period)
-        return aim
+        if self._escape is None or not isinstance(aim, JointGoal):
+            return aim
+        escaping = self._escape.escaping
+        followed = self._escape.pursue(aim, q, self._potential, self.period)
+        if self._escape.escaping and not escaping:
+            if self._at_goal(obstacles).state == MotionState.inside_barrier:
+                self._escape = Escape(self.robot)  # no way leads to a goal that is blocked
+                return aim
+        return followed
 
-    @property
-    def _led(self) -> bool:
-        """Whether a guide leads the arm: it needs a configuration to go to."""
-        return self._guide is not None and self._posture.found
+    def _at_goal(self, obstacles: Obstacles) -> Diagnosis:
+        """What an arm at rest at the goal does."""
+        q = self._posture.q
+        return self._moving_by(obstacles).diagnose(q, np.zeros_like(q), q, obstacles)
+
+    def _is_free(self, obstacles: Obstacles, q: Array) -> bool:
+        """Whether the arm may rest at q (nv,), as far as the system knows of clearances."""
+        return self._system.diagnose(q, np.zeros_like(q), q, obstacles).state != MotionState.inside_barrier
 
     def _moving_by(self, obstacles: Obstacles) -> GeometricSystem:
         """The system, with barriers that leave the goal free as long as all obstacles are at rest."""
-        if self._led and self._guide is not None:
+        if self._guide is not None:
             return self._guide.moving
         speeds = (np.abs(actor.velocity).max() for actor in self.stage.actors)
-        if not (self._method.safe and self._posture.found) or max(speeds, default=0.0) > STILL:
+        if not self._method.safe or max(speeds, default=0.0) > STILL:
             self._relaxed = None
             return self._system
         if self._relaxed is None:
@@ -309,6 +321,7 @@ class Session:
 
     def _begin(self) -> None:
         self.time, self._count, self._touched = 0.0, 0, 0
+        self._moved = 0.0
         self.running, self._until = True, float("inf")
         self._step = self._solution = None
         self._contacts = ()
@@ -333,11 +346,9 @@ class Session:
         if self._pose is not None:
             stiffness = self._numbers[self._method.name]["stiffness"]
             self._aim = PoseAim(self.robot, self.tip, self._pose, stiffness=stiffness, posture=self._posture)
-        if self._led and self._guide is not None:
+        if self._guide is not None:
             self._guide.set_goal(self._posture.q)
-        # A pose without a posture is approached so slowly that it would count as stuck.
-        escapes = self._method.escapes and self._posture.found
-        self._escape = Escape(self.robot) if escapes else None
+        self._escape = Escape(self.robot) if self._method.escapes else None
 
     def _set_actors(self, actors: list[Actor]) -> None:
         self.stage.set_things(actors)
@@ -386,13 +397,3 @@ class Session:
 
     def _poses(self) -> Array:
         return np.array([actor.pose for actor in self.stage.actors]).reshape(-1, 4, 4)
-
-
-def in_words(sentence: str, owners: npt.NDArray[np.intp], things: tuple[Thing, ...]) -> str:
-    """A diagnosis with the names of obstacles in place of the numbers of their points."""
-
-    def name(match: re.Match[str]) -> str:
-        point = int(match[1])
-        return things[owners[point]].name if 0 <= point < len(owners) else match[0]
-
-    return re.sub(r"\blink (?=\S*link)", "", re.sub(r"obstacle point (-?\d+)", name, sentence))

@@ -72,7 +72,7 @@ class GoalControl:
             self.kind.content = "**Goal: a configuration.** Move a slider, or drag the gizmo for a pose."
         elif pose is not None:
             self._place_gizmo(pose)
-            where = "" if posture.found else " **No posture found for it**: the ghost is as near as it gets."
+            where = "" if posture.found else " **Out of reach**: the ghost is as near as was found."
             self.kind.content = f"**Goal: a pose** of `{self._tip}`.{where} Drag the gizmo, or move a slider."
         self.ghost.show(self.q)
         for slider, value in zip(self._sliders, self._factors * self.q, strict=True):
@@ -91,8 +91,8 @@ class GoalControl:
         if not np.allclose(gizmo_pose(self.gizmo), pose, atol=1e-6):
             self.gizmo.position, self.gizmo.wxyz = vector[:3], vector[3:]
 
-    async def _dragged(self, _: Any) -> None:
-        self._send(m.SetPoseGoal(gizmo_pose(self.gizmo)))
+    async def _dragged(self, event: Any) -> None:
+        self._send(m.SetPoseGoal(gizmo_pose(self.gizmo), thorough=event.phase == "end"))
 
     async def _moved(self, event: Any) -> None:
         if event.client is None:  # set by `show`
