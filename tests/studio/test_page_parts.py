@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,8 @@ from sidestep.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS, build_system
 from sidestep.studio.page import colours
-from sidestep.studio.page.arm import reach
+from sidestep.studio.page.arm import reach, short_names
+from sidestep.studio.page.camera import HALF, HIGH, LOW, RIGHT, UP, VIEW, Viewpoint
 from sidestep.studio.page.marks import METRIC_SIZE, metric_ellipsoid
 from sidestep.studio.page.obstacles import FASTEST_THROW, throw_velocity
 from sidestep.studio.page.plots import Plots
@@ -31,6 +33,7 @@ from sidestep.studio.page.surface import (
 )
 from sidestep.studio.page.view import begun
 from sidestep.studio.session import Session
+from sidestep.studio.things import ball, cloud, thing_of
 from sidestep.studio.truth import solid_poses
 
 MakeSession = Callable[..., Session]
@@ -93,6 +96,55 @@ def test_the_metric_of_flat_space_is_drawn_at_full_size() -> None:
     np.testing.assert_allclose(pose[:3, 3], robot.pose(q, "tip")[:3, 3])
     _, smaller = metric_ellipsoid(robot, "tip", q, 4.0 * np.eye(3))
     assert smaller.max() == pytest.approx(0.5 * METRIC_SIZE * reach(robot), rel=1e-9)  # G = 4: half the speed
+
+
+def test_a_window_shows_arm_goal_and_obstacles_and_the_surface_beside_them() -> None:
+    rng = np.random.default_rng(0)
+    for size in (0.1, 1.0, 3.0):
+        places = size * rng.uniform(-1.0, 1.0, (12, 3)) * [1.0, 0.5, 0.3] + [0.5, 0.0, 0.3]
+        view = Viewpoint.of(places)
+
+        def seen(points: np.ndarray, view: Viewpoint = view) -> np.ndarray:
+            away = points - view.position
+            return away @ np.array([RIGHT, UP]).T / (HALF * (away @ VIEW)[:, None])
+
+        found = seen(places)
+        assert (found > LOW - 0.02).all()  # found by rounds, up to some thousandths
+        assert (found < HIGH + 0.02).all()
+        pose = view.corner(SIDE)
+        np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-12)
+        square = np.array([[x, y, 0.0] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) * SIDE
+        corners = pose[:3, 3] + square @ pose[:3, :3].T
+        inside = seen(corners)
+        assert (inside[:, 0] > -0.77).all()  # half the width that 1280 x 800 leaves between the panels
+        assert (inside[:, 1] < 1.0).all()
+        assert (inside[:, 1] > HIGH[1]).all()  # above the arm
+        assert ((corners - view.position) @ VIEW > 0.5 * view.far).all()
+        assert pose[:3, 2] @ (view.position - pose[:3, 3]) > 0.0  # its upper side is seen
+
+
+def test_joints_are_named_by_what_tells_them_apart() -> None:
+    assert short_names(["fr3_joint1", "fr3_joint2"]) == ["joint1", "joint2"]
+    assert short_names(["shoulder_pan_joint", "elbow_joint", "wrist_1_joint"]) == [
+        "shoulder_pan",
+        "elbow",
+        "wrist_1",
+    ]
+    assert short_names(["lbr_joint_1", "lbr_joint_2"]) == ["joint_1", "joint_2"]
+    assert short_names(["lift"]) == ["lift"]
+
+
+def test_the_colours_of_batched_meshes_are_shown_as_those_of_others() -> None:
+    assert colours.batched_rgb("#FFFFFF") == (255, 255, 255)
+    assert colours.batched_rgb("#000000") == (0, 0, 0)
+    assert colours.batched_rgb("#808080") == (55, 55, 55)  # ((128/255 + 0.055) / 1.055)^2.4 = 0.216
+
+
+def test_the_ball_of_a_cloud_that_is_touched_is_named_by_the_cloud(tmp_path: Path) -> None:
+    np.save(tmp_path / "wall.npy", np.zeros((2, 3)))
+    things = [cloud("wall", np.zeros(3), tmp_path / "wall.npy", 0.01), ball("a.b", np.zeros(3), 0.1)]
+    assert thing_of("wall.1", things) == "wall"
+    assert thing_of("a.b", things) == "a.b"
 
 
 def test_an_unknown_clearance_does_not_empty_its_plot(make_session: MakeSession, scenario: Scenario) -> None:

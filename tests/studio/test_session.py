@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sidestep import ExactClearance, Scenario
+from sidestep import ExactClearance, Robot, Scenario
 from sidestep.pose import pose_at
 from sidestep.scenario.runner import run_scenario
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
 from sidestep.studio.export import scenario_now
 from sidestep.studio.session import Session
-from sidestep.studio.start import scenario_of
+from sidestep.studio.start import BEND, ends, scenario_of
 from sidestep.studio.things import ball, box
 from sidestep.studio.tip import tip_of
 from sidestep.studio.truth import solid_poses
@@ -239,6 +239,14 @@ def test_the_thesis_is_told_of_centres_and_barriers_of_balls(make_session: MakeS
     assert session._obstacles().radii[0] == 0.0
     session.handle(m.SetMethod("barrier"))
     assert session._obstacles().radii[0] == bare.obstacles[0].shape.radius
+
+
+def test_an_arm_begins_above_its_base() -> None:
+    for name in ("planar2", "ur5", "fr3"):
+        robot = Robot.named(name)
+        for q in ends(robot):
+            assert min(robot.pose(q, frame.name)[2, 3] for frame in robot.frames) >= -1e-9
+            assert abs(q[1] - robot.neutral[1]) == pytest.approx(BEND, abs=1e-12)
 
 
 def test_the_tip_is_the_last_link_of_the_last_joint(make_session: MakeSession, scenario: Scenario) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import os
 import shutil
@@ -32,6 +33,7 @@ FLAGS = (  # WebGL without a graphics card; a container has no sandbox of its ow
 LOAD_TIME = 90.0  # [s] at most until the page shows the scene
 BODY_TIME = 1800.0  # [s] at most until the body is made, the first time
 PICTURE_TIME = 180.0  # [s] at most for one picture: without a graphics card each takes seconds
+POLITE = 10  # niceness of a browser that draws without a graphics card beside the loop
 MOMENT = 5e-3  # [s] longer than a control period, in whose middle a pause may fall
 FRAME = 0.25  # [s] of simulated time between two pictures of an animation
 CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
@@ -63,23 +65,25 @@ def find_chromium() -> str | None:
     return next((path for path in map(shutil.which, NAMES) if path), None)
 
 
-@contextmanager
-def browser() -> Iterator[Any]:
-    """A hidden Chromium, as Playwright's `Browser`.
-
-    Raises:
-        ModuleNotFoundError: Playwright is missing. FileNotFoundError: there is no Chromium.
-    """
-    try:
-        from playwright.sync_api import sync_playwright
-    except ModuleNotFoundError as error:
-        raise FileNotFoundError("--headless needs Playwright: pip install 'sidestep[headless]'") from error
+def check_browser() -> str:
+    """The path of a Chromium; raises FileNotFoundError where it, or Playwright, is missing."""
+    if importlib.util.find_spec("playwright") is None:
+        raise FileNotFoundError("--headless needs Playwright: pip install 'sidestep[headless]'")
     path = find_chromium()
     if path is None:
         raise FileNotFoundError(
             f"--headless needs Chromium; none of {', '.join(NAMES)} is on the PATH "
             "(apt-get install chromium, or set SIDESTEP_CHROMIUM)"
         )
+    return path
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """A hidden Chromium, as Playwright's `Browser`; raises FileNotFoundError, see `check_browser`."""
+    path = check_browser()
+    from playwright.sync_api import sync_playwright
+
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
         try:
@@ -121,11 +125,15 @@ def take_pictures(
     from sidestep.studio import messages as m
 
     check_files(screenshot, video)
-    with browser() as chromium, Studio(scenario, method=method, port=0, ellipsoids=ellipsoids) as studio:
+    check_browser()
+    with Studio(scenario, method=method, port=0, ellipsoids=ellipsoids) as studio:
         studio.wait_ready(BODY_TIME)
         studio.send(m.Restart(until=0.0))  # a moving scene would leave little time to load the page
-        page = open_page(chromium, studio.address, window)
-        film(studio, page, duration=duration, screenshot=screenshot, video=video)
+        if hasattr(os, "nice"):
+            os.nice(POLITE)  # of the browser that is begun now; the loop runs already
+        with browser() as chromium:
+            page = open_page(chromium, studio.address, window)
+            film(studio, page, duration=duration, screenshot=screenshot, video=video)
 
 
 def film(studio: Studio, page: Page, *, duration: float, screenshot: Path | None, video: Path | None) -> None:

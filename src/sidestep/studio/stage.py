@@ -11,7 +11,7 @@ import numpy.typing as npt
 from sidestep.pose import from_quaternion, pose_at, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
-from sidestep.studio.things import Thing
+from sidestep.studio.things import Thing, thing_of
 
 Array = npt.NDArray[np.float64]
 
@@ -180,7 +180,8 @@ class Stage:
             owners = [self.built.geom_owner[int(geom)] for geom in contact.geom]
             links = [name for role, name in owners if role == "link"]
             if links and contact.dist <= 0.0:
-                found.add(f"{links[0]} - {next(name for role, name in owners if role != 'link')}")
+                other = next(name for role, name in owners if role != "link")
+                found.add(f"{links[0]} - {thing_of(other, [actor.thing for actor in self.actors])}")
         return tuple(sorted(found))
 
     def _write_driven(self) -> None:

@@ -63,10 +63,19 @@ def scenario_of(choice: RobotChoice) -> Scenario:
 
 
 def ends(robot: Robot) -> tuple[Array, Array]:
-    """Start and goal (nv,): the middle of the joints, the second one bent, the first one turned to either side."""
+    """Start and goal (nv,): the middle of the joints, the second one bent, the first one turned to either side.
+
+    It is bent to where no link is below the base, if it can be.
+    """
     limits, middle = robot.limits, np.array(robot.neutral)
     if len(middle) > 1:
-        middle[1] = min(middle[1] + BEND, limits.upper[1])
+        bent = [
+            np.clip(middle + turn * np.eye(len(middle))[1], limits.lower, limits.upper)
+            for turn in (BEND, -BEND)
+        ]
+        middle = max(
+            bent, key=lambda q: min(0.0, *(robot.pose(q, frame.name)[2, 3] for frame in robot.frames))
+        )
     start, goal = middle.copy(), middle.copy()
     start[0] = max(start[0] - 0.5 * TURN, limits.lower[0])
     goal[0] = min(goal[0] + 0.5 * TURN, limits.upper[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -134,6 +135,12 @@ def things_of(scenario: Scenario) -> tuple[Thing, ...]:
         Thing(item.name or f"obstacle{index}", item, scenario.folder)
         for index, item in enumerate(scenario.obstacles)
     )
+
+
+def thing_of(solid: str, things: Iterable[Thing]) -> str:
+    """The name of the thing that a solid is a part of; its own where it is of none."""
+    whole = solid.rpartition(".")[0]
+    return whole if any(thing.name == whole and thing.cloud is not None for thing in things) else solid
 
 
 def ball(name: str, position: Array, radius: float) -> Thing:

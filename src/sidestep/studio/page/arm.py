@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,7 +118,7 @@ class BodyView:
                     batched_wxyzs=vectors[:, 3:],
                     batched_positions=vectors[:, :3],
                     batched_scales=np.array(scales),
-                    batched_colors=colours.rgb(colours.BODY),
+                    batched_colors=colours.batched_rgb(colours.BODY),
                     opacity=0.6,
                     cast_shadow=False,
                     receive_shadow=False,
@@ -156,6 +157,14 @@ def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:
     return {name: trimesh.graph.smooth_shade(mesh, angle=SHARP) for name, mesh in meshes.items()}
 
 
-def short(name: str) -> str:
-    """A joint's name without what every joint of an arm has in front."""
-    return name.rsplit("_", 1)[-1] if "_" in name else name
+def short_names(names: Sequence[str]) -> list[str]:
+    """Names of joints without the parts between underscores that all of them begin or end with."""
+    parts = [name.split("_") for name in names]
+    first, last = 0, 0
+    while all(len(part) > first + 1 and part[first] == parts[0][first] for part in parts):
+        first += 1
+    while all(len(part) > first + last + 1 and part[-1 - last] == parts[0][-1 - last] for part in parts):
+        last += 1
+    if any(part[first].isdigit() for part in parts):  # "joint_1", not "1"
+        first = max(first - 1, 0)
+    return ["_".join(part[first : len(part) - last]) for part in parts]

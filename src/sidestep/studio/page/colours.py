@@ -17,11 +17,19 @@ def rgb(colour: str) -> Rgb:
     return r, g, b
 
 
+def batched_rgb(colour: str) -> Rgb:
+    """The same for viser's batched meshes, whose colours are shown without the gamma of sRGB (viser 1.1)."""
+    encoded = np.array(to_rgb(colour))
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    r, g, b = np.round(255.0 * linear).astype(int).tolist()
+    return r, g, b
+
+
 OBSTACLE = palette.VERMILLION
 GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
 TRAIL = palette.GREEN
-BODY = palette.ORANGE
+BODY = palette.YELLOW
 METRIC = "#333333"
 SURFACE = "#B7C3A5"
 LINK, BASE = "#CBD3DE", "#9AA2AE"

@@ -13,7 +13,7 @@ from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.pose_aim import Posture
 from sidestep.studio import messages as m
-from sidestep.studio.page.arm import ArmView, reach, short
+from sidestep.studio.page.arm import ArmView, reach, short_names
 from sidestep.studio.page.obstacles import gizmo_pose
 
 if TYPE_CHECKING:
@@ -43,11 +43,12 @@ class GoalControl:
         self._sliders: list[Any] = []
         revolute = {joint.coordinate for joint in robot.joints if joint.type == JointType.revolute}
         lower, upper = robot._finite_interval()
+        labels = short_names(robot.coordinate_names)
         for k, name in enumerate(robot.coordinate_names):
             unit, factor = ("°", 180.0 / np.pi) if k in revolute else ("m", 1.0)
             low, high = factor * lower[k], factor * upper[k]
             slider = server.gui.add_slider(
-                f"{short(name)} [{unit}]",
+                f"{labels[k]} [{unit}]",
                 min=float(np.ceil(10.0 * low) / 10.0) if unit == "°" else float(low),
                 max=float(np.floor(10.0 * high) / 10.0) if unit == "°" else float(high),
                 step=0.1 if unit == "°" else 0.001,

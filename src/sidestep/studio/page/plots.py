@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 SPAN = 12.0  # [s] that is shown
 EVERY = 0.4  # [s] of the wall clock between two drawings
-HEIGHT = 78  # [px]
+HEIGHT = 70  # [px]
 
 # name, title with unit, factor, colour
 PLOTS = (
@@ -47,7 +47,7 @@ class Plots:
                     ({"label": "t"}, {"label": title, "stroke": colour, "width": 2}),
                     title=title,
                     scales={"x": {"time": False, "range": (-SPAN, 0.0)}},
-                    axes=({"show": False}, {"size": 54, "space": 18}),
+                    axes=({"show": False}, {"size": 62, "space": 18}),
                     legend={"show": False},
                     cursor={"show": False},
                     height=HEIGHT,

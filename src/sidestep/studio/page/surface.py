@@ -13,12 +13,13 @@ import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, Obstacles
 from sidestep.body import Body
-from sidestep.pose import from_roll_pitch_yaw, pose_at, pose_vector
+from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import Method, Numbers, build_system, method_named
 from sidestep.studio.page import colours
-from sidestep.studio.page.arm import reach, short
+from sidestep.studio.page.arm import short_names
+from sidestep.studio.page.camera import Viewpoint
 
 if TYPE_CHECKING:
     import viser
@@ -28,16 +29,9 @@ Array = npt.NDArray[np.float64]
 CELLS = 60  # along each joint: 6 degrees of a joint that turns all the way round
 SIDE = 1.2  # [m] of the surface in the scene
 TOP = 0.3  # [m] above the plane at which hills are cut off, and open: the walls at joint limits would hide the rest
-GAP = 0.1  # [m] between the surface and what the arm can reach
-BEHIND = (
-    -0.93,
-    0.36,
-    0.0,
-)  # direction from the arm to the surface: behind the arm, on the left as the page opens
-TURN, TILT = 0.9, 0.5  # [rad] of the surface about the vertical and then its own x, towards who looks
 LEAST_MOVE = 0.004  # [m] of an obstacle, or [rad] of a joint that is held, before it is computed again
 PAUSE = 0.3  # [s] at least between two of them: the page has other things to do
-TRAIL_POINTS = 300
+TRAIL_POINTS, TRAIL_STEP = 150, 0.02  # [rad | m] of a joint between two points
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +80,15 @@ class Surface:
         self._thread.start()
 
     def show(
-        self, snapshot: Snapshot, robot: Robot, body: Body | None, joints: tuple[int, int] | None
+        self,
+        snapshot: Snapshot,
+        robot: Robot,
+        body: Body | None,
+        joints: tuple[int, int] | None,
+        viewpoint: Viewpoint,
     ) -> None:
-        """The surface over two joints at the present state; None hides it."""
+        """The surface over two joints at the present state, in a corner of the window; no joints: none."""
+        self._viewpoint = viewpoint
         if joints is None or body is None or joints[0] == joints[1]:
             self.clear()
             return
@@ -125,8 +125,10 @@ class Surface:
 
     @property
     def trail(self) -> list[Array]:
-        """Places (3,) in the frame of the surface where the joints have been."""
-        return list(self._trail)
+        """Places (3,) in the frame of the surface where the joints have been, on the surface as it is now."""
+        if self._done is None or self._heights is None:
+            return []
+        return [on_surface(self._done.robot, self._done.joints, q, self._heights) for q in self._trail]
 
     def place_of(self, name: str) -> Array:
         """Where the mark "state" or "goal" is in the frame of the surface, (3,)."""
@@ -162,43 +164,45 @@ class Surface:
         if "surface" in self._parts:
             self._parts["surface"].vertices, self._parts["surface"].faces = vertices, faces
             return
-        where = pose_vector(placement(request.robot))
+        where = pose_vector(self._viewpoint.corner(SIDE))
         self._parts["root"] = self._server.scene.add_frame(
             "/surface", show_axes=False, position=where[:3], wxyz=where[3:]
         )
         self._parts["surface"] = self._server.scene.add_mesh_simple(
-            "/surface/mesh", vertices, faces, color=colours.rgb(colours.SURFACE), side="double"
+            "/surface/mesh",
+            vertices,
+            faces,
+            color=colours.rgb(colours.SURFACE),
+            side="double",
+            cast_shadow=False,
         )
         for k, (joint, side) in enumerate(
             zip(request.joints, ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0)), strict=True)
         ):
             self._parts[f"label{k}"] = self._server.scene.add_label(
                 f"/surface/label{k}",
-                short(request.robot.coordinate_names[joint]),
+                short_names(request.robot.coordinate_names)[joint],
                 position=(0.5 * SIDE + 0.06) * np.array(side),
             )
 
     def _show_state(self, snapshot: Snapshot, robot: Robot, joints: tuple[int, int]) -> None:
         assert self._heights is not None
-        here = on_surface(robot, joints, snapshot.q, self._heights)
-        if not self._trail or np.linalg.norm(here - self._trail[-1]) > 0.005:
-            self._trail.append(here)
-            if len(self._trail) > 1:
-                line = np.array(self._trail)
-                segments = np.stack([line[:-1], line[1:]], axis=1).astype(np.float32)
-                if "trail" in self._parts:
-                    self._parts["trail"].points = segments
-                else:
-                    self._parts["trail"] = self._server.scene.add_line_segments(
-                        "/surface/trail",
-                        segments,
-                        colours.rgb(colours.TRAIL),
-                        thickness=4.0,
-                        thickness_units="screen",
-                    )
-        self._mark("state", here, colours.TRAIL)
+        if not self._trail or np.abs(snapshot.q - self._trail[-1])[list(joints)].max() > TRAIL_STEP:
+            self._trail.append(np.array(snapshot.q))
+        line = np.array([*self.trail, on_surface(robot, joints, snapshot.q, self._heights)])
+        self._show_trail(np.stack([line[:-1], line[1:]], axis=1).astype(np.float32))
+        self._mark("state", line[-1], colours.TRAIL)
         if snapshot.goal is not None:
             self._mark("goal", on_surface(robot, joints, snapshot.goal, self._heights), colours.GOAL)
+
+    def _show_trail(self, segments: npt.NDArray[np.float32]) -> None:
+        if "trail" in self._parts:
+            if not np.array_equal(self._parts["trail"].points, segments):
+                self._parts["trail"].points = segments
+            return
+        self._parts["trail"] = self._server.scene.add_line_segments(
+            "/surface/trail", segments, colours.rgb(colours.TRAIL), thickness=4.0, thickness_units="screen"
+        )
 
     def _mark(self, name: str, place: Array, colour: str) -> None:
         if name not in self._parts:
@@ -223,13 +227,6 @@ def ranges(robot: Robot, joints: tuple[int, int]) -> tuple[Array, Array]:
     lower, upper = robot._finite_interval()
     pick = list(joints)
     return np.array(lower[pick]), np.array(upper[pick])
-
-
-def placement(robot: Robot) -> Array:
-    """Where the surface is in the scene, pose (4, 4) of its middle: behind all that the arm can reach, tilted."""
-    middle = (reach(robot) + GAP + 0.5 * SIDE) * np.array(BEHIND)
-    middle[2] = 0.5 * SIDE * np.sin(TILT)  # its lower edge lies on the floor
-    return pose_at(middle, from_roll_pitch_yaw([TILT, 0.0, TURN]))
 
 
 def scale(robot: Robot, joints: tuple[int, int]) -> float:

@@ -22,6 +22,7 @@ from sidestep.studio.export import numbers_of
 from sidestep.studio.methods import THESIS_COMPONENTS, method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, BodyView, reach
+from sidestep.studio.page.camera import Viewpoint
 from sidestep.studio.page.goal import GoalControl
 from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacle_panel import ObstaclePanel
@@ -31,6 +32,7 @@ from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
+from sidestep.studio.things import thing_of
 from sidestep.studio.tip import tip_of
 
 if TYPE_CHECKING:
@@ -38,10 +40,12 @@ if TYPE_CHECKING:
 
 WORDS_EVERY = 0.15  # [s] nobody reads faster
 GRID_DEPTH = 0.05  # [m] below the base: a planar arm, half as thick, does not lie in the grid
-VIEW_DIRECTION = (0.63, -0.50, 0.59)  # unit vector from the arm to the camera
-VIEW_DISTANCE = 1.6  # of the arm's reach
-SKY_LIGHT = 3.2  # so that lit faces have about the colour that the legend shows
-MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 365, 290, 122  # [px]
+NEAR = 1.5  # of the arm's reach: obstacles farther off need not be in the window as it opens
+SKY_LIGHT = 1.8  # so that lit faces have about the colour that the legend shows
+MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 365, 290, 154  # [px]
+STYLE = (
+    "<style>.mantine-Slider-markLabel{translate:0 3px}</style>"  # else a slider's knob covers its least value
+)
 
 
 class View:
@@ -64,7 +68,7 @@ class View:
         self.last: m.Snapshot | None = None
         self._edition = -1
         self._told = 0.0
-        self._set_up_scene(scenario, robot)
+        self._set_up_scene()
         gui = server.gui
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         panel = gui.add_panel()
@@ -93,7 +97,7 @@ class View:
         self.surface = Surface(server, self._lock)
         self._body_now: Body | None = None
         self._choice = scenario.robot
-        self._set_robot(robot)
+        self._set_robot(scenario, robot)
 
     def send(self, command: m.Command) -> None:
         """Hands a command to the loop."""
@@ -117,7 +121,7 @@ class View:
             if snapshot.scenario.robot != self._choice:
                 self._remove_robot()
                 self._choice = snapshot.scenario.robot
-                self._set_robot(load_robot(snapshot.scenario))
+                self._set_robot(snapshot.scenario, load_robot(snapshot.scenario))
             if snapshot.edition != self._edition:
                 self._edition = snapshot.edition
                 self.obstacles.set_things(snapshot.things)
@@ -142,7 +146,7 @@ class View:
             self.arm.show(snapshot.q)
             self.arm.colour({item.link: item.distance for item in self._clearances})
             self.goal.show(snapshot.goal, snapshot.goal_pose, snapshot.posture)
-            self.surface.show(snapshot, self.robot, self._body_now, self._pair())
+            self.surface.show(snapshot, self.robot, self._body_now, self._pair(), self._viewpoint)
             self.marks.show_nearest(self._clearances, visible=self._nearest.value)
             self.marks.show_trail(snapshot.q, visible=self._trail.value)
             self.marks.show_metric(snapshot.q, snapshot.metric, visible=self._metric.value)
@@ -201,11 +205,14 @@ class View:
         if self._clearances:
             first = self._clearances[0]
             facts.append(
-                f"nearest {html.escape(first.link)} – {html.escape(first.obstacle)}: {1e3 * first.distance:.0f} mm, "
+                f"nearest {html.escape(first.link)} – {html.escape(thing_of(first.obstacle, snapshot.things))}: "
+                f"{1e3 * first.distance:.0f} mm, "
                 f"least so far {1e3 * self.least_clearance:.0f} mm"
             )
         touch = (
-            f"touches {html.escape(', '.join(snapshot.contacts))}" if snapshot.contacts else "touches nothing"
+            f"touches: {html.escape(', '.join(snapshot.contacts))}"
+            if snapshot.contacts
+            else "touches nothing"
         )
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
         facts.append(f"{touch} · {snapshot.time:.1f} s · {speed}")
@@ -216,7 +223,7 @@ class View:
         if content != self._words.content:
             self._words.content = content
 
-    def _set_up_scene(self, scenario: Scenario, robot: Robot) -> None:
+    def _set_up_scene(self) -> None:
         scene = self._server.scene
         scene.set_up_direction("+z")
         scene.add_grid(
@@ -234,17 +241,18 @@ class View:
         scene.add_light_hemisphere(
             "/light", sky_color=(255, 255, 255), ground_color=(170, 170, 170), intensity=SKY_LIGHT
         )
-        self._point_camera(scenario, robot)
 
-    def _point_camera(self, scenario: Scenario, robot: Robot) -> None:
-        """Where a new window looks from: the arm fills it at start and goal."""
+    def _point_cameras(self, scenario: Scenario, robot: Robot) -> None:
+        """Where all windows look from, those to come as well: arm, goal and obstacles fill them."""
         start = coordinates(scenario.start, robot, "start")
-        ends = [start, goal_posture(scenario, robot, start).q]
-        places = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
-        middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
-        camera = self._server.initial_camera
-        camera.look_at = tuple(middle)
-        camera.position = tuple(middle + VIEW_DISTANCE * reach(robot) * np.array(VIEW_DIRECTION))
+        ends = start, goal_posture(scenario, robot, start).q
+        places = [robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames]
+        beside = [np.array(item.position) for item in scenario.obstacles]
+        near = [place for place in beside if np.linalg.norm(place) < NEAR * reach(robot)]
+        self._viewpoint = Viewpoint.of(np.array([*places, *near]))
+        cameras: list[Any] = [client.camera for client in self._server.get_clients().values()]
+        for camera in (self._server.initial_camera, *cameras):
+            camera.position, camera.look_at = self._viewpoint.position, self._viewpoint.target
 
     def _add_switches(self) -> None:
         gui = self._server.gui
@@ -266,8 +274,9 @@ class View:
         self._ghost.on_update(lambda _: self.goal.set_visible(self._ghost.value))
         self._body_shown.on_update(lambda _: self._set_body_visible())
 
-    def _set_robot(self, robot: Robot) -> None:
+    def _set_robot(self, scenario: Scenario, robot: Robot) -> None:
         self.robot, self.tip = robot, tip_of(robot)
+        self._point_cameras(scenario, robot)
         names = tuple(robot.coordinate_names)
         self._first.options = self._second.options = names
         self._first.value, self._second.value = names[0], names[min(1, len(names) - 1)]
@@ -322,7 +331,7 @@ def in_box(words: str, facts: str = "") -> str:
     """Words about the state above smaller facts, always equally high, so that nothing below moves."""
     return (
         f'<div style="height:{WORDS_HEIGHT}px;overflow:hidden;padding:2px 10px;line-height:1.35">'
-        f'<div style="font-size:15px;font-weight:600">{words}</div>'
+        f'<div style="font-size:14px;font-weight:600">{words}</div>'
         f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
     )
 
@@ -335,4 +344,4 @@ def begun(words: str) -> str:
 
 def stamped(text: str, stamp: int) -> str:
     """The words with a number by which it is known that a browser has them."""
-    return f'<div id="words" data-stamp="{stamp}">{text}</div>'
+    return f'{STYLE}<div id="words" data-stamp="{stamp}">{text}</div>'
