@@ -180,7 +180,8 @@ void bind_safety(nb::module_& m) {
       "What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing\n"
       "speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest\n"
       "one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;\n"
-      "max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises ValueError that names the setting.")
+      "max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises\n"
+      "ValueError that names the setting.")
       .def(
           "__init__",
           [](SafetySettings* self, double margin, double rate, double braking_fraction, double correction,
@@ -200,8 +201,7 @@ void bind_safety(nb::module_& m) {
       .def("__repr__", [](const SafetySettings& s) {
         return "SafetySettings(margin=" + std::to_string(s.margin) + ", rate=" + std::to_string(s.rate) +
                ", braking_fraction=" + std::to_string(s.braking_fraction) + ", correction=" +
-               std::to_string(s.correction) + ", max_rows=" +
-               std::to_string(s.max_rows) + ")";
+               std::to_string(s.correction) + ", max_rows=" + std::to_string(s.max_rows) + ")";
       });
 }
 

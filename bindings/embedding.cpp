@@ -113,8 +113,8 @@ void bind_embedding(nb::module_& m) {
       "activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.\n"
       "strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer\n"
       "and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between\n"
-      "neighbouring points. reach [m]: clearances are measured up to here, so that what keeps them sees an obstacle\n"
-      "from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
+      "neighbouring points. reach [m]: clearances are measured up to here; what approaches is seen from as far as\n"
+      "the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
       .def(
           "__init__",
           [](ClearanceBarrier* self, const Robot& robot, const Body& body, double activation, double strength,

@@ -275,8 +275,8 @@ class ClearanceBarrier(Embedding):
     activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.
     strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer
     and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between
-    neighbouring points. reach [m]: clearances are measured up to here, so that what keeps them sees an obstacle
-    from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
+    neighbouring points. reach [m]: clearances are measured up to here; what approaches is seen from as far as
+    the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
     """
 
     def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.3) -> None: ...
@@ -1001,7 +1001,8 @@ class SafetySettings:
     What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing
     speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest
     one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;
-    max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises ValueError that names the setting.
+    max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises
+    ValueError that names the setting.
     """
 
     def __init__(self, *, margin: float = 0.005, rate: float = 20.0, braking_fraction: float = 0.5, correction: float = 0.5, max_rows: int = 32) -> None: ...

@@ -6,7 +6,7 @@ namespace sidestep {
 
 void ApproachMean::add(const ClearanceSample& sample) noexcept {
   const double ahead = sample.value + horizon_ * sample.rate;
-  if (!(ahead < limit())) {
+  if (!(ahead < reference_ + BoltzmannMean::window / inverse_T_)) {
     return;
   }
   if (ahead < reference_) {

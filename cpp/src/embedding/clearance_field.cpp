@@ -70,15 +70,6 @@ struct Means {
   }
 };
 
-void write(const ClearanceSample& sample, const KinematicState& state, int joint, Eigen::Index at,
-           ClearanceStateView& out) noexcept {
-  out.values[at] = sample.value;
-  out.rates[at] = sample.rate;
-  out.curvatures[at] = sample.curvature;
-  out.gradients.col(at).setZero();
-  accumulate_generalised_force(state, joint, sample.gradient.first, out.gradients.col(at));
-}
-
 }  // namespace
 
 ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temperature)
@@ -185,8 +176,8 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       const bool within = means.nearest.value < reach;
       if (within || query.ahead < horizon.distance) {
         const Eigen::Index at = cluster.first + k;
-        write(within ? means.nearest : means.approach, state, joint, at, out);
-        write(means.approach, state, joint, at, out.approach);
+        write(within ? means.nearest : means.approach, state, joint, -1, at, out);
+        write(means.approach, state, joint, -1, at, out.approach);
         out.nearest[at] = tree.order()[static_cast<std::size_t>(query.nearest)];
       }
     }

@@ -30,21 +30,15 @@ void write(const Eigen::Matrix3d& S, double (&columns)[6][capacity], int k) noex
 
 }  // namespace
 
-EllipsoidGaps::EllipsoidGaps(const KinematicState::Link& a, const KinematicState::Link& b) noexcept {
+EllipsoidGaps::EllipsoidGaps(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& p_AB, const SpatialMotion& velocity,
+                             const SpatialMotion& bias) noexcept {
   RelativeMotion& motion = pairs_.motion;
-  const Eigen::Matrix3d R_AW = a.R_WL.transpose();
-  Eigen::Matrix3d::Map(motion.rotation) = R_AW * b.R_WL;
-  Eigen::Vector3d::Map(motion.position) = R_AW * (b.p_WL - a.p_WL);
-  // Seen from a: V = V_b − V_a, and V' less what a turns it by, A_b − A_a − V_a × V.
-  const Eigen::Vector3d angular = b.velocity.angular - a.velocity.angular;
-  const Eigen::Vector3d linear = b.velocity.linear - a.velocity.linear;
-  const Eigen::Vector3d bias_angular = b.bias.angular - a.bias.angular - a.velocity.angular.cross(angular);
-  const Eigen::Vector3d bias_linear =
-      b.bias.linear - a.bias.linear - a.velocity.angular.cross(linear) - a.velocity.linear.cross(angular);
-  Eigen::Vector3d::Map(motion.angular) = R_AW * angular;
-  Eigen::Vector3d::Map(motion.linear) = R_AW * (linear + angular.cross(a.p_WL));
-  Eigen::Vector3d::Map(motion.bias_angular) = R_AW * bias_angular;
-  Eigen::Vector3d::Map(motion.bias_linear) = R_AW * (bias_linear + bias_angular.cross(a.p_WL));
+  Eigen::Matrix3d::Map(motion.rotation) = R_AB;
+  Eigen::Vector3d::Map(motion.position) = p_AB;
+  Eigen::Vector3d::Map(motion.angular) = velocity.angular;
+  Eigen::Vector3d::Map(motion.linear) = velocity.linear;
+  Eigen::Vector3d::Map(motion.bias_angular) = bias.angular;
+  Eigen::Vector3d::Map(motion.bias_linear) = bias.linear;
 }
 
 void EllipsoidGaps::add(const Eigen::Vector3d& centre_a, const Eigen::Matrix3d& S_a, const Eigen::Vector3d& centre_b,

@@ -24,9 +24,8 @@ class PairOfLinks {
         second_(link_or_world(state, second.joint)),
         R_(first_.R_WL.transpose() * second_.R_WL),
         p_(first_.R_WL.transpose() * (second_.p_WL - first_.p_WL)),
-        omega_(first_.R_WL.transpose() * (second_.velocity.angular - first_.velocity.angular)),
-        velocity_(first_.R_WL.transpose() * (second_.velocity.linear - first_.velocity.linear) +
-                  omega_.cross(first_.R_WL.transpose() * first_.p_WL)),
+        velocity_(in_first(second_.velocity.angular - first_.velocity.angular,
+                           second_.velocity.linear - first_.velocity.linear)),
         a_{first.ellipsoids, first.centre, first.radius},
         b_{second.ellipsoids, R_ * second.centre + p_, second.radius} {}
 
@@ -57,7 +56,14 @@ class PairOfLinks {
     }
   }
 
-  EllipsoidGaps gaps() const noexcept { return {first_, second_}; }
+  EllipsoidGaps gaps() const noexcept {
+    // Seen from the first, V = V_2 − V_1, and V' less what the first turns it by, A_2 − A_1 − V_1 × V.
+    const SpatialMotion& own = first_.velocity;
+    const Eigen::Vector3d angular = second_.velocity.angular - own.angular, linear = second_.velocity.linear - own.linear;
+    return {R_, p_, velocity_,
+            in_first(second_.bias.angular - first_.bias.angular - own.angular.cross(angular),
+                     second_.bias.linear - first_.bias.linear - own.angular.cross(linear) - own.linear.cross(angular))};
+  }
 
   /// No gap shrinks faster [m/s].
   double closing_speed() const noexcept { return closing_speed(a_.centre, a_.radius, b_.centre, b_.radius); }
@@ -81,11 +87,16 @@ class PairOfLinks {
     auto begin() const noexcept { return ellipsoids.begin(); }
     auto end() const noexcept { return ellipsoids.end(); }
   };
+  /// What is taken at the world origin and expressed in the world, at the origin of the first link and in its frame.
+  SpatialMotion in_first(const Eigen::Vector3d& angular, const Eigen::Vector3d& linear) const noexcept {
+    return {first_.R_WL.transpose() * angular, first_.R_WL.transpose() * (linear + angular.cross(first_.p_WL))};
+  }
   /// Of balls.
   double closing_speed(const Eigen::Vector3d& a, double radius_a, const Eigen::Vector3d& b,
                        double radius_b) const noexcept {
-    const Eigen::Vector3d d = a - b, v = velocity_ + omega_.cross(b);
-    return Horizon::closing_speed(d.dot(v), d.norm(), radius_a + radius_b, v.norm()) + omega_.norm() * radius_b;
+    const Eigen::Vector3d d = a - b, v = velocity_.linear + velocity_.angular.cross(b);
+    return Horizon::closing_speed(d.dot(v), d.norm(), radius_a + radius_b, v.norm()) +
+           velocity_.angular.norm() * radius_b;
   }
   static bool near(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double distance) noexcept {
     return distance > 0.0 && (b - a).squaredNorm() < distance * distance;
@@ -93,7 +104,8 @@ class PairOfLinks {
 
   const KinematicState::Link &first_, &second_;
   Eigen::Matrix3d R_;
-  Eigen::Vector3d p_, omega_, velocity_;  // of the second, seen from the first, at its origin
+  Eigen::Vector3d p_;
+  SpatialMotion velocity_;  // of the second, seen from the first, at its origin
   Ellipsoids a_, b_;
 };
 
@@ -102,6 +114,14 @@ class MeanGap {
  public:
   MeanGap(const PairOfLinks& links, double temperature, double horizon) noexcept
       : links_(links), mean_(temperature), approach_(temperature, horizon), gaps_(links.gaps()) {}
+
+  /// Of one pair, which is not added; to be called before any is.
+  EllipsoidGap gap(const BodyEllipsoid& a, const BodyEllipsoid& b) noexcept {
+    gaps_.add(a.mean, a.shape, b.mean, b.shape);
+    gaps_.solve();
+    gaps_.clear();
+    return gaps_[0];
+  }
 
   void add(const BodyEllipsoid& a, const BodyEllipsoid& b) noexcept {
     if (gaps_.full()) {
@@ -129,7 +149,6 @@ class MeanGap {
   int nearest() const noexcept { return nearest_; }  ///< of the second link
 
  private:
-
   const PairOfLinks& links_;
   BoltzmannMean mean_;
   ApproachMean approach_;
@@ -157,16 +176,6 @@ struct Support {
     point = link.R_WL * S_m / value;
   }
 };
-
-void write(const ClearanceSample& sample, const KinematicState& state, int joint_a, int joint_b, Eigen::Index k,
-           ClearanceStateView& out) noexcept {
-  out.values[k] = sample.value;
-  out.rates[k] = sample.rate;
-  out.curvatures[k] = sample.curvature;
-  out.gradients.col(k).setZero();
-  accumulate_generalised_force(state, joint_a, sample.gradient.first, out.gradients.col(k));
-  accumulate_generalised_force(state, joint_b, sample.gradient.second, out.gradients.col(k));
-}
 
 void check_temperature(double temperature, const char* owner) {
   if (!(temperature > 0.0) || !std::isfinite(temperature)) {
@@ -250,14 +259,12 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     if (first == nullptr) {
       continue;
     }
-    EllipsoidGaps likely = pair.gaps();
-    likely.add(first->mean, first->shape, second->mean, second->shape);
-    likely.solve();
-    const EllipsoidGap gap = likely[0];
-    const double near = std::min(reach + pairs_[i].contact, gap.value) + window;
-    const double minded = std::min(ahead.distance, gap.value + ahead.time * gap.rate) + window;
-    const double limit = std::max(near, minded + closing);
     MeanGap gaps(pair, temperature_, ahead.time);
+    const EllipsoidGap gap = gaps.gap(*first, *second);
+    const double near = std::min(reach + pairs_[i].contact, gap.value) + window;
+    const double minded =
+        std::min(ahead.distance + pairs_[i].contact, gap.value + ahead.time * gap.rate) + window;
+    const double limit = std::max(near, minded + closing);
     pair.for_each_below(limit, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double bound) {
       if (bound < near || bound - ahead.time * pair.closing_speed(a, b) < minded) {
         gaps.add(a, b);
@@ -337,7 +344,7 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
       }
     }
     const ClearanceSample result = mean.result(), minded = approach.result();
-    if (std::min(result.value, minded.value + ahead.time * minded.rate - ahead.distance) < reach_) {
+    if (result.value < reach_ || minded.value + ahead.time * minded.rate < ahead.distance) {
       const int joint = links_[i].front().joint;
       write(result, state, joint, -1, k, out.clearances);
       write(minded, state, joint, -1, k, out.clearances.approach);

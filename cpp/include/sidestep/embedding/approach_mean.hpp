@@ -15,7 +15,7 @@ namespace sidestep {
 /// of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is smallest is
 /// what it has to mind: not always the nearest, past which it may move.
 struct Horizon {
-  double time = 0.0;      ///< τ [s]
+  double time = 0.0;                                           ///< τ [s]
   double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
 
   static constexpr double longest = 0.5;  ///< τ [s] at most, whatever the limits
@@ -46,9 +46,6 @@ struct Horizon {
 class ApproachMean {
  public:
   ApproachMean(double temperature, double horizon) noexcept : inverse_T_(1.0 / temperature), horizon_(horizon) {}
-
-  /// Samples from this h + τ h' on would not change the mean.
-  double limit() const noexcept { return reference_ + BoltzmannMean::window / inverse_T_; }
 
   void add(const ClearanceSample& sample) noexcept;
 

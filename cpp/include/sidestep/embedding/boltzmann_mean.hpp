@@ -3,31 +3,9 @@
 #include <cmath>
 #include <limits>
 
-#include "sidestep/kinematics/kinematic_state.hpp"
+#include "sidestep/embedding/clearance_sample.hpp"
 
 namespace sidestep {
-
-/// Wrenches about the world origin on up to two links, as the gradient of a clearance.
-struct WrenchPair {
-  SpatialForce first, second;
-
-  void add(double factor, const WrenchPair& other) noexcept {
-    first.angular += factor * other.first.angular;
-    first.linear += factor * other.first.linear;
-    second.angular += factor * other.second.angular;
-    second.linear += factor * other.second.linear;
-  }
-  void scale(double factor) noexcept {
-    first.angular *= factor, first.linear *= factor;
-    second.angular *= factor, second.linear *= factor;
-  }
-};
-
-/// A clearance with its first and second time derivative and its gradient.
-struct ClearanceSample {
-  double value, rate, curvature;
-  WrenchPair gradient;
-};
 
 /// Reduces clearances h_n to one by the Boltzmann mean with temperature T, and carries its derivatives:
 ///
@@ -53,9 +31,8 @@ class BoltzmannMean {
 
   /// Samples this far beyond the smallest weigh less than exp(−30) = 1e-13: rounding.
   static constexpr double window = 30.0;
-  /// Samples from this value on would not change the mean.
-  double horizon() const noexcept { return reference_ + window / inverse_T_; }
-  bool matters(double value) const noexcept { return value < horizon(); }
+  /// Whether a sample of this value changes the mean.
+  bool matters(double value) const noexcept { return value < reference_ + window / inverse_T_; }
   bool empty() const noexcept { return !(reference_ < std::numeric_limits<double>::infinity()); }
 
   /// Returns whether the sample is the smallest so far.

@@ -16,8 +16,8 @@ namespace sidestep {
 /// become infinite and the ellipsoids cannot touch. Moving obstacles enter dψ/dt and d²ψ/dt² exactly.
 class ClearanceBarrier final : public Barrier {
  public:
-  /// The body must be calibrated. Clearances are measured up to `reach` [m], at least to the activation distance: what
-  /// keeps them (TorqueController, AccelerationFilter) must see an obstacle from as far as the arm needs to stop.
+  /// The body must be calibrated. Clearances are measured up to `reach` [m], at least to the activation distance, and
+  /// what approaches as far as the arm needs to stop, for what keeps them (TorqueController, AccelerationFilter).
   /// Throws std::invalid_argument that names what is wrong.
   ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature = 0.002,
                    double reach = 0.3);

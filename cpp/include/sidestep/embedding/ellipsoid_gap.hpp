@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
-#include "sidestep/embedding/body_ellipsoid.hpp"
 #include "sidestep/embedding/ellipsoid_pairs.hpp"
+#include "sidestep/kinematics/kinematic_state.hpp"
 
 namespace sidestep {
 
@@ -29,9 +29,12 @@ struct EllipsoidGap {
 /// centres, in 16 steps at most.
 class EllipsoidGaps {
  public:
-  /// Vectors and gaps are in the frame of a, or of the world if none is given.
+  /// Of ellipsoids at rest that are given in one frame.
   EllipsoidGaps() noexcept = default;
-  EllipsoidGaps(const KinematicState::Link& a, const KinematicState::Link& b) noexcept;
+  /// Where the frame of b is in that of a, in which gaps are, and how it moves there: spatial velocity at the origin of a,
+  /// and its time derivative at q̈ = 0.
+  EllipsoidGaps(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& p_AB, const SpatialMotion& velocity,
+                const SpatialMotion& bias) noexcept;
 
   bool full() const noexcept { return pairs_.size == EllipsoidPairs::capacity; }
   int size() const noexcept { return pairs_.size; }
@@ -43,7 +46,6 @@ class EllipsoidGaps {
   /// To be called before gaps are read.
   void solve() noexcept;
 
-  double value(int k) const noexcept { return pairs_.value[k]; }
   EllipsoidGap operator[](int k) const noexcept;
 
  private:
