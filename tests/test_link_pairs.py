@@ -74,7 +74,7 @@ def test_pairs_are_kept_and_made_again_where_they_cannot_be_read() -> None:
     path.write_text('[["link1", "link3", -0.25]]')
     assert barrier_pairs(robot, body) == (("link1", "link3", -0.25),)  # it is read
     path.write_text("[[")
-    with pytest.warns(RuntimeWarning, match="is unreadable and is made again"):
+    with pytest.warns(RuntimeWarning, match="are unreadable and are made again"):
         assert barrier_pairs(robot, body) == pairs
     assert barrier_pairs(robot, body) == pairs  # and written again
     assert stored_at(robot, Body.cover(robot, components=5)) != path

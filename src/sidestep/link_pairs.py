@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import warnings
 from pathlib import Path
 from typing import TypeAlias
 
@@ -44,21 +43,19 @@ def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
         robot: with collision meshes. body: a covering body of it.
     """
     path = stored_at(robot, body)
-    for stored in (path, cache.SHIPPED / path.name):
-        try:
-            return tuple((str(a), str(b), float(contact)) for a, b, contact in json.loads(stored.read_text()))
-        except FileNotFoundError:
-            continue
-        except (ValueError, TypeError, OSError) as error:
-            warnings.warn(f"{stored} is unreadable and is made again: {error}", RuntimeWarning, stacklevel=2)
-            break
+    stored = cache.read_stored(
+        path, _read_pairs, "the cached pairs of links are unreadable and are made again"
+    )
+    if stored is not None:
+        return stored
     pairs = _find_pairs(robot, body)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(path, json.dumps(pairs, indent=1) + "\n")
-    except OSError as error:
-        warnings.warn(f"the pairs of links are not cached: {error}", RuntimeWarning, stacklevel=2)
+    text = json.dumps(pairs, indent=1) + "\n"
+    cache.write_stored(path, lambda file: write_text(file, text), "the pairs of links are not cached")
     return pairs
+
+
+def _read_pairs(path: Path) -> tuple[LinkPair, ...]:
+    return tuple((str(a), str(b), float(contact)) for a, b, contact in json.loads(path.read_text()))
 
 
 def stored_at(robot: Robot, body: Body) -> Path:

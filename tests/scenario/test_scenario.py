@@ -7,7 +7,6 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from sidestep import presets
 from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
 from sidestep.scenario import scenario as module
 
@@ -134,12 +133,6 @@ def test_a_pose_and_the_numbers_of_barriers_arrive_and_survive_saving(tmp_path: 
     )
     scenario.save(tmp_path / "copy.yaml")
     assert Scenario.load(tmp_path / "copy.yaml") == scenario
-
-
-def test_the_numbers_of_barriers_are_those_of_the_presets() -> None:
-    choice = dataclasses.asdict(module.BarrierChoice())
-    assert choice.pop("ellipsoids") is None
-    assert choice == dataclasses.asdict(presets.Barriers())
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())

@@ -8,7 +8,7 @@ import os
 import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import platformdirs
 
@@ -17,7 +17,11 @@ from sidestep.body.cover import ALGORITHM_VERSION, CoverSettings
 from sidestep.body.fitting import FitSettings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sidestep.robot import Robot
+
+Contents = TypeVar("Contents")
 
 CACHE_VARIABLE = "SIDESTEP_CACHE_DIR"
 SHIPPED = Path(__file__).parent / "covers"  # made by benchmarks/ship_covers.py, under the names of the cache
@@ -50,25 +54,42 @@ def read(robot: Robot, settings: FitSettings | CoverSettings) -> body_file.BodyC
 
     Warns about an entry that cannot be read.
     """
-    path = cache_path(robot, settings)
-    for stored in (path, SHIPPED / path.name):
-        try:
-            return body_file.read(stored, robot)
-        except FileNotFoundError:
-            continue
-        except (ValueError, OSError) as error:
-            warnings.warn(
-                f"cached body is unreadable and is fitted again: {error}", RuntimeWarning, stacklevel=3
-            )
-            return None
-    return None
+    return read_stored(
+        cache_path(robot, settings),
+        lambda stored: body_file.read(stored, robot),
+        "cached body is unreadable and is fitted again",
+    )
 
 
 def write(robot: Robot, settings: FitSettings | CoverSettings, contents: body_file.BodyContents) -> None:
     """Stores a fit; warns if the cache cannot be written, because a fit without a cache is still a fit."""
-    path = cache_path(robot, settings)
+    write_stored(
+        cache_path(robot, settings),
+        lambda path: body_file.write(path, contents),
+        "the fitted body is not cached",
+    )
+
+
+def read_stored(path: Path, reader: Callable[[Path], Contents], warning: str) -> Contents | None:
+    """What `reader` makes of the user's file, or of the one of that name that comes with Sidestep; None without both.
+
+    A file that `reader` refuses by an OSError, ValueError or TypeError gives `warning` and None.
+    """
+    for stored in (path, SHIPPED / path.name):
+        try:
+            return reader(stored)
+        except FileNotFoundError:
+            continue
+        except (ValueError, TypeError, OSError) as error:
+            warnings.warn(f"{warning}: {error}", RuntimeWarning, stacklevel=4)
+            break
+    return None
+
+
+def write_stored(path: Path, writer: Callable[[Path], None], warning: str) -> None:
+    """Has `writer` write the user's file; an OSError gives `warning`."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        body_file.write(path, contents)
+        writer(path)
     except OSError as error:
-        warnings.warn(f"the fitted body is not cached: {error}", RuntimeWarning, stacklevel=3)
+        warnings.warn(f"{warning}: {error}", RuntimeWarning, stacklevel=4)

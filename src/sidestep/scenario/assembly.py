@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, TypeAlias, TypeVar
@@ -33,9 +33,8 @@ from sidestep.guidance import GuidedMotion
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
 from sidestep.pose import from_roll_pitch_yaw, pose_at
-from sidestep.presets import Barriers, barrier_system
+from sidestep.presets import barrier_system
 from sidestep.scenario.scenario import (
-    BarrierChoice,
     BasePose,
     EmbeddingChoice,
     JointState,
@@ -267,7 +266,7 @@ def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
 def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
     choice = scenario.system
     if scenario.method != "written":
-        return barrier_system(robot, body, numbers=barrier_numbers(scenario.barriers))
+        return barrier_system(robot, body, numbers=scenario.barriers)
     return GeometricSystem(
         _embeddings(scenario.embedding, robot, body),
         stiffness=choice.stiffness,
@@ -275,13 +274,6 @@ def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
         damping_form=choice.damping_form,
         switch=_switch(choice.switch, robot),
     )
-
-
-def barrier_numbers(choice: BarrierChoice) -> Barriers:
-    """The numbers of the recommended system that a file has."""
-    numbers = asdict(choice)
-    del numbers["ellipsoids"]
-    return Barriers(**numbers)
 
 
 def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[Embedding]:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import yaml
 
+from sidestep.barriers import Barriers
 from sidestep.scenario.validation import ScenarioError, check_document, parse_yaml
 
 Vector3 = tuple[float, float, float]
@@ -148,23 +149,12 @@ class SystemChoice:
 
 
 @dataclass(frozen=True)
-class BarrierChoice:
-    """Numbers of the recommended system, see `sidestep.presets.Barriers`, with the same defaults.
+class BarrierChoice(Barriers):
+    """Numbers of the recommended system, see `sidestep.presets.Barriers`, and of its body.
 
     ellipsoids: of the covering body per link; left out: as many as it takes.
     """
 
-    stiffness: float = 4.0
-    damping: float = 4.0
-    activation: float = 0.1
-    strength: float = 0.1
-    power: float = 2.0
-    limit_activation: float = 0.1
-    limit_strength: float = 0.02
-    self_activation: float = 0.05
-    self_strength: float = 0.02
-    floor: float = 0.002
-    temperature: float = 0.002
     ellipsoids: int | None = None
 
 

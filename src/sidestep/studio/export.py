@@ -11,8 +11,9 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.barriers import Barriers
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import barrier_numbers, pose_of
+from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.scenario import (
     BarrierChoice,
     BodyChoice,
@@ -97,9 +98,10 @@ def switch_of(method: str, numbers: Mapping[str, float], num_coordinates: int) -
 def numbers_of(scenario: Scenario) -> tuple[str, dict[str, float]]:
     """The method that a scenario file asks for, and the numbers it has for it, moved into their ranges."""
     if scenario.method != "written":
-        return scenario.method, _in_range(
-            scenario.method, dataclasses.asdict(barrier_numbers(scenario.barriers))
-        )
+        numbers = {
+            entry.name: getattr(scenario.barriers, entry.name) for entry in dataclasses.fields(Barriers)
+        }
+        return scenario.method, _in_range(scenario.method, numbers)
     system, switch = scenario.system, scenario.system.switch
     numbers = {"stiffness": float(np.mean(system.stiffness)), "damping": float(np.mean(system.damping))}
     method = {"none": "unswitched", "distance": "thesis"}.get(switch.type, switch.type)
