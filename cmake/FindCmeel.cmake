@@ -7,6 +7,7 @@ if(Python_FOUND)
       "from importlib.metadata import distribution as d; print(d('cmeel-eigen').locate_file('cmeel.prefix'))"
     OUTPUT_VARIABLE SIDESTEP_CMEEL_PREFIX OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
   if(SIDESTEP_CMEEL_PREFIX)
+    keep_files(SIDESTEP_CMEEL_PREFIX include/eigen3 share/eigen3)
     list(APPEND CMAKE_PREFIX_PATH "${SIDESTEP_CMEEL_PREFIX}")
   endif()
 endif()
