@@ -84,8 +84,8 @@ void bind_settings(nb::module_& m) {
       m, "PlannerSettings",
       "How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.\n"
       "allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance\n"
-      "[m]: two in each other. slack [m]: kept everywhere is margin - slack. fade [m]: motion within which an end's smaller\n"
-      "margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.\n"
+      "[m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.\n"
+      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.\n"
       "shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
@@ -153,7 +153,9 @@ void bind_guide(nb::module_& m) {
                    "The attractor, as a goal for a GeometricSystem.")
       .def_prop_ro("tight", [](const Guidance& g) { return to_numpy(g.attractor.tight); },
                    "Where barriers are to leave room (nv,): the tightest place of the path that the arm is about to pass, else\n"
-                   "the goal. See GeometricSystem.relaxed_at.");
+                   "the goal. See GeometricSystem.relaxed_at.")
+      .def_prop_ro("arrives", [](const Guidance& g) { return g.attractor.arrives; },
+                   "Whether the end of the path is within the lead, so that barriers are to leave room at the goal too.");
 
   nb::class_<Guide>(
       m, "Guide",

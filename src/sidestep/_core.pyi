@@ -1344,12 +1344,12 @@ class PlannerSettings:
     """
     How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.
     allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance
-    [m]: two in each other. slack [m]: kept everywhere is margin - slack. fade [m]: motion within which an end's smaller
-    margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.
+    [m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.
+    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.
     shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 40) -> None: ...
+    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 100) -> None: ...
 
     @property
     def margin(self) -> float: ...
@@ -1374,7 +1374,7 @@ class RouteSettings:
     |q - q*| at which it waits for the arm. Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, *, speed: float = 1.0, speed_share: float = 0.7, acceleration: float = 3.0, wide: float = 0.04, slowest: float = 0.25, lead: float = 0.4) -> None: ...
+    def __init__(self, *, speed: float = 2.0, speed_share: float = 0.7, acceleration: float = 4.0, wide: float = 0.03, slowest: float = 0.35, lead: float = 0.4) -> None: ...
 
     @property
     def speed(self) -> float: ...
@@ -1424,6 +1424,12 @@ class Guidance:
         """
         Where barriers are to leave room (nv,): the tightest place of the path that the arm is about to pass, else
         the goal. See GeometricSystem.relaxed_at.
+        """
+
+    @property
+    def arrives(self) -> bool:
+        """
+        Whether the end of the path is within the lead, so that barriers are to leave room at the goal too.
         """
 
 class Guide:

@@ -87,6 +87,7 @@ class GuidedMotion:
             seed=seed,
             synchronous=synchronous,
         )
+        self._goal = np.zeros(robot.num_coordinates)
         self._moving = self.system
         self._relaxed: tuple[bytes, Obstacles] | None = None  # where, and among what
         self._next_look = -float("inf")
@@ -95,14 +96,15 @@ class GuidedMotion:
     def moving(self) -> GeometricSystem:
         """The system with barriers that leave room where the arm has to come close, as of the last step.
 
-        Relaxed at the tightest place of the path ahead, else at the goal, as long as all that is seen is at rest;
-        never below the barriers' floors, see `GeometricSystem.relaxed_at`.
+        Relaxed at the tightest place of the path ahead, and at the goal where there is none and at the end, as long as
+        all that is seen is at rest; never below the barriers' floors, see `GeometricSystem.relaxed_at`.
         """
         return self._moving
 
     def set_goal(self, goal: npt.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to from now on."""
         self.guide.set_goal(goal)
+        self._goal = np.array(goal, dtype=np.float64)
         self._next_look = -float("inf")
 
     def step(
@@ -134,10 +136,13 @@ class GuidedMotion:
         if guidance.status is GuideStatus.idle or np.any(obstacles.velocities):
             self._moving, self._relaxed = self.system, None
             return
-        place = guidance.tight.tobytes()
-        if self._relaxed is None or place != self._relaxed[0] or not _same(obstacles, self._relaxed[1]):
-            self._moving = self.system.relaxed_at(guidance.tight, obstacles)
-            self._relaxed = place, obstacles
+        places = [guidance.tight, *([self._goal] if guidance.arrives else [])]
+        key = np.concatenate(places).tobytes()
+        if self._relaxed is None or key != self._relaxed[0] or not _same(obstacles, self._relaxed[1]):
+            self._moving = self.system
+            for place in places:
+                self._moving = self._moving.relaxed_at(place, obstacles)
+            self._relaxed = key, obstacles
 
 
 def _same(a: Obstacles, b: Obstacles) -> bool:

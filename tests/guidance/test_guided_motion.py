@@ -125,22 +125,33 @@ def test_barriers_leave_a_goal_free_once_it_is_free(robot: ss.Robot, body: _core
 def test_barriers_leave_room_at_the_tightest_place_of_the_path(robot: ss.Robot, body: _core.Body) -> None:
     motion = guided(robot, body, planner=ss.PlannerSettings(margin=0.01, floor=0.01))
     motion.set_goal(GOAL)
-    q, v, gains = START, np.zeros(3), []
+    q, v, rest, values = START, np.zeros(3), np.zeros(3), []
     for k in range(4000):
         step = motion.step(q, v, WALL, time=PERIOD * k)
         if step.status == ss.GuideStatus.arrived:
             break
         tight = motion.lead(q, WALL, PERIOD * k).tight
         if not np.array_equal(tight, GOAL):
-            pulls = [
-                np.linalg.norm(s.acceleration(tight, np.zeros(3), step.goal, WALL).acceleration)
-                for s in (motion.moving, motion.system)
-            ]
-            gains.append(pulls[0] / pulls[1])
+            systems = (motion.moving, motion.system)
+            values.append([s.acceleration(tight, rest, GOAL, WALL).values.max() for s in systems])
         v = v + PERIOD * step.acceleration
         q = q + PERIOD * v
     assert step.status == ss.GuideStatus.arrived
-    assert len(gains) > 10
-    # What the goal's pull gains there: always something, and most where the path is tightest.
-    assert np.median(gains) > 1.02
-    assert np.max(gains) > 1.3
+    assert len(values) > 10
+    relaxed, full = np.array(values).T
+    assert np.all(full > 0.0)
+    # Activation distances are shorter than the clearances there, but for the steps until the next look at the scene.
+    assert np.percentile(relaxed, 90) == 0.0
+    assert np.all(relaxed <= full)
+
+
+def test_at_the_end_barriers_leave_room_at_the_goal_as_well(robot: ss.Robot, body: _core.Body) -> None:
+    along, across = np.array([np.cos(0.8), -np.sin(0.8), 0.0]), np.array([-np.sin(0.8), -np.cos(0.8), 0.0])
+    beside = ss.Obstacles(np.vstack([WALL.points, 0.9 * along + 0.1 * across]), 0.03)
+    motion = guided(robot, body, planner=ss.PlannerSettings(margin=0.01, floor=0.01))
+    motion.set_goal(GOAL)
+    q, status, _ = run(motion, START, beside, 20.0)
+    assert status == ss.GuideStatus.arrived
+    rest = np.zeros(3)
+    assert motion.system.acceleration(GOAL, rest, GOAL, beside).values.max() > 0.0
+    assert motion.moving.acceleration(GOAL, rest, GOAL, beside).values.max() == 0.0

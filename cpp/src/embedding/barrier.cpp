@@ -33,7 +33,7 @@ std::shared_ptr<const Embedding> Barrier::relaxed_at(const Eigen::VectorXd& goal
   std::shared_ptr<Barrier> relaxed = clone();
   const double least = std::min(relaxed_floors * function_.floor, function_.activation);
   for (Eigen::Index k = 0; k < clearances.size(); ++k) {
-    relaxed->activations_[k] = std::clamp(relaxed_share * clearances[k], least, function_.activation);
+    relaxed->activations_[k] = std::clamp(relaxed_share * clearances[k], least, std::max(least, activations_[k]));
   }
   return relaxed;
 }

@@ -95,6 +95,7 @@ void Guide::set_obstacles(const Obstacles& obstacles) {
 GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept {
   attractor.velocity.setZero(goal_.size());
   attractor.tight = goal_;
+  attractor.arrives = true;
   if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite()) {
     attractor.position = goal_;
     if (q.size() == goal_.size()) {
@@ -137,6 +138,7 @@ GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attrac
     follower_.advance(answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity);
     if (const Eigen::Index tightest = follower_.tightest(answer.route, settings_.route); tightest >= 0) {
       attractor.tight = answer.route.q.col(tightest);
+      attractor.arrives = answer.route.length() - follower_.station <= settings_.route.lead;
     }
   } else {
     attractor.position = goal_;

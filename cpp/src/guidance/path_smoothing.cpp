@@ -36,16 +36,79 @@ std::vector<double> stations(const Waypoints& path) {
 constexpr double sample = 0.1;       // between clearances on an edge [rad]
 constexpr double farthest = 0.3;     // that a waypoint is shifted at a time [rad]
 constexpr int shifts = 8;            // tried for a waypoint
+constexpr double slowest = 0.25;     // share of the speed that is left where there is no clearance
+constexpr int misses = 3;            // share of the attempts to shorten that may fail in a row: one in three
+constexpr double gain = 1e-3;        // a length below which a shortcut is not worth a check [rad]
 
-/// The least clearance on an edge, but for its ends, not above `cap`. At its ends a path may have to be near.
-double least_clearance(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const BodyClearance& body,
-                       const Obstacles& obstacles, double cap, BodyClearance::Workspace& w) {
-  const int pieces = 1 + static_cast<int>((b - a).norm() / sample);
+/// How long it takes to pass an edge at speeds proportional to the clearance, 1 rad/s from `wide` on [s].
+double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const BodyClearance& body, const Obstacles& obstacles,
+                double wide, BodyClearance::Workspace& w) {
+  const double length = (b - a).norm();
+  const int pieces = 1 + static_cast<int>(length / sample);
+  double sum = 0.0;
   for (int i = 0; i < pieces; ++i) {
-    cap = body.nearest(a + (i + 0.5) / pieces * (b - a), obstacles, cap, w).clearance;
+    const double clearance = body.nearest(a + (i + 0.5) / pieces * (b - a), obstacles, wide, w).clearance;
+    sum += 1.0 / std::clamp(clearance / wide, slowest, 1.0);
   }
-  return cap;
+  return sum * length / pieces;
 }
+
+/// A path whose stretch between two points of it is another.
+class Stretch {
+ public:
+  Stretch(const Waypoints& way, RandomStream& random) : way_(way), at_(stations(way)) {
+    from_ = random.uniform(0.0, at_.back());
+    to_ = random.uniform(0.0, at_.back());
+    if (from_ > to_) {
+      std::swap(from_, to_);
+    }
+    first_ = edge(from_);
+    last_ = edge(to_);
+  }
+
+  bool bends() const { return first_ < last_; }
+
+  /// A straight edge.
+  Waypoints straight() const { return {on(first_, from_), on(last_, to_)}; }
+
+  /// As it is, but one joint at a constant rate.
+  Waypoints evened(Eigen::Index joint) const {
+    Waypoints between{on(first_, from_)};
+    const double begin = between.front()[joint], end = on(last_, to_)[joint];
+    for (std::size_t k = first_ + 1; k <= last_; ++k) {
+      between.push_back(way_[k]);
+      between.back()[joint] = begin + (at_[k] - from_) / (to_ - from_) * (end - begin);
+    }
+    between.push_back(on(last_, to_));
+    return between;
+  }
+
+  /// [rad]
+  double length() const { return to_ - from_; }
+
+  Waypoints with(const Waypoints& between) const {
+    const auto after = [&](std::size_t k) { return way_.begin() + static_cast<std::ptrdiff_t>(k) + 1; };
+    Waypoints next(way_.begin(), after(first_));
+    next.insert(next.end(), between.begin(), between.end());
+    next.insert(next.end(), after(last_), way_.end());
+    return next;
+  }
+
+ private:
+  /// The edge that holds a point.
+  std::size_t edge(double station) const {
+    return static_cast<std::size_t>(std::upper_bound(at_.begin() + 1, at_.end() - 1, station) - at_.begin()) - 1;
+  }
+  Eigen::VectorXd on(std::size_t k, double station) const {
+    const double length = at_[k + 1] - at_[k];
+    return way_[k] + (length > 0.0 ? (station - at_[k]) / length : 0.0) * (way_[k + 1] - way_[k]);
+  }
+
+  const Waypoints& way_;
+  std::vector<double> at_;
+  double from_, to_;
+  std::size_t first_, last_;
+};
 
 }  // namespace
 
@@ -53,22 +116,23 @@ Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, co
                       const Margins& margins, double wide, RandomStream& random, BodyClearance::Workspace& workspace) {
   Eigen::MatrixXd way = path;
   const Eigen::VectorXd &low = body.robot().limits().lower, &high = body.robot().limits().upper;
-  const auto clearance = [&](Eigen::Index k, const Eigen::VectorXd& q) {
-    const double least = least_clearance(way.col(k - 1), q, body, obstacles, wide, workspace);
-    return least_clearance(q, way.col(k + 1), body, obstacles, least, workspace);
+  const auto around = [&](Eigen::Index k, const Eigen::VectorXd& q) {
+    return duration(way.col(k - 1), q, body, obstacles, wide, workspace) +
+           duration(q, way.col(k + 1), body, obstacles, wide, workspace);
   };
   for (Eigen::Index k = 1; k + 1 < way.cols(); ++k) {
-    double best = clearance(k, way.col(k));
-    for (int i = 0; i < shifts && best < wide; ++i) {
+    double best = around(k, way.col(k));
+    const double least = (way.col(k) - way.col(k - 1)).norm() + (way.col(k + 1) - way.col(k)).norm();
+    for (int i = 0; i < shifts && best > least; ++i) {
       Eigen::VectorXd q = way.col(k);
       for (Eigen::Index j = 0; j < q.size(); ++j) {
         q[j] = std::clamp(q[j] + random.uniform(-farthest, farthest), low[j], high[j]);
       }
-      const double gained = clearance(k, q);
-      if (gained > best && body.edge_free(way.col(k - 1), q, obstacles, margins, workspace) &&
+      const double found = around(k, q);
+      if (found < best && body.edge_free(way.col(k - 1), q, obstacles, margins, workspace) &&
           body.edge_free(q, way.col(k + 1), obstacles, margins, workspace)) {
         way.col(k) = q;
-        best = gained;
+        best = found;
       }
     }
   }
@@ -82,32 +146,28 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
     way.push_back(path.col(k));
   }
   way = skip(way, body, obstacles, margins, workspace);
-  for (int attempt = 0; attempt < attempts && way.size() > 2; ++attempt) {
-    const std::vector<double> at = stations(way);
-    double from = random.uniform(0.0, at.back()), to = random.uniform(0.0, at.back());
-    if (from > to) {
-      std::swap(from, to);
+  const auto free = [&](const Waypoints& between) {
+    for (std::size_t k = 1; k < between.size(); ++k) {
+      if (!body.edge_free(between[k - 1], between[k], obstacles, margins, workspace)) {
+        return false;
+      }
     }
-    // The edges that hold the two points.
-    const auto edge = [&](double s) {
-      const auto above = std::upper_bound(at.begin() + 1, at.end() - 1, s);
-      return static_cast<std::size_t>(above - at.begin()) - 1;
-    };
-    const std::size_t i = edge(from), j = edge(to);
-    if (i == j) {
+    return true;
+  };
+  int missed = 0;
+  for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2; ++attempt) {
+    const Stretch stretch(way, random);
+    ++missed;
+    if (!stretch.bends()) {
       continue;
     }
-    const auto on = [&](std::size_t k, double s) -> Eigen::VectorXd {
-      const double length = at[k + 1] - at[k];
-      return way[k] + (length > 0.0 ? (s - at[k]) / length : 0.0) * (way[k + 1] - way[k]);
-    };
-    const Eigen::VectorXd a = on(i, from), b = on(j, to);
-    if (body.edge_free(a, b, obstacles, margins, workspace)) {
-      Waypoints next(way.begin(), way.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-      next.push_back(a);
-      next.push_back(b);
-      next.insert(next.end(), way.begin() + static_cast<std::ptrdiff_t>(j) + 1, way.end());
-      way = std::move(next);
+    const auto joint = static_cast<Eigen::Index>(random.uniform(0.0, static_cast<double>(path.rows())));
+    for (const Waypoints& between : {stretch.straight(), stretch.evened(joint)}) {
+      if (stations(between).back() < stretch.length() - gain && free(between)) {
+        way = stretch.with(between);
+        missed = 0;
+        break;
+      }
     }
   }
   way = skip(way, body, obstacles, margins, workspace);

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
+constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
 constexpr double short_step = 0.25;      // of the range
 constexpr double domain = 1.0;           // of the range: how far samples may be from a node that was trapped
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
@@ -98,7 +99,7 @@ bool RrtConnect::obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles
 
 Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
                             const Obstacles& obstacles) {
-  Margins margins{distance, settings_.slack, settings_.fade, {}};
+  Margins margins{distance, std::max(settings_.slack, slack_share * distance), settings_.fade, {}};
   for (const Eigen::VectorXd* q : {&start, &goal}) {
     body_->clearances(*q, obstacles, distance, workspace_, clearances_);
     Eigen::VectorXd deficits(body_->num_items());

@@ -70,9 +70,11 @@ class Guide {
   void set_obstacles(const Obstacles& obstacles);
 
   /// Where to be drawn to: position (nv) and velocity (nv) of a JointGoal; and where barriers are to leave room (nv), see
-  /// GeometricSystem::relaxed_at: the tightest place of the path that the arm is about to pass, else the goal.
+  /// GeometricSystem::relaxed_at: the tightest place of the path that the arm is about to pass, else the goal; at the goal
+  /// too where the arm `arrives`, which is the end of the path within the lead.
   struct Attractor {
     Eigen::VectorXd position, velocity, tight;
+    bool arrives = false;
   };
 
   /// One step of the loop, at a time [s] that does not go back. Never blocks; allocates nothing unless synchronous.

@@ -7,13 +7,14 @@
 
 namespace sidestep {
 
-/// Shortens a free path: waypoints that can be left out are, then `attempts` random pairs of points on it are joined by a
-/// straight edge where that is free. What it returns is free with the same margins.
+/// Shortens a free path: waypoints that can be left out are, then at most `attempts` random stretches of it are replaced by
+/// a straight edge, or by the same with one joint at a constant rate (Geraerts and Overmars 2007), where that is shorter and
+/// free; a third of the attempts in vain ends it. What it returns is free with the same margins.
 Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
                         const Margins& margins, int attempts, RandomStream& random, BodyClearance::Workspace& workspace);
 
-/// Shifts the waypoints of a free path away from what is near, as long as they gain clearance, up to `wide` [m], on the edges
-/// to either side; ends stay. What it returns is free with the same margins.
+/// Shifts the waypoints of a free path where the edges to either side then take less time, at speeds proportional to the
+/// clearance below `wide` [m], a quarter at least; ends stay. What it returns is free with the same margins.
 Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
                       const Margins& margins, double wide, RandomStream& random, BodyClearance::Workspace& workspace);
 

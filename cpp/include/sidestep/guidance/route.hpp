@@ -7,11 +7,11 @@
 namespace sidestep {
 
 struct RouteSettings {
-  double speed = 1.0;         ///< fastest |dq*/dt| of the attractor [rad/s]
+  double speed = 2.0;         ///< fastest |dq*/dt| of the attractor [rad/s]
   double speed_share = 0.7;   ///< of the joints' velocity limits that it may ask for
-  double acceleration = 3.0;  ///< at which it slows down ahead [rad/s²]
-  double wide = 0.04;         ///< clearance from which it goes at full speed [m]
-  double slowest = 0.25;      ///< share of the speed that is left where there is none
+  double acceleration = 4.0;  ///< at which it slows down ahead [rad/s²]
+  double wide = 0.03;         ///< clearance from which it goes at full speed [m]
+  double slowest = 0.35;      ///< share of the speed that is left where there is none
   double lead = 0.4;          ///< |q − q*| at which it waits for the arm [rad]
 
   /// Throws std::invalid_argument that names the setting at fault.

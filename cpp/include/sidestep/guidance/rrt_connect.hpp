@@ -16,13 +16,13 @@ struct PlannerSettings {
   double floor = 0.005;     ///< clearance asked for at last, where there is no wider way [m]
   double allowance = 0.02;       ///< how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
   double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
-  double slack = 0.002;     ///< see Margins [m]
+  double slack = 0.002;     ///< see Margins, at least; else a quarter of the margin [m]
   double fade = 0.3;        ///< see Margins [m]
   double range = 1.5;       ///< longest edge of the trees [rad | m]
   int max_nodes = 10000;    ///< of both trees
   int max_iterations = 40000;
   double max_seconds = std::numeric_limits<double>::infinity();
-  int shortcuts = 40;       ///< attempts to shorten a path
+  int shortcuts = 100;      ///< attempts to shorten a path
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
