@@ -13,7 +13,7 @@ from PIL import Image
 from sidestep.pose import from_quaternion
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
-from sidestep.studio.headless import Window, go_to, picture
+from sidestep.studio.headless import Window, go_to, new_page, picture
 from sidestep.studio.page.view import MAIN_WIDTH, PLOT_WIDTH
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
@@ -31,7 +31,7 @@ class Looker:
         self.errors: list[str] = []
         self.asked: list[str] = []
         self.studio = studio
-        self.page = chromium.new_page(viewport={"width": window.width, "height": window.height})
+        self.page = new_page(chromium, window)
         self.page.set_default_timeout(1e3 * PATIENCE)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", self._hear)

@@ -13,8 +13,9 @@ from PIL import Image
 from sidestep import ExactClearance, Scenario
 from sidestep.studio import messages as m
 from sidestep.studio.export import python_snippet
-from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, film, find_chromium
+from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, film, find_chromium, new_page
 from sidestep.studio.methods import METHODS
+from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.page.obstacles import gizmo_pose
 from sidestep.studio.page.surface import on_surface
 from sidestep.studio.studio import Studio
@@ -68,10 +69,10 @@ def test_an_obstacle_dragged_into_the_way_is_not_touched(studio: Studio, looker:
     until(lambda: last(studio).recording and last(studio).running, "recording")
     before = last(studio)
     ball = before.poses[0][:3, 3]
-    # The goal first, then the ball from its place to where the tip passes: the plane of the drag faces the camera.
-    target = studio.view.robot.pose(before.q + np.array([0.5, 0.0]), studio.view.tip)[:3, 3]
+    # The goal first, then the ball onto the circle of the tip, sideways in the window: a drag is in a plane that
+    # faces the camera, and this arm can yield in its own plane alone.
     studio.send(m.SetJointGoal(before.q + np.array([1.0, 0.0])))
-    looker.drag(ball, target)
+    looker.drag(ball, ball - 0.4 * RIGHT)
     moved = lambda: float(np.linalg.norm(last(studio).poses[0][:3, 3] - ball))  # noqa: E731
     until(lambda: moved() > 0.1, "the drag")
     begin = last(studio).time
@@ -83,6 +84,8 @@ def test_an_obstacle_dragged_into_the_way_is_not_touched(studio: Studio, looker:
     things = rows[0].things
     exact = ExactClearance(studio.view.robot, [solid for thing in things for solid in thing.solids])
     poses = np.array([solid_poses(things, row.poses) for row in rows])
+    tip = studio.view.robot.pose(before.q, studio.view.tip)[:3, 3]
+    assert np.linalg.norm(poses[-1, 0, :3]) == pytest.approx(np.linalg.norm(tip), abs=0.1)  # [m] in its way
     worst = exact.decided_minimum(np.array([row.q for row in rows]), poses)
     assert rows[-1].time - rows[0].time > 3.0
     assert worst.clearance.distance > 0.0
@@ -137,11 +140,11 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
 def test_three_browsers_see_the_same_one_of_them_in_a_notebook(
     studio: Studio, looker: Looker, chromium: Any
 ) -> None:
-    second = Looker(chromium, studio)
-    notebook = chromium.new_page(viewport={"width": 1000, "height": 760})
+    notebook = new_page(chromium, Window(1000, 760))
     notebook.set_default_timeout(1e3 * PATIENCE)
+    notebook.set_content(f"<h1>A notebook</h1>{studio._repr_html_()}", wait_until="commit")
+    second = Looker(chromium, studio)
     try:
-        notebook.set_content(f"<h1>A notebook</h1>{studio._repr_html_()}")
         frame = notebook.frame_locator("iframe")
         frame.locator("#words").wait_for()
         frame.locator("canvas").first.wait_for()
@@ -153,13 +156,13 @@ def test_three_browsers_see_the_same_one_of_them_in_a_notebook(
         for window in (looker.page, second.page, frame):
             value = window.locator(field).first.input_value
             until(lambda value=value: value() == "25", "the same field in every window")  # type: ignore[misc]
+        same = lambda: bool(differ(looker.scene(), second.scene()).mean() < 0.01)  # noqa: E731  up to edges
+        until(same, "the same picture")
         before = second.scene()
-        assert differ(looker.scene(), before).mean() < 0.01  # up to the edges of what is drawn
         run_to(studio, 0.5)
         until(lambda: studio.view.shown[0] > 0.49, "the end of the motion")
-        after = second.scene()
-        assert differ(before, after).sum() > 1000  # [px] of the arm that moves
-        assert differ(looker.scene(), after).mean() < 0.01
+        until(same, "the same picture after the motion")
+        assert differ(before, second.scene()).sum() > 1000  # [px] of the arm that moves
         words = second.page.locator("#words").inner_text()
         assert "0.5 s" in words
         assert looker.page.locator("#words").inner_text() == words

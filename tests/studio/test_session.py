@@ -16,6 +16,7 @@ from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
 from sidestep.studio.export import scenario_now
 from sidestep.studio.session import Session
+from sidestep.studio.stage import DRAG_ACCELERATION, DRAG_SPEED
 from sidestep.studio.start import BEND, ends, scenario_of
 from sidestep.studio.things import ball, box
 from sidestep.studio.tip import tip_of
@@ -70,6 +71,24 @@ def test_a_ball_drawn_into_the_arm_at_rest_does_not_touch_it(
     np.testing.assert_allclose(
         last.poses[0][:3, 3], tip, atol=1e-3
     )  # where it was drawn to, within a millimetre
+
+
+def test_a_drawn_ball_moves_as_a_hand_does(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="unswitched")
+    place = session.snapshot().poses[0][:3, 3] + np.array([0.4, 0.3, 0.0])
+    session.handle(m.DragThing("ball", pose_at(place)))
+    velocities = [np.zeros(3)]
+    for _ in range(1500):
+        session.step()
+        velocities.append(session.snapshot().velocities[0])
+    speeds = np.linalg.norm(velocities, axis=1)
+    changes = np.linalg.norm(np.diff(velocities, axis=0), axis=1)
+    assert 0.9 < speeds.max() <= DRAG_SPEED + 1e-9
+    at_rest = 10.0 * DRAG_ACCELERATION * session.period  # what is left when it is put in its place
+    assert changes.max() <= at_rest + 1e-9
+    assert np.median(changes[:200]) == pytest.approx(DRAG_ACCELERATION * session.period, rel=1e-6)
+    np.testing.assert_allclose(session.snapshot().poses[0][:3, 3], place, atol=1e-12)
+    assert speeds[-1] == 0.0
 
 
 def test_a_thrown_ball_flies_straight_and_is_told_to_the_controller(

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (  # WebGL without a graphics card; a container has no sandbox of its own to offer
     "--no-sandbox",
+    "--disable-gpu-compositing",  # each picture in half the time
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
@@ -38,6 +39,19 @@ MOMENT = 5e-3  # [s] longer than a control period, in whose middle a pause may f
 FRAME = 0.25  # [s] of simulated time between two pictures of an animation
 CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
   if (notice.innerText.includes('Software WebGL')) notice.querySelector('button')?.click()"""  # of viser
+FEW_FRAMES = """const waiting = new Map(), draw = window.requestAnimationFrame.bind(window);
+const now = key => {
+  const [timer, done] = waiting.get(key) ?? [];
+  if (waiting.delete(key)) { clearTimeout(timer); draw(done); }
+};
+let last = 0;
+window.requestAnimationFrame = done => {
+  waiting.set(++last, [setTimeout(now, 250, last), done]);
+  return last;
+};
+window.cancelAnimationFrame = key => { clearTimeout(waiting.get(key)?.[0]); waiting.delete(key); };
+window.drawn = () => new Promise(done => { [...waiting.keys()].forEach(now); draw(done); });
+"""  # four a second, others when asked for by `drawn`
 ANIMATION_WIDTH = 800  # [px]
 
 
@@ -92,10 +106,10 @@ def browser() -> Iterator[Any]:
             chromium.close()
 
 
-def open_page(chromium: Any, address: str, window: Window = Window()) -> Page:
-    """The page in a new window, once the scene is shown."""
+def new_page(chromium: Any, window: Window) -> Page:
+    """An empty window, which draws no more than it needs: the loop and others want the processor as well."""
     page: Page = chromium.new_page(viewport={"width": window.width, "height": window.height})
-    go_to(page, address)
+    page.add_init_script(FEW_FRAMES)
     return page
 
 
@@ -132,7 +146,8 @@ def take_pictures(
         if hasattr(os, "nice"):
             os.nice(POLITE)  # of the browser that is begun now; the loop runs already
         with browser() as chromium:
-            page = open_page(chromium, studio.address, window)
+            page = new_page(chromium, window)
+            go_to(page, studio.address)
             film(studio, page, duration=duration, screenshot=screenshot, video=video)
 
 
@@ -171,12 +186,10 @@ def run_until(studio: Studio, time: float) -> None:
 
 
 def picture(studio: Studio, page: Page) -> bytes:
-    """What the page shows, as PNG, once it has drawn what it was last sent."""
+    """What a page of `new_page` shows, as PNG, once it has drawn what it was last sent."""
     stamp = studio.view.stamp()
     page.wait_for_selector(f"#words[data-stamp='{stamp}']", timeout=1e3 * PICTURE_TIME)
-    page.evaluate(
-        f"{CLOSE_NOTICE}; new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
-    )
+    page.evaluate(f"{CLOSE_NOTICE}; drawn().then(drawn).then(drawn)")
     return bytes(page.screenshot(timeout=1e3 * PICTURE_TIME))
 
 

@@ -17,6 +17,7 @@ Array = npt.NDArray[np.float64]
 
 FOLLOW_TIME = 0.05  # [s] in which a drawn obstacle makes up 63 % of its way, below the speed limit
 DRAG_SPEED = 1.0  # [m/s] at most of a drawn obstacle: what the hand of a person does near an arm
+DRAG_ACCELERATION = 4.0  # [m/s^2] the same; a mouse jumps, and from a jump nothing can yield
 THERE = 1e-4  # [m] from its target a drawn obstacle is put there
 FAR = 3.0  # [m] from the origin; a thrown obstacle stops there
 
@@ -55,10 +56,15 @@ class Actor:
         there = False
         if self.target is not None:
             way = self.target[:3, 3] - self.pose[:3, 3]
-            velocity = way / max(FOLLOW_TIME, period)
-            speed = float(np.linalg.norm(velocity))
-            self.velocity = velocity * min(1.0, DRAG_SPEED / speed) if speed > 0.0 else velocity
-            there = bool(np.linalg.norm(way) < THERE)
+            distance = float(np.linalg.norm(way))
+            # No faster than it can still be stopped from.
+            speed = min(
+                distance / max(FOLLOW_TIME, period), DRAG_SPEED, np.sqrt(2.0 * DRAG_ACCELERATION * distance)
+            )
+            change = way * (speed / max(distance, 1e-12)) - self.velocity
+            size, most = float(np.linalg.norm(change)), DRAG_ACCELERATION * period
+            self.velocity = self.velocity + change * min(1.0, most / max(size, 1e-12))
+            there = distance < THERE and bool(np.linalg.norm(self.velocity) < 10.0 * most)
             if there:
                 self.velocity = way / period
             if not np.array_equal(self.pose[:3, :3], self.target[:3, :3]):

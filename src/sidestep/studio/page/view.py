@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 WORDS_EVERY = 0.15  # [s] nobody reads faster
 GRID_DEPTH = 0.05  # [m] below the base: a planar arm, half as thick, does not lie in the grid
-NEAR = 1.5  # of the arm's reach: obstacles farther off need not be in the window as it opens
-SKY_LIGHT = 1.8  # so that lit faces have about the colour that the legend shows
+NEAR = 2.0  # of the arm's reach: obstacles farther off need not be in the window as it opens
+SKY_LIGHT = 2.4  # so that lit faces have about the colour that the legend shows
 MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 365, 290, 154  # [px]
 STYLE = (
     "<style>.mantine-Slider-markLabel{translate:0 3px}</style>"  # else a slider's knob covers its least value
