@@ -5,19 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from sidestep import ExactClearance, Robot, Scenario
 from sidestep.pose import pose_at
 from sidestep.scenario.runner import run_scenario
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
-from sidestep.studio.export import scenario_now
+from sidestep.studio.export import save_scenario, scenario_now
+from sidestep.studio.page.arm import link_meshes, short_names
 from sidestep.studio.session import Session
 from sidestep.studio.stage import DRAG_ACCELERATION, DRAG_SPEED
-from sidestep.studio.start import BEND, ends, scenario_of
+from sidestep.studio.start import BEND, ends, scenario_of, starting_scenario
 from sidestep.studio.things import ball, box
 from sidestep.studio.tip import tip_of
 from sidestep.studio.truth import solid_poses
@@ -293,3 +296,42 @@ def test_a_diagnosis_names_links_and_obstacles(make_session: MakeSession, scenar
     words = run(session, 3.0).words
     assert words.startswith("stuck ")
     assert re.search(r": link2 against ball, \d+ mm away$", words)
+
+
+URDF = """<robot name="two">{links}
+  <joint name="two_joint_a" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="50" velocity="3"/></joint>
+  <joint name="two_joint_b" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="50" velocity="3"/></joint>
+</robot>"""
+LINK = """
+  <link name="{name}"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>
+    <visual><geometry><mesh filename="package://two/bar.stl"/></geometry></visual>
+    <collision><geometry><mesh filename="package://two/bar.stl"/></geometry></collision></link>"""
+
+
+def test_a_robot_of_a_urdf_with_meshes_moves_and_is_saved_with_them(
+    make_session: MakeSession, tmp_path: Path
+) -> None:
+    (tmp_path / "two").mkdir()
+    bar = trimesh.creation.box((0.4, 0.05, 0.05), pose_at([0.2, 0.0, 0.0]))
+    bar.export(tmp_path / "two" / "bar.stl")
+    links = "".join(LINK.format(name=name) for name in ("upper", "lower"))
+    file = tmp_path / "two" / "two.urdf"
+    file.write_text(URDF.format(links='<link name="base"/>' + links), encoding="utf-8")
+    scenario = replace(starting_scenario(urdf=file, package_dirs=[tmp_path]), obstacles=())
+    session = make_session(
+        scenario, method="unswitched", numbers={"unswitched": {"stiffness": 4.0, "damping": 4.0}}
+    )
+    meshes = link_meshes(session.robot)
+    assert {name: mesh.bounds[1].tolist() for name, mesh in meshes.items()} == {
+        name: pytest.approx([0.4, 0.025, 0.025], abs=1e-6)  # of an STL in single precision
+        for name in ("upper", "lower")
+    }
+    assert short_names(session.robot.coordinate_names) == ["a", "b"]
+    last = run(session, 5.0)
+    assert last.goal is not None
+    assert np.abs(last.q - last.goal).max() < 0.05  # [rad] counts as arrived
+    again = Scenario.load(save_scenario(scenario_now(last, name="two"), tmp_path))
+    np.testing.assert_array_equal(make_session(again, method="unswitched").snapshot().q, last.q)
