@@ -150,7 +150,7 @@ def test_at_the_end_barriers_leave_room_at_the_goal_as_well(robot: ss.Robot, bod
     beside = ss.Obstacles(np.vstack([WALL.points, 0.9 * along + 0.1 * across]), 0.03)
     motion = guided(robot, body, planner=ss.PlannerSettings(margin=0.01, floor=0.01))
     motion.set_goal(GOAL)
-    q, status, _ = run(motion, START, beside, 20.0)
+    _, status, _ = run(motion, START, beside, 20.0)
     assert status == ss.GuideStatus.arrived
     rest = np.zeros(3)
     assert motion.system.acceleration(GOAL, rest, GOAL, beside).values.max() > 0.0
