@@ -120,7 +120,8 @@ void bind_speed_regulator(nb::module_& m) {
       "it is: the smooth maximum rho of all ratios of speed to allowed speed obeys drho/dt <= rate (1 - rho)/min(rho, 1).\n"
       "joint_fraction [-]: of the joint velocity limits that is allowed; rate [1/s]: how quickly that is approached;\n"
       "closing_speed [m/s] and closing_slope [1/s]: the motion of the arm may shrink a clearance h by at most\n"
-      "closing_speed + closing_slope max(h, 0) per second. Raises ValueError that names the setting.")
+      "closing_speed + closing_slope max(h, 0) per second, for what is within the reach of its barrier. Raises\n"
+      "ValueError that names the setting.")
       .def(
           "__init__",
           [](SpeedRegulator* self, double joint_fraction, double rate, double closing_speed, double closing_slope) {

@@ -113,8 +113,9 @@ void bind_embedding(nb::module_& m) {
       "activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.\n"
       "strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer\n"
       "and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between\n"
-      "neighbouring points. reach [m]: clearances are measured up to here; what approaches is seen from as far as\n"
-      "the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
+      "neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More\n"
+      "costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What\n"
+      "approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
       .def(
           "__init__",
           [](ClearanceBarrier* self, const Robot& robot, const Body& body, double activation, double strength,
@@ -124,7 +125,7 @@ void bind_embedding(nb::module_& m) {
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("activation") = 0.10, nb::arg("strength") = 0.1,
           nb::arg("power") = 2.0, nb::arg("floor") = 0.002, nb::arg("temperature") = 0.002,
-          nb::arg("reach") = 0.3)
+          nb::arg("reach") = 0.0)
       .def_prop_ro("activation", [](const ClearanceBarrier& b) { return b.function().activation; })
       .def_prop_ro("reach", &ClearanceBarrier::reach)
       .def_prop_ro("components",
@@ -165,7 +166,7 @@ void bind_embedding(nb::module_& m) {
           },
           nb::arg("robot"), nb::arg("body"), nb::arg("pairs"), nb::kw_only(), nb::arg("activation") = 0.05,
           nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
-          nb::arg("temperature") = 0.002, nb::arg("reach") = 0.1);
+          nb::arg("temperature") = 0.002, nb::arg("reach") = 0.0);
 
   nb::class_<PlaneBarrier, Embedding>(
       m, "PlaneBarrier",
@@ -182,7 +183,7 @@ void bind_embedding(nb::module_& m) {
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("point"), nb::arg("normal"), nb::arg("links"),
           nb::arg("activation") = 0.05, nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
-          nb::arg("temperature") = 0.002, nb::arg("reach") = 0.3);
+          nb::arg("temperature") = 0.002, nb::arg("reach") = 0.0);
 
   nb::class_<Sum, Embedding>(m, "Sum",
                              "Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).")

@@ -275,11 +275,12 @@ class ClearanceBarrier(Embedding):
     activation [m]: where it begins; larger reacts earlier and gentler, and closes narrow passages.
     strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer
     and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between
-    neighbouring points. reach [m]: clearances are measured up to here; what approaches is seen from as far as
-    the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
+    neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More
+    costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What
+    approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.3) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0) -> None: ...
 
     @property
     def activation(self) -> float: ...
@@ -306,7 +307,7 @@ class SelfCollisionBarrier(Embedding):
     ClearanceBarrier.
     """
 
-    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str] | tuple[str, str, float]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.1) -> None: ...
+    def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str] | tuple[str, str, float]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0) -> None: ...
 
 class PlaneBarrier(Embedding):
     """
@@ -314,7 +315,7 @@ class PlaneBarrier(Embedding):
     the plane, normal (3,) to the free side, in the world; other parameters as in ClearanceBarrier.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, point: numpy.typing.ArrayLike, normal: numpy.typing.ArrayLike, links: Sequence[str], activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.3) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, point: numpy.typing.ArrayLike, normal: numpy.typing.ArrayLike, links: Sequence[str], activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0) -> None: ...
 
 class Sum(Embedding):
     """
@@ -451,7 +452,8 @@ class SpeedRegulator:
     it is: the smooth maximum rho of all ratios of speed to allowed speed obeys drho/dt <= rate (1 - rho)/min(rho, 1).
     joint_fraction [-]: of the joint velocity limits that is allowed; rate [1/s]: how quickly that is approached;
     closing_speed [m/s] and closing_slope [1/s]: the motion of the arm may shrink a clearance h by at most
-    closing_speed + closing_slope max(h, 0) per second. Raises ValueError that names the setting.
+    closing_speed + closing_slope max(h, 0) per second, for what is within the reach of its barrier. Raises
+    ValueError that names the setting.
     """
 
     def __init__(self, *, joint_fraction: float = 0.9, rate: float = 10.0, closing_speed: float = float('inf'), closing_slope: float = 1.0) -> None: ...

@@ -14,7 +14,8 @@ struct SpeedRegulatorSettings {
   /// How quickly the limit is approached [1/s]; see below.
   double rate = 10.0;
   /// Speed and separation: the motion of the arm may shrink a clearance h by at most
-  /// closing_speed + closing_slope max(h, 0) [m/s; 1/s]. Infinite: no such limit.
+  /// closing_speed + closing_slope max(h, 0) [m/s; 1/s], for what is within the reach of its barrier. Infinite: no such
+  /// limit.
   double closing_speed = std::numeric_limits<double>::infinity();
   double closing_slope = 1.0;
 

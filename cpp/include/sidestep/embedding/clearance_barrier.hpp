@@ -20,7 +20,7 @@ class ClearanceBarrier final : public Barrier {
   /// what approaches as far as the arm needs to stop, for what keeps them (TorqueController, AccelerationFilter).
   /// Throws std::invalid_argument that names what is wrong.
   ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature = 0.002,
-                   double reach = 0.3);
+                   double reach = 0.0);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
 

@@ -17,11 +17,10 @@ namespace sidestep {
 /// mean (see boltzmann_mean.hpp).
 class SelfCollisionBarrier final : public Barrier {
  public:
-  /// Clearances are measured up to `reach` [m], at least to the activation distance, for what keeps them, as in
-  /// ClearanceBarrier. Throws std::invalid_argument if there is no pair, a link is unknown or has no ellipsoid, the two are
+  /// Clearances are measured up to `reach` [m], at least to the activation distance, as in ClearanceBarrier. Throws std::invalid_argument if there is no pair, a link is unknown or has no ellipsoid, the two are
   /// rigidly connected or `contact` is not finite; or names the setting at fault.
   SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<LinkPair>& pairs, BarrierFunction barrier,
-                       double temperature = 0.002, double reach = 0.1);
+                       double temperature = 0.002, double reach = 0.0);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
@@ -53,7 +52,7 @@ class PlaneBarrier final : public Barrier {
   /// moved by a joint. Throws std::invalid_argument that names what is wrong.
   PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                const std::vector<std::string>& links, BarrierFunction barrier, double temperature = 0.002,
-               double reach = 0.3);
+               double reach = 0.0);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;
