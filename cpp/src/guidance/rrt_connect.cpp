@@ -158,8 +158,8 @@ Plan RrtConnect::find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
   Margins kept;
   // A wide way is tried for a little, what lies between for longer.
   const std::array<std::pair<double, int>, 3> levels{
-      std::pair{margin, settings_.max_iterations / 800},
-      std::pair{std::sqrt(margin * settings_.floor), settings_.max_iterations / 125},
+      std::pair{margin, settings_.max_iterations / 400},
+      std::pair{std::sqrt(margin * settings_.floor), settings_.max_iterations / 40},
       std::pair{settings_.floor, settings_.max_iterations}};
   for (const auto& [level, iterations] : levels) {
     if (plan.status != PlanStatus::no_path || (level == settings_.floor && iterations < settings_.max_iterations)) {

@@ -182,7 +182,7 @@ BOOST_AUTO_TEST_CASE(a_closed_way_ends_with_the_budget) {
                                  at(points, 0.02), 0);
   BOOST_TEST(name(plan.status) == "no_path");
   BOOST_TEST(plan.path.size() == 0);
-  BOOST_TEST(plan.iterations == 500 / 800 + 500 / 125 + 500);
+  BOOST_TEST(plan.iterations == 500 / 400 + 500 / 40 + 500);
   settings.max_seconds = 1e-9;
   RrtConnect hurried(body, settings);
   BOOST_TEST(name(hurried.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5),

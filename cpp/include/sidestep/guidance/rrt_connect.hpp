@@ -33,7 +33,7 @@ struct PlannerSettings {
 /// obstacles, seed) unless the time runs out.
 ///
 /// Margins shrink in two ways, both stated in the plan: where no path keeps `margin`, one with their geometric mean, then one
-/// that keeps `floor` is searched for, with an 800th, a 125th and the whole of the budget; and near start and goal every link
+/// that keeps `floor` is searched for, with a 400th, a 40th and the whole of the budget; and near start and goal every link
 /// may be as near to things as it is there, see Margins. A link deeper than `allowance` inside something at an end is refused
 /// as in collision.
 class RrtConnect {
