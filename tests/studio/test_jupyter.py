@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sidestep.studio.headless import find_chromium
+from sidestep.studio.headless import FLAGS, browser, find_chromium
 from sidestep.studio.studio import NOTEBOOK_SCALE
 from studio.looker import PATIENCE, differ, until
 
@@ -93,6 +93,12 @@ def jupyter(tmp_path: Path) -> Iterator[str]:
         server.terminate()  # and with it its kernels
         server.wait(timeout=20.0)
         log.close()
+
+
+@pytest.fixture
+def chromium() -> Iterator[Any]:
+    with browser(flags=FLAGS) as started:
+        yield started
 
 
 def test_the_scene_moves_inside_a_notebook(jupyter: str, chromium: Any) -> None:

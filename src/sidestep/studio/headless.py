@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (  # WebGL without a graphics card; a container has no sandbox of its own to offer
     "--no-sandbox",
-    "--disable-gpu-compositing",  # each picture in half the time
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
 )
+FAST = "--disable-gpu-compositing"  # each picture in half the time; JupyterLab does not run cells with it
 LOAD_TIME = 90.0  # [s] at most until the page shows the scene
 BODY_TIME = 1800.0  # [s] at most until the body is made, the first time
 PICTURE_TIME = 180.0  # [s] at most for one picture: without a graphics card each takes seconds
@@ -93,13 +93,13 @@ def check_browser() -> str:
 
 
 @contextmanager
-def browser() -> Iterator[Any]:
+def browser(*, flags: tuple[str, ...] = (*FLAGS, FAST)) -> Iterator[Any]:
     """A hidden Chromium, as Playwright's `Browser`; raises FileNotFoundError, see `check_browser`."""
     path = check_browser()
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        chromium = playwright.chromium.launch(executable_path=path, args=list(flags))
         try:
             yield chromium
         finally:
