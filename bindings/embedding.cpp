@@ -115,7 +115,8 @@ void bind_embedding(nb::module_& m) {
       "and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between\n"
       "neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More\n"
       "costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What\n"
-      "approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
+      "approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises\n"
+      "ValueError that names what is wrong.")
       .def(
           "__init__",
           [](ClearanceBarrier* self, const Robot& robot, const Body& body, double activation, double strength,

@@ -85,7 +85,8 @@ void bind_settings(nb::module_& m) {
       "How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.\n"
       "allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance\n"
       "[m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.\n"
-      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.\n"
+      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the\n"
+      "trees. max_nodes, max_iterations, max_seconds: the budget.\n"
       "shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
@@ -155,7 +156,8 @@ void bind_guide(nb::module_& m) {
                    "Where barriers are to leave room (nv,): the tightest place of the path that the arm is about to pass, else\n"
                    "the goal. See GeometricSystem.relaxed_at.")
       .def_prop_ro("arrives", [](const Guidance& g) { return g.attractor.arrives; },
-                   "Whether the end of the path is within the lead, so that barriers are to leave room at the goal too.");
+                   "Whether barriers are to leave room at the goal as well: `tight` is another place, and the end of the path is\n"
+                   "within the lead.");
 
   nb::class_<Guide>(
       m, "Guide",

@@ -277,7 +277,8 @@ class ClearanceBarrier(Embedding):
     and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between
     neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More
     costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What
-    approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
+    approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises
+    ValueError that names what is wrong.
     """
 
     def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0) -> None: ...
@@ -1347,7 +1348,8 @@ class PlannerSettings:
     How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.
     allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance
     [m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.
-    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes, max_iterations, max_seconds: the budget.
+    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the
+    trees. max_nodes, max_iterations, max_seconds: the budget.
     shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
     """
 
@@ -1431,7 +1433,8 @@ class Guidance:
     @property
     def arrives(self) -> bool:
         """
-        Whether the end of the path is within the lead, so that barriers are to leave room at the goal too.
+        Whether barriers are to leave room at the goal as well: `tight` is another place, and the end of the path is
+        within the lead.
         """
 
 class Guide:

@@ -95,7 +95,7 @@ void Guide::set_obstacles(const Obstacles& obstacles) {
 GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept {
   attractor.velocity.setZero(goal_.size());
   attractor.tight = goal_;
-  attractor.arrives = true;
+  attractor.arrives = false;
   if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite()) {
     attractor.position = goal_;
     if (q.size() == goal_.size()) {

@@ -81,7 +81,7 @@ def read_stored(path: Path, reader: Callable[[Path], Contents], warning: str) ->
         except FileNotFoundError:
             continue
         except (ValueError, TypeError, OSError) as error:
-            warnings.warn(f"{warning}: {error}", RuntimeWarning, stacklevel=4)
+            warnings.warn(f"{warning}: {stored}: {error}", RuntimeWarning, stacklevel=4)
             break
     return None
 

@@ -71,7 +71,7 @@ class Guide {
 
   /// Where to be drawn to: position (nv) and velocity (nv) of a JointGoal; and where barriers are to leave room (nv), see
   /// GeometricSystem::relaxed_at: the tightest place of the path that the arm is about to pass, else the goal; at the goal
-  /// too where the arm `arrives`, which is the end of the path within the lead.
+  /// as well where that is another place and the arm `arrives`: the end of the path is within the lead.
   struct Attractor {
     Eigen::VectorXd position, velocity, tight;
     bool arrives = false;
