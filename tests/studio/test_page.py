@@ -17,6 +17,7 @@ from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, film, find_
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.page.obstacles import gizmo_pose
+from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.page.surface import on_surface
 from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses
@@ -221,7 +222,11 @@ def test_a_cloud_is_added_dragged_thrown_and_removed(studio: Studio, looker: Loo
     assert len(thing.cloud) == 64  # a plate of 20 cm with a point every 2.5 cm
     until(lambda: thing.name in studio.view.obstacles.names, "its picture")
     assert differ(without, looker.image()).sum() > 200  # [px]
-    before = last(studio).poses[1][:3, 3]
+    now = last(studio)
+    exact = ExactClearance(studio.view.robot, thing.solids)
+    for q in (now.q, now.posture.q):
+        assert exact.distance(q, solid_poses((thing,), now.poses[1:])).distance > CLEAR
+    before = now.poses[1][:3, 3]
     to = before + np.array([0.0, 0.3, 0.0])
     studio.send(m.SetRunning(True))
     looker.drag(before + thing.cloud[np.abs(thing.cloud).sum(axis=1).argmin()], to)

@@ -111,10 +111,17 @@ class Thing:
         return points, np.full(len(points), self.obstacle.spacing)
 
     @cached_property
+    def middle(self) -> Array:
+        """The middle (3,) of a ball that holds it, in its frame [m]."""
+        middle: Array = 0.5 * (self.offsets.min(axis=0) + self.offsets.max(axis=0))
+        return middle
+
+    @cached_property
     def size(self) -> float:
-        """Largest distance [m] of a point of it from its origin."""
-        solid = self.solids[0]
-        return float(np.linalg.norm(self.offsets, axis=1).max()) + solid.bounding_radius
+        """The radius [m] of that ball."""
+        return float(
+            np.linalg.norm(self.offsets - self.middle, axis=1).max() + self.solids[0].bounding_radius
+        )
 
     def at(self, pose: Array) -> Thing:
         """The same thing, starting at another pose (4, 4), at rest."""

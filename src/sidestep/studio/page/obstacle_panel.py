@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.obstacles import load_point_cloud
-from sidestep.pose import pose_at
+from sidestep.pose import from_quaternion, pose_at
 from sidestep.studio import messages as m
+from sidestep.studio.page.placing import Ball, Camera, free_place
 from sidestep.studio.things import CLOUD_RADIUS, Thing, ball, box, cloud, scattered, thinned
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 NONE = "(none)"
+GIZMO_ROOM = 1.2  # of the length of its arrows: it is drawn on top of all, and takes the mouse
 
 
 class ObstaclePanel:
@@ -44,7 +46,7 @@ class ObstaclePanel:
             initial_value=6.0,
             hint="Radius of a ball, edge of a box or of a plate of points.",
         )
-        add = gui.add_button("Add", hint="Beside the goal; drag it where you want it.")
+        add = gui.add_button("Add", hint="Near the goal, where it is free; drag it where you want it.")
         add.on_click(self._add)
         upload = gui.add_upload_button(
             "Add a point cloud file …", hint="A .ply, .pcd or .npy; it is thinned."
@@ -65,6 +67,7 @@ class ObstaclePanel:
         remove.on_click(self._remove)
         self._chosen.on_update(self._chose)
         self._count = 0
+        self._sent: list[tuple[str, Ball]] = []  # added, and not there yet
 
     def select(self, name: str) -> None:
         """Chooses an obstacle."""
@@ -101,21 +104,17 @@ class ObstaclePanel:
             m.DragThing(self._chosen.value, pose_at(self._place.value, last.poses[index][:3, :3]))
         )
 
-    def _add(self, _: Any) -> None:
-        last = self._view.last
-        if last is None:
-            return
+    def _add(self, event: Any) -> None:
         kind, size = str(self._kind.value), self._size.value / 100.0
-        name = self._new_name(kind)
-        goal = np.array(self._view.goal.gizmo.position)
-        place = goal + np.array([0.0, 0.0, size + 0.15])
+        name, nowhere = self._new_name(kind), np.zeros(3)
         if kind == "ball":
-            made = ball(name, place, size)
+            made = ball(name, nowhere, size)
         elif kind == "box":
-            made = box(name, place, np.full(3, size))
+            made = box(name, nowhere, np.full(3, size))
         else:
-            made = self._cloud(name, scattered(size, seed=self._count), place)
-        self._view.send(m.AddThing(made))
+            made = self._cloud(name, scattered(size, seed=self._count))
+        with self._view.telling(event.client):
+            self._put(made, event.client)
 
     def _upload(self, event: Any) -> None:
         file = event.target.value
@@ -123,12 +122,36 @@ class ObstaclePanel:
             path = self._folder / Path(file.name).name
             path.write_bytes(file.content)
             points = thinned(np.array(load_point_cloud(path).points))
-            self._view.send(m.AddThing(self._cloud(self._new_name("cloud"), points, np.zeros(3))))
+            self._put(self._cloud(self._new_name("cloud"), points), event.client, as_written=True)
 
-    def _cloud(self, name: str, points: Array, place: Array) -> Thing:
+    def _put(self, thing: Thing, client: Any, *, as_written: bool = False) -> None:
+        """Adds a thing where it is free; `as_written`: where its file has it, if it is free there."""
+        view, last = self._view, self._view.last
+        if last is None:
+            raise ValueError("the loop does not run yet")
+        there = {present.name for present in last.things}
+        self._sent = [(present, ball) for present, ball in self._sent if present not in there]
+        others = [
+            (pose[:3, :3] @ present.middle + pose[:3, 3], present.size)
+            for present, pose in zip(last.things, last.poses, strict=True)
+        ]
+        gizmo, camera = view.goal.gizmo, client.camera
+        place = free_place(
+            view.robot,
+            (last.q, last.posture.q),
+            [*others, *(ball for _, ball in self._sent)],
+            (np.array(gizmo.position), GIZMO_ROOM * gizmo.scale),
+            thing.size,
+            Camera(np.array(camera.position), from_quaternion(np.array(camera.wxyz)), camera.fov),
+            first=(thing.middle,) if as_written else (),
+        )
+        self._sent.append((thing.name, (place, thing.size)))
+        view.send(m.AddThing(thing.at(pose_at(place - thing.middle))))
+
+    def _cloud(self, name: str, points: Array) -> Thing:
         path = self._folder / f"{name}.npy"
         np.save(path, points)
-        return cloud(name, place, path, CLOUD_RADIUS)
+        return cloud(name, np.zeros(3), path, CLOUD_RADIUS)
 
     def _new_name(self, kind: str) -> str:
         taken = () if self._view.last is None else {thing.name for thing in self._view.last.things}
