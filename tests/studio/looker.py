@@ -130,6 +130,13 @@ def last(studio: Studio) -> m.Snapshot:
     return studio.snapshot
 
 
+def run_to(studio: Studio, time: float) -> m.Snapshot:
+    """Runs to a simulated time [s] and pauses there."""
+    studio.send(m.SetRunning(True, until=time))
+    until(lambda: not last(studio).running and last(studio).time > time - 0.01, f"{time} s")
+    return last(studio)
+
+
 def reset(studio: Studio) -> None:
     """Puts planar2 at its start, paused, with one ball, shown live."""
     studio.view.recorder.show_live()

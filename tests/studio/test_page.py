@@ -17,11 +17,10 @@ from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, film, find_
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.page.obstacles import gizmo_pose
-from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.page.surface import on_surface
 from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses
-from studio.looker import PATIENCE, WINDOW, Looker, differ, last, reset, until
+from studio.looker import PATIENCE, WINDOW, Looker, differ, last, reset, run_to, until
 
 pytestmark = pytest.mark.skipif(
     find_chromium() is None,
@@ -33,12 +32,6 @@ pytestmark = pytest.mark.skipif(
 def at_the_start(studio: Studio) -> None:
     """Each test begins with the arm at its start, paused, and one ball."""
     reset(studio)
-
-
-def run_to(studio: Studio, time: float) -> m.Snapshot:
-    studio.send(m.SetRunning(True, until=time))
-    until(lambda: not last(studio).running and last(studio).time > time - 0.01, f"{time} s")
-    return last(studio)
 
 
 def test_the_arm_is_on_the_page(studio: Studio, looker: Looker) -> None:
@@ -208,78 +201,6 @@ def test_the_metric_is_drawn_at_the_tip(studio: Studio, looker: Looker) -> None:
     assert changed[round(y) - 25 : round(y) + 25, round(x) - 25 : round(x) + 25].any()
     looker.check("metric")
     until(lambda: not studio.view.marks.metric.visible, "the end of the metric")
-
-
-def test_a_cloud_is_added_dragged_thrown_and_removed(studio: Studio, looker: Looker) -> None:
-    looker.tab("Obstacles")
-    looker.choose("new", "cloud")
-    looker.type("size [cm]", "20")
-    without = looker.image()
-    looker.press("Add")
-    until(lambda: len(last(studio).things) == 2, "the cloud")
-    thing = last(studio).things[1]
-    assert thing.cloud is not None
-    assert len(thing.cloud) == 64  # a plate of 20 cm with a point every 2.5 cm
-    until(lambda: thing.name in studio.view.obstacles.names, "its picture")
-    assert differ(without, looker.image()).sum() > 200  # [px]
-    now = last(studio)
-    exact = ExactClearance(studio.view.robot, thing.solids)
-    for q in (now.q, now.posture.q):
-        assert exact.distance(q, solid_poses((thing,), now.poses[1:])).distance > CLEAR
-    before = now.poses[1][:3, 3]
-    to = before + np.array([0.0, 0.3, 0.0])
-    studio.send(m.SetRunning(True))
-    looker.drag(before + thing.cloud[np.abs(thing.cloud).sum(axis=1).argmin()], to)
-    until(lambda: float(np.linalg.norm(last(studio).poses[1][:3, 3] - before)) > 0.1, "the drag")
-    looker.choose("obstacle", thing.name)
-    looker.press("Throw at the arm")
-    until(lambda: bool(np.linalg.norm(last(studio).velocities[1]) > 0.4), "the throw")  # at 0.5 m/s
-    looker.press("Remove")
-    until(lambda: [thing.name for thing in last(studio).things] == ["ball"], "the removal")
-
-
-def test_a_cloud_file_is_added(studio: Studio, looker: Looker, tmp_path: Path) -> None:
-    points = np.random.default_rng(0).uniform(-0.1, 0.1, (30, 3)) + np.array([-0.8, 0.0, 0.0])
-    np.save(tmp_path / "wall.npy", points)
-    looker.tab("Obstacles")
-    with looker.page.expect_file_chooser() as chooser:
-        looker.press("Add a point cloud file …")
-    chooser.value.set_files(tmp_path / "wall.npy")
-    until(lambda: len(last(studio).things) == 2, "the cloud")
-    np.testing.assert_array_equal(last(studio).things[1].cloud, points)
-
-
-def test_a_ball_is_thrown_with_the_mouse(studio: Studio, looker: Looker) -> None:
-    ball = last(studio).poses[0][:3, 3]
-    studio.send(m.SetRunning(True))
-    looker.drag(ball, ball + np.array([0.0, 0.3, 0.1]), key="Shift")
-    until(
-        lambda: float(np.linalg.norm(last(studio).poses[0][:3, 3] - ball)) > 0.5, "the flight"
-    )  # [m] the hand let go after 0.3
-
-
-def test_a_motion_is_recorded_and_replayed(studio: Studio, looker: Looker) -> None:
-    recorder, view = studio.view.recorder, studio.view
-    looker.tab("Scenario")
-    looker.press("Record")
-    until(lambda: last(studio).recording and last(studio).time > 1.0, "a second of motion")
-    looker.press("Stop")
-    until(lambda: not last(studio).recording, "the end of the recording")
-    rows = recorder.rows
-    np.testing.assert_allclose(np.diff([row.time for row in rows]), 0.005, atol=1e-9)
-    run_to(studio, last(studio).time + 0.5)  # the arm is elsewhere now
-    looker.press("Play")
-    until(lambda: recorder.replaying and np.array_equal(view.arm.q, rows[-1].q), "the replay's end")
-    looker.type("moment [s]", "0.5")
-    shown = rows[int(np.searchsorted([row.time for row in rows], rows[0].time + 0.5))]
-    until(lambda: np.array_equal(view.arm.q, shown.q), "the moment")
-    with looker.page.expect_download() as download:
-        looker.press("Download recording")
-    kept = np.load(download.value.path())
-    np.testing.assert_array_equal(kept["q"], [row.q for row in rows])
-    looker.press("Live")
-    until(lambda: np.array_equal(view.arm.q, last(studio).q), "the live state")
-    assert not recorder.replaying
 
 
 def test_the_gizmo_sets_a_pose_goal(studio: Studio, looker: Looker) -> None:

@@ -94,6 +94,49 @@ def test_a_drawn_ball_moves_as_a_hand_does(make_session: MakeSession, scenario: 
     assert speeds[-1] == 0.0
 
 
+def test_a_ball_drawn_while_paused_is_put_there_and_what_is_said_follows(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario, method="reactive")
+    before = run(session, 0.2)
+    session.handle(m.SetRunning(False))
+    beside = session.robot.pose(before.q, session.tip)[:3, 3] + np.array([0.0, -0.10, 0.0])
+    session.handle(m.DragThing("ball", pose_at(beside)))
+    now = session.snapshot()
+    np.testing.assert_array_equal(now.poses[0], pose_at(beside))
+    np.testing.assert_array_equal(now.velocities, np.zeros((1, 3)))
+    assert now.time == before.time
+    exact = ExactClearance(session.robot, [solid for thing in now.things for solid in thing.solids])
+    truth = exact.distance(now.q, solid_poses(now.things, now.poses)).distance
+    # A covering body is larger than the arm, by a centimetre or two with few ellipsoids.
+    assert truth - 0.03 < now.nearest[1] < truth < 0.05
+    session.handle(m.DragThing("ball", pose_at(session.robot.pose(before.q, session.tip)[:3, 3])))
+    assert session.snapshot().contacts == ("link2 - ball",)
+    session.handle(m.DragThing("ball", before.poses[0]))
+    np.testing.assert_array_equal(run(session, 0.1).poses[0], before.poses[0])  # and stays there
+
+
+def test_a_free_ball_drawn_while_paused_stays_at_rest(make_session: MakeSession, scenario: Scenario) -> None:
+    free = replace(scenario, obstacles=(replace(scenario.obstacles[0], free=True),))
+    session = make_session(free, method="unswitched")
+    session.handle(m.SetRunning(False))
+    session.handle(m.DragThing("ball", pose_at([-0.7, 0.2, 0.1])))
+    np.testing.assert_allclose(run(session, 0.1).poses[0], pose_at([-0.7, 0.2, 0.1]), atol=1e-12)
+
+
+def test_restart_and_loading_end_a_recording(make_session: MakeSession, scenario: Scenario) -> None:
+    for command in (m.Restart(), m.Load(replace(scenario_of(RobotChoice(name="planar3")), obstacles=()))):
+        session = make_session(scenario, method="unswitched")
+        session.handle(m.SetRecording(True))
+        for _ in range(100):
+            session.step()
+        session.handle(command)
+        after = run(session, 0.1)
+        assert not after.recording
+        np.testing.assert_allclose([row.time for row in after.rows], 0.005 * np.arange(1, 21), atol=1e-12)
+        assert {len(row.q) for row in after.rows} == {2}  # none of the other arm
+
+
 def test_a_thrown_ball_flies_straight_and_is_told_to_the_controller(
     make_session: MakeSession, scenario: Scenario
 ) -> None:

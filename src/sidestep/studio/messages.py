@@ -48,7 +48,7 @@ class RemoveThing:
 
 @dataclass(frozen=True)
 class DragThing:
-    """The obstacle called `name` is drawn to a pose (4, 4); None lets go."""
+    """The obstacle called `name` is drawn to a pose (4, 4), or put there while the loop is paused; None lets go."""
 
     name: str
     pose: Array | None
@@ -87,7 +87,7 @@ class SetRunning:
 
 @dataclass(frozen=True)
 class SetRecording:
-    """Begins a recording, or ends it."""
+    """Begins a recording, or ends it; `Restart` and `Load` end it as well."""
 
     recording: bool
 
@@ -200,12 +200,13 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One moment of a recording: time [s], q (nv,), the obstacles and their poses (N, 4, 4)."""
+    """One moment of a recording: time [s], q (nv,), the obstacles, their poses (N, 4, 4), the metric (nv, nv)."""
 
     time: float
     q: Array
     things: tuple[Thing, ...]
     poses: Array
+    metric: Array
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ class Session:
         self._numbers = {name: check_numbers(METHODS[name], {}) for name in METHODS}
         self._method = method_named(method)
         self._edition = 0
-        self._recording = False
+        self._rows = []
         given = {name: check_numbers(method_named(name), values) for name, values in (numbers or {}).items()}
         self._load(scenario, self._method, given)
 
@@ -127,11 +127,13 @@ class Session:
                 gone = self.actor(name)
                 self._set_actors([actor for actor in self.stage.actors if actor is not gone])
             case m.DragThing(name, place):
-                actor = self.actor(name)
-                actor.target = None if place is None else np.array(place, dtype=float)
-                actor.touched = True
                 if place is None:
-                    self.stage.throw(actor, np.zeros(3))
+                    self.stage.throw(self.actor(name), np.zeros(3))
+                elif self.running:
+                    self.stage.draw(self.actor(name), place)
+                else:
+                    self.stage.put(self.actor(name), place)
+                    self._relaxed = None
             case m.ThrowThing(name, velocity):
                 self.stage.throw(self.actor(name), velocity)
             case m.SetMethod(name):
@@ -153,7 +155,9 @@ class Session:
             case m.Load(scenario, asked):
                 self._load(scenario, self._method if asked is None else method_named(asked), {})
             case m.Seen():
-                pass
+                return
+        if not self.running and self._step is not None:
+            self._look_again()
 
     def step(self) -> None:
         """One control period: obstacles, state, wanted acceleration, torque, physics.
@@ -188,7 +192,7 @@ class Session:
         else:
             self._contacts = ()
         if self._recording and self._count % RECORD_EVERY == 0:
-            self._rows.append(m.Row(self.time, q, self._things, self._poses()))
+            self._rows.append(m.Row(self.time, q, self._things, self._poses(), np.array(step.metric)))
 
     def snapshot(self, *, real_time: float = 0.0) -> m.Snapshot:
         """The state now, and the rows recorded since the last snapshot."""
@@ -277,6 +281,14 @@ class Session:
         q = self._posture.q
         return self._moving_by(obstacles).diagnose(q, np.zeros_like(q), q, obstacles)
 
+    def _look_again(self) -> None:
+        """The system and the contacts as they are now, while time stands still."""
+        q, v = self.stage.state()
+        obstacles = self._obstacles()
+        aim = self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
+        self._step = self._moving_by(obstacles).acceleration(q, v, aim, obstacles)
+        self._contacts = self.stage.contacts()
+
     def _is_free(self, obstacles: Obstacles, q: Array) -> bool:
         """Whether the arm may rest at q (nv,), as far as the system knows of clearances."""
         return self._system.diagnose(q, np.zeros_like(q), q, obstacles).state != MotionState.inside_barrier
@@ -326,7 +338,7 @@ class Session:
         self._step = self._solution = None
         self._contacts = ()
         self._times = deque(maxlen=TIMED_STEPS)
-        self._rows = []
+        self._recording = False  # time goes back: a recording is of one motion
         self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(self._start, np.zeros_like(self._start))
         self._begin_pursuit()  # what was stuck before is so no longer

@@ -170,6 +170,22 @@ class Stage:
         bad = self.data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number
         return not bad and bool(np.isfinite(self.data.qvel).all())
 
+    def draw(self, actor: Actor, pose: Array) -> None:
+        """Draws an obstacle to a pose (4, 4), as a hand does."""
+        actor.target, actor.touched = np.array(pose, dtype=float), True
+
+    def put(self, actor: Actor, pose: Array) -> None:
+        """Puts an obstacle at a pose (4, 4), at rest."""
+        actor.target, actor.touched, actor.velocity = None, True, np.zeros(3)
+        actor.pose = np.array(pose, dtype=float)
+        actor.quaternion = pose_vector(actor.pose)[3:]
+        for other, at, dof in self._free:
+            if other is actor:
+                self.data.qpos[at : at + 7] = [*actor.pose[:3, 3], *actor.quaternion]
+                self.data.qvel[dof : dof + 6] = 0.0
+        self._write_driven()
+        mujoco.mj_forward(self.built.model, self.data)
+
     def throw(self, actor: Actor, velocity: Array) -> None:
         """Lets an obstacle fly on with a velocity (3,) [m/s]."""
         actor.target, actor.touched = None, True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import socket
 import threading
 import time as clock
@@ -12,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
-from sidestep.simulation.clearance import Clearance
 from sidestep.studio import messages as m
 from sidestep.studio.loop import Beginning, Loop
 from sidestep.studio.truth import Truth
@@ -25,6 +25,7 @@ NOTEBOOK_HEIGHT = 640  # [px]
 NOTEBOOK_SCALE = (
     0.7  # the output of a cell is narrow: at full size the panels would leave little of the scene
 )
+REPLAY_FRAME = 1.0 / 30.0  # [s] between two pictures of a replay; the paused loop sends few states
 STEP_OF_TRUTH = 0.05  # [s] between two measurements on the exact meshes, at least
 
 
@@ -63,12 +64,12 @@ class Studio:
 
         self.server, self.host, self.port = server, host, server.get_port()
         self._stopping = threading.Event()
-        self._clearances: tuple[Clearance, ...] = ()
         self.snapshot: m.Snapshot | None = None
         self.error = ""
         self._loop = Loop(Beginning(scenario, method, dict(numbers or {}), ellipsoids))
         self.view: View = View(server, scenario, robot, self.send)
-        self._truth = Truth(self._take_truth)
+        self._truth = Truth(self.view.take_clearances)
+        self._last_truth, self._reported = 0.0, ""
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -125,31 +126,38 @@ class Studio:
         self.view.stop()
         self.server.stop()
 
-    def _take_truth(self, found: tuple[Clearance, ...], time: float) -> None:
-        self._clearances = found
-        self.view.take_clearances(found, time)
-
     def _run(self) -> None:
-        last_truth = 0.0
         while not self._stopping.is_set():
-            snapshot = self._loop.wait(0.1)
+            fresh = self._loop.wait(REPLAY_FRAME if self.view.recorder.replaying else 0.1)
             for note in self._loop.take_notes():
                 if isinstance(note, m.Failed):
                     self.error = note.message
                 self.view.tell(note)
+            snapshot = fresh or (self.snapshot if self.view.recorder.replaying else None)
             if snapshot is not None:
-                self.view.take_rows(self._loop.take_rows())
-                self.view.show(snapshot)
+                try:
+                    self._draw(snapshot)
+                except Exception as error:  # the page goes on with the next state
+                    self._report(error)
                 self.snapshot = snapshot  # after it is on the page
-                now = clock.monotonic()
-                if now - last_truth > STEP_OF_TRUTH and self.view.robot.num_coordinates == len(snapshot.q):
-                    last_truth = now
-                    self._truth.look(
-                        self.view.robot, snapshot.things, snapshot.q, snapshot.poses, snapshot.time
-                    )
             if self._loop.ended:
                 self.view.tell(m.Failed(self.error or "the process of the loop ended", fatal=True))
                 return
+
+    def _draw(self, snapshot: m.Snapshot) -> None:
+        self.view.take_rows(self._loop.take_rows())
+        row, now = self.view.show(snapshot), clock.monotonic()
+        if now - self._last_truth > STEP_OF_TRUTH and self.view.robot.num_coordinates == len(row.q):
+            self._last_truth = now
+            self._truth.look(self.view.robot, row, self.view.epoch)
+
+    def _report(self, error: Exception) -> None:
+        """Logs what went wrong while drawing, and says it on the page; the same not twice in a row."""
+        text = f"drawing failed: {type(error).__name__}: {error}"
+        if text != self._reported:
+            self._reported = text
+            logging.getLogger(__name__).error(text, exc_info=error)
+            self.view.tell(m.Failed(text))
 
 
 def check_port(host: str, port: int) -> None:

@@ -12,6 +12,7 @@ from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation import ExactClearance
 from sidestep.simulation.clearance import Clearance
+from sidestep.studio.messages import Row
 from sidestep.studio.things import Thing
 
 Array = npt.NDArray[np.float64]
@@ -21,13 +22,13 @@ class Truth:
     """Measures the clearance of every link, in a thread of its own: the latest state is taken, others are dropped.
 
     Args:
-        tell: called with the clearances of the links, nearest first, and the time [s] they belong to.
+        tell: called with the clearances of the links, nearest first, the time [s] they belong to, and the epoch.
     """
 
-    def __init__(self, tell: Callable[[tuple[Clearance, ...], float], None]) -> None:
+    def __init__(self, tell: Callable[[tuple[Clearance, ...], float, int], None]) -> None:
         self._tell = tell
         self._wake = threading.Condition()
-        self._next: tuple[Robot, tuple[Thing, ...], Array, Array, float] | None = None
+        self._next: tuple[Robot, Row, int] | None = None
         self._stopping = False
         self._robot: Robot | None = None
         self._things: tuple[Thing, ...] | None = None
@@ -35,10 +36,10 @@ class Truth:
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def look(self, robot: Robot, things: tuple[Thing, ...], q: Array, poses: Array, time: float) -> None:
-        """Asks for the clearances of an arm at q (nv,) among things at poses (N, 4, 4)."""
+    def look(self, robot: Robot, row: Row, epoch: int) -> None:
+        """Asks for the clearances of an arm at a moment; `epoch` is handed on."""
         with self._wake:
-            self._next = robot, things, q, poses, time
+            self._next = robot, row, epoch
             self._wake.notify()
 
     def stop(self) -> None:
@@ -56,10 +57,10 @@ class Truth:
                 if self._stopping:
                     return
                 assert self._next is not None
-                robot, things, q, poses, time = self._next
+                robot, row, epoch = self._next
                 self._next = None
-            found = self._measure(robot, things, q, poses)
-            self._tell(tuple(sorted(found, key=lambda item: item.distance)), time)
+            found = self._measure(robot, row.things, row.q, row.poses)
+            self._tell(tuple(sorted(found, key=lambda item: item.distance)), row.time, epoch)
 
     def _measure(
         self, robot: Robot, things: tuple[Thing, ...], q: Array, poses: Array

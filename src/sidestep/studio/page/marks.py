@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -72,10 +73,21 @@ class Marks:
         points = self._trail_points
         if not points or np.linalg.norm(here - points[-1]) > TRAIL_STEP:
             points.append(here)
-            if len(points) > 1:
-                line = np.array(points)
-                self.trail.points = np.stack([line[:-1], line[1:]], axis=1).astype(np.float32)
+            self._draw_trail(visible)
         self.trail.visible = visible and len(points) > 1
+
+    def _draw_trail(self, visible: bool) -> None:
+        line = np.array(self._trail_points)
+        if len(line) > 1:
+            self.trail.points = np.stack([line[:-1], line[1:]], axis=1).astype(np.float32)
+        self.trail.visible = visible and len(line) > 1
+
+    def show_way(self, way: Sequence[Array], *, visible: bool) -> None:
+        """In place of the trail: where the tip is at some of many configurations (nv,), in their order."""
+        some = np.unique(np.linspace(0, len(way) - 1, TRAIL_POINTS).astype(int))
+        self.clear_trail()
+        self._trail_points.extend(self._robot.pose(way[k], self._tip)[:3, 3] for k in some)
+        self._draw_trail(visible)
 
     def clear_trail(self) -> None:
         """Forgets where the tip has been."""

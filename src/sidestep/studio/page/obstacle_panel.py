@@ -67,6 +67,7 @@ class ObstaclePanel:
         remove.on_click(self._remove)
         self._chosen.on_update(self._chose)
         self._count = 0
+        self._shown = (NONE, 0.0, 0.0, 0.0)
         self._sent: list[tuple[str, Ball]] = []  # added, and not there yet
 
     def select(self, name: str) -> None:
@@ -91,7 +92,15 @@ class ObstaclePanel:
         index, last = self._index(), self._view.last
         if index is not None and last is not None:
             x, y, z = (float(value) for value in last.poses[index][:3, 3].round(3))
-            self._place.value = (x, y, z)
+            if self._shown != (self._chosen.value, x, y, z):  # else it may be typed over just now
+                self._shown = self._chosen.value, x, y, z
+                self._place.value = (x, y, z)
+
+    def follow(self, snapshot: m.Snapshot) -> None:
+        """Shows where the chosen obstacle has come to rest, or is while the loop is paused."""
+        index = self._index()
+        if index is not None and (not snapshot.running or not snapshot.velocities[index].any()):
+            self._show_place()
 
     def _chose(self, _: Any) -> None:
         self._show_place()

@@ -59,7 +59,7 @@ def free_place(
     def clear(place: Array) -> bool:
         apart = (np.linalg.norm(place - centre) - radius - size for centre, radius in others)
         pose = pose_vector(pose_at(place))[None]
-        return min(apart, default=np.inf) > CLEAR and all(
+        return bool(min(apart, default=np.inf) > CLEAR) and all(
             arm.distance(q, pose).distance > CLEAR for q in postures
         )
 

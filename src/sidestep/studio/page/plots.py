@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,14 +56,14 @@ class Plots:
                 )
             )
 
-    def add(self, snapshot: Snapshot, clearance: float) -> None:
-        """Takes what is plotted; a time before the last one (a restart) begins anew."""
+    def add(self, snapshot: Snapshot, clearance: float) -> tuple[float, ...] | None:
+        """Takes what is plotted, and returns it; a time before the last one (a restart) begins anew."""
         if self._rows and snapshot.time < self._rows[-1][0]:
             self._rows.clear()
             for handle in self._handles:
                 handle.data = NOTHING
         if not snapshot.status[0] or (self._rows and snapshot.time == self._rows[-1][0]):
-            return  # there was no step yet, or none since
+            return None  # there was no step yet, or none since
         height = float(np.linalg.norm(snapshot.values))
         self._rows.append(
             (
@@ -77,20 +78,32 @@ class Plots:
         self._stale = True
         while self._rows[-1][0] - self._rows[0][0] > SPAN:
             self._rows.popleft()
+        return self._rows[-1]
 
-    def draw(self, now: float, *, at_once: bool = False) -> None:
-        """Sends the plots if there is something new, not more often than `EVERY` unless `at_once`."""
-        if not self._stale or len(self._rows) < 2 or (now - self._drawn < EVERY and not at_once):
+    def draw(self, now: float, *, at_once: bool = False, anew: bool = False) -> None:
+        """Sends the plots if there is something new, or `anew`; not more often than `EVERY` unless `at_once`."""
+        if (self._stale or anew) and (now - self._drawn >= EVERY or at_once):
+            self._drawn, self._stale = now, False
+            self._send(self.rows)
+
+    def draw_past(self, now: float, rows: Sequence[tuple[float, ...]], time: float) -> None:
+        """In place of the live plots: rows up to a time [s]."""
+        if now - self._drawn >= EVERY:
+            self._drawn = now
+            self._send(np.array([row for row in rows if time - SPAN <= row[0] <= time]))
+
+    def _send(self, rows: Array) -> None:
+        if len(rows) < 2:
+            for handle in self._handles:
+                handle.data = NOTHING
             return
-        self._drawn, self._stale = now, False
-        columns = np.array(self._rows).T
+        columns = rows.T
         before_now = (
             columns[0] - columns[0, -1]
         )  # the scales stay as they are: changing them is slow in the browser
         for handle, values, (_, _, factor, _) in zip(self._handles, columns[1:], PLOTS, strict=True):
             known = np.isfinite(values)  # a single unknown value would empty the plot
-            if known.sum() > 1:
-                handle.data = (before_now[known], factor * values[known])
+            handle.data = (before_now[known], factor * values[known]) if known.sum() > 1 else NOTHING
 
     @property
     def rows(self) -> Array:

@@ -20,12 +20,17 @@ Array = npt.NDArray[np.float64]
 
 
 class Recorder:
-    """Records rows while the loop runs, and shows them again in place of the live state."""
+    """Records rows while the loop runs, and shows them again in place of the live state.
+
+    Attributes:
+        rows: of the last recording. plotted: what the plots showed meanwhile.
+    """
 
     def __init__(self, server: viser.ViserServer, view: View) -> None:
         self._view = view
         self.rows: list[m.Row] = []
-        self._replaying, self._since = False, 0.0
+        self.plotted: list[tuple[float, ...]] = []
+        self._replaying, self._since, self._of_this_arm = False, 0.0, True
         gui = server.gui
         buttons = gui.add_button_group("record", ("Record", "Stop"), hint="200 states a second.")
         buttons.on_click(self._on_record)
@@ -39,49 +44,81 @@ class Recorder:
         self._slider.on_update(self._on_moment)
         save = gui.add_button("Download recording", hint="NumPy's .npz: time [s], q [rad], poses, names.")
         save.on_click(self._on_save)
-        self.state: Any = gui.add_markdown("nothing recorded")
+        self.state: Any = gui.add_markdown("nothing recorded; Restart and loading end a recording")
 
     @property
     def replaying(self) -> bool:
         """Whether the recording is shown in place of the live state."""
         return self._replaying
 
+    @property
+    def length(self) -> float:
+        """Of the recording [s]."""
+        return self.rows[-1].time - self.rows[0].time if self.rows else 0.0
+
     def take(self, rows: list[m.Row]) -> None:
         """Rows that the loop has recorded."""
         if rows:
+            if self.rows and rows[0].time <= self.rows[-1].time:
+                self._begin()  # of another recording
             self.rows += rows
-            self.state.content = f"recorded {self.rows[-1].time - self.rows[0].time:.1f} s"
 
-    def current(self) -> m.Row | None:
-        """The row that is shown now, None when the live state is."""
+    def show(self, recording: bool) -> None:
+        """Says whether the loop records, and how much there is."""
+        if self.rows or recording:
+            text = f"{'recording' if recording else 'recorded'} {self.length:.1f} s"
+            if not self._of_this_arm:
+                text += " of another arm"
+            if text != self.state.content:
+                self.state.content = text
+
+    def current(self) -> int | None:
+        """The index of the row that is shown now, None when the live state is."""
         if not self._replaying or not self.rows:
             return None
-        length = self.rows[-1].time - self.rows[0].time
         if self._since > 0.0:
-            moment = min(clock.monotonic() - self._since, length)
+            moment = min(clock.monotonic() - self._since, self.length)
             self._slider.value = round(moment, 2)
-            if moment >= length:
+            if moment >= self.length:
                 self._since = 0.0
         times = [row.time for row in self.rows]
         index = int(np.searchsorted(times, times[0] + float(self._slider.value)))
-        return self.rows[min(index, len(self.rows) - 1)]
+        return min(index, len(self.rows) - 1)
+
+    def leave_arm(self) -> None:
+        """Another arm takes the stage: what there is can be downloaded, but not be shown with it."""
+        self.show_live()
+        self._of_this_arm = not self.rows
+
+    def show_live(self) -> None:
+        """Ends a replay."""
+        self._replaying, self._slider.disabled = False, True
+
+    def _begin(self) -> None:
+        self.rows, self.plotted, self._of_this_arm = [], [], True
+        self.show_live()
 
     def _on_record(self, event: Any) -> None:
         recording = event.target.value == "Record"
         if recording:
-            self.rows = []
-            self.show_live()
+            self._begin()
             self._view.send(m.SetRunning(True))
         self._view.send(m.SetRecording(recording))
 
     def _on_replay(self, event: Any) -> None:
         if event.target.value == "Live":
             self.show_live()
-        elif len(self.rows) > 1:
-            self._slider.max = max(round(self.rows[-1].time - self.rows[0].time, 2), 0.01)
+            return
+        with self._view.telling(event.client):
+            if not self._of_this_arm:
+                raise ValueError("the recording is of another arm; it can be downloaded")
+            if len(self.rows) < 2:
+                raise ValueError("nothing is recorded: press Record, then Stop")
+            self._view.send(m.SetRecording(False))
+            self._view.send(m.SetRunning(False))
+            self._slider.max = max(round(self.length, 2), 0.01)
             self._slider.disabled = False
             self._replaying, self._since = True, clock.monotonic()
-            self._view.send(m.SetRunning(False))
 
     def _on_moment(self, event: Any) -> None:
         if event.client is not None:
@@ -90,10 +127,6 @@ class Recorder:
     def _on_save(self, event: Any) -> None:
         if self.rows and event.client is not None:
             event.client.send_file_download("recording.npz", as_npz(self.rows), save_immediately=True)
-
-    def show_live(self) -> None:
-        """Ends a replay."""
-        self._replaying, self._slider.disabled = False, True
 
 
 def as_npz(rows: list[m.Row]) -> bytes:

@@ -112,6 +112,10 @@ class Surface:
         self._parts, self._heights, self._request, self._done = {}, None, None, None
         self._trail.clear()
 
+    def clear_trail(self) -> None:
+        """Forgets where the joints have been."""
+        self._trail.clear()
+
     def stop(self) -> None:
         """Ends the thread."""
         self._stopping = True

@@ -32,7 +32,7 @@ from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
-from sidestep.studio.things import thing_of
+from sidestep.studio.things import Thing, thing_of
 from sidestep.studio.tip import tip_of
 
 if TYPE_CHECKING:
@@ -66,7 +66,8 @@ class View:
         self._stamp, self._text = 0, in_box("preparing …")
         self.least_clearance = np.inf
         self.last: m.Snapshot | None = None
-        self._edition = -1
+        self.epoch = 0  # grows when clearances that were asked for before no longer count
+        self._replayed = False
         self._told = 0.0
         self._set_up_scene()
         gui = server.gui
@@ -115,47 +116,79 @@ class View:
         except (ValueError, OSError) as error:
             client.add_notification("Not possible", str(error), color="red", auto_close_seconds=8.0)
 
-    def show(self, snapshot: m.Snapshot) -> None:
-        """Shows the state of the loop."""
+    def show(self, snapshot: m.Snapshot) -> m.Row:
+        """Shows the state of the loop, or in place of it a moment of the recording; returns which."""
         with self._lock, self._server.atomic():
-            if snapshot.scenario.robot != self._choice:
-                self._remove_robot()
-                self._choice = snapshot.scenario.robot
-                self._set_robot(snapshot.scenario, load_robot(snapshot.scenario))
-            if snapshot.edition != self._edition:
-                self._edition = snapshot.edition
-                self.obstacles.set_things(snapshot.things)
-                self._clearances, self.least_clearance = (), np.inf
-                self.marks.clear_trail()
-            needs = snapshot.method, snapshot.ellipsoids
-            if self._body is None or self.last is None or needs != (self.last.method, self.last.ellipsoids):
-                self._load_body(*needs)
-            changed = self.last is None or snapshot.edition != self.last.edition
-            self.last = snapshot
-            if changed:
-                self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
-            row = self.recorder.current()
-            if row is not None and len(row.q) == len(snapshot.q):
-                self.obstacles.set_things(row.things)
-                self.obstacles.show(row.things, row.poses)
-                self.arm.show(row.q)
-                self._say(in_box(f"Replay, {row.time:.2f} s."))
-                return
-            self.obstacles.set_things(snapshot.things)
-            self.obstacles.show(snapshot.things, snapshot.poses)
-            self.arm.show(snapshot.q)
+            self._take(snapshot)
+            index = self.recorder.current()
+            if (index is not None) != self._replayed:
+                self._set_replayed(index is not None)
+            row = live_row(snapshot) if index is None else self.recorder.rows[index]
+            self.obstacles.set_things(row.things)
+            self.obstacles.show(row.things, row.poses)
+            self.arm.show(row.q)
             self.arm.colour({item.link: item.distance for item in self._clearances})
-            self.goal.show(snapshot.goal, snapshot.goal_pose, snapshot.posture)
-            self.surface.show(snapshot, self.robot, self._body_now, self._pair(), self._viewpoint)
             self.marks.show_nearest(self._clearances, visible=self._nearest.value)
-            self.marks.show_trail(snapshot.q, visible=self._trail.value)
-            self.marks.show_metric(snapshot.q, snapshot.metric, visible=self._metric.value)
+            self.marks.show_metric(row.q, row.metric, visible=self._metric.value)
             self.tuning.show(snapshot)
-            self.plots.add(snapshot, self._clearances[0].distance if self._clearances else np.inf)
+            self.recorder.show(snapshot.recording)
+            self.obstacle_panel.follow(snapshot)
             now = clock.monotonic()
-            self.plots.draw(now)
-            self._show_words(snapshot)
-            self.shown = snapshot.time, self._measured
+            if index is None:
+                self.marks.show_trail(row.q, visible=self._trail.value)
+                self.goal.show(snapshot.goal, snapshot.goal_pose, snapshot.posture)
+                self.surface.show(snapshot, self.robot, self._body_now, self._pair(), self._viewpoint)
+                added = self.plots.add(snapshot, self._clearances[0].distance if self._clearances else np.inf)
+                if snapshot.recording and added is not None:
+                    self.recorder.plotted.append(added)
+                self.plots.draw(now)
+                self._show_words(now, snapshot)
+            else:
+                way = [past.q for past in self.recorder.rows[: index + 1]]
+                self.marks.show_way(way, visible=self._trail.value)
+                self.plots.draw_past(now, self.recorder.plotted, row.time)
+                self._show_replay_words(now, row)
+            self.shown = row.time, self._measured
+            return row
+
+    def _take(self, snapshot: m.Snapshot) -> None:
+        """Another robot, body or choice of obstacles."""
+        before = self.last
+        if snapshot.scenario.robot != self._choice:
+            self.recorder.leave_arm()
+            self._remove_robot()
+            self._choice = snapshot.scenario.robot
+            self._set_robot(snapshot.scenario, load_robot(snapshot.scenario))
+        self.last = snapshot
+        needs = snapshot.method, snapshot.ellipsoids
+        if self._body is None or before is None or needs != (before.method, before.ellipsoids):
+            self._load_body(*needs)
+        if before is None or snapshot.edition != before.edition:
+            self._forget_clearances()
+            self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
+        if before is not None and (snapshot.time < before.time or snapshot.scenario != before.scenario):
+            self.marks.clear_trail()
+            self.surface.clear_trail()
+
+    def _set_replayed(self, replayed: bool) -> None:
+        """Whether the scene shows the recording: what belongs to the live state alone is hidden then."""
+        self._replayed = replayed
+        self._forget_clearances()
+        self._show_goal()
+        if replayed:
+            self.surface.clear()
+        else:
+            self.plots.draw(clock.monotonic(), at_once=True, anew=True)
+
+    def _show_goal(self) -> None:
+        self.goal.set_visible(self._ghost.value and not self._replayed)
+
+    def _forget_clearances(self) -> None:
+        """What was measured is of other obstacles, or of another time."""
+        self.epoch += 1
+        self._clearances, self._measured = (), np.nan
+        if not self._replayed:
+            self.least_clearance = np.inf
 
     def stamp(self) -> int:
         """Sends what is not sent yet, and a number after it: a browser that has the number has all of it."""
@@ -166,13 +199,13 @@ class View:
             self._say(self._text)
             return self._stamp
 
-    def take_clearances(self, found: tuple[Clearance, ...], time: float) -> None:
-        """What the exact meshes say, nearest first."""
+    def take_clearances(self, found: tuple[Clearance, ...], time: float, epoch: int) -> None:
+        """What the exact meshes say of a time [s], nearest first, and the `epoch` in which it was asked for."""
         with self._lock:
-            if self.last is not None and time > self.last.time:
-                return  # of before a restart
+            if epoch != self.epoch:
+                return
             self._clearances, self._measured = found, time
-            if found:
+            if found and not self._replayed:
                 self.least_clearance = min(self.least_clearance, found[0].distance)
 
     def take_rows(self, rows: list[m.Row]) -> None:
@@ -195,28 +228,33 @@ class View:
         """Ends what runs beside the page."""
         self.surface.stop()
 
-    def _show_words(self, snapshot: m.Snapshot) -> None:
-        now = clock.monotonic()
-        if now - self._told < WORDS_EVERY:
-            return
-        self._told = now
-        words = begun(snapshot.words)
-        facts = []
-        if self._clearances:
-            first = self._clearances[0]
-            facts.append(
-                f"nearest {html.escape(first.link)} – {html.escape(thing_of(first.obstacle, snapshot.things))}: "
-                f"{1e3 * first.distance:.0f} mm, "
-                f"least so far {1e3 * self.least_clearance:.0f} mm"
-            )
+    def _show_words(self, now: float, snapshot: m.Snapshot) -> None:
         touch = (
             f"touches: {html.escape(', '.join(snapshot.contacts))}"
             if snapshot.contacts
             else "touches nothing"
         )
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
-        facts.append(f"{touch} · {snapshot.time:.1f} s · {speed}")
-        self._say(in_box(f"{html.escape(words)}.", "<br>".join(facts)))
+        least = f", least so far {1e3 * self.least_clearance:.0f} mm"
+        facts = [*self._nearest_facts(snapshot.things, least), f"{touch} · {snapshot.time:.1f} s · {speed}"]
+        self._tell(now, begun(snapshot.words), facts)
+
+    def _show_replay_words(self, now: float, row: m.Row) -> None:
+        self._tell(
+            now, f"Replay of {row.time:.2f} s", [*self._nearest_facts(row.things), "the loop is paused"]
+        )
+
+    def _nearest_facts(self, things: tuple[Thing, ...], more: str = "") -> list[str]:
+        if not self._clearances:
+            return []
+        first = self._clearances[0]
+        pair = f"{html.escape(first.link)} – {html.escape(thing_of(first.obstacle, things))}"
+        return [f"nearest {pair}: {1e3 * first.distance:.0f} mm{more}"]
+
+    def _tell(self, now: float, words: str, facts: list[str]) -> None:
+        if now - self._told >= WORDS_EVERY:
+            self._told = now
+            self._say(in_box(f"{html.escape(words)}.", "<br>".join(facts)))
 
     def _say(self, text: str) -> None:
         self._text, content = text, stamped(text, self._stamp)
@@ -271,7 +309,7 @@ class View:
         self._first: Any = gui.add_dropdown("over", ("-",))
         self._second: Any = gui.add_dropdown("and", ("-",))
         gui.add_html(colours.legend_html())
-        self._ghost.on_update(lambda _: self.goal.set_visible(self._ghost.value))
+        self._ghost.on_update(lambda _: self._show_goal())
         self._body_shown.on_update(lambda _: self._set_body_visible())
 
     def _set_robot(self, scenario: Scenario, robot: Robot) -> None:
@@ -285,6 +323,7 @@ class View:
         self._body: BodyView | None = None
         with self._goal_tab:
             self.goal = GoalControl(self._server, robot, self.tip, self._send)
+        self._show_goal()
 
     def _remove_robot(self) -> None:
         self.surface.clear()
@@ -325,6 +364,11 @@ class View:
                 self._send(m.SetRunning(False))
             case _:
                 self._send(m.Restart())
+
+
+def live_row(snapshot: m.Snapshot) -> m.Row:
+    """The state of the loop as a moment."""
+    return m.Row(snapshot.time, snapshot.q, snapshot.things, snapshot.poses, snapshot.metric)
 
 
 def in_box(words: str, facts: str = "") -> str:
