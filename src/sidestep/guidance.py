@@ -101,6 +101,12 @@ class GuidedMotion:
         """
         return self._moving
 
+    @property
+    def places(self) -> npt.NDArray[np.float64]:
+        """The configurations (k, nv) [rad | m] at which `moving` is relaxed, in turn."""
+        key = b"" if self._relaxed is None else self._relaxed[0]
+        return np.frombuffer(key).reshape(-1, len(self._goal))
+
     def set_goal(self, goal: npt.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to from now on."""
         self.guide.set_goal(goal)

@@ -8,23 +8,17 @@ from typing import Any
 
 import pytest
 
-from sidestep import Body, Robot, Scenario
+from sidestep import Scenario
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
 from sidestep.studio.headless import browser
-from sidestep.studio.methods import THESIS_COMPONENTS, Method
 from sidestep.studio.session import Session
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
+from sidestep.studio.systems import make_body
 from studio.looker import PATIENCE, Looker
 
 SMALL = 2  # ellipsoids per link: a second of work, and kept for all tests
-
-
-def small_body(robot: Robot, method: Method, ellipsoids: int | None) -> Body:
-    if method.covering:
-        return Body.cover(robot, components=ellipsoids)
-    return Body.fit(robot, components=THESIS_COMPONENTS)
 
 
 @pytest.fixture
@@ -36,7 +30,7 @@ def scenario() -> Scenario:
 @pytest.fixture
 def make_session() -> Callable[..., Session]:
     def make(scenario: Scenario, **options: object) -> Session:
-        return Session(scenario, prepare=small_body, ellipsoids=SMALL, **options)  # type: ignore[arg-type]
+        return Session(scenario, prepare=make_body, ellipsoids=SMALL, **options)  # type: ignore[arg-type]
 
     return make
 

@@ -69,14 +69,14 @@ def test_it_listens_to_this_machine_alone_unless_told_otherwise(
     assert all(options["method"] == "barrier" for _, options in opened)
 
 
-def test_a_file_opens_with_its_own_method_a_shipped_scenario_with_barriers(
+def test_a_scenario_opens_with_the_method_it_is_written_for(
     monkeypatch: pytest.MonkeyPatch, opened: list[tuple[Scenario, dict[str, Any]]], tmp_path: Path
 ) -> None:
     shipped = Scenario.load("planar-one-obstacle")
     dataclasses.replace(shipped, method="guided").save(tmp_path / "mine.yaml")
     for arguments in ((str(tmp_path / "mine.yaml"),), (shipped.name,), (shipped.name, "--method", "thesis")):
         assert invoke(monkeypatch, "studio", *arguments) == 0
-    assert [options["method"] for _, options in opened] == ["guided", "barrier", "thesis"]
+    assert [options["method"] for _, options in opened] == ["guided", "written", "thesis"]
 
 
 def test_a_taken_port_is_one_line(

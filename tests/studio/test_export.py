@@ -11,13 +11,25 @@ import numpy as np
 import pytest
 
 from sidestep import Scenario
+from sidestep.scenario import shipped_scenarios
 from sidestep.scenario.assembly import assemble
-from sidestep.scenario.scenario import JointState, RobotChoice, SystemChoice
+from sidestep.scenario.scenario import (
+    BarrierChoice,
+    BodyChoice,
+    EmbeddingChoice,
+    JointLimitChoice,
+    JointState,
+    RobotChoice,
+    StraightMove,
+    SwitchChoice,
+    SystemChoice,
+)
 from sidestep.simulation.pose_aim import PoseAim
 from sidestep.studio import messages as m
-from sidestep.studio.export import numbers_of, python_snippet, save_scenario, scenario_now, switch_of
-from sidestep.studio.methods import METHODS
+from sidestep.studio.export import not_kept, python_snippet, save_scenario, scenario_now
+from sidestep.studio.methods import METHODS, WRITTEN
 from sidestep.studio.session import Session
+from sidestep.studio.systems import numbers_of, parts_of
 from sidestep.studio.things import CLOUD_LIMIT, cloud, scattered, thinned
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
@@ -42,7 +54,9 @@ def begun(session: Session, goal: str) -> Session:
 
 
 @pytest.mark.parametrize("goal", ["configuration", "pose"])
-@pytest.mark.parametrize("name", [name for name in METHODS if name != "guided"])
+@pytest.mark.parametrize(
+    "name", [name for name in METHODS if name not in ("guided", "geodesic_only", WRITTEN)]
+)
 def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, name: str, goal: str
 ) -> None:
@@ -82,13 +96,114 @@ def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
 
 def test_the_thresholds_of_seven_joints_survive() -> None:
     numbers = tuned("thesis")
-    switch = switch_of("thesis", numbers, 7)
     state = JointState("rad", (0.0,) * 7)
-    system = SystemChoice(numbers["stiffness"], numbers["damping"], switch=switch)
-    assert numbers_of(Scenario("mine", RobotChoice("fr3"), state, state, system=system)) == (
-        "thesis",
-        numbers,
-    )
+    mine = Scenario("mine", RobotChoice("fr3"), state, state)
+    parts = parts_of(METHODS["thesis"], numbers, mine)
+    mine = replace(mine, body=parts.body, embedding=parts.embedding, system=parts.system)
+    assert numbers_of(mine) == ("thesis", numbers)
+    # What no method of the page is exactly stays what the file says.
+    for other in (
+        replace(mine, body=replace(mine.body, components=3)),
+        replace(mine, embedding=replace(mine.embedding, combine="stack")),
+        replace(mine, system=replace(mine.system, damping_form="metric")),
+        replace(mine, system=replace(mine.system, stiffness=50.0)),  # beyond its slider
+    ):
+        assert numbers_of(other) == (WRITTEN, {})
+    fall = replace(mine, system=SystemChoice(switch=SwitchChoice("geodesic_only")))
+    assert numbers_of(fall) == ("geodesic_only", {})
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_a_shipped_scenario_is_saved_as_it_was_loaded(
+    make_session: Callable[..., Session], tmp_path: Path, name: str
+) -> None:
+    shipped = Scenario.load(name)
+    session = make_session(shipped, method=numbers_of(shipped)[0])
+    for _ in range(2):  # as it opens, and after a motion and a restart
+        kept = Scenario.load(save_scenario(scenario_now(session.snapshot(), name=name), tmp_path))
+        assert kept == shipped
+        for _ in range(20):
+            session.step()
+        session.handle(m.Restart())
+
+
+STRANGE: dict[str, Any] = {
+    "method": "written",
+    "body": BodyChoice(components=3, covariance="diagonal", seed=1),
+    "embedding": EmbeddingChoice(
+        density="average", joint_limits=JointLimitChoice(slope=20.0), combine="stack"
+    ),
+    "system": SystemChoice(stiffness=12.0, damping=0.3, damping_form="metric"),
+}
+
+
+def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+) -> None:
+    start = replace(scenario.start, velocity=(0.2, -0.1))
+    strange = replace(scenario, start=start, **STRANGE)
+    session = make_session(strange, method=numbers_of(strange)[0])
+    session.step()
+    parts = assemble(strange)
+    expected = parts.system.acceleration(
+        parts.start, parts.start_velocity, parts.goal, parts.seen
+    ).acceleration
+    np.testing.assert_array_equal(session._step.acceleration, expected)  # type: ignore[union-attr]
+    variables: dict[str, Any] = {}
+    exec(python_snippet(session.snapshot()), variables)
+    again = variables["system"].acceleration(parts.start, parts.start_velocity, parts.goal, parts.seen)
+    np.testing.assert_array_equal(again.acceleration, expected)
+    for _ in range(50):
+        session.step()
+    now = session.snapshot()
+    kept = Scenario.load(save_scenario(scenario_now(now, name="kept"), tmp_path))
+    assert {key: getattr(kept, key) for key in STRANGE} == STRANGE
+    np.testing.assert_allclose(kept.start.velocity, now.v, rtol=1e-12)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(make_session(kept, method=WRITTEN).snapshot().v, kept.start.velocity)
+
+
+def test_barriers_beyond_their_sliders_are_kept_and_others_can_be_moved(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+) -> None:
+    wide = replace(scenario, barriers=BarrierChoice(activation=0.5, ellipsoids=2))
+    session = make_session(wide)
+    assert session.snapshot().numbers["barrier"]["activation"] == 0.5
+    kept = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="kept"), tmp_path))
+    assert kept.barriers == wide.barriers
+    moved = {**session.snapshot().numbers["barrier"], "damping": 5.0}
+    session.handle(m.SetNumbers("barrier", moved))
+    assert session.snapshot().numbers["barrier"] == moved
+    with pytest.raises(ValueError, match=r"activation is 0.6, allowed: \[0.02, 0.3\]"):
+        session.handle(m.SetNumbers("barrier", {"activation": 0.6}))
+
+
+def test_obstacles_go_on_as_they_moved(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+) -> None:
+    ball = scenario.obstacles[0]
+    move = StraightMove((-0.9, 0.3, 0.0), 0.1, 0.9)
+    scripted = replace(ball, name="scripted", motion=move, position=(-0.9, 0.0, 0.0))
+    drifting = replace(ball, name="drifting", velocity=(0.1, 0.0, 0.2), position=(-0.9, -0.4, 0.0))
+    free = replace(ball, name="free", free=True, position=(-0.4, -0.9, 0.0))
+    several = replace(scenario, obstacles=(ball, scripted, drifting, free))
+    session = make_session(several, method="unswitched")
+    session.handle(m.ThrowThing("ball", np.array([0.0, 0.3, 0.1])))
+    for _ in range(400):
+        session.step()
+    assert not_kept(session.snapshot()) == ""
+    session.handle(m.ThrowThing("free", np.array([0.2, 0.0, 0.0])))
+    now = session.snapshot()
+    assert not_kept(now) == "At rest in a file, as free obstacles are: free."
+    loaded = Scenario.load(save_scenario(scenario_now(now, name="kept"), tmp_path))
+    again = make_session(loaded, method="unswitched")
+    for _ in range(700):
+        session.step()
+        again.step()
+    moved = session.snapshot().poses - now.poses
+    assert (np.linalg.norm(moved[:3, :3, 3], axis=1) > 0.1).all()
+    # Degrees of a rotation lose a digit; the sums of the steps begin elsewhere.
+    np.testing.assert_allclose(again.snapshot().poses[:3], session.snapshot().poses[:3], atol=1e-9)
+    np.testing.assert_allclose(again.snapshot().poses[1][:3, 3], (-0.9, 0.3, 0.0), atol=1e-9)  # its end
 
 
 def test_the_snippet_of_a_pose_holds_the_same_pose(
@@ -99,10 +214,10 @@ def test_the_snippet_of_a_pose_holds_the_same_pose(
     variables: dict[str, Any] = {}
     exec(python_snippet(session.snapshot()), variables)
     goal, q, v = variables["goal"], POSE + 0.01, np.zeros(2)
-    assert isinstance(session._aim, PoseAim)
+    assert isinstance(session._pursuit._aim, PoseAim)
     np.testing.assert_array_equal(
         variables["system"].acceleration(q, v, goal, ball()).acceleration,
-        session._system.acceleration(q, v, session._aim.goal, ball()).acceleration,
+        session._pursuit.system.acceleration(q, v, session._pursuit._aim.goal, ball()).acceleration,
     )
 
 

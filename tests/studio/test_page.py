@@ -225,6 +225,7 @@ def test_a_shipped_scenario_is_one_click_away(studio: Studio, looker: Looker) ->
     looker.choose("shipped", "planar-one-obstacle")
     looker.press("Load")
     until(lambda: last(studio).scenario.name == "planar-one-obstacle", "the scenario")
+    assert last(studio).method == "written"  # as it is written for
 
 
 def test_the_thesis_is_one_click_away(

@@ -127,13 +127,14 @@ def test_a_ball_dragged_while_paused_moves_and_its_numbers_follow(studio: Studio
     until(
         lambda: np.allclose(fields.value, last(studio).poses[0][:3, 3], atol=6e-4), "the numbers"
     )  # of 1 mm
-    view, place = studio.view, last(studio).poses[0][:3, 3]
+    view = studio.view
     until(lambda: view.marks.nearest.visible, "the nearest line")
-    # The line ends on the ball of 6 cm, where it is now.
-    until(
-        lambda: bool(np.isclose(np.linalg.norm(view.marks.nearest.points[0, 1] - place), 0.06, atol=1e-4)),
-        "its clearance",
-    )
+
+    def ends_on_the_ball() -> bool:
+        off = np.linalg.norm(view.marks.nearest.points[0, 1] - last(studio).poses[0][:3, 3])
+        return bool(np.isclose(off, 0.06, atol=1e-4))  # [m] its radius, in single precision
+
+    until(ends_on_the_ball, "its clearance")
 
 
 def test_what_goes_wrong_while_drawing_is_said_and_drawing_goes_on(

@@ -13,7 +13,7 @@ import pytest
 from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
 from sidestep.pose import pose_at
 from sidestep.studio import messages as m
-from sidestep.studio.methods import METHODS, build_system
+from sidestep.studio.methods import METHODS
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import reach, short_names
 from sidestep.studio.page.camera import HALF, HIGH, LOW, RIGHT, UP, VIEW, Viewpoint
@@ -33,6 +33,7 @@ from sidestep.studio.page.surface import (
 )
 from sidestep.studio.page.view import begun
 from sidestep.studio.session import Session
+from sidestep.studio.systems import build_system
 from sidestep.studio.things import ball, cloud, thing_of
 from sidestep.studio.truth import solid_poses
 
@@ -44,11 +45,13 @@ def test_the_surface_is_the_embedding_over_two_joints(make_session: MakeSession,
     snapshot, robot = session.snapshot(), session.robot
     method, body = METHODS["unswitched"], Body.fit(robot, components=1)
     numbers = method.defaults
-    system = build_system(method, robot, body, numbers)
+    system = build_system(method, robot, body, numbers, scenario)
     points, radii = seen(snapshot, bare=True)
     np.testing.assert_array_equal(points, session._obstacles().points)
     np.testing.assert_array_equal(radii, session._obstacles().radii)
-    request = Request(robot, body, method, numbers, (0, 1), snapshot.q, points, radii)
+    request = Request(
+        robot, body, method, numbers, (0, 1), snapshot.q, points, radii, scenario, snapshot.relaxed
+    )
     heights = heights_over(request, system)
     axis = np.linspace(-np.pi, np.pi, CELLS + 1)  # planar2 turns from -pi to pi
     q = axis[[35, 22]]
@@ -79,7 +82,10 @@ def test_a_surface_is_computed_again_only_when_it_would_look_different(
     body = Body.fit(session.robot, components=1)
 
     def request(q: np.ndarray, points: np.ndarray) -> Request:
-        return Request(session.robot, body, method, method.defaults, (0, 1), q, points, np.zeros(len(points)))
+        radii = np.zeros(len(points))
+        return Request(
+            session.robot, body, method, method.defaults, (0, 1), q, points, radii, scenario, snapshot.relaxed
+        )
 
     points = seen(snapshot, bare=True)[0]
     first = request(snapshot.q, points)

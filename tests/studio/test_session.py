@@ -219,9 +219,9 @@ def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, sce
     session.handle(m.SetMethod("unswitched"))
     assert len(run(session, 0.1).values) == 1  # one density
     session.handle(m.SetNumbers("unswitched", {"stiffness": 4.0}))
-    assert session._system.stiffness[0, 0] == 4.0
+    assert session._pursuit.system.stiffness[0, 0] == 4.0
     session.handle(m.SetMethod("barrier"))
-    assert session._system.stiffness[0, 0] == session.snapshot().numbers["barrier"]["stiffness"]
+    assert session._pursuit.system.stiffness[0, 0] == session.snapshot().numbers["barrier"]["stiffness"]
     assert session.snapshot().numbers["unswitched"]["stiffness"] == 4.0
     with pytest.raises(ValueError, match=r"barrier: activation is 9.0, allowed: \[0.02, 0.3\]"):
         session.handle(m.SetNumbers("barrier", {"activation": 9.0}))

@@ -27,8 +27,8 @@ def studio(
     method: Annotated[
         str | None,
         typer.Option(
-            help="How the arm is moved at first; the page lists the methods [default: as a scenario file says, else "
-            "barrier]."
+            help="How the arm is moved at first; the page lists the methods [default: as the scenario says; without "
+            "one, barrier]."
         ),
     ] = None,
     ellipsoids: Annotated[
@@ -60,13 +60,12 @@ def studio(
 
     Ends with Ctrl-C. The first run with a robot fits its body, which can take minutes; the page says how far it is.
     """
-    from sidestep.studio.export import numbers_of
     from sidestep.studio.start import starting_scenario
+    from sidestep.studio.systems import numbers_of
 
     chosen = starting_scenario(scenario, robot=robot, urdf=urdf, package_dirs=package_dir or ())
     if method is None:
-        own = scenario is not None and Path(scenario).is_file()
-        method = numbers_of(chosen)[0] if own else "barrier"
+        method = numbers_of(chosen)[0]
     if not headless and (screenshot or video):
         raise ValueError("--screenshot and --video go with --headless")
     if headless:

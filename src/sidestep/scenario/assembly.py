@@ -44,6 +44,7 @@ from sidestep.scenario.scenario import (
     Scenario,
     Shape,
     SwitchChoice,
+    SystemChoice,
 )
 from sidestep.scenario.seen import View, seen_at, view_of
 from sidestep.scenario.validation import ScenarioError
@@ -264,15 +265,21 @@ def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
 
 
 def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
-    choice = scenario.system
     if scenario.method != "written":
         return barrier_system(robot, body, numbers=scenario.barriers)
+    return written_system(scenario.embedding, scenario.system, robot, body)
+
+
+def written_system(
+    embedding: EmbeddingChoice, system: SystemChoice, robot: Robot, body: Body
+) -> GeometricSystem:
+    """The system that a file writes out; raises ValueError where its switch does not fit the robot."""
     return GeometricSystem(
-        _embeddings(scenario.embedding, robot, body),
-        stiffness=choice.stiffness,
-        damping=choice.damping,
-        damping_form=choice.damping_form,
-        switch=_switch(choice.switch, robot),
+        _embeddings(embedding, robot, body),
+        stiffness=system.stiffness,
+        damping=system.damping,
+        damping_form=system.damping_form,
+        switch=_switch(system.switch, robot),
     )
 
 

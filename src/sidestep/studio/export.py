@@ -4,72 +4,97 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
 from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.barriers import Barriers
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.scenario import (
     BarrierChoice,
-    BodyChoice,
-    EmbeddingChoice,
-    JointLimitChoice,
     JointState,
     MethodChoice,
+    Obstacle,
     PoseChoice,
     RobotChoice,
+    StraightMove,
     SwitchChoice,
+    Vector3,
 )
 from sidestep.simulation.pose_aim import ENTER, POSITION_SHARE, TURN_SHARE
 from sidestep.studio.messages import Snapshot
-from sidestep.studio.methods import METHODS, THESIS_COMPONENTS
+from sidestep.studio.methods import METHODS, WRITTEN
+from sidestep.studio.pursuit import STILL
+from sidestep.studio.systems import Parts, parts_of
 from sidestep.studio.things import written_pose
 
 Array = npt.NDArray[np.float64]
 
 
 def scenario_now(snapshot: Snapshot, *, name: str) -> Scenario:
-    """The scenario as it stands: arm, goal and obstacles where they are now, the method and its numbers."""
-    scenario, numbers = snapshot.scenario, snapshot.numbers[snapshot.method]
-    system, body, embedding = scenario.system, scenario.body, scenario.embedding
-    method: MethodChoice = "written"
-    barriers = scenario.barriers
-    if METHODS[snapshot.method].covering:
-        method = cast("MethodChoice", snapshot.method)
-        barriers = BarrierChoice(**numbers, ellipsoids=snapshot.ellipsoids)
+    """The scenario as it stands: arm, goal and obstacles as they are and move now, the method and its numbers.
+
+    What is as it was loaded stays as it was written; see `not_kept` for what a file cannot say.
+    """
+    scenario, method = snapshot.scenario, METHODS[snapshot.method]
+    numbers = snapshot.numbers[snapshot.method]
+    velocity = snapshot.v / max(1.0, snapshot.speed_share)  # the start of a file is within the limits
+    parts, choice, barriers = parts_of(METHODS[WRITTEN], {}, scenario), "written", scenario.barriers
+    if method.covering:
+        choice, barriers = method.name, BarrierChoice(**numbers, ellipsoids=snapshot.ellipsoids)
     else:
-        system = dataclasses.replace(
-            system,
-            stiffness=numbers["stiffness"],
-            damping=numbers["damping"],
-            switch=switch_of(snapshot.method, numbers, len(snapshot.q)),
-        )
-        body = BodyChoice(components=THESIS_COMPONENTS)
-        embedding = EmbeddingChoice(joint_limits=JointLimitChoice())
+        parts = parts_of(method, numbers, scenario)
     return dataclasses.replace(
         scenario,
         name=name,
-        method=method,
-        start=_state(snapshot.q),
-        goal=_goal(snapshot),
-        obstacles=tuple(
-            dataclasses.replace(thing.at(pose).obstacle, name=thing.name)
-            for thing, pose in zip(snapshot.things, snapshot.poses, strict=True)
-        ),
-        body=body,
-        embedding=embedding,
-        system=system,
+        method=cast("MethodChoice", choice),
+        start=scenario.start if snapshot.time == 0.0 else _state(snapshot.q, velocity),
+        goal=scenario.goal if snapshot.goal_written else _goal(snapshot),
+        obstacles=tuple(_obstacle(snapshot, index) for index in range(len(snapshot.things))),
+        body=parts.body,
+        embedding=parts.embedding,
+        system=parts.system,
         barriers=barriers,
     )
 
 
-def _state(q: Array) -> JointState:
-    return JointState("rad", tuple(float(value) for value in q))
+def not_kept(snapshot: Snapshot) -> str:
+    """What moves now and rests at the start of a file, in words; "" where nothing is lost."""
+    flying = [
+        thing.name
+        for thing, velocity in zip(snapshot.things, snapshot.velocities, strict=True)
+        if thing.obstacle.free and np.linalg.norm(velocity) > STILL
+    ]
+    return f"At rest in a file, as free obstacles are: {', '.join(flying)}." if flying else ""
+
+
+def _obstacle(snapshot: Snapshot, index: int) -> Obstacle:
+    """An obstacle where it is now, that goes on as it does now."""
+    thing, pose = snapshot.things[index], snapshot.poses[index]
+    item, velocity = thing.obstacle, _vector(snapshot.velocities[index])
+    at_rest = item.free or snapshot.courses[index] == "held"
+    move = None if snapshot.courses[index] != "file" else item.motion
+    if move is not None:
+        rest, velocity = move.end - snapshot.time, (0.0, 0.0, 0.0)
+        begin = max(move.begin - snapshot.time, 0.0)
+        move = StraightMove(move.to, begin, rest) if rest > begin else None
+    if not np.array_equal(pose, thing.start):
+        item = thing.at(pose).obstacle
+    return dataclasses.replace(
+        item, name=thing.name, velocity=(0.0, 0.0, 0.0) if at_rest else velocity, motion=move
+    )
+
+
+def _state(q: Array, v: Array | None = None) -> JointState:
+    velocity = tuple(map(float, v)) if v is not None and v.any() else None
+    return JointState("rad", tuple(map(float, q)), velocity)
+
+
+def _vector(values: Array) -> Vector3:
+    x, y, z = map(float, values)
+    return x, y, z
 
 
 def _goal(snapshot: Snapshot) -> JointState | PoseChoice:
@@ -77,52 +102,6 @@ def _goal(snapshot: Snapshot) -> JointState | PoseChoice:
         return _state(snapshot.posture.q)
     posture = _state(snapshot.posture.q) if snapshot.posture.found else None
     return PoseChoice(snapshot.tip, *written_pose(snapshot.goal_pose), posture)
-
-
-def switch_of(method: str, numbers: Mapping[str, float], num_coordinates: int) -> SwitchChoice:
-    """The switch of one of the thesis's methods as a scenario file has it."""
-    match method:
-        case "thesis":
-            ends = {0, 1, num_coordinates - 1}
-            thresholds = tuple(numbers["outer" if k in ends else "inner"] for k in range(num_coordinates))
-            return SwitchChoice("distance", thresholds=thresholds, slope=numbers["slope"])
-        case "sigmoid":
-            return SwitchChoice("sigmoid", threshold=numbers["threshold"], slope=numbers["slope"])
-        case "binary":
-            return SwitchChoice("binary", threshold=numbers["threshold"])
-        case "harmonic_only":
-            return SwitchChoice("harmonic_only")
-    return SwitchChoice("none")
-
-
-def numbers_of(scenario: Scenario) -> tuple[str, dict[str, float]]:
-    """The method that a scenario file asks for, and the numbers it has for it, moved into their ranges."""
-    if scenario.method != "written":
-        numbers = {
-            entry.name: getattr(scenario.barriers, entry.name) for entry in dataclasses.fields(Barriers)
-        }
-        return scenario.method, _in_range(scenario.method, numbers)
-    system, switch = scenario.system, scenario.system.switch
-    numbers = {"stiffness": float(np.mean(system.stiffness)), "damping": float(np.mean(system.damping))}
-    method = {"none": "unswitched", "distance": "thesis"}.get(switch.type, switch.type)
-    if method not in METHODS:
-        return "unswitched", {}
-    if switch.thresholds is not None:
-        numbers["outer"] = switch.thresholds[0]
-        if len(switch.thresholds) > 3:  # with fewer joints there is none between the first two and the last
-            numbers["inner"] = switch.thresholds[2]
-    for name in ("threshold", "slope"):
-        value = getattr(switch, name)
-        if value is not None:
-            numbers[name] = float(value)
-    return method, _in_range(method, numbers)
-
-
-def _in_range(method: str, numbers: Mapping[str, float]) -> dict[str, float]:
-    ranges = {parameter.name: parameter for parameter in METHODS[method].parameters}
-    return {
-        name: float(np.clip(value, ranges[name].lower, ranges[name].upper)) for name, value in numbers.items()
-    }
 
 
 def save_scenario(scenario: Scenario, folder: Path) -> Path:
@@ -158,12 +137,7 @@ def python_snippet(snapshot: Snapshot) -> str:
         lines += [f"body = ss.Body.cover(robot{count})", f"numbers = Barriers({values})"]
         lines += ["system = barrier_system(robot, body, numbers=numbers)"]
     else:
-        spring = f"stiffness={numbers['stiffness']!r}, damping={numbers['damping']!r}"
-        lines += [
-            f"body = ss.Body.fit(robot, components={THESIS_COMPONENTS})",
-            "psi = ss.Sum([ss.CollisionDensity(robot, body), ss.JointLimitPotential(robot)])",
-            f"system = ss.GeometricSystem([psi], {spring}, switch={_switch_code(method, numbers)})",
-        ]
+        lines += _written_code(parts_of(METHODS[method], numbers, snapshot.scenario))
     lines += _goal_code(snapshot)
     if METHODS[method].covering:
         place = "goal" if snapshot.goal_pose is None else "posture"
@@ -191,7 +165,8 @@ def _goal_code(snapshot: Snapshot) -> list[str]:
     posture = snapshot.posture.q.tolist()
     if snapshot.goal_pose is None:
         return [f"goal = {posture}  # [rad | m]"]
-    stiffness = snapshot.numbers[snapshot.method]["stiffness"]
+    numbers = snapshot.numbers[snapshot.method]
+    stiffness = numbers.get("stiffness", snapshot.scenario.system.stiffness)
     pull = (
         f"position_stiffness={POSITION_SHARE * stiffness!r}, orientation_stiffness={TURN_SHARE * stiffness!r}"
     )
@@ -205,18 +180,36 @@ def _goal_code(snapshot: Snapshot) -> list[str]:
     return [*lines, f"posture = {posture}  # {says}"]
 
 
-def _switch_code(method: str, numbers: Mapping[str, float]) -> str:
-    match method:
-        case "thesis":
-            thresholds = (
-                f"[{numbers['outer']!r} if k in (0, 1, robot.num_coordinates - 1) else {numbers['inner']!r} "
-            )
-            thresholds += "for k in range(robot.num_coordinates)]"
-            return f"ss.DistanceSwitch({thresholds}, {numbers['slope']!r})"
+def _written_code(parts: Parts) -> list[str]:
+    body, embedding, system = parts.body, parts.embedding, parts.system
+    psi = [f"ss.CollisionDensity(robot, body, average={embedding.density == 'average'})"]
+    if embedding.joint_limits is not None:
+        limits = embedding.joint_limits
+        psi += [f"ss.JointLimitPotential(robot, slope={limits.slope!r}, height={limits.height!r})"]
+    together = f"[{', '.join(psi)}]"
+    if embedding.combine == "sum" and len(psi) > 1:
+        together = f"[ss.Sum({together})]"
+    spring = (
+        f"stiffness={system.stiffness!r}, damping={system.damping!r}, damping_form={system.damping_form!r}"
+    )
+    return [
+        f"body = ss.Body.fit(robot, components={body.components!r}, covariance={body.covariance!r}, "
+        f"seed={body.seed!r})",
+        f"psi = {together}",
+        f"system = ss.GeometricSystem(psi, {spring}, switch={_switch_code(system.switch)})",
+    ]
+
+
+def _switch_code(switch: SwitchChoice) -> str:
+    match switch.type:
+        case "distance":
+            return f"ss.DistanceSwitch({list(switch.thresholds or ())!r}, {switch.slope!r})"
         case "sigmoid":
-            return f"ss.SigmoidSwitch({numbers['threshold']!r}, {numbers['slope']!r})"
+            return f"ss.SigmoidSwitch({switch.threshold!r}, {switch.slope!r})"
         case "binary":
-            return f"ss.BinarySwitch({numbers['threshold']!r})"
+            return f"ss.BinarySwitch({switch.threshold!r})"
         case "harmonic_only":
             return "ss.HarmonicOnly()"
+        case "geodesic_only":
+            return "ss.GeodesicOnly()"
     return "None"

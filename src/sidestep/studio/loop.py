@@ -22,8 +22,8 @@ from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
-from sidestep.studio.methods import THESIS_COMPONENTS, Method
 from sidestep.studio.session import Session
+from sidestep.studio.systems import Covering, Recipe, make_body
 
 FRAME = 1.0 / 30.0  # [s] between two snapshots
 IDLE_FRAME = 0.2  # [s] the same while the loop is paused
@@ -158,8 +158,13 @@ def serve(connection: Connection[Any, Any]) -> None:
     """Runs a session in real time until the other end hangs up."""
     beginning: Beginning = connection.recv()
 
-    def prepare(robot: Robot, method: Method, ellipsoids: int | None) -> Body:
-        return prepare_body(robot, method, ellipsoids=ellipsoids, tell=connection.send)
+    def prepare(robot: Robot, recipe: Recipe) -> Body:
+        doing = "covering" if isinstance(recipe, Covering) else "fitting"
+
+        def progress(link: str, done: int, total: int) -> None:
+            connection.send(m.Preparing(f"{doing} {link} ({done} of {total})"))
+
+        return make_body(robot, recipe, progress)
 
     connection.send(m.Preparing(f"loading {beginning.scenario.name}"))
     try:
@@ -244,17 +249,6 @@ class _Pacer:
         self._next_frame = max(self._next_frame, now - FRAME) + (
             FRAME if self._session.running else IDLE_FRAME
         )
-
-
-def prepare_body(robot: Robot, method: Method, *, ellipsoids: int | None, tell: Any) -> Body:
-    """The body that a method needs, from the cache or made now, telling how far it is."""
-
-    def progress(link: str, done: int, total: int) -> None:
-        tell(m.Preparing(f"{'covering' if method.covering else 'fitting'} {link} ({done} of {total})"))
-
-    if method.covering:
-        return Body.cover(robot, components=ellipsoids, progress=progress)
-    return Body.fit(robot, components=THESIS_COMPONENTS, progress=progress)
 
 
 def main() -> None:

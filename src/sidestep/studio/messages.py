@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from sidestep.simulation.pose_aim import Posture
 from sidestep.studio.things import Thing
 
 Array = npt.NDArray[np.float64]
+Course = Literal["file", "held", "left"]
 
 
 @dataclass(frozen=True)
@@ -156,9 +157,11 @@ class Snapshot:
         edition: grows when obstacles come or go, or a scenario is loaded; `things` then changed.
         time: simulated [s]. q, v: (nv,). running: or paused.
         goal: (nv,) of a joint goal, else None; goal_pose: (4, 4) of a pose goal, else None, of the frame `tip`;
-            posture: where the arm is at the goal.
+            posture: where the arm is at the goal. goal_written: it is that of the scenario.
+        relaxed: (k, nv) where barriers are relaxed, see `Pursuit.places`.
         ellipsoids: of a covering body per link, None: as many as it takes.
-        things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s].
+        things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s];
+            courses: by what they move.
         method: its name; numbers: its parameters by method and name.
         words: what the arm does; status: names of the step's and the torque program's status.
         nearest: (name of link or "", clearance [m] that the controller measures; inf where it does not).
@@ -177,11 +180,14 @@ class Snapshot:
     goal: Array | None
     goal_pose: Array | None
     posture: Posture
+    goal_written: bool
+    relaxed: Array
     tip: str
     ellipsoids: int | None
     things: tuple[Thing, ...]
     poses: Array
     velocities: Array
+    courses: tuple[Course, ...]
     method: str
     numbers: dict[str, dict[str, float]]
     words: str

@@ -9,22 +9,10 @@ from typing import Any
 import numpy as np
 
 from sidestep import presets
-from sidestep._core import (
-    BinarySwitch,
-    CollisionDensity,
-    DistanceSwitch,
-    GeometricSystem,
-    HarmonicOnly,
-    JointLimitPotential,
-    SigmoidSwitch,
-    Sum,
-)
-from sidestep.body import Body
-from sidestep.robot import Robot
 
 Numbers = dict[str, float]
 
-THESIS_COMPONENTS = presets.Thesis.components  # Gaussians per link
+WRITTEN = "written"  # the method of a scenario file that says itself how the arm is moved
 
 
 @dataclass(frozen=True)
@@ -189,6 +177,23 @@ METHODS: dict[str, Method] = {
             covering=False,
             safe=False,
         ),
+        Method(
+            "geodesic_only",
+            "geodesics alone: no goal",
+            "Free fall along a geodesic of the curved space (T5.3), for comparison: it knows no goal.",
+            (),
+            covering=False,
+            safe=False,
+        ),
+        Method(
+            WRITTEN,
+            "as the scenario file says",
+            "Body, embedding, switch and numbers of the scenario that was loaded, as its file has them; without any "
+            "in a file, one density without a switch. Choose another method to tune it here.",
+            (),
+            covering=False,
+            safe=False,
+        ),
     )
 }
 
@@ -200,8 +205,18 @@ def method_named(name: str) -> Method:
     return METHODS[name]
 
 
-def check_numbers(method: Method, numbers: Mapping[str, float]) -> Numbers:
+def in_range(method: Method, numbers: Mapping[str, float]) -> bool:
+    """Whether all numbers are within the ranges of the page's sliders."""
+    return all(p.lower <= numbers[p.name] <= p.upper for p in method.parameters if p.name in numbers)
+
+
+def check_numbers(
+    method: Method, numbers: Mapping[str, float], kept: Mapping[str, float] | None = None
+) -> Numbers:
     """All numbers of a method: the given ones, checked, and defaults for the rest.
+
+    Args:
+        kept: numbers that are allowed as they are, in range or not: those of a scenario file.
 
     Raises:
         ValueError: an unknown name or a value out of its range, with what is allowed.
@@ -210,38 +225,10 @@ def check_numbers(method: Method, numbers: Mapping[str, float]) -> Numbers:
     ranges = {parameter.name: parameter for parameter in method.parameters}
     for name, value in numbers.items():
         if name not in ranges:
-            raise ValueError(f"{method.name} has no parameter {name!r}; it has {', '.join(ranges)}")
+            raise ValueError(f"{method.name} has no parameter {name!r}; it has {', '.join(ranges) or 'none'}")
         lower, upper = ranges[name].lower, ranges[name].upper
-        if not (np.isfinite(value) and lower <= value <= upper):
+        as_it_is = kept is not None and value == kept.get(name)
+        if not (np.isfinite(value) and lower <= value <= upper) and not as_it_is:
             raise ValueError(f"{method.name}: {name} is {value}, allowed: [{lower:g}, {upper:g}]")
         complete[name] = float(value)
     return complete
-
-
-def build_system(method: Method, robot: Robot, body: Body, numbers: Mapping[str, float]) -> GeometricSystem:
-    """The dynamical system of a method.
-
-    Args:
-        method, numbers: see `check_numbers`. robot: the arm. body: covering or fitted, as the method says.
-    """
-    if method.covering:
-        return presets.barrier_system(robot, body, numbers=presets.Barriers(**numbers))
-    spring: dict[str, Any] = {"stiffness": numbers["stiffness"], "damping": numbers["damping"]}
-    psi = Sum([CollisionDensity(robot, body), JointLimitPotential(robot)])
-    return GeometricSystem([psi], **spring, switch=_switch(method, robot, numbers))
-
-
-def _switch(method: Method, robot: Robot, numbers: Mapping[str, float]) -> Any:
-    match method.name:
-        case "thesis":
-            nv = robot.num_coordinates
-            thresholds = np.full(nv, numbers["inner"])
-            thresholds[[*range(min(2, nv)), nv - 1]] = numbers["outer"]
-            return DistanceSwitch(thresholds=thresholds, slope=numbers["slope"])
-        case "sigmoid":
-            return SigmoidSwitch(threshold=numbers["threshold"], slope=numbers["slope"])
-        case "binary":
-            return BinarySwitch(threshold=numbers["threshold"])
-        case "harmonic_only":
-            return HarmonicOnly()
-    return None

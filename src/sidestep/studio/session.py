@@ -13,40 +13,34 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import (
-    Diagnosis,
-    Escape,
-    GeometricSystem,
-    JointGoal,
-    MotionState,
-    Obstacles,
-    PoseGoal,
-    Step,
-    TorqueController,
-    TorqueSolution,
-)
+from sidestep._core import Obstacles, Step, TorqueController, TorqueSolution
 from sidestep.body import Body
-from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import POSTURE_STARTS, coordinates, goal_posture, load_robot
+from sidestep.scenario.assembly import (
+    POSTURE_STARTS,
+    coordinates,
+    goal_posture,
+    load_robot,
+    start_velocity,
+)
 from sidestep.scenario.scenario import JointState
-from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
+from sidestep.simulation.pose_aim import Posture, posture_at
 from sidestep.simulation.run import status_name
 from sidestep.studio import messages as m
-from sidestep.studio.export import numbers_of
-from sidestep.studio.methods import METHODS, Method, Numbers, build_system, check_numbers, method_named
+from sidestep.studio.methods import METHODS, Method, Numbers, check_numbers, method_named
+from sidestep.studio.pursuit import Pursuit
 from sidestep.studio.stage import Actor, Stage
+from sidestep.studio.systems import Recipe, build_system, numbers_of, recipe_of
 from sidestep.studio.things import things_of
 from sidestep.studio.tip import at_tip, tip_of
 from sidestep.studio.words import in_words
 
 Array = npt.NDArray[np.float64]
-Prepare = Callable[[Robot, Method, int | None], Body]
+Prepare = Callable[[Robot, Recipe], Body]
 
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
-STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
 REST = 0.5  # [s] for which all joints have been slower than `SLOW`: the arm rests
 SLOW = 0.02  # [rad/s | m/s]
 
@@ -58,7 +52,7 @@ class Session:
         scenario: robot, start, goal, obstacles and control period.
         method: one of `METHODS`. numbers: of methods, by name; defaults for the rest.
         ellipsoids: of a covering body per link, where the scenario does not say; None: as many as it takes.
-        prepare: gives the body of a robot that a method needs, with this number of ellipsoids; may take long.
+        prepare: gives the body of a robot by a recipe; may take long.
 
     Raises:
         ValueError: that names what is wrong in the scenario, the method or its numbers.
@@ -74,15 +68,11 @@ class Session:
     period: float
     time: float
     running: bool
-    _bodies: dict[bool, Body]
-    _system: GeometricSystem
+    _bodies: dict[str, Body]
+    _ellipsoids: int | None
+    _pursuit: Pursuit
     _controller: TorqueController
     _posture: Posture
-    _ellipsoids: int | None
-    _relaxed: GeometricSystem | None
-    _aim: JointGoal | PoseAim
-    _guide: GuidedMotion | None
-    _escape: Escape | None
     _step: Step | None
     _solution: TorqueSolution | None
     _contacts: tuple[str, ...]
@@ -117,7 +107,7 @@ class Session:
                 target = np.array(pose, dtype=float)
                 near = self.stage.state()[0] if self._pose is None else self._posture.q
                 starts = POSTURE_STARTS if thorough else 1
-                free = partial(self._is_free, self._obstacles())
+                free = partial(self._pursuit.is_free, obstacles=self._obstacles())
                 self._set_goal(
                     target, posture_at(self.robot, self.tip, target, near, starts=starts, free=free)
                 )
@@ -133,14 +123,14 @@ class Session:
                     self.stage.draw(self.actor(name), place)
                 else:
                     self.stage.put(self.actor(name), place)
-                    self._relaxed = None
+                    self._pursuit.obstacles_changed()
             case m.ThrowThing(name, velocity):
                 self.stage.throw(self.actor(name), velocity)
             case m.SetMethod(name):
                 self._use(method_named(name), self._numbers[name])
             case m.SetNumbers(name, numbers):
                 method = method_named(name)
-                checked = check_numbers(method, numbers)
+                checked = check_numbers(method, numbers, self._numbers[name])
                 if method is self._method:
                     self._use(method, checked)
                 self._numbers[name] = checked
@@ -170,9 +160,7 @@ class Session:
         if np.abs(v).max() > SLOW:
             self._moved = self.time
         obstacles = self._obstacles()
-        goal = self._attractor(q, obstacles)
-        step = self._moving_by(obstacles).acceleration(q, v, goal, obstacles)
-        self._potential = step.goal_potential
+        step = self._pursuit.step(q, v, obstacles)
         mass, bias = stage.dynamics()
         solution = self._controller.solve(
             q, v, step.acceleration, mass, bias, clearances=step if self._method.safe else None
@@ -199,18 +187,15 @@ class Session:
         q, v = self.stage.state()
         limits = self.robot.limits
         rows, self._rows = tuple(self._rows), []
+        obstacles = self._obstacles()
         words, status = "at the start", ("", "")
         nearest, values, metric, torque = ("", np.inf), np.zeros(0), np.eye(len(q)), 0.0
         if self._step is not None and self._solution is not None:
             step = self._step
             diagnosis = step.diagnosis
-            there = None if self.time - self._moved < REST else self._at_goal(self._obstacles())
+            there = None if self.time - self._moved < REST else self._pursuit.at_goal(obstacles)
             words = in_words(diagnosis, there, owners=self._owners, things=self._things)
-            if self._guide is not None:
-                words = f"guide: {self._guide_says}; {words}"
-            if self._escape is not None and self._escape.escaping:
-                words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
-            words = self._posture.in_words(words)
+            words = self._pursuit.in_words(words)
             status = status_name(step.status), status_name(self._solution.status)
             values, metric = np.array(step.values), np.array(step.metric)
             clearances = np.asarray(step.clearances.values)
@@ -227,11 +212,14 @@ class Session:
             goal=self._posture.q if self._pose is None else None,
             goal_pose=self._pose,
             posture=self._posture,
+            goal_written=self._goal_written,
+            relaxed=self._pursuit.places(obstacles),
             tip=self.tip,
             ellipsoids=self._ellipsoids,
             things=self._things,
             poses=self._poses(),
             velocities=np.array([actor.velocity for actor in self.stage.actors]).reshape(-1, 3),
+            courses=tuple(actor.course for actor in self.stage.actors),
             method=self._method.name,
             numbers={name: dict(numbers) for name, numbers in self._numbers.items()},
             words=words,
@@ -258,77 +246,32 @@ class Session:
 
     # --- parts ---
 
-    def _attractor(self, q: Array, obstacles: Obstacles) -> JointGoal | PoseGoal:
-        """What the system is drawn to now: the goal, a sub-goal, or a place on the guide's path."""
-        self._guide_time += self.period
-        if self._guide is not None:
-            guidance = self._guide.lead(q, obstacles, self._guide_time)
-            self._guide_says = guidance.status.name.replace("_", " ")
-            return guidance.goal
-        aim = self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
-        if self._escape is None or not isinstance(aim, JointGoal):
-            return aim
-        escaping = self._escape.escaping
-        followed = self._escape.pursue(aim, q, self._potential, self.period)
-        if self._escape.escaping and not escaping:
-            if self._at_goal(obstacles).state == MotionState.inside_barrier:
-                self._escape = Escape(self.robot)  # no way leads to a goal that is blocked
-                return aim
-        return followed
-
-    def _at_goal(self, obstacles: Obstacles) -> Diagnosis:
-        """What an arm at rest at the goal does."""
-        q = self._posture.q
-        return self._moving_by(obstacles).diagnose(q, np.zeros_like(q), q, obstacles)
-
     def _look_again(self) -> None:
         """The system and the contacts as they are now, while time stands still."""
         q, v = self.stage.state()
-        obstacles = self._obstacles()
-        aim = self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
-        self._step = self._moving_by(obstacles).acceleration(q, v, aim, obstacles)
+        self._step = self._pursuit.look(q, v, self._obstacles())
         self._contacts = self.stage.contacts()
-
-    def _is_free(self, obstacles: Obstacles, q: Array) -> bool:
-        """Whether the arm may rest at q (nv,), as far as the system knows of clearances."""
-        return self._system.diagnose(q, np.zeros_like(q), q, obstacles).state != MotionState.inside_barrier
-
-    def _moving_by(self, obstacles: Obstacles) -> GeometricSystem:
-        """The system, with barriers that leave the goal free as long as all obstacles are at rest."""
-        if self._guide is not None:
-            return self._guide.moving
-        speeds = (np.abs(actor.velocity).max() for actor in self.stage.actors)
-        if not self._method.safe or max(speeds, default=0.0) > STILL:
-            self._relaxed = None
-            return self._system
-        if self._relaxed is None:
-            self._relaxed = self._system.relaxed_at(self._posture.q, obstacles)
-        return self._relaxed
 
     def _load(self, scenario: Scenario, method: Method, given: dict[str, Numbers]) -> None:
         robot = load_robot(scenario)
-        ellipsoids = scenario.barriers.ellipsoids or self._usual_ellipsoids
-        bodies: dict[bool, Body] = {}
+        bodies: dict[str, Body] = {}
         if self._edition and robot.fingerprint == self.robot.fingerprint:
             robot, bodies = self.robot, dict(self._bodies)
-            if ellipsoids != self._ellipsoids:
-                bodies.pop(True, None)
         start = coordinates(scenario.start, robot, "start.position")
+        velocity = start_velocity(scenario.start, robot)
         posture = goal_posture(scenario, robot, start)
         pose = None if isinstance(scenario.goal, JointState) else at_tip(scenario.goal, robot)
         stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
         asked, values = numbers_of(scenario)
-        numbers = self._numbers | {asked: check_numbers(METHODS[asked], values)} | given
-        self._system = self._system_for(robot, bodies, method, numbers[method.name], ellipsoids)
-        self.robot, self._bodies, self._numbers, self._method = robot, bodies, numbers, method
-        self._ellipsoids = ellipsoids
-        self.tip = tip_of(robot)
-        self.scenario, self.stage = scenario, stage
+        numbers = self._numbers | {asked: METHODS[asked].defaults | values} | given
+        ellipsoids = scenario.barriers.ellipsoids or self._usual_ellipsoids
+        self._pursuit = self._pursuit_by(method, numbers[method.name], scenario, robot, bodies, ellipsoids)
+        self.scenario, self.robot, self.tip, self.stage = scenario, robot, tip_of(robot), stage
+        self._method, self._numbers, self._bodies, self._ellipsoids = method, numbers, bodies, ellipsoids
         self.period = scenario.simulation.period
         self._controller = TorqueController(robot, period=self.period)
-        self._start = start
-        self._make_guide()
-        self._set_goal(pose, posture)
+        self._start = start, velocity
+        self._set_goal(pose, posture, written=True)
         self._begin()
 
     def _begin(self) -> None:
@@ -340,55 +283,45 @@ class Session:
         self._times = deque(maxlen=TIMED_STEPS)
         self._recording = False  # time goes back: a recording is of one motion
         self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
-        self.stage.set_state(self._start, np.zeros_like(self._start))
-        self._begin_pursuit()  # what was stuck before is so no longer
+        self.stage.set_state(*self._start)
+        self._pursuit.begin(self._pose, self._posture)
 
-    def _set_goal(self, pose: Array | None, posture: Posture) -> None:
-        self._pose, self._posture = pose, posture
-        self._begin_pursuit()
-
-    def _make_guide(self) -> None:
-        self._guide, self._guide_time, self._guide_says = None, 0.0, ""
-        if self._method.guided:
-            self._guide = GuidedMotion(self.robot, self._bodies[True], system=self._system)
-
-    def _begin_pursuit(self) -> None:
-        self._potential, self._relaxed = float("nan"), None
-        self._aim = JointGoal(self._posture.q)
-        if self._pose is not None:
-            stiffness = self._numbers[self._method.name]["stiffness"]
-            self._aim = PoseAim(self.robot, self.tip, self._pose, stiffness=stiffness, posture=self._posture)
-        if self._guide is not None:
-            self._guide.set_goal(self._posture.q)
-        self._escape = Escape(self.robot) if self._method.escapes else None
+    def _set_goal(self, pose: Array | None, posture: Posture, *, written: bool = False) -> None:
+        self._pose, self._posture, self._goal_written = pose, posture, written
+        self._pursuit.begin(pose, posture)
 
     def _set_actors(self, actors: list[Actor]) -> None:
         self.stage.set_things(actors)
         self._edition += 1
         self._look()
 
-    def _use(self, method: Method, numbers: Mapping[str, float]) -> None:
-        self._system = self._system_for(self.robot, self._bodies, method, numbers, self._ellipsoids)
+    def _use(self, method: Method, numbers: Numbers) -> None:
+        self._pursuit = self._pursuit_by(
+            method, numbers, self.scenario, self.robot, self._bodies, self._ellipsoids
+        )
         self._method, self._numbers[method.name] = method, dict(numbers)
-        self._make_guide()
-        self._begin_pursuit()
+        self._pursuit.begin(self._pose, self._posture)
         self._look()
 
-    def _system_for(
+    def _pursuit_by(
         self,
-        robot: Robot,
-        bodies: dict[bool, Body],
         method: Method,
-        numbers: Mapping[str, float],
+        numbers: Numbers,
+        scenario: Scenario,
+        robot: Robot,
+        bodies: dict[str, Body],
         ellipsoids: int | None,
-    ) -> GeometricSystem:
-        if method.covering not in bodies:
-            bodies[method.covering] = self._prepare(robot, method, ellipsoids)
-        return build_system(method, robot, bodies[method.covering], numbers)
+    ) -> Pursuit:
+        recipe = recipe_of(method, scenario, ellipsoids)
+        if str(recipe) not in bodies:
+            bodies[str(recipe)] = self._prepare(robot, recipe)
+        body = bodies[str(recipe)]
+        system = build_system(method, robot, body, numbers, scenario)
+        return Pursuit(robot, tip_of(robot), method, body, system, scenario.simulation.period)
 
     def _look(self) -> None:
         """Lays out what is seen: points of each obstacle in its frame, and whose each point is."""
-        self._relaxed = None
+        self._pursuit.obstacles_changed()
         views = [actor.thing.seen(bare=not self._method.safe) for actor in self.stage.actors]
         self._views = [points for points, _ in views]
         self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in views)])

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sidestep.pose import from_quaternion, pose_at, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
+from sidestep.studio.messages import Course
 from sidestep.studio.things import Thing, thing_of
 
 Array = npt.NDArray[np.float64]
@@ -41,6 +42,11 @@ class Actor:
     @property
     def free(self) -> bool:
         return self.thing.obstacle.free
+
+    @property
+    def course(self) -> Course:
+        """By what it moves: as its file says, held by a hand, or as it was left."""
+        return "file" if not self.touched else "left" if self.target is None else "held"
 
     def scripted(self, time: float) -> None:
         """Sets the velocity that the scenario asks for at a time [s]."""

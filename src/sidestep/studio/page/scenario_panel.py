@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from sidestep.scenario import Scenario, shipped_scenarios
-from sidestep.studio.export import save_scenario, scenario_now
+from sidestep.studio.export import not_kept, save_scenario, scenario_now
 
 if TYPE_CHECKING:
     import viser
@@ -40,28 +40,34 @@ class ScenarioPanel:
         gui.add_button("Download").on_click(self._download)
 
     def _load_thesis(self, event: Any) -> None:
-        self._view.load(Scenario.load(f"thesis-{event.target.value}"), with_method=False)
+        self._view.load(Scenario.load(f"thesis-{event.target.value}"))
 
     def _load_shipped(self, _: Any) -> None:
-        self._view.load(Scenario.load(str(self._shipped.value)), with_method=False)
+        self._view.load(Scenario.load(str(self._shipped.value)))
 
     def _load_upload(self, event: Any) -> None:
         file = event.target.value
         with self._view.telling(event.client):
             text = file.content.decode("utf-8", errors="replace")
             scenario = Scenario.from_text(text, file=file.name, folder=self._folder)
-            self._view.load(scenario, with_method=True)
+            self._view.load(scenario)
 
     def _save(self, event: Any) -> None:
         with self._view.telling(event.client):
             path = save_scenario(self._now(), self._folder)
-            event.client.add_notification("Saved", str(path), color="green", auto_close_seconds=6.0)
+            self._told("Saved", str(path), event.client)
 
     def _download(self, event: Any) -> None:
         with self._view.telling(event.client):
             scenario = self._now()
             text = yaml.safe_dump(scenario.to_document(), sort_keys=False, allow_unicode=True)
             event.client.send_file_download(f"{scenario.name}.yaml", text.encode(), save_immediately=True)
+            self._told("Downloaded", f"{scenario.name}.yaml", event.client)
+
+    def _told(self, what: str, where: str, client: Any) -> None:
+        lost = "" if self._view.last is None else not_kept(self._view.last)
+        colour = "orange" if lost else "green"
+        client.add_notification(what, f"{where}. {lost}", color=colour, auto_close_seconds=8.0)
 
     def _now(self) -> Scenario:
         name = str(self._name.value)

@@ -15,11 +15,13 @@ from sidestep._core import GeometricSystem, Obstacles
 from sidestep.body import Body
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
+from sidestep.scenario import Scenario
 from sidestep.studio.messages import Snapshot
-from sidestep.studio.methods import Method, Numbers, build_system, method_named
+from sidestep.studio.methods import Method, Numbers, method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import short_names
 from sidestep.studio.page.camera import Viewpoint
+from sidestep.studio.systems import build_system
 
 if TYPE_CHECKING:
     import viser
@@ -46,17 +48,27 @@ class Request:
     q: Array
     points: Array
     radii: Array
+    scenario: Scenario
+    relaxed: Array  # (k, nv) places at which the barriers are relaxed, as in the loop
 
     def differs(self, other: Request | None) -> bool:
         """Whether it would look different."""
-        if other is None or self.robot is not other.robot or self.body is not other.body:
+        if other is None or self.joints != other.joints or not self.same_system(other):
             return True
-        if (self.joints, self.method, self.numbers) != (other.joints, other.method, other.numbers):
+        if not np.array_equal(self.relaxed, other.relaxed):
             return True
         held = np.delete(self.q - other.q, self.joints)
         if np.abs(held).max(initial=0.0) > 5.0 * LEAST_MOVE or self.points.shape != other.points.shape:
             return True
         return bool(np.abs(self.points - other.points).max(initial=0.0) > LEAST_MOVE)
+
+    def same_system(self, other: Request) -> bool:
+        """Whether both are of the same system."""
+        mine, others = (
+            (id(it.body), it.method.name, it.numbers, it.scenario.embedding, it.scenario.system)
+            for it in (self, other)
+        )
+        return mine == others
 
 
 class Surface:
@@ -74,7 +86,7 @@ class Surface:
         self._done: Request | None = None
         self._heights: Array | None = None
         self._wake = threading.Event()
-        self._system: tuple[Body, str, Numbers, GeometricSystem] | None = None
+        self._system: tuple[Request, GeometricSystem] | None = None
         self._stopping = False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -94,8 +106,9 @@ class Surface:
             return
         method = method_named(snapshot.method)
         points, radii = seen(snapshot, bare=not method.safe)
+        numbers, scenario = snapshot.numbers[method.name], snapshot.scenario
         request = Request(
-            robot, body, method, snapshot.numbers[method.name], joints, snapshot.q, points, radii
+            robot, body, method, numbers, joints, snapshot.q, points, radii, scenario, snapshot.relaxed
         )
         if self._done is not None and (self._done.robot is not robot or self._done.joints != joints):
             self.clear()
@@ -154,11 +167,12 @@ class Surface:
             clock.sleep(PAUSE)
 
     def _system_of(self, request: Request) -> GeometricSystem:
-        kept = self._system
-        if kept is None or kept[0] is not request.body or kept[1:3] != (request.method.name, request.numbers):
-            made = build_system(request.method, request.robot, request.body, request.numbers)
-            kept = self._system = request.body, request.method.name, dict(request.numbers), made
-        return kept[3]
+        if self._system is None or not self._system[0].same_system(request):
+            made = build_system(
+                request.method, request.robot, request.body, request.numbers, request.scenario
+            )
+            self._system = request, made
+        return self._system[1]
 
     def _show_surface(self, request: Request, heights: Array) -> None:
         x, y = (np.linspace(-0.5 * SIDE, 0.5 * SIDE, CELLS + 1) for _ in range(2))
@@ -196,8 +210,7 @@ class Surface:
         line = np.array([*self.trail, on_surface(robot, joints, snapshot.q, self._heights)])
         self._show_trail(np.stack([line[:-1], line[1:]], axis=1).astype(np.float32))
         self._mark("state", line[-1], colours.TRAIL)
-        if snapshot.goal is not None:
-            self._mark("goal", on_surface(robot, joints, snapshot.goal, self._heights), colours.GOAL)
+        self._mark("goal", on_surface(robot, joints, snapshot.posture.q, self._heights), colours.GOAL)
 
     def _show_trail(self, segments: npt.NDArray[np.float32]) -> None:
         if "trail" in self._parts:
@@ -240,9 +253,13 @@ def scale(robot: Robot, joints: tuple[int, int]) -> float:
 
 
 def heights_over(request: Request, system: GeometricSystem) -> Array:
-    """|psi| (CELLS + 1, CELLS + 1) at rest, over the whole range of two joints, the others as in `request.q`."""
+    """|psi| (CELLS + 1, CELLS + 1) of a system, relaxed as in the loop: at rest, over the whole range of two joints,
+    the others as in `request.q`.
+    """
     lower, upper = ranges(request.robot, request.joints)
     obstacles = Obstacles(request.points, request.radii) if len(request.points) else Obstacles.none()
+    for place in request.relaxed:
+        system = system.relaxed_at(place, obstacles)
     rest, q = np.zeros_like(request.q), np.array(request.q)
     heights = np.zeros((CELLS + 1, CELLS + 1))
     for i, first in enumerate(np.linspace(lower[0], upper[0], CELLS + 1)):

@@ -45,7 +45,9 @@ class TuningPanel:
         elif snapshot.numbers[method.name] != self._numbers:
             self._numbers = dict(snapshot.numbers[method.name])
             for name, value in self._numbers.items():
-                self._sliders[name].value = value
+                slider = self._sliders[name]
+                slider.min, slider.max = min(slider.min, value), max(slider.max, value)
+                slider.value = value
 
     def _lay_out(self, method: Method, numbers: Numbers) -> None:
         self._shown = method
@@ -57,12 +59,13 @@ class TuningPanel:
         with self._folder:
             for parameter in method.parameters:
                 unit = f" [{parameter.unit}]" if parameter.unit else ""
+                value = numbers[parameter.name]  # that of a file may be out of the range
                 slider = self._server.gui.add_slider(
                     f"{parameter.name.replace('_', ' ')}{unit}",
-                    min=parameter.lower,
-                    max=parameter.upper,
+                    min=min(parameter.lower, value),
+                    max=max(parameter.upper, value),
                     step=(parameter.upper - parameter.lower) / 1000.0,
-                    initial_value=numbers[parameter.name],
+                    initial_value=value,
                     hint=f"{parameter.sentence} From {parameter.lower:g} to {parameter.upper:g}, "
                     f"recommended {parameter.default:g}.",
                 )

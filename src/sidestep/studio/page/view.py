@@ -18,8 +18,7 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
 from sidestep.simulation.clearance import Clearance
 from sidestep.studio import messages as m
-from sidestep.studio.export import numbers_of
-from sidestep.studio.methods import THESIS_COMPONENTS, method_named
+from sidestep.studio.methods import method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, BodyView, reach
 from sidestep.studio.page.camera import Viewpoint
@@ -32,6 +31,7 @@ from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
+from sidestep.studio.systems import Recipe, make_body, numbers_of, recipe_of
 from sidestep.studio.things import Thing, thing_of
 from sidestep.studio.tip import tip_of
 
@@ -104,9 +104,9 @@ class View:
         """Hands a command to the loop."""
         self._send(command)
 
-    def load(self, scenario: Scenario, *, with_method: bool) -> None:
-        """Another scenario for loop and page, with the method it asks for, or that which is on."""
-        self._send(m.Load(scenario, numbers_of(scenario)[0] if with_method else None))
+    def load(self, scenario: Scenario) -> None:
+        """Another scenario for loop and page, with the method that it is written for."""
+        self._send(m.Load(scenario, numbers_of(scenario)[0]))
 
     @contextlib.contextmanager
     def telling(self, client: Any) -> Iterator[None]:
@@ -160,9 +160,9 @@ class View:
             self._choice = snapshot.scenario.robot
             self._set_robot(snapshot.scenario, load_robot(snapshot.scenario))
         self.last = snapshot
-        needs = snapshot.method, snapshot.ellipsoids
-        if self._body is None or before is None or needs != (before.method, before.ellipsoids):
-            self._load_body(*needs)
+        recipe = recipe_of(method_named(snapshot.method), snapshot.scenario, snapshot.ellipsoids)
+        if self._body is None or recipe != self._recipe:
+            self._load_body(recipe)
         if before is None or snapshot.edition != before.edition:
             self._forget_clearances()
             self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
@@ -331,18 +331,12 @@ class View:
             if part is not None:
                 part.remove()
 
-    def _load_body(self, name: str, ellipsoids: int | None) -> None:
-        """The body of a method; the loop has made it, so it comes from the cache."""
-        method = method_named(name)
+    def _load_body(self, recipe: Recipe) -> None:
+        """The body that a method needs; the loop has made it, so it comes from the cache."""
         if self._body is not None:
             self._body.remove()
-        body = (
-            Body.cover(self.robot, components=ellipsoids)
-            if method.covering
-            else Body.fit(self.robot, components=THESIS_COMPONENTS)
-        )
-        self._body_now = body
-        self._body = BodyView(self._server, body, "/arm", visible=self._body_shown.value)
+        self._recipe, self._body_now = recipe, make_body(self.robot, recipe)
+        self._body = BodyView(self._server, self._body_now, "/arm", visible=self._body_shown.value)
 
     def _pair(self) -> tuple[int, int] | None:
         """The two joints over which the curved space is shown, None when it is not."""

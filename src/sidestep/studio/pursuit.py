@@ -1,0 +1,129 @@
+"""A method on its way to a goal: the system, what draws it, and how it gets out where it is stuck."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import (
+    Diagnosis,
+    Escape,
+    GeometricSystem,
+    JointGoal,
+    MotionState,
+    Obstacles,
+    PoseGoal,
+    Step,
+)
+from sidestep.body import Body
+from sidestep.guidance import GuidedMotion
+from sidestep.robot import Robot
+from sidestep.simulation.pose_aim import PoseAim, Posture
+from sidestep.studio.methods import Method
+
+Array = npt.NDArray[np.float64]
+
+STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
+
+
+class Pursuit:
+    """What moves one arm by one method.
+
+    Args:
+        robot, tip: the arm, and the frame whose pose is a goal. body, system: of the method. period: of control [s].
+    """
+
+    def __init__(
+        self, robot: Robot, tip: str, method: Method, body: Body, system: GeometricSystem, period: float
+    ) -> None:
+        self.system = system
+        self._robot, self._tip, self._method, self._period = robot, tip, method, period
+        self._guide = GuidedMotion(robot, body, system=system) if method.guided else None
+        self._time, self._says = 0.0, ""
+
+    def begin(self, pose: Array | None, posture: Posture) -> None:
+        """Goes to a posture, or a pose (4, 4) by it; what was stuck before is so no longer."""
+        self._posture = posture
+        self._potential = float("nan")
+        self._aim: JointGoal | PoseAim = JointGoal(posture.q)
+        if pose is not None:
+            stiffness = float(self.system.stiffness[0, 0])
+            self._aim = PoseAim(self._robot, self._tip, pose, stiffness=stiffness, posture=posture)
+        if self._guide is not None:
+            self._guide.set_goal(posture.q)
+        self._escape = Escape(self._robot) if self._method.escapes else None
+        self.obstacles_changed()
+
+    def obstacles_changed(self) -> None:
+        """Obstacles came, went, or are suddenly elsewhere."""
+        self._relaxed: GeometricSystem | None = None
+
+    def step(self, q: Array, v: Array, obstacles: Obstacles) -> Step:
+        """The wanted acceleration at q, v (nv,) for one period: to the goal, a sub-goal, or along the guide's path."""
+        goal = self._attractor(q, obstacles)
+        step = self._moving_by(obstacles).acceleration(q, v, goal, obstacles)
+        self._potential = step.goal_potential
+        return step
+
+    def look(self, q: Array, v: Array, obstacles: Obstacles) -> Step:
+        """The same to the goal alone, without time passing."""
+        return self._moving_by(obstacles).acceleration(q, v, self._goal(q), obstacles)
+
+    def at_goal(self, obstacles: Obstacles) -> Diagnosis:
+        """What an arm at rest at the goal does."""
+        q = self._posture.q
+        return self._moving_by(obstacles).diagnose(q, np.zeros_like(q), q, obstacles)
+
+    def is_free(self, q: Array, obstacles: Obstacles) -> bool:
+        """Whether the arm may rest at q (nv,), as far as the system knows of clearances."""
+        return self.system.diagnose(q, np.zeros_like(q), q, obstacles).state != MotionState.inside_barrier
+
+    def places(self, obstacles: Obstacles) -> Array:
+        """Where barriers are relaxed, (k, nv): the arm moves by the system relaxed at these places in turn."""
+        if self._guide is not None:
+            return self._guide.places
+        return np.array([self._posture.q] if self._relaxes(obstacles) else []).reshape(
+            -1, len(self._posture.q)
+        )
+
+    def in_words(self, words: str) -> str:
+        """What the arm does, with what guides it."""
+        if self._guide is not None:
+            words = f"guide: {self._says}; {words}"
+        if self._escape is not None and self._escape.escaping:
+            words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
+        return self._posture.in_words(words)
+
+    def _goal(self, q: Array) -> JointGoal | PoseGoal:
+        return self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
+
+    def _attractor(self, q: Array, obstacles: Obstacles) -> JointGoal | PoseGoal:
+        self._time += self._period
+        if self._guide is not None:
+            guidance = self._guide.lead(q, obstacles, self._time)
+            self._says = guidance.status.name.replace("_", " ")
+            return guidance.goal
+        aim = self._goal(q)
+        if self._escape is None or not isinstance(aim, JointGoal):
+            return aim
+        escaping = self._escape.escaping
+        followed = self._escape.pursue(aim, q, self._potential, self._period)
+        if self._escape.escaping and not escaping:
+            if self.at_goal(obstacles).state == MotionState.inside_barrier:
+                self._escape = Escape(self._robot)  # no way leads to a goal that is blocked
+                return aim
+        return followed
+
+    def _relaxes(self, obstacles: Obstacles) -> bool:
+        return self._method.safe and bool(np.abs(obstacles.velocities).max(initial=0.0) <= STILL)
+
+    def _moving_by(self, obstacles: Obstacles) -> GeometricSystem:
+        """The system, with barriers that leave the goal free as long as all obstacles are at rest."""
+        if self._guide is not None:
+            return self._guide.moving
+        if not self._relaxes(obstacles):
+            self._relaxed = None
+            return self.system
+        if self._relaxed is None:
+            self._relaxed = self.system.relaxed_at(self._posture.q, obstacles)
+        return self._relaxed
