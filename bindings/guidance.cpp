@@ -76,7 +76,8 @@ void bind_plan(nb::module_& m) {
       .def_ro("nodes", &Plan::nodes, "Of both trees.")
       .def_ro("iterations", &Plan::iterations)
       .def_ro("search_seconds", &Plan::search_seconds, "[s] until a path was found, or given up.")
-      .def_ro("smoothing_seconds", &Plan::smoothing_seconds, "[s] to make it short.");
+      .def_ro("improvement_seconds", &Plan::improvement_seconds,
+              "[s] to look for a wider one, and to make it short.");
 }
 
 void bind_settings(nb::module_& m) {

@@ -1340,8 +1340,8 @@ class Plan:
         """[s] until a path was found, or given up."""
 
     @property
-    def smoothing_seconds(self) -> float:
-        """[s] to make it short."""
+    def improvement_seconds(self) -> float:
+        """[s] to look for a wider one, and to make it short."""
 
 class PlannerSettings:
     """

@@ -2,13 +2,11 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "kernels/distance_kernel.hpp"
-#include "sidestep/embedding/instruction_set.hpp"
 #include "sidestep/embedding/ellipsoid_gap.hpp"
 
 namespace sidestep {
@@ -16,21 +14,10 @@ namespace {
 
 constexpr const char* owner = "body clearance";
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
+constexpr double cover_overshoot = 0.02;      // [m] of the balls that cover an ellipsoid
 constexpr double closest_centres = 1e-6;      // [m] of which a direction is taken
 
 static_assert(kernels::most_balls == PointTree::leaf_size);
-
-kernels::Distances distances_kernel() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::distances_avx512;
-    case InstructionSet::avx2: return kernels::distances_avx2;
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::distances_baseline;
-}
 
 kernels::PlacedEllipsoid placed(const Eigen::Vector3d& centre, const Eigen::Matrix3d& axes, const Eigen::Vector3d& squares,
                                 double extent) noexcept {
@@ -59,7 +46,7 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
   const std::vector<BodyEllipsoid> all = body_ellipsoids(robot_, body, owner);
   const auto nv = robot_.num_coordinates();
   const auto item = [&](CoordinateLabel label, int link) {
-    return Item{std::move(label), link, -1, -1, Eigen::VectorXd::Zero(nv), 0.0};
+    return Item{std::move(label), link, -1, -1, -1, Eigen::VectorXd::Zero(nv), Eigen::MatrixXd::Zero(nv, nv), 0.0};
   };
   // The links far from the base first: they are the likeliest in the way.
   for (auto e = all.rbegin(); e != all.rend(); ++e) {
@@ -67,7 +54,7 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
     const auto same = [&](const Link& link) { return link.name == name; };
     if (e->joint >= 0 && std::none_of(links_.begin(), links_.end(), same)) {
       items_.push_back(item({CoordinateLabel::Kind::obstacle, name}, add_link(all, body, name)));
-      add_reach(items_.back().reach, links_.back(), -1);
+      add_reach(items_.back(), links_.back());
     }
   }
   if (items_.empty()) {
@@ -89,8 +76,9 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
       int& later = i > j ? i : j;
       later = robot_.joints()[static_cast<std::size_t>(later)].parent;
     }
-    add_reach(pair.reach, first, i);
-    add_reach(pair.reach, second, i);
+    pair.base = i;
+    add_reach(pair, first);
+    add_reach(pair, second);
   }
   for (const KeptPlane& plane : planes) {
     if (!plane.point.allFinite() || !plane.normal.allFinite() || !(plane.normal.norm() > 0.0)) {
@@ -101,7 +89,7 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
     for (const std::string& name : plane.links) {
       items_.push_back(item({CoordinateLabel::Kind::plane, name}, add_link(all, body, name)));
       items_.back().plane = static_cast<int>(planes_.size()) - 1;
-      add_reach(items_.back().reach, links_[static_cast<std::size_t>(items_.back().link)], -1);
+      add_reach(items_.back(), links_[static_cast<std::size_t>(items_.back().link)]);
     }
   }
   if (num_items() > max_items) {
@@ -128,7 +116,8 @@ int BodyClearance::add_link(const std::vector<BodyEllipsoid>& all, const Body& b
   for (const BodyEllipsoid& e : all) {
     if (body.links[static_cast<std::size_t>(e.component)] == name) {
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(e.shape);
-      link.ellipsoids.push_back({e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), e.shape, e.extent});
+      link.ellipsoids.push_back({e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), e.shape, e.extent,
+                                 cover_by_balls(e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), cover_overshoot)});
       link.centre += e.mean;
     }
   }
@@ -143,11 +132,12 @@ int BodyClearance::add_link(const std::vector<BodyEllipsoid>& all, const Body& b
   return static_cast<int>(links_.size()) - 1;
 }
 
-void BodyClearance::add_reach(Eigen::VectorXd& reach, const Link& link, int end) const {
+void BodyClearance::add_reach(Item& item, const Link& link) const {
   // Up the chain, with a ball around the origin below that holds the link in every configuration.
   double ball = 0.0;
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // of that origin, from joint j
-  for (int j = link.joint; j != end;) {
+  Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link
+  for (int j = link.joint; j != item.base;) {
     const Joint& joint = robot_.joints()[static_cast<std::size_t>(j)];
     double radius = 0.0, next = 0.0;  // from the axis; of the ball around j
     if (j == link.joint) {
@@ -160,8 +150,14 @@ void BodyClearance::add_reach(Eigen::VectorXd& reach, const Link& link, int end)
       next = offset.norm() + ball;
     }
     const bool turns = joint.type == JointType::revolute;
-    reach[joint.coordinate] += std::abs(joint.multiplier) * (turns ? radius : 1.0);
-    if (!turns) {
+    const double factor = std::abs(joint.multiplier), R = factor * (turns ? radius : 1.0);
+    item.reach[joint.coordinate] += R;
+    later[joint.coordinate] += R;
+    if (turns) {
+      // All later ones turn with it, and the pairs (i, j) and (j, i) count alike; itself once.
+      item.bend.row(joint.coordinate) += 2.0 * factor * later.transpose();
+      item.bend(joint.coordinate, joint.coordinate) -= factor * R;
+    } else {
       const JointLimits& limits = robot_.limits();
       const double low = joint.multiplier * limits.lower[joint.coordinate] + joint.offset;
       const double high = joint.multiplier * limits.upper[joint.coordinate] + joint.offset;
@@ -176,8 +172,14 @@ void BodyClearance::add_reach(Eigen::VectorXd& reach, const Link& link, int end)
 BodyClearance::Workspace::Workspace(const BodyClearance& body)
     : poses_(body.robot_.joints().size()),
       motions_(body.items_.size()),
+      curvatures_(body.items_.size()),
       q_(body.robot_.num_coordinates()),
       difference_(body.robot_.num_coordinates()) {
+  std::size_t most = 0;
+  for (const Link& link : body.links_) {
+    most = std::max(most, link.ellipsoids.size());
+  }
+  bounds_.resize(most);
   intervals_.reserve(most_intervals);
 }
 
@@ -201,74 +203,88 @@ void BodyClearance::place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) con
 }
 
 const BodyClearance::Workspace::Pose& BodyClearance::pose(const Workspace& w, int joint) const noexcept {
-  static const Workspace::Pose world{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()};
+  static const Workspace::Pose world{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                     Eigen::Vector3d::Zero()};
   return joint < 0 ? world : w.poses_[static_cast<std::size_t>(joint)];
 }
 
-BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obstacles, double cap, double stop,
-                                         const Workspace& w) const noexcept {
+BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obstacles, const Asked& asked,
+                                         Workspace& w) const noexcept {
   const Link& link = links_[static_cast<std::size_t>(item.link)];
   if (item.other >= 0) {
     const Link& other = links_[static_cast<std::size_t>(item.other)];
-    const double gap_cap = cap + item.contact;
-    const double gap = look_at_pair(link, other, gap_cap, stop + item.contact, w);
-    return {gap < gap_cap ? gap - item.contact : cap, -1};  // exactly the cap where nothing is nearer
+    const Asked gap_asked{asked.cap + item.contact, asked.near + item.contact, asked.stop + item.contact};
+    const double gap = look_at_pair(link, other, gap_asked, w);
+    return {gap < gap_asked.cap ? gap - item.contact : asked.cap, -1};  // exactly the cap where nothing is nearer
   }
   if (item.plane >= 0) {
-    return {look_at_plane(link, planes_[static_cast<std::size_t>(item.plane)], cap, w), -1};
+    return {look_at_plane(link, planes_[static_cast<std::size_t>(item.plane)], asked.cap, w), -1};
   }
-  return look_at_points(link, obstacles, cap, stop, w);
+  return look_at_points(link, obstacles, asked, w);
 }
 
-BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obstacles& obstacles, double cap, double stop,
-                                                   const Workspace& w) const noexcept {
+BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obstacles& obstacles, const Asked& asked,
+                                                   Workspace& w) const noexcept {
   const Workspace::Pose& X = pose(w, link.joint);
-  const PointTree& tree = obstacles.tree();
-  const kernels::Distances distances = distances_kernel();
-  Found found{cap, -1};
-  // Whether anything is near the ball around the link.
-  if (link.ellipsoids.size() > 1) {
-    const Eigen::Vector3d centre = X.p + X.R * link.centre;
-    const auto around = [&](const Balls& balls, int first, int count, double least, float* values) {
-      unsigned near = 0;
-      for (int i = 0; i < count; ++i) {
-        const int n = first + i;
-        const double x = balls.x[n] - centre.x(), y = balls.y[n] - centre.y(), z = balls.z[n] - centre.z();
-        const double distance = std::sqrt(x * x + y * y + z * z) - balls.radius[n];
-        values[i] = static_cast<float>(distance);
-        near |= (distance < least ? 1u : 0u) << i;
+  const auto bound = [&](const Eigen::Vector3d& centre, double radius, double enough) {
+    return w.field_.bound(X.p + X.R * centre, enough + radius, obstacles) - radius;
+  };
+  Found found{asked.cap, -1};
+  // From coarse to fine: the ball around the link, those around its ellipsoids, those that cover them, and themselves.
+  const double around = bound(link.centre, link.radius, asked.cap);
+  if (around >= std::min(asked.cap, asked.near)) {
+    found.clearance = std::min(asked.cap, around);
+    return found;
+  }
+  std::size_t nearest = 0;
+  for (std::size_t i = 0; i < link.ellipsoids.size(); ++i) {
+    const Ellipsoid& e = link.ellipsoids[i];
+    double least = bound(e.mean, e.extent, found.clearance);
+    if (least < std::min(asked.near, found.clearance)) {
+      double covered = infinity;
+      for (const CoverBall& ball : e.cover) {
+        covered = std::min(covered, bound(ball.centre, ball.radius, found.clearance));
       }
-      return near;
-    };
-    const double reach = link.radius + cap;
-    if (tree.nearest(reach, reach, around).point < 0) {
-      return found;
+      least = std::max(least, covered);
+    }
+    w.bounds_[i] = least;
+    nearest = least < w.bounds_[nearest] ? i : nearest;
+    if (least >= asked.near) {
+      found.clearance = std::min(found.clearance, least);
     }
   }
-  for (const Ellipsoid& e : link.ellipsoids) {
+  const PointTree& tree = obstacles.tree();
+  const kernels::Distances distances = kernels::distances();
+  // The one that seems nearest first: those whose bound is above its clearance need not be looked at.
+  for (std::size_t k = 0; k < link.ellipsoids.size() && !(found.clearance < asked.stop); ++k) {
+    const std::size_t i = k == 0 ? nearest : (k <= nearest ? k - 1 : k);
+    if (!(w.bounds_[i] < std::min(asked.near, found.clearance))) {
+      continue;
+    }
+    const Ellipsoid& e = link.ellipsoids[i];
     const kernels::PlacedEllipsoid ellipsoid = placed(X.p + X.R * e.mean, e.axes_T * X.R.transpose(), e.squares, e.extent);
     const auto measure = [&](const Balls& balls, int first, int count, double least, float* values) {
       return distances(ellipsoid, balls, first, count, least, values);
     };
-    const PointTree::Nearest at = tree.nearest(found.clearance, stop, measure);
+    const PointTree::Nearest at = tree.nearest(found.clearance, asked.stop, measure);
     if (at.point >= 0) {
       found = {at.distance, tree.order()[static_cast<std::size_t>(at.point)]};
-      if (found.clearance < stop) {
-        break;
-      }
     }
   }
   return found;
 }
 
-double BodyClearance::look_at_pair(const Link& a, const Link& b, double cap, double stop,
-                                   const Workspace& w) const noexcept {
+double BodyClearance::look_at_pair(const Link& a, const Link& b, const Asked& asked, const Workspace& w) const noexcept {
   const Workspace::Pose &X = pose(w, a.joint), &Y = pose(w, b.joint);
   const Eigen::Vector3d between = Y.p + Y.R * b.centre - X.p - X.R * a.centre;
-  double least = cap;
-  const double far = a.radius + b.radius + cap;
-  if (far <= 0.0 || between.squaredNorm() >= far * far) {
+  double least = asked.cap;
+  const double far = a.radius + b.radius + asked.cap;
+  const double squared = between.squaredNorm();
+  if (far <= 0.0 || squared >= far * far) {
     return least;
+  }
+  if (const double around = std::sqrt(squared) - a.radius - b.radius; around >= asked.near) {
+    return around;
   }
   // In the frame of a's joint, where the centres of a stand still.
   const Eigen::Matrix3d R_XY = X.R.transpose() * Y.R;
@@ -282,15 +298,18 @@ double BodyClearance::look_at_pair(const Link& a, const Link& b, double cap, dou
     for (const Ellipsoid& e : a.ellipsoids) {
       const Eigen::Vector3d d = centre - e.mean;
       const double cut = e.extent + f.extent + least;
-      const double squared = d.squaredNorm();
-      if (cut <= 0.0 || squared >= cut * cut) {
+      const double distance = d.squaredNorm();
+      if (cut <= 0.0 || distance >= cut * cut) {
         continue;
       }
-      const Eigen::Vector3d n = d / std::max(std::sqrt(squared), closest_centres);
+      const Eigen::Vector3d n = d / std::max(std::sqrt(distance), closest_centres);
       const Eigen::Vector3d n_b = R_XY.transpose() * n;
-      if (n.dot(d) - std::sqrt(n.dot(e.shape * n)) - std::sqrt(n_b.dot(f.shape * n_b)) < least) {  // not above the gap
-        least = std::min(least, ellipsoid_gap(d, e.shape, R_XY * f.shape * R_XY.transpose()).value);
-        if (least < stop) {
+      const double bound = n.dot(d) - std::sqrt(n.dot(e.shape * n)) - std::sqrt(n_b.dot(f.shape * n_b));
+      if (bound < least) {
+        const double gap =
+            bound < asked.near ? ellipsoid_gap(d, e.shape, R_XY * f.shape * R_XY.transpose()).value : bound;
+        least = std::min(least, gap);
+        if (least < asked.stop) {
           return least;
         }
       }
@@ -313,26 +332,13 @@ double BodyClearance::look_at_plane(const Link& link, const Plane& plane, double
   return least;
 }
 
-double BodyClearance::margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, const Margins& margins,
-                                double& slope) const noexcept {
-  double lowered = 0.0;
-  for (const Margins::End& end : margins.ends) {
-    const double deficit = end.deficits[item];
-    if (deficit > 0.0) {
-      slope = std::max(slope, deficit / margins.fade);
-      const double away = items_[static_cast<std::size_t>(item)].reach.dot((q - end.q).cwiseAbs());
-      lowered = std::max(lowered, deficit * std::max(0.0, 1.0 - away / margins.fade));
-    }
-  }
-  return margin(item, margins) - lowered;
-}
-
 BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap,
                                               Workspace& w) const noexcept {
+  w.field_.follow(obstacles);
   place(q, w);
   Nearest nearest{cap};
   for (int i = 0; i < num_items(); ++i) {
-    const Found found = look(items_[static_cast<std::size_t>(i)], obstacles, nearest.clearance, -infinity, w);
+    const Found found = look(items_[static_cast<std::size_t>(i)], obstacles, {nearest.clearance, infinity, -infinity}, w);
     if (found.clearance < nearest.clearance) {
       nearest = {found.clearance, i, found.point};
     }
@@ -342,82 +348,19 @@ BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> 
 
 BodyClearance::Nearest BodyClearance::nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles,
                                               double cap, Workspace& w) const noexcept {
+  w.field_.follow(obstacles);
   place(q, w);
-  const Found found = look(items_[static_cast<std::size_t>(item)], obstacles, cap, -infinity, w);
+  const Found found = look(items_[static_cast<std::size_t>(item)], obstacles, {cap, infinity, -infinity}, w);
   return {found.clearance, found.clearance < cap ? item : -1, found.point};
 }
 
 void BodyClearance::clearances(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w,
                                Eigen::Ref<Eigen::VectorXd> out) const noexcept {
+  w.field_.follow(obstacles);
   place(q, w);
   for (int i = 0; i < num_items(); ++i) {
-    out[i] = look(items_[static_cast<std::size_t>(i)], obstacles, cap, -infinity, w).clearance;
+    out[i] = look(items_[static_cast<std::size_t>(i)], obstacles, {cap, infinity, -infinity}, w).clearance;
   }
-}
-
-bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, const Margins& margins,
-                         Workspace& w) const noexcept {
-  place(q, w);
-  double slope = 0.0;
-  for (int k = 0; k < num_items(); ++k) {
-    // In the order of the items, but the one that was in the way last before all.
-    const int i = k == 0 ? w.last_ : (k <= w.last_ ? k - 1 : k);
-    const double margin = margin_at(i, q, margins, slope);
-    if (look(items_[static_cast<std::size_t>(i)], obstacles, margin, margin, w).clearance < margin) {
-      w.last_ = i;
-      return false;
-    }
-  }
-  return true;
-}
-
-bool BodyClearance::edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b,
-                              const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
-  w.difference_ = b - a;
-  std::array<std::uint64_t, max_items / 64> all{};
-  for (int i = 0; i < num_items(); ++i) {
-    all[static_cast<std::size_t>(i / 64)] |= std::uint64_t{1} << (i % 64);
-    w.motions_[static_cast<std::size_t>(i)] = motion(i, w.difference_);
-  }
-  // Breadth first: what is in the way is found early.
-  w.intervals_.clear();
-  w.intervals_.push_back({0.5, 0.5, all});
-  for (std::size_t n = 0; n < w.intervals_.size(); ++n) {
-    const Workspace::Interval at = w.intervals_[n];
-    w.q_ = a + at.middle * w.difference_;
-    place(w.q_, w);
-    std::array<std::uint64_t, max_items / 64> open{};
-    double decided = at.half;  // around the middle
-    for (std::size_t word = 0; word < open.size(); ++word) {
-      for (std::uint64_t left = at.open[word]; left != 0; left &= left - 1) {
-        const int bit = std::countr_zero(left);
-        const int i = static_cast<int>(word) * 64 + bit;
-        double slope = 0.0;
-        const double margin = margin_at(i, w.q_, margins, slope);
-        const double speed = (1.0 + slope) * w.motions_[static_cast<std::size_t>(i)];
-        const double enough = margin - margins.slack + at.half * speed;
-        const double clearance =
-            look(items_[static_cast<std::size_t>(i)], obstacles, std::max(margin, enough), margin, w).clearance;
-        if (clearance < margin) {
-          w.last_ = i;
-          return false;
-        }
-        if (clearance < enough) {
-          open[word] |= std::uint64_t{1} << bit;
-          decided = std::min(decided, (clearance - margin + margins.slack) / speed);
-        }
-      }
-    }
-    if (decided < at.half) {
-      if (w.intervals_.size() + 2 > most_intervals) {
-        return false;
-      }
-      const double half = 0.5 * (at.half - decided), away = decided + half;
-      w.intervals_.push_back({at.middle - away, half, open});
-      w.intervals_.push_back({at.middle + away, half, open});
-    }
-  }
-  return true;
 }
 
 }  // namespace sidestep

@@ -187,7 +187,7 @@ void Guide::run() {
   while (!stopping_.load()) {
     static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.period)));
     if (states_.update() && !stopping_.load()) {
-      look(states_.get());
+      look(State(states_.get()));  // a copy: newer ones come while it looks
     }
   }
 }
@@ -284,18 +284,21 @@ void Guide::search(const State& state, const Obstacles& obstacles) {
   const Eigen::VectorXd start = state.q.cwiseMax(limits.lower).cwiseMin(limits.upper);
   const double margin = std::max(margin_, settings_.planner.floor);
   const std::uint64_t seed = settings_.seed + searches_++;
-  Plan plan = planner_.find(start, state.goal, obstacles, seed, margin);
+  Plan plan = planner_.find(start, state.goal, obstacles, seed);
   const PlanStatus status = plan.status;
   const bool found = status == PlanStatus::found;
   have_path_ = found;
   failed_ = !found;
   failed_at_ = state.time;
   if (found) {
-    path_margins_ = planner_.margins(plan.margin, start, state.goal, obstacles);
-    if (!settings_.synchronous && plan.path.cols() > 2) {  // to begin with
+    if (!settings_.synchronous) {  // to begin with
       follow(state, plan, obstacles, false);
     }
-    planner_.smooth(plan, obstacles, seed);
+    planner_.improve(plan, obstacles, seed, margin);
+    path_margins_ = planner_.margins(plan.margin, start, state.goal, obstacles);
+    if (!settings_.synchronous) {
+      plan.path = entered(plan, states_.get().q, obstacles);
+    }
     follow(state, plan, obstacles, true);
   }
   {
@@ -307,6 +310,22 @@ void Guide::search(const State& state, const Obstacles& obstacles) {
   if (!found) {
     answer(state, status, false);
   }
+}
+
+Eigen::MatrixXd Guide::entered(const Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles) {
+  const JointLimits& limits = body_.robot().limits();
+  const Eigen::VectorXd here = q.cwiseMax(limits.lower).cwiseMin(limits.upper);
+  // Back to the start it can go as it came, also where that is not straight.
+  for (Eigen::Index k = plan.path.cols() - 1; k >= 0; --k) {
+    const double margin = k == 0 ? settings_.planner.floor : plan.margin;
+    if (body_.edge_free(here, plan.path.col(k), obstacles, planner_.margins(margin, here, plan.path.col(k), obstacles),
+                        planner_.workspace())) {
+      Eigen::MatrixXd path(plan.path.rows(), plan.path.cols() - k + 1);
+      path << here, plan.path.rightCols(plan.path.cols() - k);
+      return path;
+    }
+  }
+  return plan.path;
 }
 
 void Guide::follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured) {

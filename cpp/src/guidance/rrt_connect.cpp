@@ -1,7 +1,6 @@
 #include "sidestep/guidance/rrt_connect.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
@@ -115,27 +114,15 @@ Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const
 }
 
 Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
-                      std::uint64_t seed, double margin) {
-  Plan plan = find(start, goal, obstacles, seed, margin);
-  smooth(plan, obstacles, seed);
+                      std::uint64_t seed) {
+  Plan plan = find(start, goal, obstacles, seed);
+  improve(plan, obstacles, seed, settings_.margin);
   return plan;
 }
 
-void RrtConnect::smooth(Plan& plan, const Obstacles& obstacles, std::uint64_t seed) {
-  if (plan.status != PlanStatus::found || plan.path.cols() <= 2 || settings_.shortcuts == 0) {
-    return;
-  }
-  const double begin = seconds();
-  RandomStream random(~seed);
-  const Margins kept = margins(plan.margin, plan.path.col(0), plan.path.rightCols(1), obstacles);
-  plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_);
-  plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_);
-  plan.smoothing_seconds = seconds() - begin;
-}
-
 Plan RrtConnect::find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
-                      std::uint64_t seed, double margin) {
-  const double begin = seconds(), deadline = begin + settings_.max_seconds;
+                      std::uint64_t seed) {
+  const double begin = seconds();
   Plan plan;
   const JointLimits& limits = body_->robot().limits();
   for (const Eigen::VectorXd* q : {&start, &goal}) {
@@ -152,31 +139,51 @@ Plan RrtConnect::find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
     plan.status = PlanStatus::goal_in_collision;
     return plan;
   }
-
   RandomStream random(seed);
-  plan.status = PlanStatus::no_path;
-  Margins kept;
-  // A wide way is tried for a little, what lies between for longer.
-  const std::array<std::pair<double, int>, 3> levels{
-      std::pair{margin, settings_.max_iterations / 400},
-      std::pair{std::sqrt(margin * settings_.floor), settings_.max_iterations / 40},
-      std::pair{settings_.floor, settings_.max_iterations}};
-  for (const auto& [level, iterations] : levels) {
-    if (plan.status != PlanStatus::no_path || (level == settings_.floor && iterations < settings_.max_iterations)) {
-      continue;
-    }
-    plan.margin = level;
-    kept = margins(plan.margin, start, goal, obstacles);
-    if (body_->edge_free(start, goal, obstacles, kept, workspace_)) {
-      plan.path.resize(start.size(), 2);
-      plan.path << start, goal;
-      plan.status = PlanStatus::found;
-    } else {
-      search(start, goal, obstacles, kept, iterations, deadline, random, plan);
-    }
-  }
+  connect(settings_.floor, settings_.max_iterations, start, goal, obstacles, begin + settings_.max_seconds, random, plan);
   plan.search_seconds = seconds() - begin;
   return plan;
+}
+
+void RrtConnect::improve(Plan& plan, const Obstacles& obstacles, std::uint64_t seed, double margin) {
+  if (plan.status != PlanStatus::found) {
+    return;
+  }
+  const double begin = seconds();
+  RandomStream random(~seed);
+  const Eigen::VectorXd start = plan.path.col(0), goal = plan.path.rightCols(1);
+  // A wide way is tried for a little, what lies between for longer.
+  for (const auto& [level, share] : {std::pair{margin, 400}, std::pair{std::sqrt(margin * settings_.floor), 40}}) {
+    if (level > plan.margin) {
+      Plan wider = plan;
+      connect(level, settings_.max_iterations / share, start, goal, obstacles, begin + settings_.max_seconds, random, wider);
+      plan.nodes = wider.nodes;
+      plan.iterations = wider.iterations;
+      if (wider.status == PlanStatus::found) {
+        plan = std::move(wider);
+      }
+    }
+  }
+  if (plan.path.cols() > 2 && settings_.shortcuts > 0) {
+    const Margins kept = margins(plan.margin, start, goal, obstacles);
+    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_);
+    plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_);
+  }
+  plan.improvement_seconds = seconds() - begin;
+}
+
+void RrtConnect::connect(double margin, int iterations, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
+                         const Obstacles& obstacles, double deadline, RandomStream& random, Plan& plan) {
+  plan.status = PlanStatus::no_path;
+  plan.margin = margin;
+  const Margins kept = margins(margin, start, goal, obstacles);
+  if (body_->edge_free(start, goal, obstacles, kept, workspace_)) {
+    plan.path.resize(start.size(), 2);
+    plan.path << start, goal;
+    plan.status = PlanStatus::found;
+  } else {
+    search(start, goal, obstacles, kept, iterations, deadline, random, plan);
+  }
 }
 
 void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,

@@ -1,5 +1,6 @@
 #include "sidestep/obstacles/obstacles.hpp"
 
+#include <atomic>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -33,6 +34,11 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
     }
   }
   tree_ = PointTree(points_, radii_, velocities_);
+}
+
+std::uint64_t Obstacles::next_version() noexcept {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
 }
 
 }  // namespace sidestep

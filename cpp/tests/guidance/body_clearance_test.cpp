@@ -135,6 +135,7 @@ BOOST_AUTO_TEST_CASE(clearances_of_points_are_distances_from_ellipsoids) {
 
 BOOST_AUTO_TEST_CASE(no_point_moves_farther_than_the_bound) {
   Random random(2);
+  int smaller = 0;
   for (int trial = 0; trial < 200; ++trial) {
     const Robot robot = test::random_tree(random, 6);
     const Body body = calibrated(random, robot, 0.05);
@@ -164,10 +165,15 @@ BOOST_AUTO_TEST_CASE(no_point_moves_farther_than_the_bound) {
           const Eigen::Vector3d moved = frame_pose(robot, state_b, frame) * Eigen::Vector3d(body.means.col(k)) -
                                         frame_pose(robot, state_a, frame) * Eigen::Vector3d(body.means.col(k));
           BOOST_TEST(moved.norm() <= checked.motion(i, b - a) + 1e-12);  // rounding
+          const double nearer = checked.motion(i, a, b - a, w);
+          BOOST_TEST(moved.norm() <= nearer + 1e-12);
+          BOOST_TEST(nearer <= checked.motion(i, b - a));
+          smaller += nearer < 0.5 * checked.motion(i, b - a);
         }
       }
     }
   }
+  BOOST_TEST(smaller > 100);
 }
 
 BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {

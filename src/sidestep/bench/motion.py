@@ -16,6 +16,7 @@ from sidestep._core import (
     GeometricSystem,
     JointGoal,
     Obstacles,
+    Plan,
     PlanStatus,
     TorqueController,
     rollout,
@@ -72,7 +73,8 @@ class Motion:
         contacts: of MuJoCo, 0 without physics.
         arrived: within the duration.
         step_seconds: wall time [s] of steps: of the system alone, or with torque control of both from Python.
-        planning_seconds: wall time [s] until the first path, smoothing included; None where none was found.
+        first_path_seconds: wall time [s] until the first path; None where none was found.
+        planning_seconds: the same until it was improved.
         ended: what the guide said at the end, see `GuideStatus`; empty without a guide.
     """
 
@@ -84,6 +86,7 @@ class Motion:
     contacts: int
     arrived: bool
     step_seconds: Array
+    first_path_seconds: float | None = None
     planning_seconds: float | None = None
     ended: str = ""
 
@@ -113,8 +116,12 @@ def move(
     guided.set_goal(problem.goal)
     led = _Led(guided)
     motion = run(robot, system, problem, settings, led)
+    plan = led.first_plan
     return replace(
-        motion, planning_seconds=led.planning_seconds, ended="arrived" if motion.arrived else led.status
+        motion,
+        first_path_seconds=None if plan is None else plan.search_seconds,
+        planning_seconds=None if plan is None else plan.search_seconds + plan.improvement_seconds,
+        ended="arrived" if motion.arrived else led.status,
     )
 
 
@@ -233,7 +240,7 @@ class _Led:
     def __init__(self, guided: GuidedMotion) -> None:
         self._guided = guided
         self.period = guided.guide.period
-        self.planning_seconds: float | None = None
+        self.first_plan: Plan | None = None
         self.status = ""
 
     @property
@@ -245,10 +252,10 @@ class _Led:
         """Where to be drawn to."""
         guidance = self._guided.lead(q, obstacles, time)
         self.status = guidance.status.name
-        if self.planning_seconds is None:
+        if self.first_plan is None:
             plan = self._guided.guide.plan
             if plan.status is PlanStatus.found:
-                self.planning_seconds = plan.search_seconds + plan.smoothing_seconds
+                self.first_plan = plan
         return guidance.goal
 
 

@@ -89,7 +89,8 @@ class SceneOutcome:
         goal_beyond_limits: [rad | m] by which the published goal is outside the position limits; the arm is
             sent to the nearest configuration within.
         outcome: of the motion, None if there was none. path_length: sum of |dq| [rad | m].
-        planning_s: until the first path; None where none is planned. first_motion_s: until the first command.
+        first_path_s: until the first path; planning_s: until it was improved; None where none is planned.
+        first_motion_s: until the first command.
         num_points: that the controller saw at first. unknown_joints: held joints that the robot does not have.
         tolerance: of arriving [rad | m]. arrives: it should arrive; False where the goal stays blocked.
         ended: what the guide said at the end; empty without a guide.
@@ -102,6 +103,7 @@ class SceneOutcome:
     goal_beyond_limits: float
     outcome: Outcome | None
     path_length: float
+    first_path_s: float | None
     planning_s: float | None
     first_motion_s: float
     num_points: int
@@ -187,6 +189,7 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
             "limit_violations": sum(bool(item.limits) for item in moved),
             "ended": dict(Counter(item.ended for item in items if item.ended)),
             "straight_line_blocked": sum(item.straight_line_blocked for item in moved),
+            "first_path_ms": _upper([i.first_path_s for i, _ in solved if i.first_path_s is not None], 1e3),
             "planning_ms": _upper([i.planning_s for i, _ in solved if i.planning_s is not None], 1e3),
             "first_motion_ms": _upper([i.first_motion_s for i, _ in solved], 1e3),
             "path_length_rad": _upper([i.path_length for i, _ in solved]),
@@ -299,6 +302,7 @@ def judged(
         goal_beyond_limits=float(np.abs(published - problem.goal).max()),
         outcome=None if motion is None else arm.judge.judge(problem, motion, settings.motion),
         path_length=0.0 if motion is None else motion.path_length,
+        first_path_s=None if motion is None else motion.first_path_seconds,
         planning_s=None if motion is None else motion.planning_seconds,
         first_motion_s=0.0 if motion is None else motion.first_motion_seconds,
         num_points=len(problem.obstacles_at(0.0)),

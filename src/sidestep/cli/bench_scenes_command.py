@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from sidestep.bench import MotionSettings, SceneResult, SceneSettings
 
 COLUMNS = (  # title, key of the figures, decimals, which quantiles
+    ("first path [ms]", "first_path_ms", 2, ("median", "p95", "p99")),
     ("planning [ms]", "planning_ms", 2, ("median", "p95", "p99")),
     ("first motion [ms]", "first_motion_ms", 2, ("median", "p95", "p99")),
     ("path [rad]", "path_length_rad", 2, ("median", "p95", "p99")),

@@ -11,6 +11,8 @@
 #include "sidestep/embedding/embedding.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
 #include "sidestep/embedding/link_pair.hpp"
+#include "sidestep/guidance/ball_cover.hpp"
+#include "sidestep/guidance/distance_field.hpp"
 #include "sidestep/kinematics/robot.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
@@ -50,12 +52,13 @@ struct Margins {
 /// pairs are those of PlaneBarrier and SelfCollisionBarrier; that of obstacles is the distance of their balls from the
 /// ellipsoids, signed, by two steps of Newton towards the nearest place: a lower bound, as a supporting plane gives it.
 ///
-/// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): no point of an item moves farther than
+/// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): a share s of it moves no point of an item farther than
 ///
-///     motion(Δq) = Σ_i |Δq_i| R_i,
+///     motion(s Δq) = s Σ_i |Δq_i| R_i      and      s v + s²/2 Σ_i Σ_j |Δq_i| |Δq_j| R_max(i, j),
 ///
-/// R_i the largest distance that the item can have from the axis of joint i. An interval of an edge is free as far around its
-/// middle as the clearance there exceeds the motion; what is left to either side is looked at in the same way.
+/// R_i the largest distance that the item can have from the axis of joint i and v the speed of its fastest point where the
+/// motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint. An interval of an edge is free as far around its middle as the
+/// clearance there exceeds the smaller of the two; what is left to either side is looked at in the same way.
 class BodyClearance {
  public:
   /// `pairs` as for SelfCollisionBarrier. Throws std::invalid_argument if the body is not calibrated or no
@@ -80,14 +83,18 @@ class BodyClearance {
     struct Pose {
       Eigen::Matrix3d R;
       Eigen::Vector3d p;
+      Eigen::Vector3d angular, linear;  // velocities along an edge, of p
     };
     struct Interval {
       double middle, half;
       std::array<std::uint64_t, max_items / 64> open;  // items that are not decided on it
     };
+    static constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
     std::vector<Pose> poses_;
     std::vector<Interval> intervals_;
-    std::vector<double> motions_;
+    std::vector<double> motions_, curvatures_;  // of the items along an edge
+    DistanceField field_;
+    std::vector<double> bounds_;  // of the ellipsoids of a link
     Eigen::VectorXd q_, difference_;
     int last_ = 0;  // the item that was in the way last: it is looked at first
   };
@@ -127,6 +134,10 @@ class BodyClearance {
     return items_[static_cast<std::size_t>(item)].reach.dot(displacement.cwiseAbs());
   }
 
+  /// The same from q on, by the smaller of the two bounds.
+  double motion(int item, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> displacement,
+                Workspace& w) const noexcept;
+
   /// R of every coordinate, of the item that moves most: (nv) [m], or 1 for a prismatic joint.
   const Eigen::VectorXd& reach() const noexcept { return reach_; }
 
@@ -137,6 +148,7 @@ class BodyClearance {
     Eigen::Vector3d squares;  // of the semi-axes, ascending
     Eigen::Matrix3d shape;
     double extent;
+    std::vector<CoverBall> cover;
   };
   struct Link {
     std::string name;
@@ -149,7 +161,9 @@ class BodyClearance {
     CoordinateLabel label;
     int link, other = -1;    // links_; other: of a pair
     int plane = -1;          // planes_
+    int base = -1;           // joint that moves both of a pair alike
     Eigen::VectorXd reach;   // R of every coordinate
+    Eigen::MatrixXd bend;    // R of the later one of two
     double contact = 0.0;    // of a pair [m]
   };
   struct Plane {
@@ -162,14 +176,19 @@ class BodyClearance {
   };
 
   int add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name);
-  void add_reach(Eigen::VectorXd& reach, const Link& link, int end) const;
+  void add_reach(Item& item, const Link& link) const;
   void place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept;
+  void move(Eigen::Ref<const Eigen::VectorXd> velocity, Workspace& w) const noexcept;
+  double speed(const Item& item, const Workspace& w) const noexcept;
+  double curvature(int item, Eigen::Ref<const Eigen::VectorXd> displacement) const noexcept;
   const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
-  // The clearance of an item, not above `cap`; ends early, with what it found, below `stop`.
-  Found look(const Item& item, const Obstacles& obstacles, double cap, double stop, const Workspace& w) const noexcept;
-  Found look_at_points(const Link& link, const Obstacles& obstacles, double cap, double stop,
-                       const Workspace& w) const noexcept;
-  double look_at_pair(const Link& a, const Link& b, double cap, double stop, const Workspace& w) const noexcept;
+  // How exact a clearance must be: not above `cap`, a lower bound from `near` on, and any that is below `stop`.
+  struct Asked {
+    double cap, near, stop;
+  };
+  Found look(const Item& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
+  Found look_at_points(const Link& link, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
+  double look_at_pair(const Link& a, const Link& b, const Asked& asked, const Workspace& w) const noexcept;
   double look_at_plane(const Link& link, const Plane& plane, double cap, const Workspace& w) const noexcept;
   double margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, const Margins& margins, double& slope) const noexcept;
 

@@ -111,6 +111,8 @@ class Guide {
   void look(const State& state);
   void search(const State& state, const Obstacles& obstacles);
   bool way_is_free(const State& state, const Obstacles& obstacles, bool changed);
+  /// The path of a plan from where an arm is that has moved while it was made.
+  Eigen::MatrixXd entered(const Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles);
   void follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured);
   void answer(const State& state, PlanStatus status, bool direct);
 

@@ -39,8 +39,8 @@ struct Plan {
   // The budget spent.
   int nodes = 0;         ///< of both trees
   int iterations = 0;
-  double search_seconds = 0.0;     ///< until a path was found
-  double smoothing_seconds = 0.0;  ///< to make it short
+  double search_seconds = 0.0;       ///< until a path was found
+  double improvement_seconds = 0.0;  ///< to look for a wider one, and to make it short
 };
 
 /// Length of a path: Σ |Δq|, joints in radians and metres alike.

@@ -29,29 +29,23 @@ struct PlannerSettings {
 };
 
 /// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
-/// LaValle 2000) with dynamic domains (Yershova et al. 2005), shortened and widened. Deterministic in (start, goal,
-/// obstacles, seed) unless the time runs out.
+/// LaValle 2000) with dynamic domains (Yershova et al. 2005). Deterministic in (start, goal, obstacles, seed) unless the time
+/// runs out.
 ///
-/// Margins shrink in two ways, both stated in the plan: where no path keeps `margin`, one with their geometric mean, then one
-/// that keeps `floor` is searched for, with a 400th, a 40th and the whole of the budget; and near start and goal every link
-/// may be as near to things as it is there, see Margins. A link deeper than `allowance` inside something at an end is refused
-/// as in collision.
+/// The first path keeps the `floor`: those are many, and the soonest found. It is improved then: one that keeps `margin` is
+/// looked for with a 400th of the budget, else one that keeps the geometric mean of the two with a 40th, and what was found is
+/// shortened and widened. What a path keeps is stated in the plan; near start and goal every link may be as near to things as
+/// it is there, see Margins. A link deeper than `allowance` inside something at an end is refused as in collision.
 class RrtConnect {
  public:
   /// The body must outlive the planner, which is mutable: one per thread.
   RrtConnect(const BodyClearance& body, const PlannerSettings& settings);
 
-  /// margin [m]: in place of the settings', at least the floor.
-  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed,
-            double margin);
-  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed) {
-    return plan(start, goal, obstacles, seed, settings_.margin);
-  }
+  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
 
-  /// The two parts of a plan: a path as it is found, then the same, shorter and wider.
-  Plan find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed,
-            double margin);
-  void smooth(Plan& plan, const Obstacles& obstacles, std::uint64_t seed);
+  /// The two parts of a plan: the first path, then a better one. margin [m]: in place of the settings', at least the floor.
+  Plan find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
+  void improve(Plan& plan, const Obstacles& obstacles, std::uint64_t seed, double margin);
 
   const PlannerSettings& settings() const noexcept { return settings_; }
   const BodyClearance& body() const noexcept { return *body_; }
@@ -66,6 +60,8 @@ class RrtConnect {
  private:
   enum class Growth { trapped, advanced, reached };
 
+  void connect(double margin, int iterations, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
+               const Obstacles& obstacles, double deadline, RandomStream& random, Plan& plan);
   void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
               const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
   Growth grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "sidestep/obstacles/point_tree.hpp"
 
@@ -32,19 +33,26 @@ class Obstacles {
   /// The same points in the order and under the hierarchy that queries use; built at construction.
   const PointTree& tree() const noexcept { return tree_; }
 
+  /// Another number whenever points or radii may be others; copies keep it. For what is remembered about obstacles.
+  std::uint64_t version() const noexcept { return version_; }
+
   /// Moves every point along its velocity: x += s * duration. No allocation.
   void advance(double duration) noexcept {
     points_ += duration * velocities_;
     tree_.advance(duration);
+    version_ = next_version();
   }
 
  private:
   Obstacles() : points_(3, 0), radii_(0), velocities_(3, 0) {}
 
+  static std::uint64_t next_version() noexcept;
+
   Eigen::Matrix3Xd points_;
   Eigen::VectorXd radii_;
   Eigen::Matrix3Xd velocities_;
   PointTree tree_;
+  std::uint64_t version_ = next_version();
 };
 
 }  // namespace sidestep

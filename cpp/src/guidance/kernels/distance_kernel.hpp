@@ -10,7 +10,7 @@ struct PlacedEllipsoid {
   double centre[3];
   double axes[9];     // world to principal axes, by rows
   double squares[3];  // of the semi-axes [m²], ascending
-  double extent;      // the longest [m]
+  double extent;      // the longest [m]; 0: a point
 };
 
 inline constexpr int most_balls = 16;  // of one call; the arrays go on for so many from `first`
@@ -24,5 +24,8 @@ using Distances = unsigned (*)(const PlacedEllipsoid& ellipsoid, const Balls& ba
 unsigned distances_baseline(const PlacedEllipsoid&, const Balls&, int, int, double, float*) noexcept;
 unsigned distances_avx2(const PlacedEllipsoid&, const Balls&, int, int, double, float*) noexcept;
 unsigned distances_avx512(const PlacedEllipsoid&, const Balls&, int, int, double, float*) noexcept;
+
+/// The best for the machine.
+Distances distances() noexcept;
 
 }  // namespace sidestep::kernels

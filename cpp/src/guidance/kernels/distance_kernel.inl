@@ -63,7 +63,7 @@ unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int 
   // Outside the ball around it.
   Floats distance = root(squared) - static_cast<float>(ellipsoid.extent);
   unsigned near = below(distance - radius, least) & asked;
-  if (near != 0) {
+  if (near != 0 && ellipsoid.extent > 0.0) {
     e[0] = squared < centre_offset * centre_offset ? all(centre_offset) : e[0];
     Floats along{}, length{}, second{}, fourth{};
     for (int i = 0; i < 3; ++i) {

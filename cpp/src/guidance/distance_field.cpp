@@ -1,0 +1,101 @@
+#include "sidestep/guidance/distance_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/distance_kernel.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr float unknown = -std::numeric_limits<float>::infinity();
+constexpr double rounding = 1e-6;  // of distances in single precision, relative and, for cells' places, absolute [m]
+constexpr int offset = 1 << 20;    // of blocks, so that their numbers are positive
+constexpr double farthest = 1e5;   // [m] that a place may be away to have a block
+
+/// Below a distance that was rounded.
+double below(double distance) noexcept { return distance - rounding * (std::abs(distance) + 1.0); }
+
+}  // namespace
+
+double distance(const Eigen::Vector3d& x, const Obstacles& obstacles, double limit) noexcept {
+  const kernels::Distances distances = kernels::distances();
+  kernels::PlacedEllipsoid point{};
+  Eigen::Map<Eigen::Vector3d>(point.centre) = x;
+  for (const int i : {0, 4, 8}) {
+    point.axes[i] = 1.0;
+  }
+  const auto measure = [&](const Balls& balls, int first, int count, double least, float* values) {
+    return distances(point, balls, first, count, least, values);
+  };
+  return obstacles.tree().nearest(limit, -std::numeric_limits<double>::infinity(), measure).distance;
+}
+
+DistanceField::DistanceField() : slots_(slots), blocks_(most_blocks) {}
+
+void DistanceField::follow(const Obstacles& obstacles) noexcept {
+  if (obstacles.version() != version_) {
+    version_ = obstacles.version();
+    ++generation_;
+    used_ = 0;
+  }
+}
+
+double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obstacles& obstacles) noexcept {
+  float* known = nullptr;
+  Eigen::Vector3d corner;
+  if (x.cwiseAbs().maxCoeff() < farthest) {
+    std::uint64_t key = 0;
+    for (int i = 0; i < 3; ++i) {
+      const double block = std::floor(x[i] / block_edge);
+      corner[i] = block * block_edge;
+      key = key << 21 | static_cast<std::uint64_t>(static_cast<int>(block) + offset);
+    }
+    known = block_of(key);
+  }
+  if (known == nullptr) {
+    return below(distance(x, obstacles, PointTree::padding));
+  }
+  const Eigen::Vector3d inside = x - corner;
+  double best = -std::numeric_limits<double>::infinity(), limit = PointTree::padding;
+  for (const int cells : levels) {
+    const double cell = block_edge / cells;
+    int at = 0;
+    Eigen::Vector3d centre;
+    for (int i = 0; i < 3; ++i) {
+      const int number = std::clamp(static_cast<int>(inside[i] / cell), 0, cells - 1);
+      at = at * cells + number;
+      centre[i] = (number + 0.5) * cell;
+    }
+    if (known[at] == unknown) {
+      known[at] = static_cast<float>(distance(corner + centre, obstacles, limit));
+    }
+    const double away = (inside - centre).norm();
+    best = std::max(best, below(known[at]) - away);
+    if (best >= enough) {
+      break;
+    }
+    limit = known[at] + block_edge;  // two centres of a block are not that far apart
+    known += cells * cells * cells;
+  }
+  return best;
+}
+
+float* DistanceField::block_of(std::uint64_t key) noexcept {
+  for (std::uint64_t at = key * 0x9E3779B97F4A7C15u >> 40;; ++at) {
+    Slot& slot = slots_[at % slots];
+    if (slot.generation != generation_) {
+      if (used_ == most_blocks) {
+        return nullptr;
+      }
+      slot = {key, generation_, used_++};
+      blocks_[static_cast<std::size_t>(slot.block)].fill(unknown);
+    }
+    if (slot.key == key) {
+      return blocks_[static_cast<std::size_t>(slot.block)].data();
+    }
+  }
+}
+
+}  // namespace sidestep
