@@ -66,7 +66,7 @@ def test_an_obstacle_dragged_into_the_way_is_not_touched(studio: Studio, looker:
     # The goal first, then the ball onto the circle of the tip, sideways in the window: a drag is in a plane that
     # faces the camera, and this arm can yield in its own plane alone.
     studio.send(m.SetJointGoal(before.q + np.array([1.0, 0.0])))
-    looker.drag(ball, ball - 0.4 * RIGHT)
+    looker.drag(ball, ball - 0.3 * RIGHT)
     moved = lambda: float(np.linalg.norm(last(studio).poses[0][:3, 3] - ball))  # noqa: E731
     until(lambda: moved() > 0.1, "the drag")
     begin = last(studio).time
@@ -180,12 +180,19 @@ def test_the_curved_space_is_drawn_with_the_way_on_it(studio: Studio, looker: Lo
     assert heights is not None
     here = on_surface(robot, (0, 1), end.q, heights)
     way = np.array(surface.trail)
-    np.testing.assert_allclose(way[-1], here, atol=0.006)  # [m] points of the way are 5 mm apart
+    np.testing.assert_allclose(way[-1, :2], here[:2], atol=0.006)  # [m] points of the way are 5 mm apart
     np.testing.assert_allclose(surface.place_of("state"), here, atol=1e-9)
     assert end.goal is not None
     np.testing.assert_allclose(
         surface.place_of("goal"), on_surface(robot, (0, 1), end.goal, heights), atol=1e-9
     )
+    studio.send(m.SetPoseGoal(robot.pose(np.array([0.3, 0.9]), studio.view.tip)))
+    until(lambda: last(studio).goal_pose is not None, "a pose")
+    mark = lambda: on_surface(robot, (0, 1), last(studio).posture.q, surface.heights)  # type: ignore[arg-type]  # noqa: E731
+    until(lambda: np.allclose(surface.place_of("goal"), mark(), atol=1e-9), "its mark")
+    studio.send(m.Restart(until=0.0))
+    until(lambda: last(studio).time == 0.0, "the restart")
+    assert len(surface.trail) == 1  # the place where the arm is
     looker.check("curved space")
     until(lambda: surface.heights is None, "the end of the surface")
 

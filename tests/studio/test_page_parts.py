@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
+from sidestep import Body, ExactClearance, Robot, Scenario
 from sidestep.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS
@@ -27,7 +27,8 @@ from sidestep.studio.page.surface import (
     TOP,
     Request,
     heights_over,
-    on_surface,
+    labels,
+    net,
     open_faces,
     seen,
 )
@@ -62,6 +63,68 @@ def test_the_surface_is_the_embedding_over_two_joints(make_session: MakeSession,
     np.testing.assert_allclose(
         place, [q[0] * scale, q[1] * scale, min(heights[35, 22] * scale, TOP)], atol=1e-12
     )
+
+
+def test_the_surface_is_of_the_system_that_the_loop_runs(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    """Barriers that leave the goal free while obstacles are at rest, and do not while one moves."""
+    session = make_session(scenario, method="reactive")
+    place = session.robot.pose(session.snapshot().posture.q, session.tip)
+    place[1, 3] += 0.12  # [m] the goal lies within the activation distance
+    session.handle(m.SetRunning(False))
+    session.handle(m.DragThing("ball", place))
+    at_rest = session.snapshot()
+    np.testing.assert_array_equal(at_rest.relaxed, [at_rest.posture.q])
+    body, method = Body.cover(session.robot, components=2), METHODS["reactive"]
+    axis, rest = np.linspace(-np.pi, np.pi, CELLS + 1), np.zeros(2)
+    cell = [int(np.abs(axis - angle).argmin()) for angle in at_rest.posture.q]
+    q = axis[cell]  # of the grid, next to the goal
+    found = []
+    for velocity in (0.0, 0.5):
+        session.handle(m.ThrowThing("ball", np.array([0.0, velocity, 0.0])))
+        now = session.snapshot()
+        system = build_system(method, session.robot, body, now.numbers["reactive"], scenario)
+        request = Request(
+            session.robot,
+            body,
+            method,
+            now.numbers["reactive"],
+            (0, 1),
+            now.q,
+            *seen(now, bare=False),
+            scenario,
+            now.relaxed,
+        )
+        height = heights_over(request, system)[cell[0], cell[1]]
+        obstacles = session._obstacles()
+        psi = session._pursuit._moving_by(obstacles).acceleration(q, rest, q, obstacles).values
+        assert height == pytest.approx(np.linalg.norm(psi), rel=1e-12)
+        found.append((height, request))
+    assert 2.0 * found[0][0] < found[1][0]
+    assert found[1][1].differs(found[0][1])
+
+
+def test_the_axes_of_the_surface_are_named_and_have_values() -> None:
+    texts = {name: text for name, (text, _, _) in labels(Robot.named("planar2"), (0, 1)).items()}
+    assert texts == {
+        "label0-1": "-180°",
+        "label0+0": "joint1",
+        "label0+1": "180°",
+        "label1-1": "-180°",
+        "label1+0": "joint2",
+        "label1+1": "180°",
+        "label2+0": "0",
+        "label2+1": "ψ = 1.6",  # 0.3 m where 1.2 m are 2 pi
+    }
+
+
+def test_the_net_lies_on_the_surface_where_it_is_not_cut_off() -> None:
+    z = np.zeros((13, 13))
+    assert len(net(z)) == 2 * 13 * 12
+    assert net(z)[..., 2].max() < 0.01
+    z[6, 6] = TOP
+    assert len(net(z)) == 2 * 13 * 12 - 4  # two lines of each joint end there
 
 
 def test_the_surface_is_open_where_it_is_cut_off() -> None:
@@ -141,9 +204,9 @@ def test_joints_are_named_by_what_tells_them_apart() -> None:
 
 
 def test_the_colours_of_batched_meshes_are_shown_as_those_of_others() -> None:
-    assert colours.batched_rgb("#FFFFFF") == (255, 255, 255)
-    assert colours.batched_rgb("#000000") == (0, 0, 0)
-    assert colours.batched_rgb("#808080") == (55, 55, 55)  # ((128/255 + 0.055) / 1.055)^2.4 = 0.216
+    assert colours.batched((255, 255, 255)) == (255, 255, 255)
+    assert colours.batched((0, 0, 0)) == (0, 0, 0)
+    assert colours.batched((128, 128, 128)) == (55, 55, 55)  # ((128/255 + 0.055) / 1.055)^2.4 = 0.216
 
 
 def test_the_ball_of_a_cloud_that_is_touched_is_named_by_the_cloud(tmp_path: Path) -> None:
@@ -155,7 +218,11 @@ def test_the_ball_of_a_cloud_that_is_touched_is_named_by_the_cloud(tmp_path: Pat
 
 def test_an_unknown_clearance_does_not_empty_its_plot(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario, method="unswitched")
-    server = SimpleNamespace(gui=SimpleNamespace(add_uplot=lambda *_, **__: SimpleNamespace(data=None)))
+    server = SimpleNamespace(
+        gui=SimpleNamespace(
+            add_uplot=lambda *_, **__: SimpleNamespace(data=None), add_html=lambda *_, **__: None
+        )
+    )
     plots = Plots(server)  # type: ignore[arg-type]
     plots.add(session.snapshot(), 0.4)
     assert len(plots.rows) == 0  # no step yet
@@ -176,6 +243,7 @@ def test_links_change_colour_towards_contact() -> None:
     assert colours.shade_colour(colours.SHADES) == colours.rgb(colours.NEAR)
     used = [colour for colour, _ in colours.LEGEND]
     assert len(set(used)) == len(used)  # each means one thing
+    assert {colours.BASE, colours.RIM} <= set(used)  # and all are explained
 
 
 def test_a_throw_has_the_speed_of_the_hand_up_to_a_limit() -> None:

@@ -263,13 +263,15 @@ class Scenario:
         return {"format": FORMAT_VERSION, **_plain(self)}
 
     def save(self, path: str | Path) -> None:
-        """Write the scenario as YAML; file names in it stay valid from the new place."""
+        """Write the scenario as YAML, whole or not at all; file names in it stay valid from the new place."""
         target = Path(path).resolve()
         document = self._moved_to(target.parent).to_document()
-        target.write_text(
-            yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None),
-            encoding="utf-8",
+        text = yaml.safe_dump(
+            document, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None
         )
+        part = target.with_name(target.name + ".part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(target)
 
     def file(self, name: str) -> Path:
         """The path of a file that the scenario names."""

@@ -38,7 +38,9 @@ POLITE = 10  # niceness of a browser that draws without a graphics card beside t
 MOMENT = 5e-3  # [s] longer than a control period, in whose middle a pause may fall
 FRAME = 0.25  # [s] of simulated time between two pictures of an animation
 CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
-  if (notice.innerText.includes('Software WebGL')) notice.querySelector('button')?.click()"""  # of viser
+  if (notice.innerText.includes('Software WebGL')) {
+    notice.style.display = 'none'; notice.querySelector('button')?.click()
+  }"""  # of viser; it would fade out slowly
 FEW_FRAMES = """const waiting = new Map(), draw = window.requestAnimationFrame.bind(window);
 const now = key => {
   const [timer, done] = waiting.get(key) ?? [];

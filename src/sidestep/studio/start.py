@@ -20,7 +20,7 @@ DEFAULT_ROBOT = "fr3"
 TURN = 1.6  # [rad] of the first joint between start and goal
 BEND = 0.6  # [rad] of the second joint: a stretched arm cannot tell which way to fold
 BALL = 0.06  # [m] radius of the ball beside the way
-BESIDE = 0.18  # [m] between the ball and the way of the tip
+BESIDE = 0.10  # [m] between the ball and the way of the tip: the arm goes by without a stop, but yields
 
 
 def starting_scenario(

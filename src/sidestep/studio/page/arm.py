@@ -25,6 +25,10 @@ MOST_TRIANGLES = 60_000  # of an arm: a megabyte or two for each browser
 FIRST_CELL = 1e-3  # [m] detail that is given up first
 SHARP = 0.6  # [rad] edges sharper than this stay edges
 LEAST_REACH = 0.3  # [m] what the page is laid out for at least
+SAME, LEVER = (
+    5e-3,
+    0.3,
+)  # [m] links less apart than this are in one place, of which points lie this far from the frame
 TWO_DEVIATIONS = 4.0  # level of the ellipsoids of a body that is not calibrated: two standard deviations
 
 
@@ -37,6 +41,7 @@ class ArmView:
         self._frames: dict[str, Any] = {}
         self._meshes: dict[str, Any] = {}
         self._shades: dict[str, int] = {}
+        self._apart: tuple[Array, Array] = np.zeros(0), np.zeros(0)
         moving = {frame.name: frame.joint >= 0 for frame in robot.frames}
         for link, mesh in link_meshes(robot).items():
             self._frames[link] = server.scene.add_frame(f"{name}/{link}", show_axes=False)
@@ -75,6 +80,16 @@ class ArmView:
                 self._shades[link] = shade
                 self._meshes[link].color = colours.shade_colour(shade)
 
+    def hide_where_at(self, q: Array) -> None:
+        """Hides the links that are where they are at q (nv,): two surfaces in one place flicker."""
+        if np.array_equal(q, self._apart[0]) and np.array_equal(self._q, self._apart[1]):
+            return
+        self._apart = np.array(q), self._q
+        for link in self._moving:
+            if link in self._meshes:
+                moved = np.abs(self._robot.pose(q, link) - self._robot.pose(self._q, link))[:3]
+                self._meshes[link].visible = bool(moved[:, 3].max() + LEVER * moved[:, :3].max() > SAME)
+
     @property
     def q(self) -> Array:
         """The configuration (nv,) that is shown."""
@@ -93,11 +108,15 @@ class ArmView:
 class BodyView:
     """The ellipsoids of a body, fixed to the frames of an `ArmView` called `arm`."""
 
-    def __init__(self, server: viser.ViserServer, body: Body, arm: str, *, visible: bool) -> None:
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, body: Body, arm: str, *, visible: bool
+    ) -> None:
+        joints = {frame.name: frame.joint for frame in robot.frames}
         unit = trimesh.creation.icosphere(subdivisions=2)
         links = np.asarray(body.links)
         levels = np.full(len(links), TWO_DEVIATIONS) if body.levels is None else np.asarray(body.levels)
-        self._batches = []
+        self._batches: dict[str, Any] = {}
+        self._shades: dict[str, int] = {}
         for link in dict.fromkeys(body.links):
             own = np.flatnonzero(links == link)
             poses, scales = [], []
@@ -110,29 +129,37 @@ class BodyView:
                 poses.append(pose_vector(X))
                 scales.append(np.sqrt(levels[k] * values))
             vectors = np.array(poses)
-            self._batches.append(
-                server.scene.add_batched_meshes_simple(
-                    f"{arm}/{link}/body",
-                    unit.vertices.astype(np.float32),
-                    unit.faces.astype(np.uint32),
-                    batched_wxyzs=vectors[:, 3:],
-                    batched_positions=vectors[:, :3],
-                    batched_scales=np.array(scales),
-                    batched_colors=colours.batched_rgb(colours.BODY),
-                    opacity=0.6,
-                    cast_shadow=False,
-                    receive_shadow=False,
-                    visible=visible,
-                )
+            self._batches[link] = server.scene.add_batched_meshes_simple(
+                f"{arm}/{link}/body",
+                unit.vertices.astype(np.float32),
+                unit.faces.astype(np.uint32),
+                batched_wxyzs=vectors[:, 3:],
+                batched_positions=vectors[:, :3],
+                batched_scales=np.array(scales),
+                batched_colors=colours.batched(
+                    colours.rgb(colours.BASE if joints[link] < 0 else colours.LINK)
+                ),
+                opacity=0.6,
+                cast_shadow=False,
+                receive_shadow=False,
+                visible=visible,
             )
 
+    def colour(self, shades: dict[str, int]) -> None:
+        """Colours it as the links are, by their shades."""
+        for link, shade in shades.items():
+            if link in self._batches and self._shades.get(link, 0) != shade:
+                self._shades[link] = shade
+                colour = colours.batched(colours.shade_colour(shade))
+                self._batches[link].batched_colors = np.array(colour, dtype=np.uint8)
+
     def set_visible(self, visible: bool) -> None:
-        for batch in self._batches:
+        for batch in self._batches.values():
             batch.visible = visible
 
     def remove(self) -> None:
         """Takes it out of the scene."""
-        for batch in self._batches:
+        for batch in self._batches.values():
             batch.remove()
 
 

@@ -16,8 +16,8 @@ HALF = float(np.tan(0.5 * np.deg2rad(75.0)))  # of viser's angle of view, upward
 # Places in a window, in halves of its height from its middle: right and up. A window of 1280 x 800 pixels shows 0.77 to
 # either side between the panels.
 LOW, HIGH = np.array([-0.55, -0.60]), np.array([0.58, 0.30])  # of what is looked at
-CORNER, CORNER_SIDE = (-0.38, 0.66), 0.52  # middle and edge of what stands in the upper left
-LEAN = 0.35  # [rad] between its normal and the view: hills on it are seen from the side
+CORNER, CORNER_SIDE = (-0.36, 0.68), 0.50  # middle and edge of what stands in the upper left
+LEAN = 0.75  # [rad] between its normal and the view: hills on it are seen from the side
 ROUNDS = 30  # by then the distance changes by less than a part in a thousand
 
 

@@ -17,9 +17,9 @@ def rgb(colour: str) -> Rgb:
     return r, g, b
 
 
-def batched_rgb(colour: str) -> Rgb:
-    """The same for viser's batched meshes, whose colours are shown without the gamma of sRGB (viser 1.1)."""
-    encoded = np.array(to_rgb(colour))
+def batched(colour: Rgb) -> Rgb:
+    """The same colour for viser's batched meshes, which are shown without the gamma of sRGB (viser 1.1)."""
+    encoded = np.array(colour) / 255.0
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     r, g, b = np.round(255.0 * linear).astype(int).tolist()
     return r, g, b
@@ -29,16 +29,17 @@ OBSTACLE = palette.VERMILLION
 GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
 TRAIL = palette.GREEN
-BODY = palette.YELLOW
 METRIC = "#333333"
-SURFACE = "#B7C3A5"
+SURFACE, NET = "#B7C3A5", "#7D8A68"
 LINK, BASE = "#CBD3DE", "#9AA2AE"
+RIM = "#FBFF00"  # viser's own
 
 NEAR_FROM = 0.20  # [m] clearance at which a link begins to change its colour
 SHADES = 24  # steps of it: fewer messages, and nobody sees the difference
 
 LEGEND = (
-    (LINK, "link, far from obstacles"),
+    (LINK, "link, far from obstacles; the same for the ellipsoids of its body, which the controller sees"),
+    (BASE, "base, which does not move"),
     (
         NEAR,
         f"link near an obstacle (full colour: touching, fades out at {100 * NEAR_FROM:.0f} cm); nearest line",
@@ -46,9 +47,12 @@ LEGEND = (
     (OBSTACLE, "obstacle"),
     (GOAL, "goal: ghost arm; the gizmo at its tip has the colours of the axes"),
     (TRAIL, "where the tip has been; on the surface, where the joints are and have been"),
-    (BODY, "body: the ellipsoids that the controller sees"),
-    (SURFACE, "configuration space, curved by ψ; open where it is steep and high"),
+    (
+        SURFACE,
+        "configuration space, curved by ψ, with a net of darker lines; open where it is steep and high",
+    ),
     (METRIC, "metric: how freely the tip can move in each direction"),
+    (RIM, "rim of what the mouse can take"),
 )
 
 

@@ -80,7 +80,7 @@ class _View:
                 unit.faces.astype(np.uint32),
                 batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(thing.cloud), 1)),
                 batched_positions=thing.cloud,
-                batched_colors=colours.batched_rgb(colours.OBSTACLE),
+                batched_colors=colours.batched(colours.rgb(colours.OBSTACLE)),
             )
         elif solid.kind == "sphere":
             self.handle = server.scene.add_icosphere(name, solid.size[0], color=colour)

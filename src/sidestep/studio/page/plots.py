@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 SPAN = 12.0  # [s] that is shown
 EVERY = 0.4  # [s] of the wall clock between two drawings
-HEIGHT = 70  # [px]
+HEIGHT, TIMES = 66, 24  # [px] of a plot, and of the times below the last one
 
 # name, title with unit, factor, colour
 PLOTS = (
@@ -41,20 +41,24 @@ class Plots:
         self._rows: deque[tuple[float, ...]] = deque()
         self._drawn, self._stale = 0.0, False
         self._handles: list[Any] = []
-        for _, title, _, colour in PLOTS:
+        for name, title, _, colour in PLOTS:
+            last = name == PLOTS[-1][0]
             self._handles.append(
                 server.gui.add_uplot(
                     NOTHING,
                     ({"label": "t"}, {"label": title, "stroke": colour, "width": 2}),
                     title=title,
                     scales={"x": {"time": False, "range": (-SPAN, 0.0)}},
-                    axes=({"show": False}, {"size": 62, "space": 18}),
+                    axes=({"show": last, "size": TIMES, "space": 30}, {"size": 62, "space": 18}),
                     legend={"show": False},
                     cursor={"show": False},
-                    height=HEIGHT,
-                    padding=(6, 10, 6, 0),
+                    height=HEIGHT + TIMES * last,
+                    padding=(6, 10, 0 if last else 6, 0),
                 )
             )
+        server.gui.add_html(
+            '<div style="font-size:12px;text-align:center;margin-top:-8px">time before now [s]</div>'
+        )
 
     def add(self, snapshot: Snapshot, clearance: float) -> tuple[float, ...] | None:
         """Takes what is plotted, and returns it; a time before the last one (a restart) begins anew."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, Obstacles
+from sidestep._core import GeometricSystem, JointType, Obstacles
 from sidestep.body import Body
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
@@ -31,6 +31,8 @@ Array = npt.NDArray[np.float64]
 CELLS = 60  # along each joint: 6 degrees of a joint that turns all the way round
 SIDE = 1.2  # [m] of the surface in the scene
 TOP = 0.3  # [m] above the plane at which hills are cut off, and open: the walls at joint limits would hide the rest
+LINES, LIFT = 12, 2e-3  # of the net along each joint: of 30 degrees all the way round; [m] above the surface
+GAP = 0.03  # [m] between the surface and the text beside it
 LEAST_MOVE = 0.004  # [m] of an obstacle, or [rad] of a joint that is held, before it is computed again
 PAUSE = 0.3  # [s] at least between two of them: the page has other things to do
 TRAIL_POINTS, TRAIL_STEP = 150, 0.02  # [rad | m] of a joint between two points
@@ -181,6 +183,7 @@ class Surface:
         vertices, faces = grid.astype(np.float32), open_faces(z)
         if "surface" in self._parts:
             self._parts["surface"].vertices, self._parts["surface"].faces = vertices, faces
+            self._segments("net", net(z), colours.NET, thickness=1.5)
             return
         where = pose_vector(self._viewpoint.corner(SIDE))
         self._parts["root"] = self._server.scene.add_frame(
@@ -194,13 +197,14 @@ class Surface:
             side="double",
             cast_shadow=False,
         )
-        for k, (joint, side) in enumerate(
-            zip(request.joints, ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0)), strict=True)
-        ):
-            self._parts[f"label{k}"] = self._server.scene.add_label(
-                f"/surface/label{k}",
-                short_names(request.robot.coordinate_names)[joint],
-                position=(0.5 * SIDE + 0.06) * np.array(side),
+        self._segments("net", net(z), colours.NET, thickness=1.5)
+        half = 0.5 * SIDE
+        self._segments(
+            "axis", np.array([[[-half, half, 0.0], [-half, half, TOP]]]), colours.NET, thickness=2.5
+        )
+        for name, (text, place, anchor) in labels(request.robot, request.joints).items():
+            self._parts[name] = self._server.scene.add_label(
+                f"/surface/{name}", text, position=place, anchor=anchor, font_screen_scale=0.85
             )
 
     def _show_state(self, snapshot: Snapshot, robot: Robot, joints: tuple[int, int]) -> None:
@@ -208,18 +212,23 @@ class Surface:
         if not self._trail or np.abs(snapshot.q - self._trail[-1])[list(joints)].max() > TRAIL_STEP:
             self._trail.append(np.array(snapshot.q))
         line = np.array([*self.trail, on_surface(robot, joints, snapshot.q, self._heights)])
-        self._show_trail(np.stack([line[:-1], line[1:]], axis=1).astype(np.float32))
+        self._segments("trail", np.stack([line[:-1], line[1:]], axis=1), colours.TRAIL, thickness=4.0)
         self._mark("state", line[-1], colours.TRAIL)
         self._mark("goal", on_surface(robot, joints, snapshot.posture.q, self._heights), colours.GOAL)
 
-    def _show_trail(self, segments: npt.NDArray[np.float32]) -> None:
-        if "trail" in self._parts:
-            if not np.array_equal(self._parts["trail"].points, segments):
-                self._parts["trail"].points = segments
-            return
-        self._parts["trail"] = self._server.scene.add_line_segments(
-            "/surface/trail", segments, colours.rgb(colours.TRAIL), thickness=4.0, thickness_units="screen"
-        )
+    def _segments(self, name: str, ends: Array, colour: str, *, thickness: float) -> None:
+        """Lines between pairs of points (n, 2, 3), new or in place of those there were."""
+        segments = ends.astype(np.float32)
+        if name not in self._parts:
+            self._parts[name] = self._server.scene.add_line_segments(
+                f"/surface/{name}",
+                segments,
+                colours.rgb(colour),
+                thickness=thickness,
+                thickness_units="screen",
+            )
+        elif not np.array_equal(self._parts[name].points, segments):
+            self._parts[name].points = segments
 
     def _mark(self, name: str, place: Array, colour: str) -> None:
         if name not in self._parts:
@@ -287,3 +296,43 @@ def open_faces(z: Array) -> npt.NDArray[np.uint32]:
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     faces = np.stack([[a, b, c], [a, c, d]]).transpose(0, 2, 3, 1).reshape(-1, 3)
     return faces[(z.ravel()[faces] < TOP).all(axis=1)].astype(np.uint32)
+
+
+def net(z: Array) -> Array:
+    """Lines (n, 2, 3) on a grid of heights z (n, n) [m], along both joints, where it is below `TOP`."""
+    axis = np.linspace(-0.5 * SIDE, 0.5 * SIDE, len(z))
+    grid = np.stack([*np.meshgrid(axis, axis, indexing="ij"), z + LIFT], axis=-1)
+    every = (len(z) - 1) // LINES
+    along = [
+        np.stack([line[:-1], line[1:]], axis=1) for g in (grid, grid.swapaxes(0, 1)) for line in g[::every]
+    ]
+    segments = np.concatenate(along)
+    return segments[(segments[..., 2] < TOP + LIFT).all(axis=1)]
+
+
+def labels(robot: Robot, joints: tuple[int, int]) -> dict[str, tuple[str, Array, Any]]:
+    """Names and ends of the axes: text, place (3,) in the frame of the surface, and which part of the text is there."""
+    lower, upper = ranges(robot, joints)
+    names = short_names(robot.coordinate_names)
+    turns = {joint.coordinate for joint in robot.joints if joint.type == JointType.revolute}
+    half, found = 0.5 * SIDE, {}
+    anchors = ("top-left", "top-center", "top-right"), ("bottom-left", "center-left", "center-left")
+    for k, joint in enumerate(joints):
+        out = np.array([0.0, -half - GAP, 0.0]) if k == 0 else np.array([half + GAP, 0.0, 0.0])
+        here = [(-1.0, lower[k]), (0.0, names[joint]), (1.0, upper[k])]
+        for (side, value), anchor in zip(here, anchors[k], strict=True):
+            place = out + half * side * np.eye(3)[k]
+            unit = "°" if joint in turns else " m"
+            text = (
+                value
+                if isinstance(value, str)
+                else f"{np.rad2deg(value) if joint in turns else value:.0f}{unit}"
+            )
+            found[f"label{k}{side:+.0f}"] = text, place, anchor
+    found["label2+0"] = "0", np.array([-half - GAP, half, 0.0]), "center-right"
+    found["label2+1"] = (
+        f"ψ = {TOP / scale(robot, joints):.1f}",
+        np.array([-half, half, TOP + GAP]),
+        "bottom-center",
+    )
+    return found

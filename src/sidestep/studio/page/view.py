@@ -128,6 +128,8 @@ class View:
             self.obstacles.show(row.things, row.poses)
             self.arm.show(row.q)
             self.arm.colour({item.link: item.distance for item in self._clearances})
+            if self._body is not None:
+                self._body.colour(self.arm.shades)
             self.marks.show_nearest(self._clearances, visible=self._nearest.value)
             self.marks.show_metric(row.q, row.metric, visible=self._metric.value)
             self.tuning.show(snapshot)
@@ -137,6 +139,7 @@ class View:
             if index is None:
                 self.marks.show_trail(row.q, visible=self._trail.value)
                 self.goal.show(snapshot.goal, snapshot.goal_pose, snapshot.posture)
+                self.goal.ghost.hide_where_at(row.q)
                 self.surface.show(snapshot, self.robot, self._body_now, self._pair(), self._viewpoint)
                 added = self.plots.add(snapshot, self._clearances[0].distance if self._clearances else np.inf)
                 if snapshot.recording and added is not None:
@@ -336,7 +339,9 @@ class View:
         if self._body is not None:
             self._body.remove()
         self._recipe, self._body_now = recipe, make_body(self.robot, recipe)
-        self._body = BodyView(self._server, self._body_now, "/arm", visible=self._body_shown.value)
+        self._body = BodyView(
+            self._server, self.robot, self._body_now, "/arm", visible=self._body_shown.value
+        )
 
     def _pair(self) -> tuple[int, int] | None:
         """The two joints over which the curved space is shown, None when it is not."""
