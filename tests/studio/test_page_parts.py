@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sidestep import Body, ExactClearance, Robot, Scenario
+from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
 from sidestep.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS
@@ -29,6 +29,7 @@ from sidestep.studio.page.surface import (
     heights_over,
     labels,
     net,
+    on_surface,
     open_faces,
     seen,
 )
