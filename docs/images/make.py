@@ -1,7 +1,7 @@
 """Makes the pictures of the README: python docs/images/make.py [demo | studio | animation ...]
 
 Those of the studio need Chromium and `pip install 'sidestep[headless]'`; without a graphics card the animation takes
-minutes. As root, put `setpriv --bounding-set=-sys_nice` in front: else Chromium takes the processor before the loop.
+minutes.
 """
 
 import subprocess

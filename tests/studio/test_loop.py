@@ -7,13 +7,14 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import replace
 from multiprocessing import Pipe
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sidestep import Scenario
 from sidestep.studio import messages as m
-from sidestep.studio.headless import Window, check_files
+from sidestep.studio.headless import Window, check_files, save_animation
 from sidestep.studio.loop import Beginning, Loop, serve
 from sidestep.studio.studio import check_port
 
@@ -92,12 +93,35 @@ def test_a_port_that_is_taken_is_named() -> None:
 
 
 def test_pictures_need_a_place_and_a_known_format() -> None:
-    from pathlib import Path
-
     with pytest.raises(ValueError, match="--headless needs --screenshot FILE or --video FILE"):
         check_files(None, None)
-    with pytest.raises(ValueError, match=r"--video is way\.mp4; allowed: \.gif, \.webp"):
-        check_files(None, Path("way.mp4"))
+    with pytest.raises(ValueError, match=r"--video is way\.avi; allowed: \.gif, \.webp, \.mp4, \.webm"):
+        check_files(None, Path("way.avi"))
+    with pytest.raises(ValueError, match=r"--screenshot is nowhere/end\.png; there is no folder nowhere"):
+        check_files(Path("nowhere/end.png"), None)
+    check_files(Path("end.png"), Path("way.mp4"))
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm"])
+def test_a_video_shows_the_pictures_a_quarter_of_a_second_each(tmp_path: Path, suffix: str) -> None:
+    import av
+    from PIL import Image
+
+    colours = [(200, 30, 30), (30, 200, 30), (30, 30, 200)]
+    file = tmp_path / f"way{suffix}"
+    save_animation([Image.new("RGB", (321, 240), colour) for colour in colours], file)
+    with av.open(str(file)) as container:
+        frames = list(container.decode(video=0))
+    assert [frame.time for frame in frames] == pytest.approx(
+        [0.0, 0.25, 0.5], abs=1e-3
+    )  # clocks of the formats
+    assert (frames[0].width, frames[0].height) == (320, 240)
+    for frame, colour in zip(frames, colours, strict=True):
+        middle = frame.to_ndarray(format="rgb24")[120, 160]
+        np.testing.assert_allclose(middle, colour, atol=12)  # of 255: limited range and lossy
+
+
+def test_a_window_has_a_size() -> None:
     with pytest.raises(ValueError, match="--size is '10x10'; allowed: WIDTHxHEIGHT"):
         Window.from_text("10x10")
     assert Window.from_text("1920x1080") == Window(1920, 1080)

@@ -17,6 +17,7 @@ from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, film, find_
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.page.obstacles import gizmo_pose
+from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.page.surface import on_surface
 from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses
@@ -159,6 +160,7 @@ def test_three_browsers_see_the_same_one_of_them_in_a_notebook(
         assert differ(before, second.scene()).sum() > 1000  # [px] of the arm that moves
         words = second.page.locator("#words").inner_text()
         assert "0.5 s" in words
+        assert "status: system ok, torque program ok" in words
         assert looker.page.locator("#words").inner_text() == words
         until(lambda: frame.locator("#words").inner_text() == words, "the words in the notebook")
         assert second.errors == []
@@ -235,16 +237,55 @@ def test_a_shipped_scenario_is_one_click_away(studio: Studio, looker: Looker) ->
     assert last(studio).method == "written"  # as it is written for
 
 
-def test_the_thesis_is_one_click_away(
-    studio: Studio, looker: Looker, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Up to where it is loaded: its arm has a body that takes long to make."""
-    loaded: list[Scenario] = []
-    monkeypatch.setattr(studio.view, "load", lambda scenario, **_: loaded.append(scenario))
+def test_the_thesis_is_one_click_away_with_its_arm_of_seven_joints(studio: Studio, looker: Looker) -> None:
     looker.tab("Scenario")
     looker.press("6.2.3")
-    until(lambda: len(loaded) == 1, "the scenario")
-    assert loaded == [Scenario.load("thesis-6.2.3")]
+    until(lambda: last(studio).scenario == Scenario.load("thesis-6.2.3"), "the scenario")
+    assert last(studio).method == "written"
+    until(lambda: last(studio).time > 0.2, "some steps")
+    studio.send(m.SetRunning(False))
+    until(lambda: not last(studio).running, "the pause")
+    robot, now = studio.view.robot, last(studio)
+    assert robot.num_coordinates == len(now.q) == 7
+    assert len(now.values) == 1  # one density, as the file says
+    with_arm = looker.image()
+    studio.view.arm.root.visible = False
+    changed = differ(with_arm, looker.image())
+    studio.view.arm.root.visible = True
+    x, y = looker.on_screen(robot.pose(now.q, "fr3_link4")[:3, 3])
+    assert changed[round(y) - 12 : round(y) + 12, round(x) - 12 : round(x) + 12].any()
+    looker.tab("Goal")
+    looker.type("joint7 [°]", "50")
+    until(lambda: bool(np.isclose(last(studio).posture.q[6], np.deg2rad(50.0))), "the goal")
+    looker.tab("Obstacles")
+    for count in (4, 5):  # beside the three balls
+        looker.press("Add")
+        until(lambda count=count: len(last(studio).things) == count, "a ball more")  # type: ignore[misc]
+    after = last(studio)
+    exact = ExactClearance(robot, [solid for thing in after.things[3:] for solid in thing.solids])
+    for q in (after.q, after.posture.q):
+        assert exact.distance(q, solid_poses(after.things[3:], after.poses[3:])).distance > CLEAR
+    run_to(studio, after.time + 0.3)
+    assert last(studio).touched == 0
+
+
+def test_a_ghost_is_not_drawn_where_the_arm_is(studio: Studio, looker: Looker) -> None:
+    ghost, here = studio.view.goal.ghost, last(studio).q
+    shown = lambda: {link: bool(mesh.visible) for link, mesh in ghost._meshes.items()}  # noqa: E731
+    studio.send(m.SetJointGoal(here))
+    until(lambda: not any(shown().values()), "no ghost")
+    studio.send(m.SetJointGoal(here + np.array([0.0, 0.2])))
+    until(lambda: shown() == {"link1": False, "link2": True}, "the ghost of the second link")
+
+
+def test_a_body_has_the_colours_of_its_links(studio: Studio, looker: Looker) -> None:
+    tip = studio.view.robot.pose(last(studio).q, studio.view.tip)
+    tip[1, 3] -= 0.15  # [m] the second link is near, the first is not
+    studio.send(m.DragThing("ball", tip))
+    body = studio.view._body
+    assert body is not None
+    until(lambda: studio.view.arm.shades.get("link2", 0) > 5, "a colour")
+    until(lambda: body._shades == studio.view.arm.shades, "the same colours")
 
 
 def test_a_pose_goal_is_saved_and_loaded_on_the_page(studio: Studio, looker: Looker, folder: Path) -> None:

@@ -47,7 +47,8 @@ def studio(
         Path | None, typer.Option(help="With --headless: picture (.png) of the end.")
     ] = None,
     video: Annotated[
-        Path | None, typer.Option(help="With --headless: animation (.gif or .webp) of the way.")
+        Path | None,
+        typer.Option(help="With --headless: animation (.gif, .webp) or video (.mp4, .webm) of the way."),
     ] = None,
     duration: Annotated[
         float, typer.Option(min=0.5, max=600.0, help="With --headless: for how long [s of simulated time].")

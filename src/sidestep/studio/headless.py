@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import io
 import os
 import shutil
+import sys
 import time as clock
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +38,7 @@ LOAD_TIME = 90.0  # [s] at most until the page shows the scene
 BODY_TIME = 1800.0  # [s] at most until the body is made, the first time
 PICTURE_TIME = 180.0  # [s] at most for one picture: without a graphics card each takes seconds
 POLITE = 10  # niceness of a browser that draws without a graphics card beside the loop
+DROP_CAPABILITY, RAISE_PRIORITY = 24, 23  # PR_CAPBSET_DROP and CAP_SYS_NICE of Linux
 MOMENT = 5e-3  # [s] longer than a control period, in whose middle a pause may fall
 FRAME = 0.25  # [s] of simulated time between two pictures of an animation
 CLOSE_NOTICE = """for (const notice of document.querySelectorAll('[role=alert]'))
@@ -54,7 +58,9 @@ window.requestAnimationFrame = done => {
 window.cancelAnimationFrame = key => { clearTimeout(waiting.get(key)?.[0]); waiting.delete(key); };
 window.drawn = () => new Promise(done => { [...waiting.keys()].forEach(now); draw(done); });
 """  # four a second, others when asked for by `drawn`
+ANIMATIONS = (".gif", ".webp")
 ANIMATION_WIDTH = 800  # [px]
+CODECS = {".mp4": ("libx264", {"crf": "18"}), ".webm": ("libvpx-vp9", {"crf": "24", "b": "0"})}  # of videos
 
 
 @dataclass(frozen=True)
@@ -100,12 +106,19 @@ def browser(*, flags: tuple[str, ...] = (*FLAGS, FAST)) -> Iterator[Any]:
     path = check_browser()
     from playwright.sync_api import sync_playwright
 
+    stay_polite()
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path, args=list(flags))
         try:
             yield chromium
         finally:
             chromium.close()
+
+
+def stay_polite() -> None:
+    """Keeps browsers that this thread starts as root from putting themselves before the loop, in order to draw."""
+    if sys.platform == "linux" and os.geteuid() == 0:
+        ctypes.CDLL(None).prctl(DROP_CAPABILITY, RAISE_PRIORITY, 0, 0, 0)
 
 
 def new_page(chromium: Any, window: Window) -> Page:
@@ -196,17 +209,26 @@ def picture(studio: Studio, page: Page) -> bytes:
 
 
 def check_files(screenshot: Path | None, video: Path | None) -> None:
-    """Raises ValueError when there is nothing to write, or in another format than those known."""
+    """Raises ValueError when there is nothing to write, or no folder for it, or in another format than those known;
+    FileNotFoundError when what writes the format is not installed."""
     if screenshot is None and video is None:
         raise ValueError("--headless needs --screenshot FILE or --video FILE")
     if screenshot is not None and screenshot.suffix.lower() != ".png":
         raise ValueError(f"--screenshot is {screenshot}; allowed: .png")
-    if video is not None and video.suffix.lower() not in (".gif", ".webp"):
-        raise ValueError(f"--video is {video}; allowed: .gif, .webp")
+    if video is not None and video.suffix.lower() not in (*ANIMATIONS, *CODECS):
+        raise ValueError(f"--video is {video}; allowed: {', '.join((*ANIMATIONS, *CODECS))}")
+    for option, file in (("--screenshot", screenshot), ("--video", video)):
+        if file is not None and not file.resolve().parent.is_dir():
+            raise ValueError(f"{option} is {file}; there is no folder {file.parent}")
+    if video is not None and video.suffix.lower() in CODECS and importlib.util.find_spec("av") is None:
+        raise FileNotFoundError(f"--video {video} needs PyAV: pip install 'sidestep[headless]'")
 
 
 def save_animation(frames: list[Image.Image], path: Path) -> None:
-    """Writes pictures as an animation, `FRAME` apart."""
+    """Writes pictures as an animation or a video, `FRAME` apart."""
+    if path.suffix.lower() in CODECS:
+        save_video(frames, path)
+        return
     width = min(ANIMATION_WIDTH, frames[0].width)
     height = round(frames[0].height * width / frames[0].width)
     small = [frame.resize((width, height), Image.Resampling.LANCZOS) for frame in frames]
@@ -216,3 +238,18 @@ def save_animation(frames: list[Image.Image], path: Path) -> None:
         )  # keeps small things' colours
         small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in small]
     small[0].save(path, save_all=True, append_images=small[1:], duration=round(1e3 * FRAME), loop=0)
+
+
+def save_video(frames: list[Image.Image], path: Path) -> None:
+    """Writes pictures as a video, `FRAME` apart, at full size."""
+    import av
+
+    codec, options = CODECS[path.suffix.lower()]
+    with av.open(str(path), "w") as container:
+        stream: Any = container.add_stream(codec, rate=Fraction(1.0 / FRAME), options=options)
+        stream.width, stream.height = (size - size % 2 for size in frames[0].size)  # as the codecs ask for
+        stream.pix_fmt = "yuv420p"
+        for frame in frames:
+            whole = frame.crop((0, 0, stream.width, stream.height))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.asarray(whole), format="rgb24")))
+        container.mux(stream.encode())

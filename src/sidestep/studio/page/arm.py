@@ -33,9 +33,17 @@ TWO_DEVIATIONS = 4.0  # level of the ellipsoids of a body that is not calibrated
 
 
 class ArmView:
-    """An arm; `ghost` makes it see-through, in the colour of the goal."""
+    """An arm of `link_meshes`; `ghost` makes it see-through, in the colour of the goal."""
 
-    def __init__(self, server: viser.ViserServer, robot: Robot, name: str, *, ghost: bool = False) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        meshes: dict[str, trimesh.Trimesh],
+        name: str,
+        *,
+        ghost: bool = False,
+    ) -> None:
         self._robot, self._name = robot, name
         self.root = server.scene.add_frame(name, show_axes=False)
         self._frames: dict[str, Any] = {}
@@ -43,7 +51,7 @@ class ArmView:
         self._shades: dict[str, int] = {}
         self._apart: tuple[Array, Array] = np.zeros(0), np.zeros(0)
         moving = {frame.name: frame.joint >= 0 for frame in robot.frames}
-        for link, mesh in link_meshes(robot).items():
+        for link, mesh in meshes.items():
             self._frames[link] = server.scene.add_frame(f"{name}/{link}", show_axes=False)
             colour = colours.GOAL if ghost else colours.LINK if moving[link] else colours.BASE
             if ghost and not moving[link]:
@@ -177,10 +185,13 @@ def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:
         if shapes:
             merged: Any = trimesh.util.concatenate([trimesh.Trimesh(s.vertices, s.faces) for s in shapes])
             whole[link.name] = merged
-    meshes, cell = dict(whole), FIRST_CELL
-    while sum(len(mesh.faces) for mesh in meshes.values()) > MOST_TRIANGLES:
+    meshes, cell = whole, FIRST_CELL
+    while (count := sum(len(mesh.faces) for mesh in meshes.values())) > MOST_TRIANGLES:
+        if meshes is not whole:
+            cell *= max(
+                1.1, np.sqrt(count / MOST_TRIANGLES)
+            )  # triangles are as many as there are cells on a surface
         meshes = {name: simplified(mesh, cell) for name, mesh in whole.items()}
-        cell *= 1.3
     return {name: trimesh.graph.smooth_shade(mesh, angle=SHARP) for name, mesh in meshes.items()}
 
 

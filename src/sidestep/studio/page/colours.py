@@ -42,14 +42,16 @@ LEGEND = (
     (BASE, "base, which does not move"),
     (
         NEAR,
-        f"link near an obstacle (full colour: touching, fades out at {100 * NEAR_FROM:.0f} cm); nearest line",
+        f"link near an obstacle (full colour: touching, fades out at {100 * NEAR_FROM:.0f} cm); nearest line: "
+        "both on the exact meshes",
     ),
     (OBSTACLE, "obstacle"),
     (GOAL, "goal: ghost arm; the gizmo at its tip has the colours of the axes"),
     (TRAIL, "where the tip has been; on the surface, where the joints are and have been"),
     (
         SURFACE,
-        "configuration space, curved by ψ, with a net of darker lines; open where it is steep and high",
+        "configuration space over two joints, the others as they are, curved by ψ, with a net of darker lines; open "
+        "where it is high; a second or so behind",
     ),
     (METRIC, "metric: how freely the tip can move in each direction"),
     (RIM, "rim of what the mouse can take"),

@@ -17,6 +17,7 @@ from sidestep.studio.page.arm import ArmView, reach, short_names
 from sidestep.studio.page.obstacles import gizmo_pose
 
 if TYPE_CHECKING:
+    import trimesh
     import viser
 
 Array = npt.NDArray[np.float64]
@@ -31,11 +32,16 @@ class GoalControl:
     """
 
     def __init__(
-        self, server: viser.ViserServer, robot: Robot, tip: str, send: Callable[[m.Command], None]
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        meshes: dict[str, trimesh.Trimesh],
+        tip: str,
+        send: Callable[[m.Command], None],
     ) -> None:
         self._robot, self._tip, self._send = robot, tip, send
         self.q = np.array(robot.neutral)
-        self.ghost = ArmView(server, robot, "/goal", ghost=True)
+        self.ghost = ArmView(server, robot, meshes, "/goal", ghost=True)
         self.gizmo = server.scene.add_transform_controls(
             "/goal_gizmo", scale=GIZMO_SIZE * reach(robot), depth_test=False, line_width=3.0
         )

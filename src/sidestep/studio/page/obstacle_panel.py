@@ -14,6 +14,7 @@ import numpy.typing as npt
 from sidestep.obstacles import load_point_cloud
 from sidestep.pose import from_quaternion, pose_at
 from sidestep.studio import messages as m
+from sidestep.studio.page.note import add_note
 from sidestep.studio.page.placing import Ball, Camera, free_place
 from sidestep.studio.things import CLOUD_RADIUS, Thing, ball, box, cloud, scattered, thinned
 
@@ -35,7 +36,8 @@ class ObstaclePanel:
         self._view = view
         gui = server.gui
         gui.add_markdown(
-            "Drag an obstacle in the scene to move it; with **shift** held, letting go throws it."
+            "Drag an obstacle in the scene to move it; with **shift** held, letting go throws it. While the loop is "
+            "paused it is put where the mouse is."
         )
         self._kind = gui.add_dropdown("new", ("ball", "box", "cloud"))
         self._size = gui.add_slider(
@@ -44,25 +46,23 @@ class ObstaclePanel:
             max=30.0,
             step=0.5,
             initial_value=6.0,
-            hint="Radius of a ball, edge of a box or of a plate of points.",
         )
-        add = gui.add_button("Add", hint="Near the goal, where it is free; drag it where you want it.")
-        add.on_click(self._add)
-        upload = gui.add_upload_button(
-            "Add a point cloud file …", hint="A .ply, .pcd or .npy; it is thinned."
+        gui.add_button("Add").on_click(self._add)
+        add_note(
+            gui,
+            "A ball of this radius, a box or plate of points of this edge: near the goal, where it is free.",
         )
-        upload.on_upload(self._upload)
+        gui.add_upload_button("Add a point cloud file …").on_upload(self._upload)
+        add_note(gui, "A .ply, .pcd or .npy, thinned; where it says, if it is free there.")
         self._folder = Path(tempfile.mkdtemp(prefix="sidestep-studio-"))
         atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
         gui.add_divider()
         self._chosen: Any = gui.add_dropdown("obstacle", (NONE,))
-        self._place: Any = gui.add_vector3(
-            "position [m]", (0.0, 0.0, 0.0), step=0.01, hint="Where it is; change it to move it."
-        )
+        self._place: Any = gui.add_vector3("position [m]", (0.0, 0.0, 0.0), step=0.01)
         self._place.on_update(self._moved)
         self._speed = gui.add_slider("speed [m/s]", min=0.1, max=2.0, step=0.1, initial_value=0.5)
-        throw = gui.add_button("Throw at the arm", hint="From where it is towards the tip.")
-        throw.on_click(self._throw)
+        gui.add_button("Throw at the arm").on_click(self._throw)
+        add_note(gui, "From where it is towards the tip.")
         remove = gui.add_button("Remove")
         remove.on_click(self._remove)
         self._chosen.on_update(self._chose)

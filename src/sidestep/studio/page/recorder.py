@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.studio import messages as m
+from sidestep.studio.page.note import add_note
 
 if TYPE_CHECKING:
     import viser
@@ -32,19 +33,19 @@ class Recorder:
         self.plotted: list[tuple[float, ...]] = []
         self._replaying, self._since, self._of_this_arm = False, 0.0, True
         gui = server.gui
-        buttons = gui.add_button_group("record", ("Record", "Stop"), hint="200 states a second.")
-        buttons.on_click(self._on_record)
-        replay = gui.add_button_group(
-            "replay", ("Play", "Live"), hint="Play shows the recording, Live the loop."
-        )
-        replay.on_click(self._on_replay)
+        gui.add_button_group("record", ("Record", "Stop")).on_click(self._on_record)
+        gui.add_button_group("replay", ("Play", "Live")).on_click(self._on_replay)
         self._slider: Any = gui.add_slider(
             "moment [s]", min=0.0, max=1.0, step=0.01, initial_value=0.0, disabled=True
         )
         self._slider.on_update(self._on_moment)
-        save = gui.add_button("Download recording", hint="NumPy's .npz: time [s], q [rad], poses, names.")
-        save.on_click(self._on_save)
-        self.state: Any = gui.add_markdown("nothing recorded; Restart and loading end a recording")
+        gui.add_button("Download recording").on_click(self._on_save)
+        self.state: Any = gui.add_markdown("nothing recorded")
+        add_note(
+            gui,
+            "200 states a second; Restart and loading end a recording. Play shows it, Live the loop. The download is "
+            "NumPy's .npz: time [s], q [rad], poses and names of obstacles.",
+        )
 
     @property
     def replaying(self) -> bool:

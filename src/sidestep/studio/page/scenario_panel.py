@@ -10,6 +10,7 @@ import yaml
 
 from sidestep.scenario import Scenario, shipped_scenarios
 from sidestep.studio.export import not_kept, save_scenario, scenario_now
+from sidestep.studio.page.note import add_note
 
 if TYPE_CHECKING:
     import viser
@@ -26,18 +27,17 @@ class ScenarioPanel:
     def __init__(self, server: viser.ViserServer, view: View, folder: Path) -> None:
         self._view, self._folder = view, folder
         gui = server.gui
-        thesis = gui.add_button_group("thesis", THESIS, hint="Scenarios of the thesis, by section.")
-        thesis.on_click(self._load_thesis)
+        gui.add_button_group("thesis", THESIS).on_click(self._load_thesis)
+        add_note(gui, "Scenarios of the thesis, by section, with the method they are written for.")
         self._shipped: Any = gui.add_dropdown("shipped", shipped_scenarios())
         gui.add_button("Load").on_click(self._load_shipped)
         self._upload: Any = gui.add_upload_button("Load a file …", mime_type=".yaml,.yml")
         self._upload.on_upload(self._load_upload)
         gui.add_divider()
         self._name: Any = gui.add_text("name", "my-scenario")
-        gui.add_button("Save", hint=f"Arm, goal and obstacles as they are now, in {folder}.").on_click(
-            self._save
-        )
+        gui.add_button("Save").on_click(self._save)
         gui.add_button("Download").on_click(self._download)
+        add_note(gui, f"Arm, goal, obstacles and method as they are now; Save writes into {folder}.")
 
     def _load_thesis(self, event: Any) -> None:
         self._view.load(Scenario.load(f"thesis-{event.target.value}"))

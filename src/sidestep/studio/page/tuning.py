@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from sidestep.studio import messages as m
 from sidestep.studio.export import python_snippet
 from sidestep.studio.methods import METHODS, Method, Numbers, method_named
+from sidestep.studio.page.note import add_note
 
 if TYPE_CHECKING:
     import viser
@@ -29,12 +30,12 @@ class TuningPanel:
         self._sentence = gui.add_markdown("")
         self._folder = gui.add_folder("Parameters")
         self._sliders: dict[str, Any] = {}
+        self._notes: list[Any] = []
         self._shown: Method | None = None
         self._timer: threading.Timer | None = None
         gui.add_button("Recommended values").on_click(self._reset)
-        gui.add_button("Export as Python", hint="The system with these numbers, as code.").on_click(
-            self._export
-        )
+        gui.add_button("Export as Python").on_click(self._export)
+        add_note(gui, "The system with these numbers, as code.")
 
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows the method and the numbers that the loop has."""
@@ -53,9 +54,9 @@ class TuningPanel:
         self._shown = method
         self._choice.value = method.label
         self._sentence.content = method.sentence
-        for slider in self._sliders.values():
-            slider.remove()
-        self._sliders = {}
+        for part in (*self._sliders.values(), *self._notes):
+            part.remove()
+        self._sliders, self._notes = {}, []
         with self._folder:
             for parameter in method.parameters:
                 unit = f" [{parameter.unit}]" if parameter.unit else ""
@@ -66,11 +67,11 @@ class TuningPanel:
                     max=max(parameter.upper, value),
                     step=(parameter.upper - parameter.lower) / 1000.0,
                     initial_value=value,
-                    hint=f"{parameter.sentence} From {parameter.lower:g} to {parameter.upper:g}, "
-                    f"recommended {parameter.default:g}.",
                 )
                 slider.on_update(self._moved)
                 self._sliders[parameter.name] = slider
+                note = f"{parameter.sentence} Recommended: {parameter.default:g}."
+                self._notes.append(add_note(self._server.gui, note))
 
     def _chose(self, event: Any) -> None:
         if event.client is not None:

@@ -20,7 +20,7 @@ from sidestep.simulation.clearance import Clearance
 from sidestep.studio import messages as m
 from sidestep.studio.methods import method_named
 from sidestep.studio.page import colours
-from sidestep.studio.page.arm import ArmView, BodyView, reach
+from sidestep.studio.page.arm import ArmView, BodyView, link_meshes, reach
 from sidestep.studio.page.camera import Viewpoint
 from sidestep.studio.page.goal import GoalControl
 from sidestep.studio.page.marks import Marks
@@ -237,9 +237,12 @@ class View:
             if snapshot.contacts
             else "touches nothing"
         )
+        system, torque = snapshot.status
+        status = [f"status: system {system}, torque program {torque}"] if system else []
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
         least = f", least so far {1e3 * self.least_clearance:.0f} mm"
-        facts = [*self._nearest_facts(snapshot.things, least), f"{touch} · {snapshot.time:.1f} s · {speed}"]
+        state = f"{touch} · {snapshot.time:.1f} s · {speed}"
+        facts = [*self._nearest_facts(snapshot.things, least), state, *status]
         self._tell(now, begun(snapshot.words), facts)
 
     def _show_replay_words(self, now: float, row: m.Row) -> None:
@@ -297,18 +300,12 @@ class View:
 
     def _add_switches(self) -> None:
         gui = self._server.gui
-        self._ghost = gui.add_checkbox("goal", True, hint="The ghost arm and its gizmo.")
-        self._body_shown = gui.add_checkbox("body", False, hint="The ellipsoids that the controller sees.")
-        self._nearest = gui.add_checkbox("nearest line", True, hint="On the exact meshes.")
-        self._trail = gui.add_checkbox("trail", True, hint="Where the tip has been.")
-        self._metric = gui.add_checkbox(
-            "metric", False, hint="How freely the tip can move in each direction."
-        )
-        self._curved = gui.add_checkbox(
-            "curved space",
-            False,
-            hint="ψ over two joints, the others held where they are; a second or so behind.",
-        )
+        self._ghost = gui.add_checkbox("goal", True)
+        self._body_shown = gui.add_checkbox("body", False)
+        self._nearest = gui.add_checkbox("nearest line", True)
+        self._trail = gui.add_checkbox("trail", True)
+        self._metric = gui.add_checkbox("metric", False)
+        self._curved = gui.add_checkbox("curved space", False)
         self._first: Any = gui.add_dropdown("over", ("-",))
         self._second: Any = gui.add_dropdown("and", ("-",))
         gui.add_html(colours.legend_html())
@@ -321,11 +318,12 @@ class View:
         names = tuple(robot.coordinate_names)
         self._first.options = self._second.options = names
         self._first.value, self._second.value = names[0], names[min(1, len(names) - 1)]
-        self.arm = ArmView(self._server, robot, "/arm")
+        meshes = link_meshes(robot)
+        self.arm = ArmView(self._server, robot, meshes, "/arm")
         self.marks = Marks(self._server, robot, self.tip)
         self._body: BodyView | None = None
         with self._goal_tab:
-            self.goal = GoalControl(self._server, robot, self.tip, self._send)
+            self.goal = GoalControl(self._server, robot, meshes, self.tip, self._send)
         self._show_goal()
 
     def _remove_robot(self) -> None:
