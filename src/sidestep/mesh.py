@@ -33,12 +33,13 @@ def simplified(mesh: trimesh.Trimesh, cell: float) -> trimesh.Trimesh:
     import trimesh
 
     keys = np.floor(mesh.vertices / cell).astype(np.int64)
-    _, cluster = np.unique(keys, axis=0, return_inverse=True)
-    cluster = cluster.reshape(-1)
+    keys -= keys.min(axis=0)
+    _, cluster = np.unique(np.ravel_multi_index(keys.T, keys.max(axis=0) + 1), return_inverse=True)
     counts = np.bincount(cluster)
     means = np.stack([np.bincount(cluster, mesh.vertices[:, k]) / counts for k in range(3)], axis=1)
     faces = cluster[mesh.faces]
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     faces = faces[distinct]
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    corners = np.sort(faces, axis=1).T
+    _, first = np.unique(np.ravel_multi_index(corners, 3 * (len(means),)), return_index=True)
     return trimesh.Trimesh(means, faces[np.sort(first)], process=False)

@@ -11,7 +11,7 @@ import pytest
 from sidestep import Scenario
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
-from sidestep.studio.headless import browser
+from sidestep.studio.headless import browser, driver
 from sidestep.studio.session import Session
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
@@ -36,8 +36,14 @@ def make_session() -> Callable[..., Session]:
 
 
 @pytest.fixture(scope="session")
-def chromium() -> Iterator[Any]:
-    with browser() as started:
+def playwright() -> Iterator[Any]:
+    with driver() as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def chromium(playwright: Any) -> Iterator[Any]:
+    with browser(playwright) as started:
         yield started
 
 

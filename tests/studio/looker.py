@@ -18,7 +18,7 @@ from sidestep.studio.page.view import MAIN_WIDTH, PLOT_WIDTH
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
 
-PATIENCE = 60.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
+PATIENCE = 120.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
 PASSIVE = "Unable to preventDefault inside passive event listener"  # the browser's own note on viser's lists
 WINDOW = Window(1080, 560)
 PANELS = PLOT_WIDTH + 10, MAIN_WIDTH + 10  # [px] at the sides of a scene

@@ -96,8 +96,8 @@ def jupyter(tmp_path: Path) -> Iterator[str]:
 
 
 @pytest.fixture
-def chromium() -> Iterator[Any]:
-    with browser(flags=FLAGS) as started:
+def chromium(playwright: Any) -> Iterator[Any]:
+    with browser(playwright, flags=FLAGS) as started:
         yield started
 
 

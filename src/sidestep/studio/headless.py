@@ -101,18 +101,24 @@ def check_browser() -> str:
 
 
 @contextmanager
-def browser(*, flags: tuple[str, ...] = (*FLAGS, FAST)) -> Iterator[Any]:
-    """A hidden Chromium, as Playwright's `Browser`; raises FileNotFoundError, see `check_browser`."""
-    path = check_browser()
+def driver() -> Iterator[Any]:
+    """What starts browsers, of which a thread can have one: Playwright; FileNotFoundError, see `check_browser`."""
+    check_browser()
     from playwright.sync_api import sync_playwright
 
     stay_polite()
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=list(flags))
-        try:
-            yield chromium
-        finally:
-            chromium.close()
+        yield playwright
+
+
+@contextmanager
+def browser(playwright: Any, *, flags: tuple[str, ...] = (*FLAGS, FAST)) -> Iterator[Any]:
+    """A hidden Chromium, as Playwright's `Browser`."""
+    chromium = playwright.chromium.launch(executable_path=check_browser(), args=list(flags))
+    try:
+        yield chromium
+    finally:
+        chromium.close()
 
 
 def stay_polite() -> None:
@@ -160,7 +166,7 @@ def take_pictures(
         studio.send(m.Restart(until=0.0))  # a moving scene would leave little time to load the page
         if hasattr(os, "nice"):
             os.nice(POLITE)  # of the browser that is begun now; the loop runs already
-        with browser() as chromium:
+        with driver() as playwright, browser(playwright) as chromium:
             page = new_page(chromium, window)
             go_to(page, studio.address)
             film(studio, page, duration=duration, screenshot=screenshot, video=video)
