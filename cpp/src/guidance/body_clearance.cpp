@@ -171,6 +171,7 @@ void BodyClearance::add_reach(Item& item, const Link& link) const {
 
 BodyClearance::Workspace::Workspace(const BodyClearance& body)
     : poses_(body.robot_.joints().size()),
+      centres_(body.links_.size()),
       motions_(body.items_.size()),
       curvatures_(body.items_.size()),
       q_(body.robot_.num_coordinates()),
@@ -200,6 +201,10 @@ void BodyClearance::place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) con
       child.p += position * (child.R * joint.axis);
     }
   }
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    const Workspace::Pose& X = pose(w, links_[i].joint);
+    w.centres_[i] = X.p + X.R * links_[i].centre;
+  }
 }
 
 const BodyClearance::Workspace::Pose& BodyClearance::pose(const Workspace& w, int joint) const noexcept {
@@ -212,9 +217,8 @@ BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obst
                                          Workspace& w) const noexcept {
   const Link& link = links_[static_cast<std::size_t>(item.link)];
   if (item.other >= 0) {
-    const Link& other = links_[static_cast<std::size_t>(item.other)];
     const Asked gap_asked{asked.cap + item.contact, asked.near + item.contact, asked.stop + item.contact};
-    const double gap = look_at_pair(link, other, gap_asked, w);
+    const double gap = look_at_pair(item, gap_asked, w);
     return {gap < gap_asked.cap ? gap - item.contact : asked.cap, -1};  // exactly the cap where nothing is nearer
   }
   if (item.plane >= 0) {
@@ -263,8 +267,8 @@ BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obsta
     }
     const Ellipsoid& e = link.ellipsoids[i];
     const kernels::PlacedEllipsoid ellipsoid = placed(X.p + X.R * e.mean, e.axes_T * X.R.transpose(), e.squares, e.extent);
-    const auto measure = [&](const Balls& balls, int first, int count, double least, float* values) {
-      return distances(ellipsoid, balls, first, count, least, values);
+    const auto measure = [&](const auto& nodes, int first, int count, double least, float* values) {
+      return distances(ellipsoid, nodes, first, count, least, values);
     };
     const PointTree::Nearest at = tree.nearest(found.clearance, asked.stop, measure);
     if (at.point >= 0) {
@@ -274,18 +278,19 @@ BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obsta
   return found;
 }
 
-double BodyClearance::look_at_pair(const Link& a, const Link& b, const Asked& asked, const Workspace& w) const noexcept {
-  const Workspace::Pose &X = pose(w, a.joint), &Y = pose(w, b.joint);
-  const Eigen::Vector3d between = Y.p + Y.R * b.centre - X.p - X.R * a.centre;
+double BodyClearance::look_at_pair(const Item& item, const Asked& asked, const Workspace& w) const noexcept {
+  const auto first = static_cast<std::size_t>(item.link), second = static_cast<std::size_t>(item.other);
+  const Link &a = links_[first], &b = links_[second];
   double least = asked.cap;
   const double far = a.radius + b.radius + asked.cap;
-  const double squared = between.squaredNorm();
+  const double squared = (w.centres_[second] - w.centres_[first]).squaredNorm();
   if (far <= 0.0 || squared >= far * far) {
     return least;
   }
   if (const double around = std::sqrt(squared) - a.radius - b.radius; around >= asked.near) {
     return around;
   }
+  const Workspace::Pose &X = pose(w, a.joint), &Y = pose(w, b.joint);
   // In the frame of a's joint, where the centres of a stand still.
   const Eigen::Matrix3d R_XY = X.R.transpose() * Y.R;
   const Eigen::Vector3d p_XY = X.R.transpose() * (Y.p - X.p);

@@ -26,8 +26,8 @@ double distance(const Eigen::Vector3d& x, const Obstacles& obstacles, double lim
   for (const int i : {0, 4, 8}) {
     point.axes[i] = 1.0;
   }
-  const auto measure = [&](const Balls& balls, int first, int count, double least, float* values) {
-    return distances(point, balls, first, count, least, values);
+  const auto measure = [&](const auto& nodes, int first, int count, double least, float* values) {
+    return distances(point, nodes, first, count, least, values);
   };
   return obstacles.tree().nearest(limit, -std::numeric_limits<double>::infinity(), measure).distance;
 }

@@ -71,45 +71,48 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
 
 PointTree::Level::Level(int count) : size(count) {
   const std::size_t room = groups(static_cast<std::size_t>(count), fan_out) * fan_out + leaf_size - fan_out;
-  for (std::vector<double>* centre : {&x, &y, &z}) {
-    centre->assign(room, padding);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    centre[axis].assign(room, padding);
+    half[axis].assign(room, 0.0);
   }
+  largest.assign(room, 0.0);
   radius.assign(room, 0.0);
 }
 
 void PointTree::refit() noexcept {
-  // A node's ball is around the middle of the box of the centres below it.
-  const auto fit = [](int first, int count, auto&& member) {
-    Eigen::Vector3d low = Eigen::Vector3d::Constant(infinity), high = -low;
-    for (int i = first; i < first + count; ++i) {
-      const Ball m = member(i);
-      low = low.cwiseMin(Eigen::Vector3d(m.x, m.y, m.z));
-      high = high.cwiseMax(Eigen::Vector3d(m.x, m.y, m.z));
-    }
-    const Eigen::Vector3d centre = 0.5 * (low + high);
-    Ball ball{centre.x(), centre.y(), centre.z(), 0.0};
-    for (int i = first; i < first + count; ++i) {
-      const Ball m = member(i);
-      ball.radius = std::max(ball.radius, (Eigen::Vector3d(m.x, m.y, m.z) - centre).norm() + m.radius);
-    }
-    return ball;
-  };
   for (std::size_t level = 0; level < levels_.size(); ++level) {
-    const int per_node = level == 0 ? leaf_size : fan_out;
-    const int members = level == 0 ? size() : levels_[level - 1].size;
     for (int node = 0; node < levels_[level].size; ++node) {
-      const int first = node * per_node;
-      const Ball ball = fit(first, std::min(per_node, members - first), [this, level](int i) {
-        const auto n = static_cast<std::size_t>(i);
-        return level == 0 ? Ball{columns_[0][n], columns_[1][n], columns_[2][n], columns_[3][n]}
-                          : levels_[level - 1].ball(i);
-      });
-      const auto n = static_cast<std::size_t>(node);
-      levels_[level].x[n] = ball.x;
-      levels_[level].y[n] = ball.y;
-      levels_[level].z[n] = ball.z;
-      levels_[level].radius[n] = ball.radius;
+      fit(level, node);
     }
+  }
+}
+
+void PointTree::fit(std::size_t level, int node) noexcept {
+  Level& at = levels_[level];
+  const bool leaf = level == 0;
+  const Level& below = levels_[leaf ? 0 : level - 1];
+  const auto n = static_cast<std::size_t>(node);
+  const std::size_t per_node = leaf ? leaf_size : fan_out;
+  const std::size_t begin = n * per_node;
+  const std::size_t end = std::min(begin + per_node, leaf ? order_.size() : static_cast<std::size_t>(below.size));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& x = leaf ? columns_[axis] : below.centre[axis];
+    double low = infinity, high = -infinity;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double half = leaf ? 0.0 : below.half[axis][i];
+      low = std::min(low, x[i] - half);
+      high = std::max(high, x[i] + half);
+    }
+    at.centre[axis][n] = 0.5 * (low + high);
+    at.half[axis][n] = 0.5 * (high - low);
+  }
+  at.radius[n] = at.largest[n] = 0.0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const Ball member = leaf ? Ball{columns_[0][i], columns_[1][i], columns_[2][i], columns_[3][i]}
+                             : below.ball(static_cast<int>(i));
+    const Eigen::Vector3d away(member.x - at.centre[0][n], member.y - at.centre[1][n], member.z - at.centre[2][n]);
+    at.radius[n] = std::max(at.radius[n], away.norm() + member.radius);
+    at.largest[n] = std::max(at.largest[n], leaf ? member.radius : below.largest[i]);
   }
 }
 

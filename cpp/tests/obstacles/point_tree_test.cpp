@@ -20,13 +20,22 @@ double scanned(const Obstacles& obstacles, const Eigen::Vector3d& place, double 
   return limit;
 }
 
-/// Nearest to a place; `looked` counts the balls that were measured.
+/// Distance of a place from what is in a box, or a ball.
+double measured(const Boxes& boxes, int n, const Eigen::Vector3d& place) {
+  const Eigen::Vector3d offset = place - Eigen::Vector3d(boxes.x[n], boxes.y[n], boxes.z[n]);
+  const Eigen::Vector3d half(boxes.half_x[n], boxes.half_y[n], boxes.half_z[n]);
+  return (offset.cwiseAbs() - half).cwiseMax(0.0).norm() - boxes.radius[n];
+}
+double measured(const Balls& balls, int n, const Eigen::Vector3d& place) {
+  return (Eigen::Vector3d(balls.x[n], balls.y[n], balls.z[n]) - place).norm() - balls.radius[n];
+}
+
+/// Nearest to a place; `looked` counts the balls and boxes that were measured.
 PointTree::Nearest nearest(const PointTree& tree, const Eigen::Vector3d& place, double limit, double stop, int& looked) {
-  return tree.nearest(limit, stop, [&](const Balls& balls, int first, int count, double least, float* values) {
+  return tree.nearest(limit, stop, [&](const auto& nodes, int first, int count, double least, float* values) {
     unsigned near = 0;
     for (int i = 0; i < count; ++i) {
-      const int n = first + i;
-      values[i] = static_cast<float>((Eigen::Vector3d(balls.x[n], balls.y[n], balls.z[n]) - place).norm() - balls.radius[n]);
+      values[i] = static_cast<float>(measured(nodes, first + i, place));
       near |= (values[i] < least ? 1u : 0u) << i;
     }
     looked += count;

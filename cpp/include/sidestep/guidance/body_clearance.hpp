@@ -91,6 +91,7 @@ class BodyClearance {
     };
     static constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
     std::vector<Pose> poses_;
+    std::vector<Eigen::Vector3d> centres_;  // of the balls around the links
     std::vector<Interval> intervals_;
     std::vector<double> motions_, curvatures_;  // of the items along an edge
     DistanceField field_;
@@ -188,7 +189,7 @@ class BodyClearance {
   };
   Found look(const Item& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
   Found look_at_points(const Link& link, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
-  double look_at_pair(const Link& a, const Link& b, const Asked& asked, const Workspace& w) const noexcept;
+  double look_at_pair(const Item& item, const Asked& asked, const Workspace& w) const noexcept;
   double look_at_plane(const Link& link, const Plane& plane, double cap, const Workspace& w) const noexcept;
   double margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, const Margins& margins, double& slope) const noexcept;
 

@@ -11,7 +11,7 @@
 
 namespace sidestep {
 
-/// Points under a hierarchy of bounding balls, so that a query looks at those near it only.
+/// Points under a hierarchy of bounding balls and boxes, so that a query looks at those near it only.
 ///
 /// The points are sorted along a Morton curve and kept as structure of arrays, padded to whole leaves: point n of the
 /// tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive points, a node `fan_out` consecutive nodes
@@ -49,7 +49,8 @@ class PointTree {
 
   /// The point whose ball is nearest by a measure, best first. measure(Balls, first, count, limit, values) writes the
   /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that room, and returns those
-  /// below `limit` as bits; of a ball it must not exceed that of a ball inside by more than what it is content to miss. The
+  /// below `limit` as bits; measure(Boxes, ...) the same of boxes, which must not exceed that of a ball inside by more than
+  /// what it is content to miss. (Boxes lie close to walls; balls around many of their points would reach far out.) The
   /// arrays go on for `leaf_size` from `first`. None from `limit` on is found, and any that is below `stop` ends the
   /// search. No allocation.
   template <class Measure>
@@ -77,20 +78,26 @@ class PointTree {
   }
 
  private:
-  /// The balls of all nodes, with room to read `leaf_size` from any node on.
+  /// The balls and boxes of all nodes, around the same centres, with room to read `leaf_size` from any node on.
   struct Level {
     int size;
-    std::vector<double> x, y, z, radius;
+    std::array<std::vector<double>, 3> centre, half;  // of the boxes of the points
+    std::vector<double> largest;                      // radius of a point
+    std::vector<double> radius;                       // of the balls
 
     explicit Level(int count);
-    Balls balls() const noexcept { return {x.data(), y.data(), z.data(), radius.data()}; }
+    Boxes boxes() const noexcept {
+      return {centre[0].data(), centre[1].data(), centre[2].data(), half[0].data(), half[1].data(), half[2].data(),
+              largest.data()};
+    }
     Ball ball(int node) const noexcept {
       const auto n = static_cast<std::size_t>(node);
-      return {x[n], y[n], z[n], radius[n]};
+      return {centre[0][n], centre[1][n], centre[2][n], radius[n]};
     }
   };
 
   void refit() noexcept;
+  void fit(std::size_t level, int node) noexcept;
 
   template <class Near, class Leaf>
   void descend(int level, int node, const Eigen::Vector3d& x, Near& near, Leaf& leaf) const noexcept {
@@ -137,7 +144,7 @@ class PointTree {
     }
     const Level& below = levels_[static_cast<std::size_t>(level) - 1];
     const int count = std::min(fan_out, below.size - first);
-    unsigned near = measure(below.balls(), first, count, found.distance, values.data());
+    unsigned near = measure(below.boxes(), first, count, found.distance, values.data());
     while (near != 0 && !(found.distance < stop)) {
       int nearest = std::countr_zero(near);
       for (unsigned left = near & (near - 1); left != 0; left &= left - 1) {

@@ -7,12 +7,12 @@ namespace sidestep::kernels {
 Distances distances() noexcept {
 #if defined(SIDESTEP_X86_KERNELS)
   switch (instruction_set()) {
-    case InstructionSet::avx512: return distances_avx512;
-    case InstructionSet::avx2: return distances_avx2;
+    case InstructionSet::avx512: return distances_avx512();
+    case InstructionSet::avx2: return distances_avx2();
     case InstructionSet::baseline: break;
   }
 #endif
-  return distances_baseline;
+  return distances_baseline();
 }
 
 }  // namespace sidestep::kernels

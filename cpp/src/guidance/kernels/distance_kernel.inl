@@ -6,6 +6,7 @@ namespace {
 
 constexpr int refinements = 2;           // a median error of 10⁻⁴ of the distance for axes 1 : 6
 constexpr float inside = -0.999f;        // of the least square: t stays above its pole
+constexpr float tiny = 1e-20f;           // [m²] in place of zero, below a fraction line
 constexpr float centre_offset = 1e-6f;   // [m] stands for the centre, where no direction is the nearest
 
 typedef float Floats __attribute__((vector_size(4 * most_balls)));
@@ -99,6 +100,66 @@ unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int 
       }
       near = below(distance - radius, least) & asked;
     }
+  }
+  distance -= radius;
+  __builtin_memcpy(distances, &distance, sizeof distance);
+  return near;
+}
+
+/// Every direction n gives a lower bound for a box too, of which the nearest corner counts:
+///
+///     d ≥ (n·c − Σ_k h_k |n_k| − √(nᵀ S n)) / |n|.
+///
+/// It is taken at the point of the box that is nearest to the centre, where the first steps of the search above lead.
+unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes, int first, int count, double limit,
+                            float* distances) noexcept {
+  const double* const middles[3] = {boxes.x, boxes.y, boxes.z};
+  const double* const halves[3] = {boxes.half_x, boxes.half_y, boxes.half_z};
+  Floats middle[3], half[3], nearest[3], radius, squared{};
+  for (int i = 0; i < most_balls; ++i) {
+    radius[i] = static_cast<float>(boxes.radius[first + i]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    for (int i = 0; i < most_balls; ++i) {
+      middle[k][i] = static_cast<float>(middles[k][first + i] - ellipsoid.centre[k]);
+      half[k][i] = static_cast<float>(halves[k][first + i]);
+    }
+    nearest[k] = middle[k] - larger(-half[k], middle[k] < half[k] ? middle[k] : half[k]);
+    squared += nearest[k] * nearest[k];
+  }
+  const float least = static_cast<float>(limit);
+  const unsigned asked = (2u << (count - 1)) - 1u;
+  Floats distance = root(squared) - static_cast<float>(ellipsoid.extent);
+  unsigned near = below(distance - radius, least) & asked;
+  if (near != 0 && ellipsoid.extent > 0.0) {
+    const double* A = ellipsoid.axes;
+    Floats e[3], second{}, fourth{};
+    for (int i = 0; i < 3; ++i) {
+      const float a2 = static_cast<float>(ellipsoid.squares[i]);
+      e[i] = static_cast<float>(A[3 * i]) * nearest[0] + static_cast<float>(A[3 * i + 1]) * nearest[1] +
+             static_cast<float>(A[3 * i + 2]) * nearest[2];
+      const Floats a2e2 = a2 * e[i] * e[i];
+      second += a2e2;
+      fourth += a2 * a2e2;
+    }
+    e[0] = squared < centre_offset * centre_offset ? all(centre_offset) : e[0];
+    // One step of Newton from infinity.
+    const Floats t = larger(root(second) - fourth / larger(second, all(tiny)), all(0.0f));
+    Floats n[3], length{}, square{};
+    for (int i = 0; i < 3; ++i) {
+      const float a2 = static_cast<float>(ellipsoid.squares[i]);
+      n[i] = e[i] / (t + a2);
+      length += n[i] * n[i];
+      square += a2 * n[i] * n[i];
+    }
+    Floats along{};
+    for (int k = 0; k < 3; ++k) {
+      const Floats n_k =
+          static_cast<float>(A[k]) * n[0] + static_cast<float>(A[3 + k]) * n[1] + static_cast<float>(A[6 + k]) * n[2];
+      along += n_k * middle[k] - half[k] * larger(n_k, -n_k);
+    }
+    distance = larger(distance, (along - root(square)) / root(length));
+    near = below(distance - radius, least) & asked;
   }
   distance -= radius;
   __builtin_memcpy(distances, &distance, sizeof distance);

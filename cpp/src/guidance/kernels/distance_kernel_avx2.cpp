@@ -8,10 +8,7 @@
 
 namespace sidestep::kernels {
 
-unsigned distances_avx2(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
-                      float* distances) noexcept {
-  return distances_to(ellipsoid, balls, first, count, limit, distances);
-}
+Distances distances_avx2() noexcept { return {distances_to, distances_to_boxes}; }
 
 }  // namespace sidestep::kernels
 #endif

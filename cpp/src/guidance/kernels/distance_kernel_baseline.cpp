@@ -5,9 +5,6 @@
 
 namespace sidestep::kernels {
 
-unsigned distances_baseline(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
-                      float* distances) noexcept {
-  return distances_to(ellipsoid, balls, first, count, limit, distances);
-}
+Distances distances_baseline() noexcept { return {distances_to, distances_to_boxes}; }
 
 }  // namespace sidestep::kernels
