@@ -229,6 +229,20 @@ def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, sce
         session.handle(m.SetMethod("magic"))
 
 
+def test_an_arm_stays_at_its_goal(make_session: MakeSession, scenario: Scenario) -> None:
+    """What is left of the way no longer shrinks there: that is no dead end."""
+    session = make_session(replace(scenario, obstacles=()))
+    goal = session.snapshot().q + 1e-3
+    session.handle(m.SetJointGoal(goal))
+    friction = session.stage.end
+    session.stage.end = lambda torque: friction(0.0 * torque)  # type: ignore[method-assign]  # it stands still
+    for _ in range(3000):
+        session.step()
+        assert not session.snapshot().words.startswith("leaves")
+    session.handle(m.SetJointGoal(goal + 0.5))
+    assert run(session, 0.7).words.startswith("leaves a dead end")
+
+
 def test_a_guided_arm_arrives(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario, method="guided")
     last, clearance = record(session, 7.0)

@@ -24,6 +24,7 @@ from sidestep.studio.methods import Method
 Array = npt.NDArray[np.float64]
 
 STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
+ARRIVED = 0.01  # [rad | m] of all joints: nearer than that, not to come nearer is no dead end
 
 
 class Pursuit:
@@ -52,6 +53,7 @@ class Pursuit:
         if self._guide is not None:
             self._guide.set_goal(posture.q)
         self._escape = Escape(self._robot) if self._method.escapes else None
+        self._arrived = False
         self.obstacles_changed()
 
     def obstacles_changed(self) -> None:
@@ -106,6 +108,11 @@ class Pursuit:
         aim = self._goal(q)
         if self._escape is None or not isinstance(aim, JointGoal):
             return aim
+        if np.abs(q - aim.position).max() < ARRIVED:
+            if not self._arrived:
+                self._arrived, self._escape = True, Escape(self._robot)
+            return aim
+        self._arrived = False
         escaping = self._escape.escaping
         followed = self._escape.pursue(aim, q, self._potential, self._period)
         if self._escape.escaping and not escaping:
