@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 MOST_TRIANGLES = 60_000  # of an arm: a megabyte or two for each browser
 FIRST_CELL = 1e-3  # [m] detail that is given up first
 SHARP = 0.6  # [rad] edges sharper than this stay edges
+SKIN = 2e-3  # [m] that a ghost is larger than its arm: surfaces in one place flicker, as of links that turn in place
 LEAST_REACH = 0.3  # [m] what the page is laid out for at least
 SAME, LEVER = (
     5e-3,
@@ -58,7 +59,7 @@ class ArmView:
                 continue  # the base stands where the arm's own does
             self._meshes[link] = server.scene.add_mesh_simple(
                 f"{name}/{link}/mesh",
-                np.asarray(mesh.vertices, dtype=np.float32),
+                np.asarray(mesh.vertices + SKIN * ghost * mesh.vertex_normals, dtype=np.float32),
                 np.asarray(mesh.faces, dtype=np.uint32),
                 color=colours.rgb(colour),
                 opacity=0.22 if ghost else None,
