@@ -83,12 +83,12 @@ void bind_plan(nb::module_& m) {
 void bind_settings(nb::module_& m) {
   nb::class_<PlannerSettings>(
       m, "PlannerSettings",
-      "How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.\n"
+      "How a PathPlanner searches. floor [m]: clearance that the first path keeps; margin [m]: that a wider one would.\n"
       "allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance\n"
       "[m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.\n"
-      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the\n"
-      "trees. max_nodes, max_iterations, max_seconds: the budget.\n"
-      "shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.")
+      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes,\n"
+      "max_iterations, max_seconds: the budget. shortcuts: attempts to shorten. Raises ValueError that names the\n"
+      "setting at fault.")
       .def(
           "__init__",
           [](PlannerSettings* self, double margin, double floor, double allowance, double pair_allowance, double slack,
@@ -227,7 +227,8 @@ void bind_guidance(nb::module_& m) {
   nb::class_<PathPlanner>(
       m, "PathPlanner",
       "Plans a path of a covering body among obstacle points: the straight edge if it is free, else RRT-Connect\n"
-      "(Kuffner and LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless time runs out.\n"
+      "(Kuffner and LaValle 2000), widened where there is room, and shortened. Deterministic in (start, goal, obstacles,\n"
+      "seed) unless time runs out.\n"
       "Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.\n"
       "robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier;\n"
       "settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.")

@@ -1345,12 +1345,12 @@ class Plan:
 
 class PlannerSettings:
     """
-    How a PathPlanner searches. margin [m]: clearance asked for at first; floor [m]: where there is no path with it.
+    How a PathPlanner searches. floor [m]: clearance that the first path keeps; margin [m]: that a wider one would.
     allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance
     [m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.
-    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the
-    trees. max_nodes, max_iterations, max_seconds: the budget.
-    shortcuts: attempts to shorten. Raises ValueError that names the setting at fault.
+    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes,
+    max_iterations, max_seconds: the budget. shortcuts: attempts to shorten. Raises ValueError that names the
+    setting at fault.
     """
 
     def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 100) -> None: ...
@@ -1498,7 +1498,8 @@ class BodyClearance:
 class PathPlanner:
     """
     Plans a path of a covering body among obstacle points: the straight edge if it is free, else RRT-Connect
-    (Kuffner and LaValle 2000), shortened. Deterministic in (start, goal, obstacles, seed) unless time runs out.
+    (Kuffner and LaValle 2000), widened where there is room, and shortened. Deterministic in (start, goal, obstacles,
+    seed) unless time runs out.
     Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.
     robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier;
     settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.

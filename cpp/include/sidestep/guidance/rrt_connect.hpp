@@ -12,8 +12,8 @@
 namespace sidestep {
 
 struct PlannerSettings {
-  double margin = 0.06;     ///< clearance asked for at first, for ways on which barriers hardly act [m]
-  double floor = 0.005;     ///< clearance asked for at last, where there is no wider way [m]
+  double margin = 0.06;     ///< clearance of a wide way, on which barriers hardly act [m]
+  double floor = 0.005;     ///< clearance that the first way keeps, and every one [m]
   double allowance = 0.02;       ///< how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
   double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
   double slack = 0.002;     ///< see Margins, at least; else a quarter of the margin [m]
