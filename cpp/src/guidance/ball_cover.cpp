@@ -10,7 +10,7 @@ std::vector<CoverBall> cover_by_balls(const Eigen::Vector3d& mean, const Eigen::
   const Eigen::Vector3d a = squares.cwiseSqrt();
   // Half a piece h in both directions raises the radius from a_1 to √(a_1² + 2 h²).
   const double half = std::sqrt(0.5 * overshoot * (2.0 * a[0] + overshoot));
-  const auto pieces = [&](double length) { return std::max(1, static_cast<int>(std::ceil(length / half))); };
+  const auto pieces = [&](double length) { return std::clamp(static_cast<int>(std::ceil(length / half)), 1, 8); };
   // An axis hardly longer than the shortest need not be cut.
   const auto whole = [&](double length) { return length < a[0] + overshoot; };
   const int along = whole(a[2]) ? 1 : pieces(a[2]), across = whole(a[1]) ? 1 : pieces(a[1]);

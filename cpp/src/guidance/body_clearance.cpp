@@ -249,7 +249,9 @@ BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obsta
       for (const CoverBall& ball : e.cover) {
         covered = std::min(covered, bound(ball.centre, ball.radius, found.clearance));
       }
-      least = std::max(least, covered);
+      if (covered > 0.0) {  // nothing is in them; of depths they say nothing
+        least = std::max(least, covered);
+      }
     }
     w.bounds_[i] = least;
     nearest = least < w.bounds_[nearest] ? i : nearest;
@@ -307,7 +309,8 @@ double BodyClearance::look_at_pair(const Item& item, const Asked& asked, const W
       if (cut <= 0.0 || distance >= cut * cut) {
         continue;
       }
-      const Eigen::Vector3d n = d / std::max(std::sqrt(distance), closest_centres);
+      const bool apart = distance > closest_centres * closest_centres;
+      const Eigen::Vector3d n = apart ? Eigen::Vector3d(d / std::sqrt(distance)) : Eigen::Vector3d::UnitX().eval();
       const Eigen::Vector3d n_b = R_XY.transpose() * n;
       const double bound = n.dot(d) - std::sqrt(n.dot(e.shape * n)) - std::sqrt(n_b.dot(f.shape * n_b));
       if (bound < least) {

@@ -92,6 +92,9 @@ double BodyClearance::margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, c
 
 bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, const Margins& margins,
                          Workspace& w) const noexcept {
+  if (!q.allFinite()) {
+    return false;
+  }
   w.field_.follow(obstacles);
   place(q, w);
   double slope = 0.0;
@@ -109,8 +112,11 @@ bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& o
 
 bool BodyClearance::edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b,
                               const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
-  w.field_.follow(obstacles);
   w.difference_ = b - a;
+  if (!a.allFinite() || !w.difference_.allFinite()) {
+    return false;
+  }
+  w.field_.follow(obstacles);
   std::array<std::uint64_t, max_items / 64> all{};
   for (int i = 0; i < num_items(); ++i) {
     all[static_cast<std::size_t>(i / 64)] |= std::uint64_t{1} << (i % 64);

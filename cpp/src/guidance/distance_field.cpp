@@ -19,7 +19,7 @@ double below(double distance) noexcept { return distance - rounding * (std::abs(
 
 }  // namespace
 
-double distance(const Eigen::Vector3d& x, const Obstacles& obstacles, double limit) noexcept {
+double distance_to_obstacles(const Eigen::Vector3d& x, const Obstacles& obstacles, double limit) noexcept {
   const kernels::Distances distances = kernels::distances();
   kernels::PlacedEllipsoid point{};
   Eigen::Map<Eigen::Vector3d>(point.centre) = x;
@@ -45,7 +45,7 @@ void DistanceField::follow(const Obstacles& obstacles) noexcept {
 double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obstacles& obstacles) noexcept {
   float* known = nullptr;
   Eigen::Vector3d corner;
-  if (x.cwiseAbs().maxCoeff() < farthest) {
+  if ((x.array().abs() < farthest).all()) {
     std::uint64_t key = 0;
     for (int i = 0; i < 3; ++i) {
       const double block = std::floor(x[i] / block_edge);
@@ -55,7 +55,7 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
     known = block_of(key);
   }
   if (known == nullptr) {
-    return below(distance(x, obstacles, PointTree::padding));
+    return below(distance_to_obstacles(x, obstacles, PointTree::padding));
   }
   const Eigen::Vector3d inside = x - corner;
   double best = -std::numeric_limits<double>::infinity(), limit = PointTree::padding;
@@ -69,7 +69,7 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
       centre[i] = (number + 0.5) * cell;
     }
     if (known[at] == unknown) {
-      known[at] = static_cast<float>(distance(corner + centre, obstacles, limit));
+      known[at] = static_cast<float>(distance_to_obstacles(corner + centre, obstacles, limit));
     }
     const double away = (inside - centre).norm();
     best = std::max(best, below(known[at]) - away);

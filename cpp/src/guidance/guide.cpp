@@ -186,7 +186,8 @@ Guide::Counts Guide::counts() const {
 void Guide::run() {
   while (!stopping_.load()) {
     static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.period)));
-    if (states_.update() && !stopping_.load()) {
+    if ((states_.update() || newer_) && !stopping_.load()) {
+      newer_ = false;
       look(State(states_.get()));  // a copy: newer ones come while it looks
     }
   }
@@ -291,14 +292,18 @@ void Guide::search(const State& state, const Obstacles& obstacles) {
   failed_ = !found;
   failed_at_ = state.time;
   if (found) {
+    const Plan first = plan;
     if (!settings_.synchronous) {  // to begin with
       follow(state, plan, obstacles, false);
     }
     planner_.improve(plan, obstacles, seed, margin);
-    path_margins_ = planner_.margins(plan.margin, start, state.goal, obstacles);
     if (!settings_.synchronous) {
-      plan.path = entered(plan, states_.get().q, obstacles);
+      newer_ = true;
+      if (!enter(plan, states_.get().q, obstacles)) {
+        plan = first;
+      }
     }
+    path_margins_ = planner_.margins(plan.margin, plan.path.col(0), state.goal, obstacles);
     follow(state, plan, obstacles, true);
   }
   {
@@ -312,20 +317,23 @@ void Guide::search(const State& state, const Obstacles& obstacles) {
   }
 }
 
-Eigen::MatrixXd Guide::entered(const Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles) {
+bool Guide::enter(Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles) {
   const JointLimits& limits = body_.robot().limits();
   const Eigen::VectorXd here = q.cwiseMax(limits.lower).cwiseMin(limits.upper);
-  // Back to the start it can go as it came, also where that is not straight.
+  Obstruction obstruction;
+  if (planner_.obstructed(here, obstacles, obstruction)) {
+    return false;
+  }
   for (Eigen::Index k = plan.path.cols() - 1; k >= 0; --k) {
-    const double margin = k == 0 ? settings_.planner.floor : plan.margin;
-    if (body_.edge_free(here, plan.path.col(k), obstacles, planner_.margins(margin, here, plan.path.col(k), obstacles),
+    if (body_.edge_free(here, plan.path.col(k), obstacles, planner_.margins(plan.margin, here, plan.path.col(k), obstacles),
                         planner_.workspace())) {
       Eigen::MatrixXd path(plan.path.rows(), plan.path.cols() - k + 1);
       path << here, plan.path.rightCols(plan.path.cols() - k);
-      return path;
+      plan.path = std::move(path);
+      return true;
     }
   }
-  return plan.path;
+  return false;
 }
 
 void Guide::follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured) {

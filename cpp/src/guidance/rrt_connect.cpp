@@ -149,14 +149,14 @@ void RrtConnect::improve(Plan& plan, const Obstacles& obstacles, std::uint64_t s
   if (plan.status != PlanStatus::found) {
     return;
   }
-  const double begin = seconds();
+  const double begin = seconds(), deadline = begin + settings_.max_seconds - plan.search_seconds;
   RandomStream random(~seed);
   const Eigen::VectorXd start = plan.path.col(0), goal = plan.path.rightCols(1);
   // A wide way is tried for a little, what lies between for longer.
   for (const auto& [level, share] : {std::pair{margin, 400}, std::pair{std::sqrt(margin * settings_.floor), 40}}) {
     if (level > plan.margin) {
       Plan wider = plan;
-      connect(level, settings_.max_iterations / share, start, goal, obstacles, begin + settings_.max_seconds, random, wider);
+      connect(level, settings_.max_iterations / share, start, goal, obstacles, deadline, random, wider);
       plan.nodes = wider.nodes;
       plan.iterations = wider.iterations;
       if (wider.status == PlanStatus::found) {

@@ -154,7 +154,7 @@ BOOST_AUTO_TEST_CASE(no_point_moves_farther_than_the_bound) {
         BOOST_TEST(at_b[i] <= 1e-5 + checked.motion(i, b - a) + 1.5 * at_a[i]);
       }
     }
-    // The bound itself, by the frames' origins, which lie within the links' balls for a body around them.
+    // The bound itself, by points on the ellipsoids.
     KinematicState state_a(robot), state_b(robot);
     state_a.update(robot, a, Eigen::VectorXd::Zero(nv));
     state_b.update(robot, b, Eigen::VectorXd::Zero(nv));
@@ -162,8 +162,10 @@ BOOST_AUTO_TEST_CASE(no_point_moves_farther_than_the_bound) {
       const int frame = robot.frame_index(checked.label(i).name);
       for (int k = 0; k < body.num_components(); ++k) {
         if (body.links[static_cast<std::size_t>(k)] == checked.label(i).name) {
-          const Eigen::Vector3d moved = frame_pose(robot, state_b, frame) * Eigen::Vector3d(body.means.col(k)) -
-                                        frame_pose(robot, state_a, frame) * Eigen::Vector3d(body.means.col(k));
+          const Eigen::Matrix3d& S = body.covariances[static_cast<std::size_t>(k)];
+          const Eigen::Vector3d n = random.matrix(3, 1);
+          const Eigen::Vector3d x = body.means.col(k) + S * n / std::sqrt(n.dot(S * n));
+          const Eigen::Vector3d moved = frame_pose(robot, state_b, frame) * x - frame_pose(robot, state_a, frame) * x;
           BOOST_TEST(moved.norm() <= checked.motion(i, b - a) + 1e-12);  // rounding
           const double nearer = checked.motion(i, a, b - a, w);
           BOOST_TEST(moved.norm() <= nearer + 1e-12);
@@ -212,6 +214,51 @@ BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
   BOOST_TEST(free > 30);
   BOOST_TEST(blocked > 30);
   BOOST_TEST(thin > 3);  // obstacles that samples 50 times coarser would have stepped over
+}
+
+BOOST_AUTO_TEST_CASE(an_edge_keeps_margins_that_ease_at_its_ends) {
+  Random random(8);
+  int free = 0, blocked = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Robot robot = test::random_tree(random, 4);
+    const BodyClearance checked(robot, calibrated(random, robot, 0.01));
+    BodyClearance::Workspace w(checked);
+    const int nv = robot.num_coordinates();
+    const Eigen::VectorXd a = random.vector(nv).cwiseMax(-3.0).cwiseMin(3.0);
+    const Eigen::VectorXd b = (a + 0.3 * random.vector(nv)).cwiseMax(-3.0).cwiseMin(3.0);
+    const int num = random.integer(10, 100);
+    const Obstacles obstacles(0.5 * random.matrix(3, num), Eigen::VectorXd::Zero(num), Eigen::Matrix3Xd::Zero(3, num));
+    Margins margins{0.03, 0.002, 0.3, {}};
+    Eigen::VectorXd clearances(checked.num_items());
+    for (const Eigen::VectorXd* q : {&a, &b}) {
+      checked.clearances(*q, obstacles, margins.margin, w, clearances);
+      margins.ends.push_back({*q, (margins.margin + 1e-6 - clearances.array()).max(0.0)});
+    }
+    const bool said = checked.edge_free(a, b, obstacles, margins, w);
+    double least = std::numeric_limits<double>::infinity();  // beyond what is asked
+    constexpr int samples = 500;
+    for (int k = 0; k <= samples; ++k) {
+      const Eigen::VectorXd q = a + (b - a) * k / samples;
+      checked.clearances(q, obstacles, 1.0, w, clearances);
+      for (int i = 0; i < checked.num_items(); ++i) {
+        double lowered = 0.0;
+        for (const Margins::End& end : margins.ends) {
+          lowered = std::max(lowered, end.deficits[i] * std::max(0.0, 1.0 - checked.motion(i, q - end.q) / margins.fade));
+        }
+        least = std::min(least, clearances[i] - (margins.margin - lowered));
+      }
+    }
+    if (said) {
+      ++free;
+      BOOST_TEST(least >= -margins.slack - 1e-5);  // single precision
+    } else {
+      ++blocked;
+      // within a sample something comes no nearer than it and the margin move, the latter by the slope of 0.1 and more
+      BOOST_TEST(least < 5.0 * checked.reach().dot((b - a).cwiseAbs()) / samples);
+    }
+  }
+  BOOST_TEST(free > 30);
+  BOOST_TEST(blocked > 30);
 }
 
 BOOST_AUTO_TEST_CASE(margins_ease_at_an_end_and_only_there) {

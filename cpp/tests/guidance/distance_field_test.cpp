@@ -34,7 +34,7 @@ BOOST_AUTO_TEST_CASE(bounds_are_below_the_distance_and_near_it_or_enough) {
     for (int k = 0; k < 400; ++k) {
       const Eigen::Vector3d x = 2.0 * random.matrix(3, 1);
       const double distance = scanned(obstacles, x), enough = 0.3;
-      BOOST_TEST(std::abs(sidestep::distance(x, obstacles, 100.0) - distance) < rounding);
+      BOOST_TEST(std::abs(distance_to_obstacles(x, obstacles, 100.0) - distance) < rounding);
       for (const double asked : {enough, std::numeric_limits<double>::infinity(), enough}) {
         const double bound = field.bound(x, asked, obstacles);
         BOOST_TEST(bound <= distance);
@@ -79,4 +79,17 @@ BOOST_AUTO_TEST_CASE(more_places_than_it_holds_and_places_far_away_are_measured)
   });
   BOOST_TEST(allocations == 0);
   BOOST_TEST(std::abs(field.bound(Eigen::Vector3d(3e5, 0.0, 0.0), all, obstacles) - 3e5) < 1.0);
+}
+
+BOOST_AUTO_TEST_CASE(a_point_far_away_hides_none_that_is_near) {
+  for (const double far : {1e4, 1e10, 1e300}) {
+    Random random(2);
+    Eigen::Matrix3Xd points = 0.3 * random.matrix(3, 300);
+    points.col(7).setConstant(far);
+    const Obstacles obstacles(points, Eigen::VectorXd::Zero(300), Eigen::Matrix3Xd::Zero(3, 300));
+    for (int k = 0; k < 100; ++k) {
+      const Eigen::Vector3d x = random.matrix(3, 1);
+      BOOST_TEST(std::abs(distance_to_obstacles(x, obstacles, 100.0) - scanned(obstacles, x)) < rounding);
+    }
+  }
 }

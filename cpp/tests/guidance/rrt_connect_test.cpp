@@ -151,6 +151,47 @@ BOOST_AUTO_TEST_CASE(says_what_is_in_the_way_and_how_deep) {
   BOOST_TEST(name(planner.plan(joints(0.5), joints(3.1), wall(), 0).status) == "invalid");
 }
 
+BOOST_AUTO_TEST_CASE(a_point_at_the_centre_of_an_ellipsoid_is_as_deep_as_it_is_thick) {
+  // Where two of the balls that cover it meet, in the middle of a cell: they do not hold the depth.
+  const Robot robot = planar(1);
+  const Eigen::Vector3d centre(0.0, 0.02, 0.02);
+  const Eigen::Matrix3d shape = Eigen::Vector3d(0.0451, 0.025, 0.025).cwiseAbs2().asDiagonal();
+  const BodyClearance body(robot, Body({"link0"}, Eigen::VectorXd::Ones(1), centre, {shape}, Eigen::VectorXd::Ones(1)));
+  BodyClearance::Workspace w(body);
+  const Obstacles point = at(centre, 0.0);
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(1);
+  Eigen::VectorXd found(1);
+  body.clearances(q, point, -0.02, w, found);
+  BOOST_TEST(std::abs(found[0] + 0.025) < 1e-4);  // what two steps of Newton leave
+  RrtConnect planner(body, {});
+  Obstruction obstruction;
+  BOOST_TEST(planner.obstructed(q, point, obstruction));
+  BOOST_TEST(std::abs(obstruction.depth - 0.025) < 1e-4);
+}
+
+BOOST_AUTO_TEST_CASE(a_wider_way_is_taken_where_there_is_one) {
+  const Robot robot = planar(3);
+  const BodyClearance body(robot, along_links(robot));
+  RrtConnect planner(body, {});
+  int wider = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Plan first = planner.find(joints(0.5), joints(-0.5), wall(), seed);
+    BOOST_TEST(name(first.status) == "found");
+    BOOST_TEST(first.margin == planner.settings().floor);
+    Plan plan = first;
+    planner.improve(plan, wall(), seed, planner.settings().margin);
+    wider += plan.margin == planner.settings().margin;
+    BOOST_TEST((plan.path.col(0) == first.path.col(0)));
+    BOOST_TEST((plan.path.rightCols(1) == first.path.rightCols(1)));
+    BOOST_TEST(plan.nodes >= first.nodes);
+    plan = first;
+    planner.improve(plan, wall(), seed, 1.0);  // a metre from everything: there is no such way
+    BOOST_TEST(plan.margin < 1.0);
+    BOOST_TEST(name(plan.status) == "found");
+  }
+  BOOST_TEST(wider > 5);
+}
+
 BOOST_AUTO_TEST_CASE(ends_that_are_slightly_inside_are_left_and_reached) {
   const Robot robot = planar(3);
   const BodyClearance body(robot, along_links(robot));

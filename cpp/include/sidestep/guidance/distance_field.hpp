@@ -36,7 +36,7 @@ class DistanceField {
   using Block = std::array<float, 1 + 4 * 4 * 4>;
   struct Slot {
     std::uint64_t key = 0;
-    std::uint32_t generation = 0;  // of the obstacles; others are empty slots
+    std::uint64_t generation = 0;  // of the obstacles; others are empty slots
     int block = 0;
   };
 
@@ -45,11 +45,11 @@ class DistanceField {
   std::vector<Slot> slots_;
   std::vector<Block> blocks_;
   int used_ = 0;
-  std::uint32_t generation_ = 0;
+  std::uint64_t generation_ = 1;
   std::uint64_t version_ = 0;
 };
 
 /// The distance of x from the nearest ball [m], not above `limit`.
-double distance(const Eigen::Vector3d& x, const Obstacles& obstacles, double limit) noexcept;
+double distance_to_obstacles(const Eigen::Vector3d& x, const Obstacles& obstacles, double limit) noexcept;
 
 }  // namespace sidestep

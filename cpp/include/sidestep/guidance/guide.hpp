@@ -111,8 +111,8 @@ class Guide {
   void look(const State& state);
   void search(const State& state, const Obstacles& obstacles);
   bool way_is_free(const State& state, const Obstacles& obstacles, bool changed);
-  /// The path of a plan from where an arm is that has moved while it was made.
-  Eigen::MatrixXd entered(const Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles);
+  /// Lets a path begin where the arm is, which has moved while it was made. False where no straight way leads there.
+  bool enter(Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles);
   void follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured);
   void answer(const State& state, PlanStatus status, bool direct);
 
@@ -143,6 +143,7 @@ class Guide {
   RrtConnect planner_;
   std::shared_ptr<const Obstacles> obstacles_;  // that it plans among
   std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, searches_ = 0;
+  bool newer_ = false;  // a state was taken that it has not looked at
   bool have_path_ = false, direct_ = false, failed_ = false;
   double margin_, failed_at_ = 0.0;
   PlanStatus status_ = PlanStatus::no_path;

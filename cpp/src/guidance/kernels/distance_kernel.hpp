@@ -2,7 +2,7 @@
 
 #include "sidestep/obstacles/balls.hpp"
 
-// The inner loop of BodyClearance, once per instruction set. Plain arrays only, as in the kernels of ClearanceField.
+// The inner loop of BodyClearance and DistanceField, once per instruction set. Plain arrays only, as in the kernels of ClearanceField.
 namespace sidestep::kernels {
 
 /// An ellipsoid in the world.

@@ -1,4 +1,4 @@
-// Included by one file per instruction set, after distance_kernel.hpp. Defines distances_to in an anonymous namespace: loops
+// Included by one file per instruction set, after distance_kernel.hpp. Defines two functions in an anonymous namespace: loops
 // over `most_balls` floats that the compiler puts side by side in the registers it has.
 
 namespace sidestep::kernels {
@@ -6,7 +6,7 @@ namespace {
 
 constexpr int refinements = 2;           // a median error of 10⁻⁴ of the distance for axes 1 : 6
 constexpr float inside = -0.999f;        // of the least square: t stays above its pole
-constexpr float tiny = 1e-20f;           // [m²] in place of zero, below a fraction line
+constexpr float tiny = 1e-20f;           // in place of zero, below a fraction line
 constexpr float centre_offset = 1e-6f;   // [m] stands for the centre, where no direction is the nearest
 
 typedef float Floats __attribute__((vector_size(4 * most_balls)));
@@ -43,7 +43,7 @@ inline unsigned below(Floats x, float limit) noexcept {
 ///
 /// The best is among n_i = e_i / (a_i² + t), at the root of |a_i n_i| = 1 (the secular equation). t = 0 gives the first-order
 /// distance; Newton's steps on 1/|a_i n_i| − 1, which is concave, come to the root from below.
-unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
+unsigned distances_to_balls(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
                       float* distances) noexcept {
   Floats offset[3], radius, e[3];
   for (int i = 0; i < most_balls; ++i) {
@@ -76,7 +76,7 @@ unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int 
       fourth += squares[i] * a2e2;
     }
     Floats support = root(along);
-    distance = larger(distance, (along - support) / root(length));
+    distance = larger((along - support) / root(length), distance);
     near = below(distance - radius, least) & asked;
     if (near != 0) {
       // From infinity the first step is to |a e| − Σ a⁴e² / Σ a²e²: the better of the two starts counts.
@@ -95,7 +95,7 @@ unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int 
           slope += share * weight;
         }
         support = root(square);
-        distance = larger(distance, (along - support) / root(length));
+        distance = larger((along - support) / root(length), distance);
         t += square * (support - 1.0f) / slope;
       }
       near = below(distance - radius, least) & asked;
@@ -108,23 +108,24 @@ unsigned distances_to(const PlacedEllipsoid& ellipsoid, const Balls& balls, int 
 
 /// Every direction n gives a lower bound for a box too, of which the nearest corner counts:
 ///
-///     d ≥ (n·c − Σ_k h_k |n_k| − √(nᵀ S n)) / |n|.
+///     d ≥ (min over the box of n·x − √(nᵀ S n)) / |n|.
 ///
-/// It is taken at the point of the box that is nearest to the centre, where the first steps of the search above lead.
+/// n is that of the point of the box that is nearest to the centre, where the first steps of the search above lead.
 unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes, int first, int count, double limit,
                             float* distances) noexcept {
   const double* const middles[3] = {boxes.x, boxes.y, boxes.z};
   const double* const halves[3] = {boxes.half_x, boxes.half_y, boxes.half_z};
-  Floats middle[3], half[3], nearest[3], radius, squared{};
+  Floats low[3], high[3], nearest[3], radius, squared{};
   for (int i = 0; i < most_balls; ++i) {
     radius[i] = static_cast<float>(boxes.radius[first + i]);
   }
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < most_balls; ++i) {
-      middle[k][i] = static_cast<float>(middles[k][first + i] - ellipsoid.centre[k]);
-      half[k][i] = static_cast<float>(halves[k][first + i]);
+      const double middle = middles[k][first + i] - ellipsoid.centre[k], half = halves[k][first + i];
+      low[k][i] = static_cast<float>(middle - half);
+      high[k][i] = static_cast<float>(middle + half);
     }
-    nearest[k] = middle[k] - larger(-half[k], middle[k] < half[k] ? middle[k] : half[k]);
+    nearest[k] = larger(low[k], all(0.0f)) - larger(-high[k], all(0.0f));
     squared += nearest[k] * nearest[k];
   }
   const float least = static_cast<float>(limit);
@@ -156,9 +157,9 @@ unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes
     for (int k = 0; k < 3; ++k) {
       const Floats n_k =
           static_cast<float>(A[k]) * n[0] + static_cast<float>(A[3 + k]) * n[1] + static_cast<float>(A[6 + k]) * n[2];
-      along += n_k * middle[k] - half[k] * larger(n_k, -n_k);
+      along += n_k > 0.0f ? n_k * low[k] : n_k * high[k];
     }
-    distance = larger(distance, (along - root(square)) / root(length));
+    distance = larger((along - root(square)) / root(length), distance);
     near = below(distance - radius, least) & asked;
   }
   distance -= radius;

@@ -8,7 +8,7 @@
 
 namespace sidestep::kernels {
 
-Distances distances_avx512() noexcept { return {distances_to, distances_to_boxes}; }
+Distances distances_avx512() noexcept { return {distances_to_balls, distances_to_boxes}; }
 
 }  // namespace sidestep::kernels
 #endif

@@ -5,6 +5,6 @@
 
 namespace sidestep::kernels {
 
-Distances distances_baseline() noexcept { return {distances_to, distances_to_boxes}; }
+Distances distances_baseline() noexcept { return {distances_to_balls, distances_to_boxes}; }
 
 }  // namespace sidestep::kernels
