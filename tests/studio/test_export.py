@@ -30,7 +30,7 @@ from sidestep.studio.export import not_kept, python_snippet, save_scenario, scen
 from sidestep.studio.methods import METHODS, WRITTEN
 from sidestep.studio.session import Session
 from sidestep.studio.systems import numbers_of, parts_of
-from sidestep.studio.things import CLOUD_LIMIT, cloud, scattered, thinned
+from sidestep.studio.things import CLOUD_LIMIT, CLOUD_RADIUS, cloud, scattered, thinned
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
 SMALL_ARM: dict[str, Any] = {
@@ -277,9 +277,13 @@ def test_a_cloud_is_saved_beside_its_scenario(
 
 def test_a_large_cloud_is_thinned() -> None:
     points = np.random.default_rng(0).uniform(0.0, 1.0, (5000, 3))
-    thin = thinned(points)
+    thin, radius = thinned(points)
     assert 0.3 * CLOUD_LIMIT < len(thin) <= CLOUD_LIMIT
-    np.testing.assert_array_equal(thinned(points[:100]), points[:100])
+    away = np.linalg.norm(points[:, None] - thin[None], axis=2).min(axis=1)
+    assert 0.5 * radius < away.max() <= radius  # balls of that radius hold every point
+    few, radius = thinned(points[:100])
+    np.testing.assert_array_equal(few, points[:100])
+    assert radius == CLOUD_RADIUS
 
 
 def ball() -> object:

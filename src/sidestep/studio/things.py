@@ -177,14 +177,17 @@ def scattered(size: float, *, seed: int) -> Array:
     return points
 
 
-def thinned(points: Array) -> Array:
-    """At most `CLOUD_LIMIT` points (n, 3): those in one cube are merged, of the smallest cubes that suffice."""
+def thinned(points: Array) -> tuple[Array, float]:
+    """At most `CLOUD_LIMIT` points (n, 3), and the radius [m] of balls around them that hold all that were given.
+
+    Those in one cube are merged, of the smallest cubes that suffice.
+    """
     voxel = CLOUD_SPACING
-    thin = points
+    thin, radii = points, np.zeros(len(points))
     while len(thin) > CLOUD_LIMIT:
-        thin = merge_in_voxels(points, voxel=voxel)[0]
+        thin, radii = merge_in_voxels(points, voxel=voxel)
         voxel *= 1.25
-    return thin
+    return thin, max(CLOUD_RADIUS, float(radii.max(initial=0.0)))
 
 
 def written_pose(pose: Array) -> tuple[Vector3, Vector3]:

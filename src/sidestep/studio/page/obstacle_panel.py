@@ -53,7 +53,10 @@ class ObstaclePanel:
             "A ball of this radius, a box or plate of points of this edge: near the goal, where it is free.",
         )
         gui.add_upload_button("Add a point cloud file …").on_upload(self._upload)
-        add_note(gui, "A .ply, .pcd or .npy, thinned; where it says, if it is free there.")
+        add_note(
+            gui,
+            "A .ply, .pcd or .npy, thinned to balls that hold its points; where it says, if it is free there.",
+        )
         self._folder = Path(tempfile.mkdtemp(prefix="sidestep-studio-"))
         atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
         gui.add_divider()
@@ -130,8 +133,8 @@ class ObstaclePanel:
         with self._view.telling(event.client):
             path = self._folder / Path(file.name).name
             path.write_bytes(file.content)
-            points = thinned(np.array(load_point_cloud(path).points))
-            self._put(self._cloud(self._new_name("cloud"), points), event.client, as_written=True)
+            points, radius = thinned(np.array(load_point_cloud(path).points))
+            self._put(self._cloud(self._new_name("cloud"), points, radius), event.client, as_written=True)
 
     def _put(self, thing: Thing, client: Any, *, as_written: bool = False) -> None:
         """Adds a thing where it is free; `as_written`: where its file has it, if it is free there."""
@@ -157,10 +160,10 @@ class ObstaclePanel:
         self._sent.append((thing.name, (place, thing.size)))
         view.send(m.AddThing(thing.at(pose_at(place - thing.middle))))
 
-    def _cloud(self, name: str, points: Array) -> Thing:
+    def _cloud(self, name: str, points: Array, radius: float = CLOUD_RADIUS) -> Thing:
         path = self._folder / f"{name}.npy"
         np.save(path, points)
-        return cloud(name, np.zeros(3), path, CLOUD_RADIUS)
+        return cloud(name, np.zeros(3), path, radius)
 
     def _new_name(self, kind: str) -> str:
         taken = () if self._view.last is None else {thing.name for thing in self._view.last.things}

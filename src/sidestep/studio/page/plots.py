@@ -23,13 +23,13 @@ SPAN = 12.0  # [s] that is shown
 EVERY = 0.4  # [s] of the wall clock between two drawings
 HEIGHT, TIMES = 66, 24  # [px] of a plot, and of the times below the last one
 
-# name, title with unit, factor, colour
+# name, title with unit, factor, decimals (no finer: an arm at rest has labels that can be read), colour
 PLOTS = (
-    ("clearance", "exact clearance [mm]", 1e3, colours.NEAR),
-    ("psi", "height of the embedding |ψ|", 1.0, palette.BLACK),
-    ("speed", "fastest joint [% of its limit]", 1e2, palette.BLACK),
-    ("torque", "largest torque [% of its limit]", 1e2, palette.BLACK),
-    ("step", "time of a step, p99 [ms]", 1e-3, palette.BLACK),
+    ("clearance", "exact clearance [mm]", 1e3, 0, colours.NEAR),
+    ("psi", "height of the embedding |ψ|", 1.0, 1, palette.BLACK),
+    ("speed", "fastest joint [% of its limit]", 1e2, 1, palette.BLACK),
+    ("torque", "largest torque [% of its limit]", 1e2, 1, palette.BLACK),
+    ("step", "time of a step, p99 [ms]", 1e-3, 2, palette.BLACK),
 )
 NOTHING = (np.array([-SPAN, 0.0]), np.array([np.nan, np.nan]))  # a plot without a line
 
@@ -41,7 +41,7 @@ class Plots:
         self._rows: deque[tuple[float, ...]] = deque()
         self._drawn, self._stale = 0.0, False
         self._handles: list[Any] = []
-        for name, title, _, colour in PLOTS:
+        for name, title, _, _, colour in PLOTS:
             last = name == PLOTS[-1][0]
             self._handles.append(
                 server.gui.add_uplot(
@@ -105,9 +105,12 @@ class Plots:
         before_now = (
             columns[0] - columns[0, -1]
         )  # the scales stay as they are: changing them is slow in the browser
-        for handle, values, (_, _, factor, _) in zip(self._handles, columns[1:], PLOTS, strict=True):
+        for handle, values, (_, _, factor, decimals, _) in zip(
+            self._handles, columns[1:], PLOTS, strict=True
+        ):
             known = np.isfinite(values)  # a single unknown value would empty the plot
-            handle.data = (before_now[known], factor * values[known]) if known.sum() > 1 else NOTHING
+            shown = np.round(factor * values[known], decimals)
+            handle.data = (before_now[known], shown) if known.sum() > 1 else NOTHING
 
     @property
     def rows(self) -> Array:
