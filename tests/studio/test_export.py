@@ -30,7 +30,7 @@ from sidestep.studio.export import not_kept, python_snippet, save_scenario, scen
 from sidestep.studio.methods import METHODS, WRITTEN
 from sidestep.studio.session import Session
 from sidestep.studio.systems import numbers_of, parts_of
-from sidestep.studio.things import CLOUD_LIMIT, CLOUD_RADIUS, cloud, scattered, thinned
+from sidestep.studio.things import CLOUD_LIMIT, CLOUD_RADIUS, box, cloud, scattered, thinned
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
 SMALL_ARM: dict[str, Any] = {
@@ -273,6 +273,20 @@ def test_a_cloud_is_saved_beside_its_scenario(
     loaded = Scenario.load(path)
     assert loaded.obstacles[1].shape.file == "mine-cloud.npy"
     np.testing.assert_array_equal(make_session(loaded).snapshot().things[1].cloud, points)
+
+
+@pytest.mark.parametrize("method", ["unswitched", "barrier"])
+def test_a_box_is_seen_as_a_run_sees_it(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, method: str
+) -> None:
+    session = make_session(scenario, method=method)
+    session.handle(m.AddThing(box("crate", np.array([0.5, 0.5, 0.0]), np.full(3, 0.1))))
+    seen = session._obstacles()
+    run = assemble(Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))).seen
+    order = [np.lexsort(np.array(o.points).T) for o in (seen, run)]
+    np.testing.assert_allclose(np.array(seen.points)[order[0]], np.array(run.points)[order[1]], atol=1e-12)
+    np.testing.assert_array_equal(np.array(seen.radii)[order[0]], np.array(run.radii)[order[1]])
+    assert len(seen.points) > 20
 
 
 def test_a_large_cloud_is_thinned() -> None:

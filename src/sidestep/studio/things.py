@@ -16,7 +16,7 @@ from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import solids
 from sidestep.scenario.scenario import Obstacle, Shape, Vector3
-from sidestep.scenario.seen import covering
+from sidestep.scenario.seen import View, view_of
 from sidestep.simulation import SceneObject
 
 Array = npt.NDArray[np.float64]
@@ -93,22 +93,26 @@ class Thing:
         return np.zeros((1, 3)) if self.cloud is None else self.cloud
 
     def seen(self, *, bare: bool) -> tuple[Array, Array]:
-        """Points (n, 3) in its frame [m] and radii (n,) [m] that the controller is told of.
+        """Points (n, 3) in its frame [m] and radii (n,) [m] that the controller is told of, as in `sidestep run`.
 
-        Balls are told as they are; other shapes as balls on the surface that leave no gap. With `bare`, what the
-        scenario file asks for: a centre without radius, where its `points` is "centre".
+        Balls are told as they are; other shapes as balls on the surface that leave no gap. With `bare`, as the scenario
+        file asks by `points`.
         """
-        shape = self.obstacle.shape
-        if bare and self.obstacle.points == "centre":
-            return self.offsets, np.zeros(len(self.offsets))
-        if shape.type in ("sphere", "points"):
-            return self.offsets, np.full(len(self.offsets), float(shape.radius or 0.0))
-        return self._surface
+        if self.cloud is None:
+            view = self._bare_view if bare else self._full_view
+            return view.points, np.full(len(view.points), view.radius)
+        has_size = not bare or self.obstacle.points == "ball"
+        return self.cloud, np.full(
+            len(self.cloud), float(self.obstacle.shape.radius or 0.0) if has_size else 0.0
+        )
 
     @cached_property
-    def _surface(self) -> tuple[Array, Array]:
-        points = covering(self.obstacle, self.solids[0])
-        return points, np.full(len(points), self.obstacle.spacing)
+    def _bare_view(self) -> View:
+        return view_of(self.obstacle, self.solids[0], bare=True)
+
+    @cached_property
+    def _full_view(self) -> View:
+        return view_of(self.obstacle, self.solids[0], bare=False)
 
     @cached_property
     def middle(self) -> Array:
