@@ -16,7 +16,7 @@ from sidestep.studio.session import Session
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
 from sidestep.studio.systems import make_body
-from studio.looker import PATIENCE, Looker
+from studio.looker import PATIENCE, Looker, reset
 
 SMALL = 2  # ellipsoids per link: a second of work, and kept for all tests
 
@@ -67,3 +67,9 @@ def studio(folder: Path) -> Iterator[Studio]:
 @pytest.fixture(scope="session")
 def looker(chromium: Any, studio: Studio) -> Looker:
     return Looker(chromium, studio)
+
+
+@pytest.fixture
+def at_the_start(studio: Studio) -> None:
+    """The arm at its start, paused, and one ball."""
+    reset(studio)

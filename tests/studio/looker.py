@@ -8,16 +8,24 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from sidestep.pose import from_quaternion
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
-from sidestep.studio.headless import Window, go_to, new_page, picture
+from sidestep.studio.headless import Window, find_chromium, go_to, new_page, picture
 from sidestep.studio.page.view import MAIN_WIDTH, PLOT_WIDTH
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
 
+ON_THE_PAGE = [  # marks of tests in the browser, each of which begins as `at_the_start` says
+    pytest.mark.skipif(
+        find_chromium() is None,
+        reason="there is no Chromium here (apt-get install chromium, or SIDESTEP_CHROMIUM)",
+    ),
+    pytest.mark.usefixtures("at_the_start"),
+]
 PATIENCE = 120.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
 PASSIVE = "Unable to preventDefault inside passive event listener"  # the browser's own note on viser's lists
 WINDOW = Window(1080, 560)

@@ -13,7 +13,7 @@ from PIL import Image
 from sidestep import ExactClearance, Scenario
 from sidestep.studio import messages as m
 from sidestep.studio.export import python_snippet
-from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, film, find_chromium, new_page
+from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, film, new_page
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.page.obstacles import gizmo_pose
@@ -21,18 +21,9 @@ from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.page.surface import on_surface
 from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses
-from studio.looker import PATIENCE, WINDOW, Looker, differ, last, reset, run_to, until
+from studio.looker import ON_THE_PAGE, PATIENCE, WINDOW, Looker, differ, last, run_to, until
 
-pytestmark = pytest.mark.skipif(
-    find_chromium() is None,
-    reason="there is no Chromium here (apt-get install chromium, or SIDESTEP_CHROMIUM)",
-)
-
-
-@pytest.fixture(autouse=True)
-def at_the_start(studio: Studio) -> None:
-    """Each test begins with the arm at its start, paused, and one ball."""
-    reset(studio)
+pytestmark = ON_THE_PAGE
 
 
 def test_the_arm_is_on_the_page(studio: Studio, looker: Looker) -> None:

@@ -10,22 +10,12 @@ import pytest
 
 from sidestep import ExactClearance
 from sidestep.studio import messages as m
-from sidestep.studio.headless import find_chromium
 from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses
-from studio.looker import Looker, differ, last, reset, run_to, until
+from studio.looker import ON_THE_PAGE, Looker, differ, last, run_to, until
 
-pytestmark = pytest.mark.skipif(
-    find_chromium() is None,
-    reason="there is no Chromium here (apt-get install chromium, or SIDESTEP_CHROMIUM)",
-)
-
-
-@pytest.fixture(autouse=True)
-def at_the_start(studio: Studio) -> None:
-    """Each test begins with the arm at its start, paused, and one ball."""
-    reset(studio)
+pytestmark = ON_THE_PAGE
 
 
 def test_a_cloud_is_added_dragged_thrown_and_removed(studio: Studio, looker: Looker) -> None:

@@ -215,27 +215,27 @@ const BodyClearance::Workspace::Pose& BodyClearance::pose(const Workspace& w, in
 
 BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obstacles, const Asked& asked,
                                          Workspace& w) const noexcept {
-  const Link& link = links_[static_cast<std::size_t>(item.link)];
   if (item.other >= 0) {
     const Asked gap_asked{asked.cap + item.contact, asked.near + item.contact, asked.stop + item.contact};
     const double gap = look_at_pair(item, gap_asked, w);
     return {gap < gap_asked.cap ? gap - item.contact : asked.cap, -1};  // exactly the cap where nothing is nearer
   }
   if (item.plane >= 0) {
-    return {look_at_plane(link, planes_[static_cast<std::size_t>(item.plane)], asked.cap, w), -1};
+    return {look_at_plane(links_[static_cast<std::size_t>(item.link)], planes_[static_cast<std::size_t>(item.plane)], asked.cap, w), -1};
   }
-  return look_at_points(link, obstacles, asked, w);
+  return look_at_points(item, obstacles, asked, w);
 }
 
-BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obstacles& obstacles, const Asked& asked,
+BodyClearance::Found BodyClearance::look_at_points(const Item& item, const Obstacles& obstacles, const Asked& asked,
                                                    Workspace& w) const noexcept {
+  const Link& link = links_[static_cast<std::size_t>(item.link)];
   const Workspace::Pose& X = pose(w, link.joint);
-  const auto bound = [&](const Eigen::Vector3d& centre, double radius, double enough) {
-    return w.field_.bound(X.p + X.R * centre, enough + radius, obstacles) - radius;
+  const auto bound = [&](const Eigen::Vector3d& place, double radius, double enough) {
+    return w.field_.bound(place, enough + radius, obstacles) - radius;
   };
   Found found{asked.cap, -1};
   // From coarse to fine: the ball around the link, those around its ellipsoids, those that cover them, and themselves.
-  const double around = bound(link.centre, link.radius, asked.cap);
+  const double around = bound(w.centres_[static_cast<std::size_t>(item.link)], link.radius, asked.cap);
   if (around >= std::min(asked.cap, asked.near)) {
     found.clearance = std::min(asked.cap, around);
     return found;
@@ -243,11 +243,11 @@ BodyClearance::Found BodyClearance::look_at_points(const Link& link, const Obsta
   std::size_t nearest = 0;
   for (std::size_t i = 0; i < link.ellipsoids.size(); ++i) {
     const Ellipsoid& e = link.ellipsoids[i];
-    double least = bound(e.mean, e.extent, found.clearance);
+    double least = bound(X.p + X.R * e.mean, e.extent, found.clearance);
     if (least < std::min(asked.near, found.clearance)) {
       double covered = infinity;
       for (const CoverBall& ball : e.cover) {
-        covered = std::min(covered, bound(ball.centre, ball.radius, found.clearance));
+        covered = std::min(covered, bound(X.p + X.R * ball.centre, ball.radius, found.clearance));
       }
       if (covered > 0.0) {  // nothing is in them; of depths they say nothing
         least = std::max(least, covered);

@@ -188,7 +188,7 @@ class BodyClearance {
     double cap, near, stop;
   };
   Found look(const Item& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
-  Found look_at_points(const Link& link, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
+  Found look_at_points(const Item& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
   double look_at_pair(const Item& item, const Asked& asked, const Workspace& w) const noexcept;
   double look_at_plane(const Link& link, const Plane& plane, double cap, const Workspace& w) const noexcept;
   double margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, const Margins& margins, double& slope) const noexcept;
