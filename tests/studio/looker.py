@@ -91,6 +91,13 @@ class Looker:
         """Clicks the button of this name."""
         self.click(f'role=button[name="{name}"]')
 
+    def answer(self, name: str) -> None:
+        """Presses a button of the question that is asked, which then goes away."""
+        button = self.page.locator(f"[role=dialog] button:has-text('{name}')")
+        button.focus()  # it moves while it appears: a click may miss it
+        button.press("Enter")
+        self.page.locator("[role=dialog]").wait_for(state="detached")
+
     def check(self, label: str) -> None:
         """Clicks the box beside a label."""
         self.click(f"xpath=//label[normalize-space()='{label}']/following::input[@type='checkbox'][1]")

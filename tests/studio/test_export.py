@@ -26,7 +26,14 @@ from sidestep.scenario.scenario import (
 )
 from sidestep.simulation.pose_aim import PoseAim
 from sidestep.studio import messages as m
-from sidestep.studio.export import not_kept, python_snippet, save_scenario, scenario_now
+from sidestep.studio.export import (
+    not_kept,
+    packed_scenario,
+    python_snippet,
+    save_scenario,
+    scenario_now,
+    unpacked_scenario,
+)
 from sidestep.studio.methods import METHODS, WRITTEN
 from sidestep.studio.session import Session
 from sidestep.studio.systems import numbers_of, parts_of
@@ -120,8 +127,8 @@ def test_a_shipped_scenario_is_saved_as_it_was_loaded(
     shipped = Scenario.load(name)
     session = make_session(shipped, method=numbers_of(shipped)[0])
     for _ in range(2):  # as it opens, and after a motion and a restart
-        kept = Scenario.load(save_scenario(scenario_now(session.snapshot(), name=name), tmp_path))
-        assert kept == shipped
+        now = scenario_now(session.snapshot(), name=name)
+        assert Scenario.load(save_scenario(now, tmp_path, replace=True)) == shipped
         for _ in range(20):
             session.step()
         session.handle(m.Restart())
@@ -273,6 +280,61 @@ def test_a_cloud_is_saved_beside_its_scenario(
     loaded = Scenario.load(path)
     assert loaded.obstacles[1].shape.file == "mine-cloud.npy"
     np.testing.assert_array_equal(make_session(loaded).snapshot().things[1].cloud, points)
+
+
+def test_a_download_is_complete_by_itself(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+) -> None:
+    """Two clouds of one file name, whose files are deleted afterwards, as when the studio ends."""
+    session = make_session(scenario, method="unswitched")
+    assert packed_scenario(scenario_now(session.snapshot(), name="mine"))[0] == "mine.yaml"
+    points = [scattered(0.2, seed=seed) for seed in (1, 2)]
+    for k, own in enumerate(points):
+        source = tmp_path / f"folder{k}" / "cloud.npy"
+        source.parent.mkdir()
+        np.save(source, own)
+        session.handle(m.AddThing(cloud(f"wall{k}", np.array([-0.9 - k, 0.0, 0.0]), source, 0.01)))
+    now = session.snapshot()
+    name, content = packed_scenario(scenario_now(now, name="mine"))
+    assert name == "mine.zip"
+    for k in range(2):
+        (tmp_path / f"folder{k}" / "cloud.npy").unlink()
+    place = tmp_path / "elsewhere"
+    place.mkdir()
+    loaded = unpacked_scenario(name, content, tmp_path, place)
+    assert sorted(file.name for file in place.iterdir()) == [
+        "mine-cloud-2.npy",
+        "mine-cloud.npy",
+        "mine.yaml",
+    ]
+    again = make_session(loaded, method="unswitched").snapshot()
+    for k, own in enumerate(points):
+        np.testing.assert_array_equal(again.things[1 + k].cloud, own)
+    np.testing.assert_array_equal(again.poses, now.poses)
+    assert packed_scenario(loaded)[1] == packed_scenario(loaded)[1]  # and it can be taken away again
+
+
+def test_a_download_that_would_not_be_complete_is_refused(scenario: Scenario, tmp_path: Path) -> None:
+    mine = replace(scenario, robot=RobotChoice(urdf="arm.urdf"), folder=tmp_path)
+    with pytest.raises(ValueError, match=r"the robot is the file .*arm\.urdf, .* use Save"):
+        packed_scenario(mine)
+
+
+def test_an_upload_that_is_no_scenario_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"mine\.zip is not a zip file"):
+        unpacked_scenario("mine.zip", b"no zip", tmp_path, tmp_path)
+    with pytest.raises(ValueError, match=r"mine\.yaml: "):
+        unpacked_scenario("mine.yaml", b"robot: 3", tmp_path, tmp_path)
+
+
+def test_a_file_that_is_there_is_replaced_only_if_asked(scenario: Scenario, tmp_path: Path) -> None:
+    mine = replace(scenario, name="mine")
+    path = save_scenario(mine, tmp_path)
+    other = replace(mine, description="another")
+    with pytest.raises(FileExistsError, match=r"mine\.yaml exists"):
+        save_scenario(other, tmp_path)
+    assert Scenario.load(path).description == ""
+    assert Scenario.load(save_scenario(other, tmp_path, replace=True)).description == "another"
 
 
 @pytest.mark.parametrize("method", ["unswitched", "barrier"])

@@ -1,4 +1,4 @@
-"""The loop in its own process, and what the studio says when it cannot start."""
+"""The loop in its own process, what reaches it, and what the studio says when it cannot start or go on."""
 
 from __future__ import annotations
 
@@ -8,15 +8,20 @@ from collections.abc import Callable
 from dataclasses import replace
 from multiprocessing import Pipe
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 
 from sidestep import Scenario
+from sidestep.pose import pose_at
+from sidestep.studio import loop as loop_module
 from sidestep.studio import messages as m
 from sidestep.studio.headless import Window, check_files, save_animation
-from sidestep.studio.loop import Beginning, Loop, serve
-from sidestep.studio.studio import check_port
+from sidestep.studio.loop import FRAME, IDLE_FRAME, Beginning, Loop, _Pacer, serve
+from sidestep.studio.outbox import Outbox, add
+from sidestep.studio.session import Session
+from sidestep.studio.studio import address_of, check_port
 
 PATIENCE = 120.0  # [s] at most for anything
 
@@ -78,6 +83,191 @@ def test_a_loop_that_cannot_start_says_why(scenario: Scenario) -> None:
     assert isinstance(failure, m.Failed)
     assert failure.fatal
     assert failure.message.startswith("no robot is named 'nobody'")
+
+
+def drag(name: str, x: float) -> m.DragThing:
+    return m.DragThing(name, pose_at([x, 0.0, 0.0]))
+
+
+def test_of_a_stream_of_places_the_latest_is_kept_and_nothing_else_is_lost() -> None:
+    waiting: list[m.Command] = []
+    throw, pose = m.ThrowThing("ball", np.ones(3)), m.SetPoseGoal(np.eye(4), thorough=False)
+    final = m.SetPoseGoal(np.eye(4))
+    sent: tuple[m.Command, ...] = (
+        drag("ball", 0.0),
+        pose,
+        drag("box", 1.0),
+        m.Seen(),
+        drag("ball", 2.0),
+        final,
+    )
+    for command in (*sent, throw, drag("ball", 3.0), drag("ball", 4.0), m.DragThing("ball", None)):
+        add(waiting, command)
+    assert [type(command) for command in waiting] == [
+        m.DragThing,
+        m.Seen,
+        m.DragThing,
+        m.SetPoseGoal,
+        m.ThrowThing,
+        m.DragThing,
+        m.DragThing,
+    ]
+    places = [
+        (command.name, None if command.pose is None else command.pose[0, 3])
+        for command in waiting
+        if isinstance(command, m.DragThing)
+    ]
+    assert places == [("box", 1.0), ("ball", 2.0), ("ball", 4.0), ("ball", None)]
+    assert waiting[3] is final
+
+
+def test_the_page_does_not_wait_for_a_loop_that_is_busy() -> None:
+    """While a body is made nobody reads; a hand goes on for minutes."""
+    here, there = Pipe()
+    outbox = Outbox(here)
+    drags = 20_000  # some hundred fill the connection
+    for k in range(drags):
+        outbox.put(drag("ball", float(k)))
+    outbox.put(m.Restart())
+    received: list[m.Command] = []
+    while not received or not isinstance(received[-1], m.Restart):
+        assert there.poll(PATIENCE)
+        received.append(there.recv())
+    assert received[-2].pose[0, 3] == drags - 1  # type: ignore[union-attr]
+    assert len(received) < 0.1 * drags
+    outbox.stop()
+    outbox.join(PATIENCE)
+    outbox.put(m.Restart())
+    assert not there.poll(0.0)
+
+
+class Clock:
+    """Goes on by a tenth of a millisecond whenever it is looked at."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def perf_counter(self) -> float:
+        self.now += 1e-4
+        return self.now
+
+
+class Hand:
+    """A connection whose other end drags without a pause until a time [s], and takes every snapshot at once."""
+
+    def __init__(self, clock: Clock, end: float) -> None:
+        self.clock, self.end = clock, end
+        self.sent: list[tuple[float, object]] = []
+        self._unseen, self._next = 0, 0.0
+
+    def poll(self, timeout: float = 0.0) -> bool:
+        self.clock.now += min(timeout, max(0.0, self._next - self.clock.now))
+        if self.clock.now >= self.end:
+            raise EOFError
+        return bool(self._unseen) or self.clock.now >= self._next
+
+    def recv(self) -> m.Command:
+        if self._unseen:
+            self._unseen -= 1
+            return m.Seen()
+        self._next = self.clock.now + 2e-3  # a mouse
+        return drag("ball", self.clock.now)
+
+    def send(self, message: object) -> None:
+        self.sent.append((self.clock.now, message))
+        self._unseen += isinstance(message, m.Snapshot)
+
+
+def paced(session: Session, monkeypatch: pytest.MonkeyPatch, duration: float) -> list[tuple[float, object]]:
+    """What a loop sends in so many seconds of a clock of its own."""
+    clock = Clock()
+    hand = Hand(clock, duration)
+    monkeypatch.setattr(loop_module, "clock", clock)
+    with pytest.raises(EOFError):
+        _Pacer(session, hand).run()  # type: ignore[arg-type]
+    return hand.sent
+
+
+@pytest.mark.parametrize("running", [True, False])
+def test_a_drag_is_not_shown_more_often_than_thirty_times_a_second(
+    make_session: Callable[..., Session], scenario: Scenario, monkeypatch: pytest.MonkeyPatch, running: bool
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    session.running = running
+    times = [time for time, message in paced(session, monkeypatch, 1.0) if isinstance(message, m.Snapshot)]
+    between = np.diff(times)
+    assert between.min() >= FRAME - 1e-9
+    assert np.median(between) < 1.2 * FRAME < IDLE_FRAME  # and paused it is shown as often: the hand sees it
+
+
+def test_a_loop_that_fails_holds_the_arm_and_says_why(
+    make_session: Callable[..., Session], scenario: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    failing = session._pursuit.step
+    calls = 0
+
+    def step(*arguments: object) -> object:
+        nonlocal calls
+        calls += 1
+        if calls == 5:
+            raise np.linalg.LinAlgError("singular")
+        return failing(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(session._pursuit, "step", step)
+    sent = [message for _, message in paced(session, monkeypatch, 0.5)]
+    (failure,) = [message for message in sent if isinstance(message, m.Failed)]
+    assert failure.message == "the step at 0.004 s failed, the loop is paused: LinAlgError: singular"
+    assert not failure.fatal
+    after = [message for message in sent[sent.index(failure) :] if isinstance(message, m.Snapshot)]
+    assert len(after) > 10  # it goes on answering
+    assert {message.time for message in after} == {after[0].time}
+    assert not any(message.running for message in after)
+    for message in after:
+        np.testing.assert_array_equal(message.q, after[0].q)
+    session.handle(m.SetRunning(True))
+    session.step()
+    assert session.time == pytest.approx(0.005, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        m.DragThing("ball", np.full((4, 4), np.nan)),
+        m.ThrowThing("ball", np.array([np.inf, 0.0, 0.0])),
+        m.SetPoseGoal(np.full((4, 4), np.nan)),
+        m.SetJointGoal(np.array([np.nan, 0.0])),
+    ],
+    ids=lambda command: type(command).__name__,
+)
+def test_what_is_not_finite_is_refused(
+    make_session: Callable[..., Session], scenario: Scenario, command: m.Command
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    before = session.snapshot()
+    with pytest.raises(ValueError, match=r"nan|inf"):
+        session.handle(command)
+    session.step()
+    now = session.snapshot()
+    np.testing.assert_array_equal(now.poses, before.poses)
+    np.testing.assert_array_equal(now.goal, before.goal)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("host", "address"),
+    [
+        ("127.0.0.1", "http://localhost:80"),
+        ("0.0.0.0", "http://localhost:80"),
+        ("192.168.1.2", "http://192.168.1.2:80"),
+        ("robot.local", "http://robot.local:80"),
+        ("::1", "http://[::1]:80"),
+        ("::", "http://[::1]:80"),
+        ("fe80::2", "http://[fe80::2]:80"),
+    ],
+)
+def test_the_address_of_every_host_can_be_opened(host: str, address: str) -> None:
+    assert address_of(host, 80) == address
+    assert urlsplit(address).port == 80
 
 
 def test_a_port_that_is_taken_is_named() -> None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import logging
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sidestep import ExactClearance
+from sidestep import ExactClearance, Scenario
 from sidestep.studio import messages as m
 from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.studio import Studio
+from sidestep.studio.things import things_of
 from sidestep.studio.truth import solid_poses
 from studio.looker import ON_THE_PAGE, Looker, differ, last, run_to, until
 
@@ -39,7 +41,7 @@ def test_a_cloud_is_added_dragged_thrown_and_removed(studio: Studio, looker: Loo
     studio.send(m.SetRunning(True))
     looker.drag(before + thing.cloud[np.abs(thing.cloud).sum(axis=1).argmin()], to)
     until(lambda: float(np.linalg.norm(last(studio).poses[1][:3, 3] - before)) > 0.1, "the drag")
-    looker.choose("obstacle", thing.name)
+    assert studio.view.obstacle_panel._chosen.value == thing.name  # what was added is chosen
     looker.press("Throw at the arm")
     until(lambda: bool(np.linalg.norm(last(studio).velocities[1]) > 0.4), "the throw")  # at 0.5 m/s
     looker.press("Remove")
@@ -54,7 +56,41 @@ def test_a_cloud_file_is_added(studio: Studio, looker: Looker, tmp_path: Path) -
         looker.press("Add a point cloud file …")
     chooser.value.set_files(tmp_path / "wall.npy")
     until(lambda: len(last(studio).things) == 2, "the cloud")
-    np.testing.assert_array_equal(last(studio).things[1].cloud, points)
+    first = last(studio).things[1]
+    np.testing.assert_array_equal(first.cloud, points)
+    other = points[:20] + np.array([0.0, 0.0, 0.5])
+    np.save(tmp_path / f"{first.name}.npy", other)  # named as what the studio keeps of the first
+    looker.page.locator("button:not([disabled])").get_by_text("Add a point cloud file …").wait_for()
+    with looker.page.expect_file_chooser() as chooser:
+        looker.press("Add a point cloud file …")
+    chooser.value.set_files(tmp_path / f"{first.name}.npy")
+    until(lambda: len(last(studio).things) == 3, "the other cloud")
+    until(lambda: studio.view.last is not None and len(studio.view.last.things) == 3, "its picture")
+    looker.tab("Scenario")
+    looker.type("name", "clouds")
+    with looker.page.expect_download() as download:
+        looker.press("Download")
+    assert download.value.suggested_filename == "clouds.zip"
+    with zipfile.ZipFile(download.value.path()) as archive:
+        archive.extractall(tmp_path / "taken")
+    taken = things_of(Scenario.load(tmp_path / "taken" / "clouds.yaml"))
+    np.testing.assert_array_equal(taken[1].cloud, points)
+    np.testing.assert_array_equal(taken[2].cloud, other)
+
+
+def test_what_is_refused_leaves_its_place_free(
+    studio: Studio, looker: Looker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    panel = studio.view.obstacle_panel
+    looker.tab("Obstacles")
+    with monkeypatch.context() as patch:
+        patch.setattr(panel, "_new_name", lambda _: "ball")  # as when two windows add at one time
+        looker.press("Add")
+        looker.page.get_by_text("two obstacles are called 'ball'").first.wait_for()
+    assert studio.error == "two obstacles are called 'ball'; names must differ"
+    studio.error = ""  # else the next test would take it for its own
+    assert panel._sent == []
+    assert len(last(studio).things) == 1
 
 
 def test_a_ball_is_thrown_with_the_mouse(studio: Studio, looker: Looker) -> None:

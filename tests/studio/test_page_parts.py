@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from sidestep.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page import colours
+from sidestep.studio.page import surface as surface_module
 from sidestep.studio.page.arm import reach, short_names
 from sidestep.studio.page.camera import HALF, HIGH, LOW, RIGHT, UP, VIEW, Viewpoint
 from sidestep.studio.page.marks import METRIC_SIZE, metric_ellipsoid
@@ -26,6 +29,7 @@ from sidestep.studio.page.surface import (
     SIDE,
     TOP,
     Request,
+    Surface,
     heights_over,
     labels,
     net,
@@ -33,11 +37,11 @@ from sidestep.studio.page.surface import (
     open_faces,
     seen,
 )
-from sidestep.studio.page.view import begun
+from sidestep.studio.page.view import begun, live_row
 from sidestep.studio.session import Session
 from sidestep.studio.systems import build_system
 from sidestep.studio.things import ball, cloud, thing_of
-from sidestep.studio.truth import solid_poses
+from sidestep.studio.truth import Truth, solid_poses
 
 MakeSession = Callable[..., Session]
 
@@ -286,6 +290,122 @@ def test_the_nearest_of_each_link_agrees_with_the_nearest_of_all(
     each = exact.of_links(snapshot.q, poses)
     assert [item.link for item in each] == ["link1", "link2"]
     assert min(item.distance for item in each) == exact.distance(snapshot.q, poses).distance
+
+
+PATIENCE = 60.0  # [s] at most for a thread to do a step
+
+
+def test_a_measurement_that_fails_is_reported_and_the_next_one_is_made(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    row = live_row(session.snapshot())
+    bad = m.Row(row.time, np.zeros(5), row.things, row.poses, row.metric)  # five joints of two
+    reported: list[tuple[str, Exception]] = []
+    found: list[Any] = []
+    heard = threading.Event()
+
+    def report(what: str, error: Exception) -> None:
+        reported.append((what, error))
+        heard.set()
+
+    def tell(*answer: object) -> None:
+        found.append(answer)
+        heard.set()
+
+    truth = Truth(tell, report)
+    truth.look(session.robot, bad, 1)
+    assert heard.wait(PATIENCE)
+    assert not found
+    assert reported[0][0] == "measuring clearances failed"
+    heard.clear()
+    truth.look(session.robot, row, 2)
+    assert heard.wait(PATIENCE)
+    truth.stop()
+    assert len(reported) == 1
+    ((clearances, time, epoch),) = found
+    exact = ExactClearance(session.robot, [solid for thing in row.things for solid in thing.solids])
+    assert (time, epoch) == (row.time, 2)
+    assert clearances[0].distance == exact.distance(row.q, solid_poses(row.things, row.poses)).distance
+
+
+def test_a_surface_that_cannot_be_computed_is_reported_and_the_next_one_is(
+    make_session: MakeSession, scenario: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    body, drawn, heard = Body.fit(session.robot, components=1), [], threading.Event()
+    reported: list[tuple[str, Exception]] = []
+
+    def report(what: str, error: Exception) -> None:
+        reported.append((what, error))
+        heard.set()
+
+    def draw(_: Surface, __: Request, heights: np.ndarray) -> None:
+        drawn.append(heights)
+        heard.set()
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("no room")
+
+    monkeypatch.setattr(Surface, "_show_surface", draw)
+    monkeypatch.setattr(Surface, "_show_state", lambda *_: None)
+    monkeypatch.setattr(surface_module, "CELLS", 4)
+    surface = Surface(None, threading.RLock(), report)  # type: ignore[arg-type]
+    place = Viewpoint.of(np.eye(3))
+    with monkeypatch.context() as patch:
+        patch.setattr(surface_module, "heights_over", fail)
+        surface.show(session.snapshot(), session.robot, body, (0, 1), place)
+        assert heard.wait(PATIENCE)
+    assert surface.heights is None
+    ((what, error),) = reported
+    assert (what, str(error)) == ("computing the curved space failed", "no room")
+    heard.clear()
+    session.handle(m.SetRunning(False))
+    session.handle(m.DragThing("ball", pose_at([0.6, 0.5, 0.0])))
+    surface.show(session.snapshot(), session.robot, body, (0, 1), place)
+    assert heard.wait(PATIENCE)
+    surface.stop()
+    assert len(reported) == 1
+    np.testing.assert_array_equal(surface.heights, drawn[0])
+    assert drawn[0].shape == (5, 5)
+
+
+def test_the_slice_of_an_arm_of_many_joints_is_taken_where_the_others_are(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    """Joints 2 and 3 of three, with names and ends of the axes, and told apart from a slice elsewhere."""
+    robot = Robot.named("planar3")
+    body, method, numbers = (
+        Body.fit(robot, components=1),
+        METHODS["unswitched"],
+        METHODS["unswitched"].defaults,
+    )
+    system = build_system(method, robot, body, numbers, scenario)
+    points, radii = np.array([[0.8, 0.3, 0.0]]), np.zeros(1)
+
+    def request(q: np.ndarray, joints: tuple[int, int] = (1, 2)) -> Request:
+        return Request(
+            robot, body, method, numbers, joints, q, points, radii, scenario, np.zeros((0, len(q)))
+        )
+
+    here = np.array([0.4, -0.2, 0.9])
+    slices = request(here)
+    heights = heights_over(slices, system)
+    axis, rest = np.linspace(-np.pi, np.pi, CELLS + 1), np.zeros(3)
+    for i, k in ((30, 30), (28, 37), (12, 50)):
+        q = np.array([0.4, axis[i], axis[k]])
+        psi = system.acceleration(q, rest, q, Obstacles(points, radii)).values
+        assert heights[i, k] == pytest.approx(np.linalg.norm(psi), rel=1e-12)
+    np.testing.assert_array_equal(heights, heights_over(request(np.add(here, [0.0, 0.3, 0.2])), system))
+    elsewhere = request(np.add(here, [0.5, 0.0, 0.0]))
+    assert elsewhere.differs(slices)
+    assert np.abs(heights_over(elsewhere, system) - heights).max() > 0.1 * heights.max()
+    swapped = heights_over(request(here, (2, 1)), system)
+    np.testing.assert_array_equal(swapped, heights.T)
+    place = on_surface(robot, (1, 2), here, heights)
+    np.testing.assert_allclose(place[:2], here[1:] * SIDE / (2.0 * np.pi), atol=1e-12)
+    texts = {name: text for name, (text, _, _) in labels(robot, (1, 2)).items()}
+    assert (texts["label0+0"], texts["label1+0"]) == ("joint2", "joint3")
 
 
 def test_a_sentence_begins_large_but_a_name_stays_as_it_is() -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import shutil
+import io
+import tempfile
+import zipfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import cast
 
@@ -31,6 +34,8 @@ from sidestep.studio.systems import Parts, parts_of
 from sidestep.studio.things import written_pose
 
 Array = npt.NDArray[np.float64]
+
+MOST_UNPACKED = 2**28  # bytes of an upload, unpacked: more than the largest clouds that are taken
 
 
 def scenario_now(snapshot: Snapshot, *, name: str) -> Scenario:
@@ -104,25 +109,92 @@ def _goal(snapshot: Snapshot) -> JointState | PoseChoice:
     return PoseChoice(snapshot.tip, *written_pose(snapshot.goal_pose), posture)
 
 
-def save_scenario(scenario: Scenario, folder: Path) -> Path:
-    """Writes a scenario as NAME.yaml, with copies of the point clouds it names beside it.
+def save_scenario(scenario: Scenario, folder: Path, *, replace: bool = False) -> Path:
+    """Writes a scenario as NAME.yaml, with copies of the files that its obstacles name beside it.
 
     Raises:
-        OSError: the folder cannot be written to.
+        FileExistsError: there is one of this name, and it is not to be replaced.
+        OSError: a file of an obstacle cannot be read, or the folder cannot be written to.
     """
+    path = folder / f"{scenario.name}.yaml"
+    if path.exists() and not replace:
+        raise FileExistsError(f"{path} exists")
+    copies: dict[Path, Path] = {}  # by what they are copies of
     obstacles = []
     for item in scenario.obstacles:
         shape = item.shape
         if shape.file is not None:
             source = scenario.file(shape.file)
-            target = (folder / f"{scenario.name}-{source.name}").resolve()
-            if source != target:
-                shutil.copyfile(source, target)
-            item = dataclasses.replace(item, shape=dataclasses.replace(shape, file=str(target)))
+            if source not in copies:
+                name = f"{scenario.name}-{source.name.removeprefix(f'{scenario.name}-')}"
+                copies[source] = _unused(folder / name, copies.values())
+            shape = dataclasses.replace(shape, file=str(copies[source]))
+            item = dataclasses.replace(item, shape=shape)
         obstacles.append(item)
-    path = folder / f"{scenario.name}.yaml"
+    contents = {copy: source.read_bytes() for source, copy in copies.items()}  # one may be another's place
+    for copy, content in contents.items():
+        copy.write_bytes(content)
     dataclasses.replace(scenario, obstacles=tuple(obstacles)).save(path)
     return path
+
+
+def _unused(path: Path, taken: Collection[Path]) -> Path:
+    """The path, or one with a number where it is taken."""
+    found, count = path.resolve(), 2
+    while found in taken:
+        found, count = path.resolve().with_stem(f"{path.stem}-{count}"), count + 1
+    return found
+
+
+def packed_scenario(scenario: Scenario) -> tuple[str, bytes]:
+    """A scenario complete in one file, by name and content: NAME.yaml, or NAME.zip with the files that it names.
+
+    Raises:
+        ValueError: its robot is a URDF file, whose meshes would be missing elsewhere.
+        OSError: a file of an obstacle cannot be read.
+    """
+    if scenario.robot.urdf is not None:
+        raise ValueError(
+            f"the robot is the file {scenario.file(scenario.robot.urdf)}, which with its meshes does not go into a "
+            "download; use Save, which names it where it is"
+        )
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        path = save_scenario(scenario, folder)
+        files = sorted(folder.iterdir())
+        if files == [path]:
+            return path.name, path.read_bytes()
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+            for file in files:
+                archive.write(file, file.name)
+        return f"{scenario.name}.zip", buffer.getvalue()
+
+
+def unpacked_scenario(name: str, content: bytes, folder: Path, place: Path) -> Scenario:
+    """A scenario of a file that was uploaded: YAML, whose file names refer to `folder`, or a .zip of
+    `packed_scenario`, which is unpacked into `place`.
+
+    Raises:
+        ValueError: it is neither; names what is wrong with it.
+    """
+    if not name.lower().endswith(".zip"):
+        text = content.decode("utf-8", errors="replace")
+        return Scenario.from_text(text, file=name, folder=folder)
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+            if size > MOST_UNPACKED:
+                raise ValueError(
+                    f"{name} holds {size / 2**20:.0f} MiB; allowed: {MOST_UNPACKED / 2**20:.0f} MiB"
+                )
+            archive.extractall(place)
+    except zipfile.BadZipFile as error:
+        raise ValueError(f"{name} is not a zip file: {error}") from error
+    files = sorted(place.glob("*.yaml"))
+    if len(files) != 1:
+        raise ValueError(f"{name} holds {len(files)} scenarios (.yaml) at its top; allowed: one")
+    return Scenario.load(files[0])
 
 
 def python_snippet(snapshot: Snapshot) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import logging
 import os
 import secrets
 import subprocess
@@ -22,6 +23,7 @@ from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
+from sidestep.studio.outbox import Outbox, add
 from sidestep.studio.session import Session
 from sidestep.studio.systems import Covering, Recipe, make_body
 
@@ -68,20 +70,19 @@ class Loop:
         self._process.stdin.flush()
         self._connection = _accept(listener, self._process)
         listener.close()
-        self._lock = threading.Lock()
         self._fresh = threading.Condition()
         self._snapshot: m.Snapshot | None = None
         self._notes: list[m.Preparing | m.Failed] = []
         self._rows: list[m.Row] = []
         self.ended = False
         self._connection.send(beginning)
+        self._outbox = Outbox(self._connection)
         self._thread = threading.Thread(target=self._receive, daemon=True)
         self._thread.start()
 
     def send(self, command: m.Command) -> None:
-        """Hands a command to the loop; of a loop that has ended nothing is heard."""
-        with self._lock, contextlib.suppress(OSError, ValueError):
-            self._connection.send(command)
+        """Hands a command to the loop and never waits, see `Outbox`; of a loop that has ended nothing is heard."""
+        self._outbox.put(command)
 
     def wait(self, timeout: float) -> m.Snapshot | None:
         """The next snapshot, or None when there was none within `timeout` [s]."""
@@ -105,6 +106,8 @@ class Loop:
 
     def stop(self) -> None:
         """Ends the process."""
+        self._outbox.stop()
+        self._outbox.join(timeout=0.2)  # longer where the loop is busy and the connection full
         with contextlib.suppress(OSError):
             self._connection.close()
         try:
@@ -112,6 +115,7 @@ class Loop:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._outbox.join(timeout=2.0)
         if self._process.stdin is not None:
             self._process.stdin.close()
 
@@ -189,17 +193,16 @@ class _Pacer:
     def __init__(self, session: Session, connection: Connection[Any, Any]) -> None:
         self._session, self._connection = session, connection
         self._unseen = 0
-        self._zero = clock.perf_counter()
-        self._next_frame = 0.0
+        self._sent, self._next_frame = -FRAME, 0.0
+        self._said = ""
         self._marks: list[tuple[float, float]] = []
 
     def run(self) -> None:
         session = self._session
         due = clock.perf_counter()
         while True:
-            while self._connection.poll():
-                if self._answer():
-                    self._next_frame = 0.0  # shown at once
+            if self._connection.poll():
+                self._answer()
                 due = max(due, clock.perf_counter() - BEHIND)
             now = clock.perf_counter()
             if session.running:
@@ -223,32 +226,49 @@ class _Pacer:
     def _step(self) -> None:
         try:
             self._session.step()
-        except RuntimeError as error:
-            self._session.running = False
-            self._connection.send(m.Failed(str(error)))
+        except Exception as error:  # the arm stays where it is, until somebody lets it run again
+            self._hold(f"the step at {self._session.time:.3f} s failed, the loop is paused", error)
 
-    def _answer(self) -> bool:
-        """Does one command; whether there is something new to show."""
-        command = self._connection.recv()
-        if isinstance(command, m.Seen):
-            self._unseen -= 1
-            return False
-        try:
-            self._session.handle(command)
-        except (ValueError, OSError) as error:
-            self._connection.send(m.Failed(str(error)))
-        return True
+    def _answer(self) -> None:
+        """Does the commands that have arrived, of a stream of places only the latest."""
+        commands: list[m.Command] = []
+        while self._connection.poll():
+            add(commands, self._connection.recv())
+        for command in commands:
+            if isinstance(command, m.Seen):
+                self._unseen -= 1
+                continue
+            try:
+                self._session.handle(command)
+                self._said = ""
+            except (ValueError, OSError) as error:
+                self._connection.send(m.Failed(str(error), refused=command))
+            except Exception as error:
+                self._hold(f"{type(command).__name__} failed, the loop is paused", error)
+            self._next_frame = min(self._next_frame, self._sent + FRAME)  # shown as soon as may be
 
     def _send(self, now: float) -> None:
         self._marks.append((now, self._session.time))
         self._marks = [mark for mark in self._marks if mark[0] > now - 1.0]
         (t0, s0), (t1, s1) = self._marks[0], self._marks[-1]
         ratio = (s1 - s0) / (t1 - t0) if t1 > t0 and s1 >= s0 else 0.0
-        self._connection.send(self._session.snapshot(real_time=ratio))
+        self._sent, self._next_frame = now, now + (FRAME if self._session.running else IDLE_FRAME)
+        try:
+            snapshot = self._session.snapshot(real_time=ratio)
+        except Exception as error:
+            self._hold("the state cannot be shown, the loop is paused", error)
+            return
+        self._connection.send(snapshot)
         self._unseen += 1
-        self._next_frame = max(self._next_frame, now - FRAME) + (
-            FRAME if self._session.running else IDLE_FRAME
-        )
+
+    def _hold(self, what: str, error: Exception) -> None:
+        """Stops the time, in which the arm moves, and says why; the same not twice in a row."""
+        self._session.running = False
+        text = f"{what}: {type(error).__name__}: {error}"
+        if text != self._said:
+            self._said = text
+            logging.getLogger(__name__).error(text, exc_info=error)
+            self._connection.send(m.Failed(text))
 
 
 def main() -> None:

@@ -224,7 +224,11 @@ class Preparing:
 
 @dataclass(frozen=True)
 class Failed:
-    """A command was refused, or the loop ended: why, in a sentence."""
+    """A command was refused, or the loop ended, or holds the arm: why, in a sentence.
+
+    refused: the command, which has changed nothing.
+    """
 
     message: str
     fatal: bool = False
+    refused: Command | None = None

@@ -104,7 +104,7 @@ class Session:
             case m.SetJointGoal(position):
                 self._set_goal(None, Posture(self.robot.check_configuration(position, "goal")))
             case m.SetPoseGoal(pose, thorough):
-                target = np.array(pose, dtype=float)
+                target = finite(pose, "the pose of the goal")
                 near = self.stage.state()[0] if self._pose is None else self._posture.q
                 starts = POSTURE_STARTS if thorough else 1
                 free = partial(self._pursuit.is_free, obstacles=self._obstacles())
@@ -112,6 +112,8 @@ class Session:
                     target, posture_at(self.robot, self.tip, target, near, starts=starts, free=free)
                 )
             case m.AddThing(thing):
+                if any(actor.thing.name == thing.name for actor in self.stage.actors):
+                    raise ValueError(f"two obstacles are called {thing.name!r}; names must differ")
                 self._set_actors([*self.stage.actors, Actor(thing)])
             case m.RemoveThing(name):
                 gone = self.actor(name)
@@ -120,12 +122,12 @@ class Session:
                 if place is None:
                     self.stage.throw(self.actor(name), np.zeros(3))
                 elif self.running:
-                    self.stage.draw(self.actor(name), place)
+                    self.stage.draw(self.actor(name), finite(place, f"the place of {name}"))
                 else:
-                    self.stage.put(self.actor(name), place)
+                    self.stage.put(self.actor(name), finite(place, f"the place of {name}"))
                     self._pursuit.obstacles_changed()
             case m.ThrowThing(name, velocity):
-                self.stage.throw(self.actor(name), velocity)
+                self.stage.throw(self.actor(name), finite(velocity, f"the velocity of {name}"))
             case m.SetMethod(name):
                 self._use(method_named(name), self._numbers[name])
             case m.SetNumbers(name, numbers):
@@ -342,3 +344,11 @@ class Session:
 
     def _poses(self) -> Array:
         return np.array([actor.pose for actor in self.stage.actors]).reshape(-1, 4, 4)
+
+
+def finite(values: npt.ArrayLike, what: str) -> Array:
+    """The values as an array; raises ValueError where one of them is not finite."""
+    array = np.array(values, dtype=float)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} is {array.tolist()}; allowed: finite numbers")
+    return array

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import logging
 import socket
 import threading
 import time as clock
@@ -68,8 +67,8 @@ class Studio:
         self.error = ""
         self._loop = Loop(Beginning(scenario, method, dict(numbers or {}), ellipsoids))
         self.view: View = View(server, scenario, robot, self.send)
-        self._truth = Truth(self.view.take_clearances)
-        self._last_truth, self._reported = 0.0, ""
+        self._truth = Truth(self.view.take_clearances, self.view.report)
+        self._last_truth = 0.0
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -82,7 +81,7 @@ class Studio:
     @property
     def address(self) -> str:
         """What to open in a browser."""
-        return f"http://{'localhost' if self.host in ('0.0.0.0', '127.0.0.1') else self.host}:{self.port}"
+        return address_of(self.host, self.port)
 
     def _repr_html_(self) -> str:
         """The page inside a notebook whose browser runs on this machine."""
@@ -138,7 +137,7 @@ class Studio:
                 try:
                     self._draw(snapshot)
                 except Exception as error:  # the page goes on with the next state
-                    self._report(error)
+                    self.view.report("drawing failed", error)
                 self.snapshot = snapshot  # after it is on the page
             if self._loop.ended:
                 self.view.tell(m.Failed(self.error or "the process of the loop ended", fatal=True))
@@ -151,13 +150,13 @@ class Studio:
             self._last_truth = now
             self._truth.look(self.view.robot, row, self.view.epoch)
 
-    def _report(self, error: Exception) -> None:
-        """Logs what went wrong while drawing, and says it on the page; the same not twice in a row."""
-        text = f"drawing failed: {type(error).__name__}: {error}"
-        if text != self._reported:
-            self._reported = text
-            logging.getLogger(__name__).error(text, exc_info=error)
-            self.view.tell(m.Failed(text))
+
+def address_of(host: str, port: int) -> str:
+    """The address of a page that is served at a host, a name or number of this machine."""
+    name = {"0.0.0.0": "localhost", "127.0.0.1": "localhost", "::": "[::1]"}.get(host)
+    if name is None:
+        name = f"[{host}]" if ":" in host else host
+    return f"http://{name}:{port}"
 
 
 def check_port(host: str, port: int) -> None:

@@ -141,11 +141,15 @@ class Thing:
 
 
 def things_of(scenario: Scenario) -> tuple[Thing, ...]:
-    """The obstacles of a scenario."""
-    return tuple(
+    """The obstacles of a scenario; raises ValueError where two share a name."""
+    things = tuple(
         Thing(item.name or f"obstacle{index}", item, scenario.folder)
         for index, item in enumerate(scenario.obstacles)
     )
+    for index, thing in enumerate(things):
+        if any(other.name == thing.name for other in things[:index]):
+            raise ValueError(f"two obstacles are called {thing.name!r}; names must differ")
+    return things
 
 
 def thing_of(solid: str, things: Iterable[Thing]) -> str:

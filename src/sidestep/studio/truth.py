@@ -23,10 +23,15 @@ class Truth:
 
     Args:
         tell: called with the clearances of the links, nearest first, the time [s] they belong to, and the epoch.
+        report: called with what went wrong, after which the thread goes on with the next state.
     """
 
-    def __init__(self, tell: Callable[[tuple[Clearance, ...], float, int], None]) -> None:
-        self._tell = tell
+    def __init__(
+        self,
+        tell: Callable[[tuple[Clearance, ...], float, int], None],
+        report: Callable[[str, Exception], None],
+    ) -> None:
+        self._tell, self._report = tell, report
         self._wake = threading.Condition()
         self._next: tuple[Robot, Row, int] | None = None
         self._stopping = False
@@ -59,8 +64,12 @@ class Truth:
                 assert self._next is not None
                 robot, row, epoch = self._next
                 self._next = None
-            found = self._measure(robot, row.things, row.q, row.poses)
-            self._tell(tuple(sorted(found, key=lambda item: item.distance)), row.time, epoch)
+            try:
+                found = self._measure(robot, row.things, row.q, row.poses)
+                self._tell(tuple(sorted(found, key=lambda item: item.distance)), row.time, epoch)
+            except Exception as error:
+                self._exact = None  # may be half made
+                self._report("measuring clearances failed", error)
 
     def _measure(
         self, robot: Robot, things: tuple[Thing, ...], q: Array, poses: Array

@@ -78,12 +78,16 @@ class ObstaclePanel:
         if name in self._chosen.options:
             self._chosen.value = name
 
+    def refused(self, name: str) -> None:
+        """An obstacle that was added is not there, and will not be."""
+        self._sent = [(sent, ball) for sent, ball in self._sent if sent != name]
+
     def set_names(self, names: tuple[str, ...]) -> None:
-        """Which obstacles there are."""
-        before = self._chosen.value
+        """Which obstacles there are; one that was added here is chosen."""
+        chosen = next((name for name, _ in reversed(self._sent) if name in names), self._chosen.value)
+        self._sent = [(name, ball) for name, ball in self._sent if name not in names]
         self._chosen.options = names or (NONE,)
-        if before not in self._chosen.options:
-            self._chosen.value = self._chosen.options[0]
+        self._chosen.value = chosen if chosen in self._chosen.options else self._chosen.options[0]
         self._show_place()
 
     def _index(self) -> int | None:
@@ -131,9 +135,12 @@ class ObstaclePanel:
     def _upload(self, event: Any) -> None:
         file = event.target.value
         with self._view.telling(event.client):
-            path = self._folder / Path(file.name).name
-            path.write_bytes(file.content)
-            points, radius = thinned(np.array(load_point_cloud(path).points))
+            with tempfile.TemporaryDirectory(
+                dir=self._folder
+            ) as folder:  # apart from the clouds that are there
+                path = Path(folder) / Path(file.name).name
+                path.write_bytes(file.content)
+                points, radius = thinned(np.array(load_point_cloud(path).points))
             self._put(self._cloud(self._new_name("cloud"), points, radius), event.client, as_written=True)
 
     def _put(self, thing: Thing, client: Any, *, as_written: bool = False) -> None:
@@ -141,8 +148,6 @@ class ObstaclePanel:
         view, last = self._view, self._view.last
         if last is None:
             raise ValueError("the loop does not run yet")
-        there = {present.name for present in last.things}
-        self._sent = [(present, ball) for present, ball in self._sent if present not in there]
         others = [
             (pose[:3, :3] @ present.middle + pose[:3, 3], present.size)
             for present, pose in zip(last.things, last.poses, strict=True)

@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 SPAN = 12.0  # [s] that is shown
 EVERY = 0.4  # [s] of the wall clock between two drawings
-HEIGHT, TIMES = 66, 24  # [px] of a plot, and of the times below the last one
+HEIGHT, TIMES = 53, 24  # [px] of a plot, and of the times below the last one
 
 # name, title with unit, factor, decimals (no finer: an arm at rest has labels that can be read), colour
 PLOTS = (

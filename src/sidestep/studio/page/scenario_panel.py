@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import atexit
 import re
+import shutil
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from sidestep.scenario import Scenario, shipped_scenarios
-from sidestep.studio.export import not_kept, save_scenario, scenario_now
+from sidestep.studio.export import (
+    not_kept,
+    packed_scenario,
+    save_scenario,
+    scenario_now,
+    unpacked_scenario,
+)
 from sidestep.studio.page.note import add_note
 
 if TYPE_CHECKING:
@@ -31,13 +38,21 @@ class ScenarioPanel:
         add_note(gui, "Scenarios of the thesis, by section, with the method they are written for.")
         self._shipped: Any = gui.add_dropdown("shipped", shipped_scenarios())
         gui.add_button("Load").on_click(self._load_shipped)
-        self._upload: Any = gui.add_upload_button("Load a file …", mime_type=".yaml,.yml")
+        self._upload: Any = gui.add_upload_button("Load a file …", mime_type=".yaml,.yml,.zip")
         self._upload.on_upload(self._load_upload)
         gui.add_divider()
         self._name: Any = gui.add_text("name", "my-scenario")
         gui.add_button("Save").on_click(self._save)
         gui.add_button("Download").on_click(self._download)
-        add_note(gui, f"Arm, goal, obstacles and method as they are now; Save writes into {folder}.")
+        add_note(
+            gui,
+            f"Arm, goal, obstacles and method as they are now. Save writes into {folder}; a download is complete by "
+            "itself: a .zip where it has point clouds or meshes.",
+        )
+        self._uploads = Path(
+            tempfile.mkdtemp(prefix="sidestep-studio-")
+        )  # as long as their obstacles may be there
+        atexit.register(shutil.rmtree, self._uploads, ignore_errors=True)
 
     def _load_thesis(self, event: Any) -> None:
         self._view.load(Scenario.load(f"thesis-{event.target.value}"))
@@ -48,21 +63,39 @@ class ScenarioPanel:
     def _load_upload(self, event: Any) -> None:
         file = event.target.value
         with self._view.telling(event.client):
-            text = file.content.decode("utf-8", errors="replace")
-            scenario = Scenario.from_text(text, file=file.name, folder=self._folder)
-            self._view.load(scenario)
+            place = Path(tempfile.mkdtemp(dir=self._uploads))
+            self._view.load(unpacked_scenario(file.name, file.content, self._folder, place))
 
     def _save(self, event: Any) -> None:
         with self._view.telling(event.client):
-            path = save_scenario(self._now(), self._folder)
-            self._told("Saved", str(path), event.client)
+            scenario = self._now()
+            try:
+                path = save_scenario(scenario, self._folder)
+            except FileExistsError as error:
+                self._ask(scenario, str(error), event.client)
+            else:
+                self._told("Saved", str(path), event.client)
+
+    def _ask(self, scenario: Scenario, problem: str, client: Any) -> None:
+        """Asks whether what is there is to be replaced."""
+        with client.gui.add_modal("Replace it?") as modal:
+            client.gui.add_markdown(f"{problem}.")
+            replace, keep = client.gui.add_button("Replace"), client.gui.add_button("Keep it")
+
+        def answer(_: Any) -> None:
+            modal.close()
+            with self._view.telling(client):
+                path = save_scenario(scenario, self._folder, replace=True)
+                self._told("Saved", str(path), client)
+
+        replace.on_click(answer)
+        keep.on_click(lambda _: modal.close())
 
     def _download(self, event: Any) -> None:
         with self._view.telling(event.client):
-            scenario = self._now()
-            text = yaml.safe_dump(scenario.to_document(), sort_keys=False, allow_unicode=True)
-            event.client.send_file_download(f"{scenario.name}.yaml", text.encode(), save_immediately=True)
-            self._told("Downloaded", f"{scenario.name}.yaml", event.client)
+            name, content = packed_scenario(self._now())
+            event.client.send_file_download(name, content, save_immediately=True)
+            self._told("Downloaded", name, event.client)
 
     def _told(self, what: str, where: str, client: Any) -> None:
         lost = "" if self._view.last is None else not_kept(self._view.last)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time as clock
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -77,11 +78,13 @@ class Surface:
     """|psi| over two joints, the others held where they are, to scale: a radian is as long upwards as sideways.
 
     Where psi has several coordinates its Euclidean norm is drawn. It is computed in a thread of its own from the same
-    system that the loop runs.
+    system that the loop runs. What goes wrong there is handed to `report`.
     """
 
-    def __init__(self, server: viser.ViserServer, lock: threading.RLock) -> None:
-        self._server, self._lock = server, lock
+    def __init__(
+        self, server: viser.ViserServer, lock: threading.RLock, report: Callable[[str, Exception], None]
+    ) -> None:
+        self._server, self._lock, self._report = server, lock, report
         self._trail: deque[Array] = deque(maxlen=TRAIL_POINTS)
         self._parts: dict[str, Any] = {}
         self._request: Request | None = None
@@ -159,14 +162,21 @@ class Surface:
             self._wake.clear()
             if self._stopping:
                 return
-            request = self._request
-            if request is not None:
-                heights = heights_over(request, self._system_of(request))
-                with self._lock:
-                    if self._request is not None and self._request.joints == request.joints:
-                        self._done, self._heights = request, heights
-                        self._show_surface(request, heights)
+            try:
+                self._compute()
+            except Exception as error:  # it is computed again when something changes
+                self._report("computing the curved space failed", error)
             clock.sleep(PAUSE)
+
+    def _compute(self) -> None:
+        request = self._request
+        if request is None:
+            return
+        heights = heights_over(request, self._system_of(request))
+        with self._lock:
+            if self._request is not None and self._request.joints == request.joints:
+                self._done, self._heights = request, heights
+                self._show_surface(request, heights)
 
     def _system_of(self, request: Request) -> GeometricSystem:
         if self._system is None or not self._system[0].same_system(request):

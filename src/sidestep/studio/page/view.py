@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import html
+import logging
 import threading
 import time as clock
 from collections.abc import Callable, Iterator
@@ -42,7 +43,8 @@ WORDS_EVERY = 0.15  # [s] nobody reads faster
 GRID_DEPTH = 0.05  # [m] below the base: a planar arm, half as thick, does not lie in the grid
 NEAR = 2.0  # of the arm's reach: obstacles farther off need not be in the window as it opens
 SKY_LIGHT = 2.4  # so that lit faces have about the colour that the legend shows
-MAIN_WIDTH, PLOT_WIDTH, WORDS_HEIGHT = 365, 290, 154  # [px]
+MAIN_WIDTH, PLOT_WIDTH = 365, 290  # [px]
+WORDS_HEIGHT = 214  # [px] at least, what the longest words usually take: what is below them stays where it is
 STYLE = (
     "<style>.mantine-Slider-markLabel{translate:0 3px}</style>"  # else a slider's knob covers its least value
 )
@@ -68,7 +70,7 @@ class View:
         self.last: m.Snapshot | None = None
         self.epoch = 0  # grows when clearances that were asked for before no longer count
         self._replayed = False
-        self._told = 0.0
+        self._told, self._reported = 0.0, ""
         self._set_up_scene()
         gui = server.gui
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
@@ -95,7 +97,7 @@ class View:
         with tabs.add_tab("Show"):
             self._add_switches()
         self.obstacles = ObstacleViews(server, send, self.obstacle_panel.select)
-        self.surface = Surface(server, self._lock)
+        self.surface = Surface(server, self._lock, self.report)
         self._body_now: Body | None = None
         self._choice = scenario.robot
         self._set_robot(scenario, robot)
@@ -222,10 +224,20 @@ class View:
             if isinstance(note, m.Preparing):
                 self._say(in_box(f"preparing: {html.escape(note.note)} …"))
                 return
+            if isinstance(note.refused, m.AddThing):
+                self.obstacle_panel.refused(note.refused.thing.name)
             if note.fatal:
                 self._say(in_box(f"The loop ended: {html.escape(note.message)}"))
         for client in self._server.get_clients().values():
             client.add_notification("Not possible", note.message, color="red", auto_close_seconds=8.0)
+
+    def report(self, what: str, error: Exception) -> None:
+        """Logs what went wrong, with where, and says it on the page; the same not twice in a row."""
+        text = f"{what}: {type(error).__name__}: {error}"
+        if text != self._reported:
+            self._reported = text
+            logging.getLogger(__name__).error(text, exc_info=error)
+            self.tell(m.Failed(text))
 
     def stop(self) -> None:
         """Ends what runs beside the page."""
@@ -240,7 +252,7 @@ class View:
         system, torque = snapshot.status
         status = [f"status: system {system}, torque program {torque}"] if system else []
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
-        least = f", least so far {1e3 * self.least_clearance:.0f} mm"
+        least = f" (least so far {1e3 * self.least_clearance:.0f} mm)"
         state = f"{touch} · {snapshot.time:.1f} s · {speed}"
         facts = [*self._nearest_facts(snapshot.things, least), state, *status]
         self._tell(now, begun(snapshot.words), facts)
@@ -255,7 +267,7 @@ class View:
             return []
         first = self._clearances[0]
         pair = f"{html.escape(first.link)} – {html.escape(thing_of(first.obstacle, things))}"
-        return [f"nearest {pair}: {1e3 * first.distance:.0f} mm{more}"]
+        return [f"exact meshes: {pair} {1e3 * first.distance:.0f} mm{more}"]
 
     def _tell(self, now: float, words: str, facts: list[str]) -> None:
         if now - self._told >= WORDS_EVERY:
@@ -369,9 +381,9 @@ def live_row(snapshot: m.Snapshot) -> m.Row:
 
 
 def in_box(words: str, facts: str = "") -> str:
-    """Words about the state above smaller facts, always equally high, so that nothing below moves."""
+    """Words about the state above smaller facts; names that are long are broken, and nothing is cut off."""
     return (
-        f'<div style="height:{WORDS_HEIGHT}px;overflow:hidden;padding:2px 10px;line-height:1.35">'
+        f'<div style="min-height:{WORDS_HEIGHT}px;overflow-wrap:anywhere;padding:2px 10px;line-height:1.35">'
         f'<div style="font-size:14px;font-weight:600">{words}</div>'
         f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
     )
