@@ -264,7 +264,8 @@ def test_a_shipped_scenario_is_one_click_away(studio: Studio, looker: Looker) ->
 def test_the_thesis_is_one_click_away_with_its_arm_of_seven_joints(studio: Studio, looker: Looker) -> None:
     looker.tab("Scenario")
     looker.press("6.2.3")
-    until(lambda: last(studio).scenario == Scenario.load("thesis-6.2.3"), "the scenario")
+    thesis = Scenario.load("thesis-6.2.3")
+    until(lambda: last(studio).scenario == thesis, "the scenario")
     assert last(studio).method == "written"
     until(lambda: last(studio).time > 0.2, "some steps")
     studio.send(m.SetRunning(False))
