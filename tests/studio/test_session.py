@@ -160,7 +160,7 @@ def test_things_come_and_go_while_the_arm_moves(make_session: MakeSession, scena
     np.testing.assert_array_equal(after.v, before.v)
     assert [thing.name for thing in after.things] == ["ball", "crate", "second"]
     assert after.edition == before.edition + 2
-    with pytest.raises(ValueError, match="two objects of the scene are named 'second'"):
+    with pytest.raises(ValueError, match="two obstacles are called 'second'"):
         session.handle(m.AddThing(ball("second", np.zeros(3), 0.05)))
     session.handle(m.RemoveThing("crate"))
     assert [thing.name for thing in run(session, 0.1).things] == ["ball", "second"]
