@@ -154,6 +154,7 @@ method: barrier
 robot: {name: planar2}
 start: {unit: rad, position: [1.0, 0.3]}
 goal: {unit: rad, position: [-1.0, 0.3]}
+barriers: {ellipsoids: 2}
 obstacles:
   - {name: ball, shape: {type: sphere, radius: 0.05}, position: [1.1, 0.0, 0.0]}
 """

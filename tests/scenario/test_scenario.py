@@ -2,12 +2,14 @@
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 
 import jsonschema
 import pytest
 
-from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
+from sidestep import Escape, PlannerSettings, RouteSettings, SafetySettings, TorqueController
+from sidestep.scenario import Scenario, ScenarioError, schema_text, settings, shipped_scenarios
 from sidestep.scenario import scenario as module
 
 BASE = """\
@@ -207,7 +209,65 @@ def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
             if field.name != "switch":
                 stated = schema["properties"][key]["properties"][field.name]["default"]
                 assert stated == getattr(value, field.name), f"{key}.{field.name}"
+    nested = {
+        ("escape",): settings.EscapeChoice,
+        ("guide", "planner"): settings.PlannerChoice,
+        ("guide", "route"): settings.RouteChoice,
+        ("torque",): settings.TorqueChoice,
+        ("torque", "safety"): settings.SafetyChoice,
+    }
+    for place, kind in nested.items():
+        part = schema
+        for name in place:
+            part = part["properties"][name]
+        plain = [field for field in dataclasses.fields(kind) if field.default is not dataclasses.MISSING]
+        numbers = {field.name: field.default for field in plain}
+        assert {name: part["properties"][name]["default"] for name in numbers} == numbers
     assert schema["properties"]["system"]["properties"]["switch"]["default"] == {"type": "none"}
     defaults = {f.name: f.default for f in dataclasses.fields(module.Obstacle)}
     for name in ("free", "points", "spacing"):
         assert schema["$defs"]["obstacle"]["properties"][name]["default"] == defaults[name]
+
+
+def core_defaults(kind: type) -> dict[str, object]:
+    """The defaults of the arguments of a class of the core, as it says them itself."""
+    (text, _, values), *_ = kind.__init__.__nb_signature__  # type: ignore[misc]
+    names = re.findall(r"(\w+): [^=,]*? = \\(\d+)", text)
+    return {name: values[int(index)] for name, index in names}
+
+
+@pytest.mark.parametrize(
+    ("choice", "kind"),
+    [
+        (settings.EscapeChoice, Escape),
+        (settings.PlannerChoice, PlannerSettings),
+        (settings.RouteChoice, RouteSettings),
+        (settings.TorqueChoice, TorqueController),
+        (settings.SafetyChoice, SafetySettings),
+    ],
+)
+def test_the_numbers_of_a_file_have_the_defaults_of_the_core(choice: type, kind: type) -> None:
+    core = core_defaults(kind)
+    own = {f.name: f.default for f in dataclasses.fields(choice) if f.default is not dataclasses.MISSING}
+    assert len(own) > 3
+    assert own == {name: core[name] for name in own}
+
+
+def test_the_numbers_beside_the_system_arrive_and_survive_saving(tmp_path: Path) -> None:
+    text = (
+        BASE
+        + """
+escape: {patience: 1.5}
+guide: {planner: {margin: 0.08, max_nodes: 500}, route: {speed: 1.25}}
+torque: {slack_weight: 50.5, safety: {margin: 0.012345678901234, max_rows: 8}}
+"""
+    )
+    mine = Scenario.from_text(text, folder=tmp_path)
+    assert mine.escape == settings.EscapeChoice(patience=1.5)
+    assert mine.guide.planner == settings.PlannerChoice(margin=0.08, max_nodes=500)
+    assert mine.guide.route == settings.RouteChoice(speed=1.25)
+    assert mine.torque.safety == settings.SafetyChoice(margin=0.012345678901234, max_rows=8)
+    mine.save(tmp_path / "mine.yaml")
+    assert Scenario.load(tmp_path / "mine.yaml") == mine
+    with pytest.raises(ScenarioError, match=r"escape\.fraction is 1\.5"):
+        Scenario.from_text(BASE + "\nescape: {fraction: 1.5}\n")

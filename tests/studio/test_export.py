@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,14 +30,15 @@ from sidestep.studio import messages as m
 from sidestep.studio.export import (
     not_kept,
     packed_scenario,
-    python_snippet,
     save_scenario,
     scenario_now,
     unpacked_scenario,
 )
 from sidestep.studio.methods import METHODS, WRITTEN
+from sidestep.studio.parameters import Parameter
 from sidestep.studio.session import Session
-from sidestep.studio.systems import numbers_of, parts_of
+from sidestep.studio.snippet import python_snippet
+from sidestep.studio.systems import as_file, numbers_of
 from sidestep.studio.things import CLOUD_LIMIT, CLOUD_RADIUS, box, cloud, scattered, thinned
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
@@ -47,9 +49,17 @@ SMALL_ARM: dict[str, Any] = {
 POSE = np.array([0.4, -0.7])  # [rad] whose pose of the tip is a goal
 
 
-def tuned(name: str) -> dict[str, float]:
+def tuned(name: str) -> dict[str, Any]:
     """Every number of a method away from its default, with all its digits."""
-    return {p.name: p.default + 0.0712345678901 * (p.upper - p.default) for p in METHODS[name].parameters}
+
+    def other(p: Parameter) -> Any:
+        if p.options:
+            return next(option for option in p.options if option != p.default)
+        assert isinstance(p.default, int | float)
+        value = p.default + 0.0712345678901 * (p.upper - p.default)
+        return round(value) if p.whole else value
+
+    return {p.name: other(p) for p in METHODS[name].parameters}
 
 
 def begun(session: Session, goal: str) -> Session:
@@ -87,10 +97,15 @@ def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
     again.step()
     parts = assemble(loaded)
     rest = np.zeros_like(parts.start)
+    q, v = again.stage.begin(0.0)
+    dynamics = (q, v, np.ones_like(q), *again.stage.dynamics())
+    torque = parts.torque_program.solve(*dynamics).torque
+    np.testing.assert_array_equal(again._controller.solve(*dynamics).torque, torque)
     aim = parts.goal if parts.pose is None else parts.pose.at(parts.start)
     run = parts.system.acceleration(parts.start, rest, aim, parts.seen)  # type: ignore[arg-type]
     variables: dict[str, Any] = {}
     exec(python_snippet(at_start), variables)
+    np.testing.assert_array_equal(variables["controller"].solve(*dynamics).torque, torque)
     system, place = variables["system"], variables.get("posture", variables["goal"])
     if METHODS[name].covering:
         system = system.relaxed_at(place, parts.seen)
@@ -105,19 +120,63 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
     numbers = tuned("thesis")
     state = JointState("rad", (0.0,) * 7)
     mine = Scenario("mine", RobotChoice("fr3"), state, state)
-    parts = parts_of(METHODS["thesis"], numbers, mine)
-    mine = replace(mine, body=parts.body, embedding=parts.embedding, system=parts.system)
+    mine = as_file(METHODS["thesis"], numbers, mine)
     assert numbers_of(mine) == ("thesis", numbers)
     # What no method of the page is exactly stays what the file says.
     for other in (
-        replace(mine, body=replace(mine.body, components=3)),
-        replace(mine, embedding=replace(mine.embedding, combine="stack")),
-        replace(mine, system=replace(mine.system, damping_form="metric")),
+        replace(mine, body=replace(mine.body, components=7)),  # not on the list
+        replace(mine, body=replace(mine.body, seed=1)),
+        replace(mine, embedding=replace(mine.embedding, joint_limits=None)),
+        replace(mine, torque=replace(mine.torque, stop_time=5.0)),  # beyond its slider
         replace(mine, system=replace(mine.system, stiffness=50.0)),  # beyond its slider
     ):
         assert numbers_of(other) == (WRITTEN, {})
     fall = replace(mine, system=SystemChoice(switch=SwitchChoice("geodesic_only")))
-    assert numbers_of(fall) == ("geodesic_only", {})
+    own = {p.name: numbers[p.name] for p in METHODS["geodesic_only"].parameters}
+    assert numbers_of(fall) == ("geodesic_only", own)
+
+
+CLASSES = {  # of the snippet, by places in a scenario file
+    "barriers": "Barriers",
+    "escape": "Escape",
+    "guide.planner": "PlannerSettings",
+    "guide.route": "RouteSettings",
+    "torque": "TorqueController",
+    "torque.safety": "SafetySettings",
+    "system": "GeometricSystem",
+    "embedding.joint_limits": "JointLimitPotential",
+    "body": "fit",
+}
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if name != WRITTEN])
+def test_every_number_is_in_the_file_and_in_the_snippet(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, name: str
+) -> None:
+    numbers = tuned(name)
+    snapshot = make_session(scenario, method=name, numbers={name: numbers}).snapshot()
+    loaded = Scenario.load(save_scenario(scenario_now(snapshot, name="mine"), tmp_path))
+    for parameter in METHODS[name].parameters:
+        if parameter.place != "system.switch":  # its numbers are in a list, see the test above
+            assert parameter.of(loaded) == numbers[parameter.name] != parameter.default
+    code = python_snippet(snapshot)
+    exec(code, {})
+    given: dict[str, dict[str, Any]] = {}
+    for call in ast.walk(ast.parse(code)):
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute | ast.Name):
+            called = call.func.attr if isinstance(call.func, ast.Attribute) else call.func.id
+            plain = [k for k in call.keywords if k.arg and isinstance(k.value, ast.Constant | ast.UnaryOp)]
+            given[called] = {str(k.arg): ast.literal_eval(k.value) for k in plain}
+    for parameter in METHODS[name].parameters:
+        value = numbers[parameter.name]
+        if parameter.name == "ellipsoids":
+            assert given["cover"]["components"] == value
+        elif parameter.name == "density":
+            assert given["CollisionDensity"]["average"] == (value == "average")
+        elif parameter.name == "combine":
+            assert ("ss.Sum(" in code) == (value == "sum")
+        elif parameter.place in CLASSES:
+            assert given[CLASSES[parameter.place]][parameter.field] == value
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
@@ -236,12 +295,12 @@ def test_a_loaded_file_brings_its_method_a_shipped_scenario_leaves_it(
     session.handle(m.SetMethod("unswitched"))
     session.handle(m.Load(saved))
     assert session.snapshot().method == "unswitched"
-    session.handle(m.SetNumbers("reactive", {}))
+    session.handle(m.SetNumbers("reactive", {name: METHODS["reactive"].defaults[name] for name in SPRING}))
     session.handle(m.Load(saved, numbers_of(saved)[0]))
     last = session.snapshot()
     assert last.method == "reactive"
-    assert last.numbers["reactive"] == {**METHODS["reactive"].defaults, **SPRING}
-    assert last.ellipsoids == saved.barriers.ellipsoids == 2
+    assert last.numbers["reactive"] == {**METHODS["reactive"].defaults, **SPRING, "ellipsoids": 2}
+    assert saved.barriers.ellipsoids == 2
 
 
 def test_a_pose_goal_survives_saving_and_loading(

@@ -1,10 +1,24 @@
 """The methods of the studio and their parameters."""
 
+import dataclasses
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from sidestep import presets
 from sidestep.bench.method import Method as BenchMethod
+from sidestep.scenario.scenario import (
+    BarrierChoice,
+    BodyChoice,
+    EmbeddingChoice,
+    JointLimitChoice,
+    SystemChoice,
+)
+from sidestep.scenario.settings import EscapeChoice, PlannerChoice, RouteChoice, SafetyChoice, TorqueChoice
 from sidestep.studio.methods import METHODS, check_numbers
+from sidestep.studio.page.tuning import add_control, show_value, value_of
+from sidestep.studio.parameters import Parameter
 
 
 def test_every_method_of_the_benchmark_is_there() -> None:
@@ -16,18 +30,84 @@ def test_every_method_of_the_benchmark_is_there() -> None:
 
 
 def test_the_recommended_numbers_are_the_presets() -> None:
-    assert presets.Barriers(**METHODS["barrier"].defaults) == presets.Barriers()
+    barriers = {p.field: p.default for p in METHODS["barrier"].parameters if p.place == "barriers"}
+    assert BarrierChoice(**barriers) == BarrierChoice()  # type: ignore[arg-type]
     thesis = METHODS["thesis"].defaults
-    assert presets.Thesis(**thesis) == presets.Thesis()  # type: ignore[arg-type]
+    own = {field.name: thesis[field.name] for field in dataclasses.fields(presets.Thesis)}
+    assert presets.Thesis(**own) == presets.Thesis()
+
+
+def every_parameter() -> dict[str, Parameter]:
+    return {f"{p.place}.{p.field}": p for method in METHODS.values() for p in method.parameters}
+
+
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        (BarrierChoice, "barriers"),
+        (EscapeChoice, "escape"),
+        (PlannerChoice, "guide.planner"),
+        (RouteChoice, "guide.route"),
+        (SafetyChoice, "torque.safety"),
+        (TorqueChoice, "torque"),
+        (SystemChoice, "system"),
+        (EmbeddingChoice, "embedding"),
+        (JointLimitChoice, "embedding.joint_limits"),
+        (BodyChoice, "body"),
+    ],
+)
+def test_every_number_of_a_scenario_file_can_be_set(kind: type, place: str) -> None:
+    parts = {"safety", "switch", "joint_limits"}  # with numbers of their own
+    constant = {"seed"}  # as docs/studio.md says
+    for field in dataclasses.fields(kind):
+        if field.name not in parts | constant:
+            assert f"{place}.{field.name}" in every_parameter()
+
+
+def test_another_value_of_a_parameter_is_of_its_kind() -> None:
+    known = every_parameter()
+    nodes, count, kind = (
+        known["guide.planner.max_nodes"],
+        known["barriers.ellipsoids"],
+        known["system.damping_form"],
+    )
+    assert (nodes.allows(500), nodes.allows(500.5), nodes.allows(True), nodes.allows("500")) == (1, 0, 0, 0)
+    assert (count.allows(None), count.allows(2), count.allows(5), count.allows(True)) == (1, 1, 0, 0)
+    assert (kind.allows("metric"), kind.allows("flat")) == (True, False)
+    assert not known["barriers.stiffness"].allows(float("nan"))
 
 
 @pytest.mark.parametrize("name", list(METHODS))
 def test_every_parameter_has_a_range_around_its_default_and_a_sentence(name: str) -> None:
-    for parameter in METHODS[name].parameters:
-        assert parameter.lower <= parameter.default <= parameter.upper
+    parameters = METHODS[name].parameters
+    assert len({p.name for p in parameters}) == len({p.sentence for p in parameters}) == len(parameters)
+    for parameter in parameters:
+        assert parameter.allows(parameter.default)
         assert parameter.sentence.endswith(".")
 
 
 def test_an_unknown_parameter_is_refused() -> None:
-    with pytest.raises(ValueError, match="unswitched has no parameter 'magic'; it has stiffness, damping"):
+    with pytest.raises(ValueError, match="unswitched has no parameter 'magic'; it has stiffness, damping, "):
         check_numbers(METHODS["unswitched"], {"magic": 1.0})
+    with pytest.raises(ValueError, match=r"density is flat, allowed: \['sum', 'average'\]"):
+        check_numbers(METHODS["unswitched"], {"density": "flat"})
+
+
+@pytest.mark.parametrize("parameter", every_parameter().values(), ids=every_parameter().keys())
+def test_a_control_gives_back_the_value_it_shows(parameter: Parameter) -> None:
+    """Also one that a file has and the page's range does not."""
+    gui = SimpleNamespace(
+        add_slider=lambda _, **it: SimpleNamespace(value=it["initial_value"], **it),
+        add_dropdown=lambda _, options, initial_value: SimpleNamespace(value=initial_value, options=options),
+    )
+    values: list[Any] = [*(parameter.options or (parameter.lower, parameter.upper)), parameter.default]
+    values += [7 if parameter.options else 2 * parameter.upper]  # type: ignore[list-item]
+    for value in values:
+        control = add_control(gui, parameter, value)
+        assert value_of(control, parameter) == (
+            value if parameter.options else pytest.approx(value, rel=5e-3)
+        )
+        show_value(control, parameter, parameter.default)
+        back = value_of(control, parameter)
+        assert back == parameter.default
+        assert type(back) is type(parameter.default)

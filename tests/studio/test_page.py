@@ -15,7 +15,6 @@ from sidestep import ExactClearance, Scenario
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import headless
 from sidestep.studio import messages as m
-from sidestep.studio.export import python_snippet
 from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, new_page, take_pictures
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import RIGHT
@@ -23,6 +22,7 @@ from sidestep.studio.page.obstacles import gizmo_pose
 from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.page.surface import on_surface
 from sidestep.studio.page.view import WORDS_HEIGHT, in_box, stamped
+from sidestep.studio.snippet import python_snippet
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses

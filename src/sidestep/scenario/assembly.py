@@ -26,6 +26,7 @@ from sidestep import (
     Robot,
     SigmoidSwitch,
     Sum,
+    TorqueController,
     Unswitched,
 )
 from sidestep._core import JointType, Obstacles
@@ -34,6 +35,7 @@ from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.presets import barrier_system
+from sidestep.scenario.parts import escape_of, guide_of, torque_program_of
 from sidestep.scenario.scenario import (
     BasePose,
     EmbeddingChoice,
@@ -73,6 +75,7 @@ class Assembly:
         start, start_velocity, goal: (nv,) [rad | m]; for a pose a configuration that has it, or is near it.
         pose: in place of the goal.
         seen: what the controller sees; a function of time [s] where an obstacle starts or stops.
+        torque_program: with the weights and limits of the scenario.
     """
 
     robot: Robot
@@ -83,6 +86,7 @@ class Assembly:
     start_velocity: Array
     goal: Array
     seen: Obstacles | Callable[[float], Obstacles]
+    torque_program: TorqueController
     safe: bool = False
     escape: Escape | None = None
     guide: GuidedMotion | None = None
@@ -133,9 +137,14 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         goal=posture.q,
         seen=seen,
         safe=barrier,
-        escape=Escape(robot) if scenario.method == "barrier" else None,
-        guide=GuidedMotion(robot, body, system=system, synchronous=True) if guided else None,
+        escape=_at("escape", scenario, partial(escape_of, scenario.escape, robot))
+        if scenario.method == "barrier"
+        else None,
+        guide=_at("guide", scenario, partial(_guide, scenario, robot, body, system)) if guided else None,
         pose=_pose_aim(scenario, robot, posture),
+        torque_program=_at(
+            "torque", scenario, partial(torque_program_of, scenario.torque, robot, scenario.simulation.period)
+        ),
     )
 
 
@@ -153,6 +162,10 @@ def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> Posture:
     if choice.posture is not None:
         return Posture(coordinates(choice.posture, robot, "goal.posture.position"))
     return posture_at(robot, choice.frame, pose_of(choice), start, starts=POSTURE_STARTS)
+
+
+def _guide(scenario: Scenario, robot: Robot, body: Body, system: GeometricSystem) -> GuidedMotion:
+    return guide_of(scenario.guide, robot, body, system, synchronous=True)
 
 
 def _pose_aim(scenario: Scenario, robot: Robot, posture: Posture) -> PoseAim | None:

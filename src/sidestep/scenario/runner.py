@@ -81,13 +81,11 @@ def _arrival(scenario: Scenario) -> Arrival:
 
 
 def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
-    from sidestep import TorqueController
-
     choice = scenario.simulation
     simulation = Simulation(parts.robot, parts.objects, timestep=choice.period)
     return simulation.run(
         parts.system if parts.guide is None else _Guided(parts.guide, parts.goal, choice.period),
-        TorqueController(parts.robot, period=choice.period),
+        parts.torque_program,
         parts.start,
         parts.pose or parts.goal,
         choice.duration,

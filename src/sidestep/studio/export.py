@@ -8,29 +8,22 @@ import tempfile
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.scenario import (
-    BarrierChoice,
     JointState,
-    MethodChoice,
     Obstacle,
     PoseChoice,
-    RobotChoice,
     StraightMove,
-    SwitchChoice,
     Vector3,
 )
-from sidestep.simulation.pose_aim import ENTER, POSITION_SHARE, TURN_SHARE
 from sidestep.studio.messages import Snapshot
-from sidestep.studio.methods import METHODS, WRITTEN
+from sidestep.studio.methods import METHODS
 from sidestep.studio.pursuit import STILL
-from sidestep.studio.systems import Parts, parts_of
+from sidestep.studio.systems import as_file
 from sidestep.studio.things import written_pose
 
 Array = npt.NDArray[np.float64]
@@ -43,25 +36,15 @@ def scenario_now(snapshot: Snapshot, *, name: str) -> Scenario:
 
     What is as it was loaded stays as it was written; see `not_kept` for what a file cannot say.
     """
-    scenario, method = snapshot.scenario, METHODS[snapshot.method]
     numbers = snapshot.numbers[snapshot.method]
+    written = as_file(METHODS[snapshot.method], numbers, snapshot.scenario)
     velocity = snapshot.v / max(1.0, snapshot.speed_share)  # the start of a file is within the limits
-    parts, choice, barriers = parts_of(METHODS[WRITTEN], {}, scenario), "written", scenario.barriers
-    if method.covering:
-        choice, barriers = method.name, BarrierChoice(**numbers, ellipsoids=snapshot.ellipsoids)
-    else:
-        parts = parts_of(method, numbers, scenario)
     return dataclasses.replace(
-        scenario,
+        written,
         name=name,
-        method=cast("MethodChoice", choice),
-        start=scenario.start if snapshot.time == 0.0 else _state(snapshot.q, velocity),
-        goal=scenario.goal if snapshot.goal_written else _goal(snapshot),
+        start=written.start if snapshot.time == 0.0 else _state(snapshot.q, velocity),
+        goal=written.goal if snapshot.goal_written else _goal(snapshot),
         obstacles=tuple(_obstacle(snapshot, index) for index in range(len(snapshot.things))),
-        body=parts.body,
-        embedding=parts.embedding,
-        system=parts.system,
-        barriers=barriers,
     )
 
 
@@ -195,93 +178,3 @@ def unpacked_scenario(name: str, content: bytes, folder: Path, place: Path) -> S
     if len(files) != 1:
         raise ValueError(f"{name} holds {len(files)} scenarios (.yaml) at its top; allowed: one")
     return Scenario.load(files[0])
-
-
-def python_snippet(snapshot: Snapshot) -> str:
-    """Python that makes the system that moves the arm, as `system`, and its `goal`."""
-    robot, method = snapshot.scenario.robot, snapshot.method
-    numbers = snapshot.numbers[method]
-    lines = ["import sidestep as ss", "", f"robot = {_robot_code(robot, snapshot.scenario)}"]
-    if METHODS[method].covering:
-        lines[1:1] = ["from sidestep.presets import Barriers, barrier_system"]
-        count = "" if snapshot.ellipsoids is None else f", components={snapshot.ellipsoids}"
-        values = ", ".join(f"{name}={value!r}" for name, value in numbers.items())
-        lines += [f"body = ss.Body.cover(robot{count})", f"numbers = Barriers({values})"]
-        lines += ["system = barrier_system(robot, body, numbers=numbers)"]
-    else:
-        lines += _written_code(parts_of(METHODS[method], numbers, snapshot.scenario))
-    lines += _goal_code(snapshot)
-    if METHODS[method].covering:
-        place = "goal" if snapshot.goal_pose is None else "posture"
-        lines += [f"# among obstacles at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]
-    return "\n".join(lines) + "\n"
-
-
-def _robot_code(robot: RobotChoice, scenario: Scenario) -> str:
-    if robot.name is not None:
-        return f"ss.Robot.named({robot.name!r})"
-    assert robot.urdf is not None
-    parts = [repr(str(scenario.file(robot.urdf)))]
-    if robot.package_dirs:
-        parts.append(f"package_dirs={[str(scenario.file(folder)) for folder in robot.package_dirs]!r}")
-    if robot.tip is not None:
-        parts.append(f"tip={robot.tip!r}")
-    if robot.locked is not None:
-        parts.append(f"locked={robot.locked!r}")
-    if robot.base is not None:
-        parts.append(f"base_pose={pose_of(robot.base).tolist()!r}")
-    return f"ss.Robot.from_urdf({', '.join(parts)})"
-
-
-def _goal_code(snapshot: Snapshot) -> list[str]:
-    posture = snapshot.posture.q.tolist()
-    if snapshot.goal_pose is None:
-        return [f"goal = {posture}  # [rad | m]"]
-    numbers = snapshot.numbers[snapshot.method]
-    stiffness = numbers.get("stiffness", snapshot.scenario.system.stiffness)
-    pull = (
-        f"position_stiffness={POSITION_SHARE * stiffness!r}, orientation_stiffness={TURN_SHARE * stiffness!r}"
-    )
-    lines = [
-        f"pose = {snapshot.goal_pose.tolist()}",
-        f"goal = ss.PoseGoal(robot, {snapshot.tip!r}, pose, {pull})",
-    ]
-    says = f"that has the pose: the goal until the tip is within {1e3 * ENTER[0]:g} mm and {ENTER[1]:g} rad of it"
-    if not snapshot.posture.found:
-        says = "the nearest found to the pose, which is out of reach: the goal"
-    return [*lines, f"posture = {posture}  # {says}"]
-
-
-def _written_code(parts: Parts) -> list[str]:
-    body, embedding, system = parts.body, parts.embedding, parts.system
-    psi = [f"ss.CollisionDensity(robot, body, average={embedding.density == 'average'})"]
-    if embedding.joint_limits is not None:
-        limits = embedding.joint_limits
-        psi += [f"ss.JointLimitPotential(robot, slope={limits.slope!r}, height={limits.height!r})"]
-    together = f"[{', '.join(psi)}]"
-    if embedding.combine == "sum" and len(psi) > 1:
-        together = f"[ss.Sum({together})]"
-    spring = (
-        f"stiffness={system.stiffness!r}, damping={system.damping!r}, damping_form={system.damping_form!r}"
-    )
-    return [
-        f"body = ss.Body.fit(robot, components={body.components!r}, covariance={body.covariance!r}, "
-        f"seed={body.seed!r})",
-        f"psi = {together}",
-        f"system = ss.GeometricSystem(psi, {spring}, switch={_switch_code(system.switch)})",
-    ]
-
-
-def _switch_code(switch: SwitchChoice) -> str:
-    match switch.type:
-        case "distance":
-            return f"ss.DistanceSwitch({list(switch.thresholds or ())!r}, {switch.slope!r})"
-        case "sigmoid":
-            return f"ss.SigmoidSwitch({switch.threshold!r}, {switch.slope!r})"
-        case "binary":
-            return f"ss.BinarySwitch({switch.threshold!r})"
-        case "harmonic_only":
-            return "ss.HarmonicOnly()"
-        case "geodesic_only":
-            return "ss.GeodesicOnly()"
-    return "None"

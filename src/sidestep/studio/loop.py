@@ -42,7 +42,7 @@ class Beginning:
 
     scenario: Scenario
     method: str
-    numbers: Mapping[str, Mapping[str, float]]
+    numbers: Mapping[str, Mapping[str, Any]]
     ellipsoids: int | None = None
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from sidestep.scenario import Scenario
 from sidestep.simulation.pose_aim import Posture
+from sidestep.studio.parameters import Numbers
 from sidestep.studio.things import Thing
 
 Array = npt.NDArray[np.float64]
@@ -72,10 +73,10 @@ class SetMethod:
 
 @dataclass(frozen=True)
 class SetNumbers:
-    """Other numbers for a method, by name."""
+    """Other numbers for a method, by name; those that are not named stay as they are."""
 
     method: str
-    numbers: dict[str, float]
+    numbers: Numbers
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,6 @@ class Snapshot:
         goal: (nv,) of a joint goal, else None; goal_pose: (4, 4) of a pose goal, else None, of the frame `tip`;
             posture: where the arm is at the goal. goal_written: it is that of the scenario.
         relaxed: (k, nv) where barriers are relaxed, see `Pursuit.places`.
-        ellipsoids: of a covering body per link, None: as many as it takes.
         things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s];
             courses: by what they move.
         method: its name; numbers: its parameters by method and name.
@@ -183,13 +183,12 @@ class Snapshot:
     goal_written: bool
     relaxed: Array
     tip: str
-    ellipsoids: int | None
     things: tuple[Thing, ...]
     poses: Array
     velocities: Array
     courses: tuple[Course, ...]
     method: str
-    numbers: dict[str, dict[str, float]]
+    numbers: dict[str, Numbers]
     words: str
     status: tuple[str, str]
     nearest: tuple[str, float]

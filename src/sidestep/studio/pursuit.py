@@ -16,8 +16,9 @@ from sidestep._core import (
     Step,
 )
 from sidestep.body import Body
-from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
+from sidestep.scenario import Scenario
+from sidestep.scenario.parts import escape_of, guide_of
 from sidestep.simulation.pose_aim import PoseAim, Posture
 from sidestep.studio.methods import Method
 
@@ -31,15 +32,22 @@ class Pursuit:
     """What moves one arm by one method.
 
     Args:
-        robot, tip: the arm, and the frame whose pose is a goal. body, system: of the method. period: of control [s].
+        robot, tip: the arm, and the frame whose pose is a goal. body, system: of the method.
+        written: the method and its numbers as a file has them: sub-goals, guide, period of control.
+
+    Raises:
+        ValueError: that names the number at fault.
     """
 
     def __init__(
-        self, robot: Robot, tip: str, method: Method, body: Body, system: GeometricSystem, period: float
+        self, robot: Robot, tip: str, method: Method, body: Body, system: GeometricSystem, written: Scenario
     ) -> None:
         self.system = system
-        self._robot, self._tip, self._method, self._period = robot, tip, method, period
-        self._guide = GuidedMotion(robot, body, system=system) if method.guided else None
+        self._robot, self._tip, self._method = robot, tip, method
+        self._period, self._choice = written.simulation.period, written.escape
+        self._guide = (
+            guide_of(written.guide, robot, body, system, synchronous=False) if method.guided else None
+        )
         self._time, self._says = 0.0, ""
 
     def begin(self, pose: Array | None, posture: Posture) -> None:
@@ -52,7 +60,7 @@ class Pursuit:
             self._aim = PoseAim(self._robot, self._tip, pose, stiffness=stiffness, posture=posture)
         if self._guide is not None:
             self._guide.set_goal(posture.q)
-        self._escape = Escape(self._robot) if self._method.escapes else None
+        self._escape = self._new_escape() if self._method.escapes else None
         self._arrived = False
         self.obstacles_changed()
 
@@ -96,6 +104,9 @@ class Pursuit:
             words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
         return self._posture.in_words(words)
 
+    def _new_escape(self) -> Escape:
+        return escape_of(self._choice, self._robot)
+
     def _goal(self, q: Array) -> JointGoal | PoseGoal:
         return self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
 
@@ -110,14 +121,14 @@ class Pursuit:
             return aim
         if np.abs(q - aim.position).max() < ARRIVED:
             if not self._arrived:
-                self._arrived, self._escape = True, Escape(self._robot)
+                self._arrived, self._escape = True, self._new_escape()
             return aim
         self._arrived = False
         escaping = self._escape.escaping
         followed = self._escape.pursue(aim, q, self._potential, self._period)
         if self._escape.escaping and not escaping:
             if self.at_goal(obstacles).state == MotionState.inside_barrier:
-                self._escape = Escape(self._robot)  # no way leads to a goal that is blocked
+                self._escape = self._new_escape()  # no way leads to a goal that is blocked
                 return aim
         return followed
 

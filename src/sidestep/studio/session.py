@@ -9,6 +9,7 @@ import time as clock
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,14 +25,16 @@ from sidestep.scenario.assembly import (
     load_robot,
     start_velocity,
 )
+from sidestep.scenario.parts import torque_program_of
 from sidestep.scenario.scenario import JointState
 from sidestep.simulation.pose_aim import Posture, posture_at
 from sidestep.simulation.run import status_name
 from sidestep.studio import messages as m
-from sidestep.studio.methods import METHODS, Method, Numbers, check_numbers, method_named
+from sidestep.studio.methods import METHODS, Method, check_numbers, method_named
+from sidestep.studio.parameters import Numbers
 from sidestep.studio.pursuit import Pursuit
 from sidestep.studio.stage import Actor, Stage
-from sidestep.studio.systems import Recipe, build_system, numbers_of, recipe_of
+from sidestep.studio.systems import Recipe, as_file, build_system, numbers_of, recipe_of
 from sidestep.studio.things import things_of
 from sidestep.studio.tip import at_tip, tip_of
 from sidestep.studio.words import in_words
@@ -69,7 +72,6 @@ class Session:
     time: float
     running: bool
     _bodies: dict[str, Body]
-    _ellipsoids: int | None
     _pursuit: Pursuit
     _controller: TorqueController
     _posture: Posture
@@ -84,17 +86,16 @@ class Session:
         scenario: Scenario,
         *,
         method: str = "barrier",
-        numbers: Mapping[str, Mapping[str, float]] | None = None,
+        numbers: Mapping[str, Mapping[str, Any]] | None = None,
         ellipsoids: int | None = None,
         prepare: Prepare,
     ) -> None:
         self._prepare, self._usual_ellipsoids = prepare, ellipsoids
-        self._numbers = {name: check_numbers(METHODS[name], {}) for name in METHODS}
+        self._numbers = {name: method.defaults for name, method in METHODS.items()}
         self._method = method_named(method)
         self._edition = 0
         self._rows = []
-        given = {name: check_numbers(method_named(name), values) for name, values in (numbers or {}).items()}
-        self._load(scenario, self._method, given)
+        self._load(scenario, self._method, numbers or {})
 
     # --- what happens ---
 
@@ -217,7 +218,6 @@ class Session:
             goal_written=self._goal_written,
             relaxed=self._pursuit.places(obstacles),
             tip=self.tip,
-            ellipsoids=self._ellipsoids,
             things=self._things,
             poses=self._poses(),
             velocities=np.array([actor.velocity for actor in self.stage.actors]).reshape(-1, 3),
@@ -254,7 +254,7 @@ class Session:
         self._step = self._pursuit.look(q, v, self._obstacles())
         self._contacts = self.stage.contacts()
 
-    def _load(self, scenario: Scenario, method: Method, given: dict[str, Numbers]) -> None:
+    def _load(self, scenario: Scenario, method: Method, given: Mapping[str, Mapping[str, Any]]) -> None:
         robot = load_robot(scenario)
         bodies: dict[str, Body] = {}
         if self._edition and robot.fingerprint == self.robot.fingerprint:
@@ -264,17 +264,27 @@ class Session:
         posture = goal_posture(scenario, robot, start)
         pose = None if isinstance(scenario.goal, JointState) else at_tip(scenario.goal, robot)
         stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
-        asked, values = numbers_of(scenario)
-        numbers = self._numbers | {asked: METHODS[asked].defaults | values} | given
-        ellipsoids = scenario.barriers.ellipsoids or self._usual_ellipsoids
-        self._pursuit = self._pursuit_by(method, numbers[method.name], scenario, robot, bodies, ellipsoids)
+        numbers = self._numbers_for(scenario, given)
+        parts = self._parts_of(method, numbers[method.name], scenario, robot, bodies)
+        self._pursuit, self._controller = parts
         self.scenario, self.robot, self.tip, self.stage = scenario, robot, tip_of(robot), stage
-        self._method, self._numbers, self._bodies, self._ellipsoids = method, numbers, bodies, ellipsoids
+        self._method, self._numbers, self._bodies = method, numbers, bodies
         self.period = scenario.simulation.period
-        self._controller = TorqueController(robot, period=self.period)
         self._start = start, velocity
         self._set_goal(pose, posture, written=True)
         self._begin()
+
+    def _numbers_for(self, scenario: Scenario, given: Mapping[str, Mapping[str, Any]]) -> dict[str, Numbers]:
+        """The numbers of all methods: as they are, those of the scenario for its method, and those given."""
+        asked, values = numbers_of(scenario)
+        numbers = {**self._numbers, asked: METHODS[asked].defaults | values}
+        ellipsoids = {"ellipsoids": scenario.barriers.ellipsoids or self._usual_ellipsoids}
+        for name, method in METHODS.items():
+            if method.covering:
+                numbers[name] = numbers[name] | ellipsoids
+        for name, own in given.items():
+            numbers[name] = check_numbers(method_named(name), own, numbers[name])
+        return numbers
 
     def _begin(self) -> None:
         self.time, self._count, self._touched = 0.0, 0, 0
@@ -298,28 +308,23 @@ class Session:
         self._look()
 
     def _use(self, method: Method, numbers: Numbers) -> None:
-        self._pursuit = self._pursuit_by(
-            method, numbers, self.scenario, self.robot, self._bodies, self._ellipsoids
+        self._pursuit, self._controller = self._parts_of(
+            method, numbers, self.scenario, self.robot, self._bodies
         )
         self._method, self._numbers[method.name] = method, dict(numbers)
         self._pursuit.begin(self._pose, self._posture)
         self._look()
 
-    def _pursuit_by(
-        self,
-        method: Method,
-        numbers: Numbers,
-        scenario: Scenario,
-        robot: Robot,
-        bodies: dict[str, Body],
-        ellipsoids: int | None,
-    ) -> Pursuit:
-        recipe = recipe_of(method, scenario, ellipsoids)
+    def _parts_of(
+        self, method: Method, numbers: Numbers, scenario: Scenario, robot: Robot, bodies: dict[str, Body]
+    ) -> tuple[Pursuit, TorqueController]:
+        recipe, written = recipe_of(method, numbers, scenario), as_file(method, numbers, scenario)
+        controller = torque_program_of(written.torque, robot, scenario.simulation.period)
         if str(recipe) not in bodies:
             bodies[str(recipe)] = self._prepare(robot, recipe)
         body = bodies[str(recipe)]
         system = build_system(method, robot, body, numbers, scenario)
-        return Pursuit(robot, tip_of(robot), method, body, system, scenario.simulation.period)
+        return Pursuit(robot, tip_of(robot), method, body, system, written), controller
 
     def _look(self) -> None:
         """Lays out what is seen: points of each obstacle in its frame, and whose each point is."""

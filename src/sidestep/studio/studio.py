@@ -8,7 +8,7 @@ import socket
 import threading
 import time as clock
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
@@ -48,7 +48,7 @@ class Studio:
         scenario: Scenario,
         *,
         method: str = "barrier",
-        numbers: Mapping[str, Mapping[str, float]] | None = None,
+        numbers: Mapping[str, Mapping[str, Any]] | None = None,
         host: str = HOST,
         port: int = PORT,
         ellipsoids: int | None = None,

@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from sidestep import presets
 from sidestep._core import GeometricSystem
-from sidestep.barriers import Barriers
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
@@ -18,10 +17,14 @@ from sidestep.scenario.scenario import (
     BodyChoice,
     EmbeddingChoice,
     JointLimitChoice,
+    MethodChoice,
     SwitchChoice,
     SystemChoice,
 )
-from sidestep.studio.methods import METHODS, WRITTEN, Method, Numbers, in_range
+from sidestep.studio.methods import METHODS, WRITTEN, Method, in_range
+from sidestep.studio.parameters import Numbers, Value, set_in
+
+SWITCH = "system.switch"  # of several forms, with numbers of their own
 
 
 @dataclass(frozen=True)
@@ -34,30 +37,28 @@ class Covering:
 Recipe = Covering | BodyChoice  # of a body
 
 
-@dataclass(frozen=True)
-class Parts:
-    """What a scenario file says of a method without barriers."""
-
-    body: BodyChoice
-    embedding: EmbeddingChoice
-    system: SystemChoice
-
-
-def parts_of(method: Method, numbers: Mapping[str, float], scenario: Scenario) -> Parts:
-    """Body, embedding and system of a method without barriers; those of the scenario where it says how to move."""
+def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Scenario:
+    """The scenario with a method and its numbers as a file has them; what the method has no numbers for stays."""
     if method.name == WRITTEN:
-        return Parts(scenario.body, scenario.embedding, scenario.system)
-    system = SystemChoice(switch=switch_of(method.name, numbers, len(scenario.start.position)))
-    if method.parameters:
-        system = dataclasses.replace(system, stiffness=numbers["stiffness"], damping=numbers["damping"])
-    return Parts(
-        BodyChoice(components=presets.Thesis.components),
-        EmbeddingChoice(joint_limits=JointLimitChoice()),
-        system,
-    )
+        return dataclasses.replace(scenario, method="written")
+    if method.covering:
+        written = dataclasses.replace(scenario, method=cast("MethodChoice", method.name))
+    else:
+        system = SystemChoice(switch=switch_of(method.name, numbers, len(scenario.start.position)))
+        embedding = EmbeddingChoice(joint_limits=JointLimitChoice())
+        written = dataclasses.replace(
+            scenario, method="written", body=BodyChoice(), embedding=embedding, system=system
+        )
+    places: dict[str, dict[str, Value]] = {}
+    for parameter in method.parameters:
+        if parameter.place != SWITCH:  # as a whole, above
+            places.setdefault(parameter.place, {})[parameter.field] = numbers[parameter.name]
+    for place, values in places.items():
+        written = set_in(written, place, values)
+    return written
 
 
-def switch_of(method: str, numbers: Mapping[str, float], num_coordinates: int) -> SwitchChoice:
+def switch_of(method: str, numbers: Mapping[str, Any], num_coordinates: int) -> SwitchChoice:
     """The switch of one of the thesis's methods as a scenario file has it."""
     match method:
         case "thesis":
@@ -75,11 +76,10 @@ def switch_of(method: str, numbers: Mapping[str, float], num_coordinates: int) -
     return SwitchChoice("none")
 
 
-def recipe_of(method: Method, scenario: Scenario, ellipsoids: int | None) -> Recipe:
+def recipe_of(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Recipe:
     """The body that a method needs."""
-    if method.covering:
-        return Covering(ellipsoids)
-    return parts_of(method, method.defaults, scenario).body
+    written = as_file(method, numbers, scenario)
+    return Covering(written.barriers.ellipsoids) if method.covering else written.body
 
 
 def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], None] | None = None) -> Body:
@@ -90,13 +90,13 @@ def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], 
 
 
 def build_system(
-    method: Method, robot: Robot, body: Body, numbers: Mapping[str, float], scenario: Scenario
+    method: Method, robot: Robot, body: Body, numbers: Mapping[str, Any], scenario: Scenario
 ) -> GeometricSystem:
     """The dynamical system of a method with a body of its recipe."""
+    written = as_file(method, numbers, scenario)
     if method.covering:
-        return presets.barrier_system(robot, body, numbers=Barriers(**numbers))
-    parts = parts_of(method, numbers, scenario)
-    return written_system(parts.embedding, parts.system, robot, body)
+        return presets.barrier_system(robot, body, numbers=written.barriers)
+    return written_system(written.embedding, written.system, robot, body)
 
 
 def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
@@ -105,26 +105,26 @@ def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
     That is one of the page's where the file says exactly what one of them with its numbers is; else `WRITTEN`.
     """
     if scenario.method != "written":
-        return scenario.method, {
-            entry.name: getattr(scenario.barriers, entry.name) for entry in dataclasses.fields(Barriers)
-        }
-    asked = Parts(scenario.body, scenario.embedding, scenario.system)
-    values = _values(scenario.system)
+        method = METHODS[scenario.method]
+        return method.name, {parameter.name: parameter.of(scenario) for parameter in method.parameters}
+    switched = _switch_numbers(scenario.system.switch)
     for method in METHODS.values():
-        numbers = {name: values.get(name, number) for name, number in method.defaults.items()}
+        numbers = {
+            p.name: switched.get(p.name, p.default) if p.place == SWITCH else p.of(scenario)
+            for p in method.parameters
+        }
         own = not method.covering and method.name != WRITTEN
-        if own and in_range(method, numbers) and parts_of(method, numbers, scenario) == asked:
+        if own and in_range(method, numbers) and as_file(method, numbers, scenario) == scenario:
             return method.name, numbers
     return WRITTEN, {}
 
 
-def _values(system: SystemChoice) -> Numbers:
-    """The numbers of a file's system by the names that the methods have for them."""
-    switch: Any = system.switch
-    values = {"stiffness": system.stiffness, "damping": system.damping}
-    if switch.thresholds:
-        values["outer"] = switch.thresholds[0]
-        if len(switch.thresholds) > 3:  # with fewer joints there is none between the first two and the last
-            values["inner"] = switch.thresholds[2]
-    given = {name: getattr(switch, name) for name in ("threshold", "slope")}
+def _switch_numbers(choice: SwitchChoice) -> Numbers:
+    """The numbers of a file's switch by the names that the methods have for them."""
+    values: Numbers = {}
+    if choice.thresholds:
+        values["outer"] = choice.thresholds[0]
+        if len(choice.thresholds) > 3:  # with fewer joints there is none between the first two and the last
+            values["inner"] = choice.thresholds[2]
+    given = {name: getattr(choice, name) for name in ("threshold", "slope")}
     return values | {name: value for name, value in given.items() if value is not None}

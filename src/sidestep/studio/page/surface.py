@@ -18,10 +18,11 @@ from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.studio.messages import Snapshot
-from sidestep.studio.methods import Method, Numbers, method_named
+from sidestep.studio.methods import Method, method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import short_names
 from sidestep.studio.page.camera import Viewpoint
+from sidestep.studio.parameters import Numbers
 from sidestep.studio.systems import build_system
 
 if TYPE_CHECKING:

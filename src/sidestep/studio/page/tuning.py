@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import TYPE_CHECKING, Any
 
 from sidestep.studio import messages as m
-from sidestep.studio.export import python_snippet
-from sidestep.studio.methods import METHODS, Method, Numbers, method_named
+from sidestep.studio.methods import METHODS, Method, method_named
 from sidestep.studio.page.note import add_note
+from sidestep.studio.parameters import Numbers, Parameter
+from sidestep.studio.snippet import python_snippet
 
 if TYPE_CHECKING:
     import viser
 
     from sidestep.studio.page.view import View
 
-SETTLE = 0.25  # [s] without a further change of a slider before the system is made anew
+SETTLE = 0.25  # [s] without a further change before the system is made anew
+STEPS = 1000  # of a slider
+AS_IT_TAKES = "as many as it takes"  # None, of numbers of ellipsoids
 
 
 class TuningPanel:
@@ -28,58 +32,65 @@ class TuningPanel:
         self._choice: Any = gui.add_dropdown("method", tuple(self._labels))
         self._choice.on_update(self._chose)
         self._sentence = gui.add_markdown("")
-        self._folder = gui.add_folder("Parameters")
-        self._sliders: dict[str, Any] = {}
-        self._notes: list[Any] = []
+        self._place = gui.add_folder("Parameters")
+        self._folders: list[Any] = []
+        self._controls: dict[str, Any] = {}
         self._shown: Method | None = None
+        self._numbers: Numbers = {}
+        self._changed: Numbers = {}  # and not sent yet
         self._timer: threading.Timer | None = None
         gui.add_button("Recommended values").on_click(self._reset)
+        add_note(gui, "Of all but the body, which takes time to make.")
         gui.add_button("Export as Python").on_click(self._export)
         add_note(gui, "The system with these numbers, as code.")
 
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows the method and the numbers that the loop has."""
-        method = method_named(snapshot.method)
+        method, numbers = method_named(snapshot.method), snapshot.numbers[snapshot.method]
         if method is not self._shown:
-            self._lay_out(method, snapshot.numbers[method.name])
-            self._numbers = dict(snapshot.numbers[method.name])
-        elif snapshot.numbers[method.name] != self._numbers:
-            self._numbers = dict(snapshot.numbers[method.name])
-            for name, value in self._numbers.items():
-                slider = self._sliders[name]
-                slider.min, slider.max = min(slider.min, value), max(slider.max, value)
-                slider.value = value
+            self._lay_out(method, numbers)
+        elif numbers != self._numbers:
+            for parameter in method.parameters:
+                if numbers[parameter.name] != self._numbers.get(parameter.name):
+                    show_value(self._controls[parameter.name], parameter, numbers[parameter.name])
+        self._numbers = dict(numbers)
+
+    def refused(self) -> None:
+        """Numbers that were sent are not taken: those of the loop are shown again."""
+        self._numbers = {}
 
     def _lay_out(self, method: Method, numbers: Numbers) -> None:
-        self._shown = method
+        self._shown, self._changed = method, {}
         self._choice.value = method.label
         self._sentence.content = method.sentence
-        for part in (*self._sliders.values(), *self._notes):
-            part.remove()
-        self._sliders, self._notes = {}, []
-        with self._folder:
-            for parameter in method.parameters:
-                unit = f" [{parameter.unit}]" if parameter.unit else ""
-                value = numbers[parameter.name]  # that of a file may be out of the range
-                slider = self._server.gui.add_slider(
-                    f"{parameter.name.replace('_', ' ')}{unit}",
-                    min=min(parameter.lower, value),
-                    max=max(parameter.upper, value),
-                    step=(parameter.upper - parameter.lower) / 1000.0,
-                    initial_value=value,
-                )
-                slider.on_update(self._moved)
-                self._sliders[parameter.name] = slider
-                note = f"{parameter.sentence} Recommended: {parameter.default:g}."
-                self._notes.append(add_note(self._server.gui, note))
+        for folder in self._folders:
+            folder.remove()
+        self._folders, self._controls = [], {}
+        titles = dict.fromkeys(parameter.folder for parameter in method.parameters)
+        with self._place:
+            for title in titles:
+                folder = self._server.gui.add_folder(title, expand_by_default=not self._folders)
+                self._folders.append(folder)
+                with folder:
+                    for parameter in method.parameters:
+                        if parameter.folder == title:
+                            self._add(parameter, numbers[parameter.name])
+
+    def _add(self, parameter: Parameter, value: Any) -> None:
+        control = add_control(self._server.gui, parameter, value)
+        control.on_update(lambda event: self._moved(event, parameter))
+        self._controls[parameter.name] = control
+        recommended = label_of(parameter.default) if parameter.options else f"{parameter.default:g}"
+        add_note(self._server.gui, f"{parameter.sentence} Recommended: {recommended}.")
 
     def _chose(self, event: Any) -> None:
         if event.client is not None:
             self._view.send(m.SetMethod(self._labels[self._choice.value]))
 
-    def _moved(self, event: Any) -> None:
+    def _moved(self, event: Any, parameter: Parameter) -> None:
         if event.client is None:
             return
+        self._changed[parameter.name] = value_of(event.target, parameter)
         if self._timer is not None:
             self._timer.cancel()
         self._timer = threading.Timer(SETTLE, self._send_numbers)
@@ -101,10 +112,59 @@ class TuningPanel:
         close.on_click(lambda _: modal.close())
 
     def _send_numbers(self) -> None:
-        if self._shown is not None:
-            values = {name: float(slider.value) for name, slider in self._sliders.items()}
-            self._view.send(m.SetNumbers(self._shown.name, values))
+        changed, self._changed = self._changed, {}
+        if self._shown is not None and changed:
+            self._view.send(m.SetNumbers(self._shown.name, changed))
 
     def _reset(self, _: Any) -> None:
         if self._shown is not None:
-            self._view.send(m.SetNumbers(self._shown.name, self._shown.defaults))
+            usual = {p.name: p.default for p in self._shown.parameters if not p.body}
+            self._view.send(m.SetNumbers(self._shown.name, usual))
+
+
+def add_control(gui: Any, parameter: Parameter, value: Any) -> Any:
+    """A slider or a list for a parameter; what a file says may be out of its range, or not in the list."""
+    label = parameter.field.replace("_", " ")
+    if parameter.options:
+        options = tuple(dict.fromkeys(label_of(option) for option in (*parameter.options, value)))
+        return gui.add_dropdown(label, options, initial_value=label_of(value))
+    lower, upper, shown = (position(parameter, end) for end in (parameter.lower, parameter.upper, value))
+    unit = f" [{parameter.unit}]" if parameter.unit else " [10^]" if parameter.powers else ""
+    step: float = 1 if parameter.whole and not parameter.powers else (upper - lower) / STEPS
+    return gui.add_slider(
+        f"{label}{unit}", min=min(lower, shown), max=max(upper, shown), step=step, initial_value=shown
+    )
+
+
+def show_value(control: Any, parameter: Parameter, value: Any) -> None:
+    """Moves a control of `add_control` to a value."""
+    if parameter.options:
+        if label_of(value) not in control.options:
+            control.options = (*control.options, label_of(value))
+        control.value = label_of(value)
+        return
+    shown = position(parameter, value)
+    control.min, control.max = min(control.min, shown), max(control.max, shown)
+    control.value = shown
+
+
+def value_of(control: Any, parameter: Parameter) -> Any:
+    """The value that a control of `add_control` shows."""
+    if parameter.options:
+        known = {label_of(option): option for option in parameter.options}
+        text = str(control.value)
+        return known[text] if text in known else int(text) if text.isdigit() else text
+    value = float(f"{10.0**control.value:.3g}") if parameter.powers else float(control.value)
+    return parameter.kept(round(value) if parameter.whole else value)
+
+
+def position(parameter: Parameter, value: Any) -> float:
+    """Where a slider stands for a value: at it, or at its power of ten."""
+    if not parameter.powers:
+        return int(value) if parameter.whole else float(value)
+    return math.log10(max(value, 1e-12))
+
+
+def label_of(option: Any) -> str:
+    """An option of a list as text."""
+    return AS_IT_TAKES if option is None else str(option)

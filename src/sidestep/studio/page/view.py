@@ -165,7 +165,8 @@ class View:
             self._choice = snapshot.scenario.robot
             self._set_robot(snapshot.scenario, load_robot(snapshot.scenario))
         self.last = snapshot
-        recipe = recipe_of(method_named(snapshot.method), snapshot.scenario, snapshot.ellipsoids)
+        numbers = snapshot.numbers[snapshot.method]
+        recipe = recipe_of(method_named(snapshot.method), numbers, snapshot.scenario)
         if self._body is None or recipe != self._recipe:
             self._load_body(recipe)
         if before is None or snapshot.edition != before.edition:
@@ -226,6 +227,8 @@ class View:
                 return
             if isinstance(note.refused, m.AddThing):
                 self.obstacle_panel.refused(note.refused.thing.name)
+            if isinstance(note.refused, m.SetNumbers):
+                self.tuning.refused()
             if note.fatal:
                 self._say(in_box(f"The loop ended: {html.escape(note.message)}"))
         for client in self._server.get_clients().values():
