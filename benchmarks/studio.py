@@ -1,10 +1,11 @@
 """What viewers cost the studio's loop: its step times with three viewers connected and with none, in one run.
 
-    python benchmarks/studio.py --robot fr3_arm --method unswitched --json benchmarks/results/studio.json
+    python benchmarks/studio.py --json benchmarks/results/studio.json
 
-The two are measured in turn, `--rounds` times. A viewer here is a process that takes in everything a browser is sent;
-it does not draw. A browser on the same machine also takes processor time, as any program does: that is not counted.
-On a machine with other work, `chrt -r 1` in front of the command keeps that work out of loop and viewers alike.
+The two are measured in turn, `--rounds` times, for each of `--methods`. A viewer here is a process that takes in
+everything a browser is sent; it does not draw. A browser on the same machine also takes processor time, as any program
+does: that is not counted. On a machine with other work, `chrt -r 1` in front of the command keeps that work out of loop
+and viewers alike.
 """
 
 from __future__ import annotations
@@ -77,34 +78,21 @@ def with_viewers(studio: Studio) -> m.Timing:
     return timing
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--robot", default="fr3_arm")
-    parser.add_argument("--method", default="unswitched")
-    parser.add_argument("--ellipsoids", type=int)
-    parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
+def measure(robot: str, method: str, ellipsoids: int | None, rounds: int) -> dict[str, object]:
+    """Step times of a method, alone and with viewers in turn."""
     pairs = []
-    scenario = starting_scenario(robot=options.robot)
-    with Studio(scenario, method=options.method, port=0, ellipsoids=options.ellipsoids) as studio:
+    with Studio(starting_scenario(robot=robot), method=method, port=0, ellipsoids=ellipsoids) as studio:
         studio.wait_ready(3600.0)
-        for k in range(options.rounds):
+        for k in range(rounds):
             order = (window, with_viewers) if k % 2 == 0 else (with_viewers, window)
-            first, second = (measure(studio) for measure in order)
+            first, second = (timed(studio) for timed in order)
             alone, seen = (first, second) if order[0] is window else (second, first)
             pairs.append((alone, seen))
             print(
-                f"round {k}: p99 {alone.p99:.0f} us alone, {seen.p99:.0f} us with {VIEWERS} viewers",
+                f"{method}, round {k}: p99 {alone.p99:.0f} us alone, {seen.p99:.0f} us with {VIEWERS} viewers",
                 flush=True,
             )
-    document = {
-        "robot": options.robot,
-        "method": options.method,
-        "viewers": VIEWERS,
-        "real_time_scheduling": os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR),
+    found: dict[str, object] = {
         "rounds": [
             {
                 name: {"median_us": t.median, "p99_us": t.p99}
@@ -114,10 +102,33 @@ def main() -> None:
         ],
         "median_ratio": float(np.median([seen.median / alone.median for alone, seen in pairs])),
         "p99_ratio": float(np.median([seen.p99 / alone.p99 for alone, seen in pairs])),
+    }
+    print(f"{method}: median ratio of medians {found['median_ratio']:.3f}, of p99 {found['p99_ratio']:.3f}")
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--robot", default="fr3_arm")
+    parser.add_argument("--methods", nargs="+", default=["barrier", "unswitched"])
+    parser.add_argument("--ellipsoids", type=int)
+    parser.add_argument("--rounds", type=int, default=6)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    methods = {
+        method: measure(options.robot, method, options.ellipsoids, options.rounds)
+        for method in options.methods
+    }
+    document = {
+        "robot": options.robot,
+        "viewers": VIEWERS,
+        "real_time_scheduling": os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR),
+        "methods": methods,
         "cpu": cpu_name(),
         "version": __version__,
     }
-    print(f"median ratio: of medians {document['median_ratio']:.3f}, of p99 {document['p99_ratio']:.3f}")
     if options.json is not None:
         options.json.write_text(json.dumps(document, indent=2) + "\n")
 

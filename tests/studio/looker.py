@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import re
 import time as clock
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,13 +21,13 @@ from sidestep.studio.page.view import MAIN_WIDTH, PLOT_WIDTH
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
 
-ON_THE_PAGE = [  # marks of tests in the browser, each of which begins as `at_the_start` says
-    pytest.mark.skipif(
-        find_chromium() is None,
-        reason="there is no Chromium here (apt-get install chromium, or SIDESTEP_CHROMIUM)",
-    ),
-    pytest.mark.usefixtures("at_the_start"),
-]
+NO_CHROMIUM = pytest.mark.skipif(
+    find_chromium() is None,
+    reason="there is no Chromium here (apt-get install chromium, or SIDESTEP_CHROMIUM)",
+)
+# Marks of tests in the browser, each of which begins as `at_the_start` says.
+ON_THE_PAGE = [NO_CHROMIUM, pytest.mark.usefixtures("at_the_start")]
+DOCUMENT = Path(__file__).parents[2] / "docs" / "studio.md"
 PATIENCE = 120.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
 PASSIVE = "Unable to preventDefault inside passive event listener"  # the browser's own note on viser's lists
 WINDOW = Window(1080, 560)
@@ -130,6 +132,13 @@ class Looker:
 
     def image(self) -> np.ndarray:
         return np.asarray(Image.open(io.BytesIO(picture(self.studio, self.page))).convert("RGB"), dtype=int)
+
+
+def documented_code() -> str:
+    """What the documentation says to type into a notebook."""
+    found = re.search(r"## Notebooks.*?```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
+    assert found is not None
+    return found[1]
 
 
 def until(condition: Callable[[], bool], what: str) -> None:

@@ -19,30 +19,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sidestep.studio.headless import FLAGS, browser, find_chromium
-from sidestep.studio.studio import NOTEBOOK_SCALE
-from studio.looker import PATIENCE, differ, until
+from sidestep.studio.headless import FLAGS, browser
+from studio.looker import NO_CHROMIUM, PATIENCE, differ, documented_code, until
 
 MISSING = [name for name in ("jupyterlab", "ipykernel") if importlib.util.find_spec(name) is None]
 pytestmark = [
     pytest.mark.skipif(bool(MISSING), reason=f"pip install {' '.join(MISSING)}"),
-    pytest.mark.skipif(find_chromium() is None, reason="there is no Chromium here"),
+    NO_CHROMIUM,
 ]
-DOCUMENT = Path(__file__).parents[2] / "docs" / "studio.md"
-
-
 BACK = "from sidestep.studio import messages as m\nstudio.send(m.Restart(until=0.0))"  # paused at the start
 QUIET = (
     "--LabApp.news_url=None",
     "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate",
 )  # offline
-
-
-def documented_code() -> str:
-    """What the documentation says to type into a notebook."""
-    found = re.search(r"## Notebooks.*?```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
-    assert found is not None
-    return found[1]
 
 
 def notebook(*cells: str) -> str:
@@ -109,6 +98,7 @@ def test_the_scene_moves_inside_a_notebook(jupyter: str, chromium: Any) -> None:
     cells = page.locator(".jp-Notebook .jp-Cell")
 
     def execute(index: int) -> None:
+        page.get_by_text("| Idle").wait_for()  # a cell that is run before the kernel is there is lost
         cells.nth(index).locator(".cm-content").click()
         page.keyboard.press("Shift+Enter")
         cells.nth(index).locator(".jp-InputPrompt").get_by_text(f"[{index + 1}]:").wait_for()
@@ -130,12 +120,9 @@ def test_the_scene_moves_inside_a_notebook(jupyter: str, chromium: Any) -> None:
     execute(1)
     until(lambda: time() == 0.0, "the start")
     before = picture()
-    # The frame is drawn smaller, which Playwright's own click does not know of.
-    outer = page.locator(".jp-OutputArea iframe").bounding_box()
     button = frame.get_by_role("button", name="Run", exact=True)
-    inner = button.evaluate("element => element.getBoundingClientRect().toJSON()")
-    x, y = (inner[a] + 0.5 * inner[b] for a, b in (("x", "width"), ("y", "height")))
-    page.mouse.click(outer["x"] + NOTEBOOK_SCALE * x, outer["y"] + NOTEBOOK_SCALE * y)
+    button.focus()  # the frame is drawn smaller, which Playwright's own click does not know of
+    button.press("Enter")
     folder = os.environ.get("SIDESTEP_PICTURES")
     if folder:
         page.screenshot(path=Path(folder) / "jupyter.png")
