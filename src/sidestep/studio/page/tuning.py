@@ -23,26 +23,25 @@ AS_IT_TAKES = "as many as it takes"  # None, of numbers of ellipsoids
 
 
 class TuningPanel:
-    """Chooses among `METHODS` and sets their numbers while the loop runs."""
+    """Chooses among `METHODS` and sets their numbers while the loop runs, in a tab of the page."""
 
-    def __init__(self, server: viser.ViserServer, view: View) -> None:
-        self._view, self._server = view, server
+    def __init__(self, server: viser.ViserServer, view: View, tab: Any) -> None:
+        self._view, self._server, self._tab = view, server, tab
         self._labels = {method.label: method.name for method in METHODS.values()}
         gui = server.gui
         self._choice: Any = gui.add_dropdown("method", tuple(self._labels))
         self._choice.on_update(self._chose)
         self._sentence = gui.add_markdown("")
-        self._place = gui.add_folder("Parameters")
         self._folders: list[Any] = []
         self._controls: dict[str, Any] = {}
         self._shown: Method | None = None
         self._numbers: Numbers = {}
         self._changed: Numbers = {}  # and not sent yet
         self._timer: threading.Timer | None = None
-        gui.add_button("Recommended values").on_click(self._reset)
-        add_note(gui, "Of all but the body, which takes time to make.")
         gui.add_button("Export as Python").on_click(self._export)
-        add_note(gui, "The system with these numbers, as code.")
+        gui.add_button("Recommended values").on_click(self._reset)
+        add_note(gui, "Of what the folders below hold, but for the body, which takes time to make.")
+        gui.add_divider()
 
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows the method and the numbers that the loop has."""
@@ -66,8 +65,9 @@ class TuningPanel:
         for folder in self._folders:
             folder.remove()
         self._folders, self._controls = [], {}
-        titles = dict.fromkeys(parameter.folder for parameter in method.parameters)
-        with self._place:
+        body_last = sorted(method.parameters, key=lambda parameter: parameter.body)
+        titles = dict.fromkeys(parameter.folder for parameter in body_last)
+        with self._tab:
             for title in titles:
                 folder = self._server.gui.add_folder(title, expand_by_default=not self._folders)
                 self._folders.append(folder)
@@ -80,8 +80,10 @@ class TuningPanel:
         control = add_control(self._server.gui, parameter, value)
         control.on_update(lambda event: self._moved(event, parameter))
         self._controls[parameter.name] = control
-        recommended = label_of(parameter.default) if parameter.options else f"{parameter.default:g}"
-        add_note(self._server.gui, f"{parameter.sentence} Recommended: {recommended}.")
+        usual = label_of(parameter.default) if parameter.options else f"{parameter.default:g}"
+        if parameter.powers:
+            usual = f"10^{position(parameter, parameter.default):g}"
+        add_note(self._server.gui, f"{parameter.sentence} Recommended: {usual}.")
 
     def _chose(self, event: Any) -> None:
         if event.client is not None:

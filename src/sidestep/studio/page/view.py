@@ -88,8 +88,8 @@ class View:
         self._goal_tab = tabs.add_tab("Goal")
         with tabs.add_tab("Obstacles"):
             self.obstacle_panel = ObstaclePanel(server, self)
-        with tabs.add_tab("Method"):
-            self.tuning = TuningPanel(server, self)
+        with tabs.add_tab("Method") as method_tab:
+            self.tuning = TuningPanel(server, self, method_tab)
         with tabs.add_tab("Scenario"):
             ScenarioPanel(server, self, Path.cwd())
             gui.add_divider()
