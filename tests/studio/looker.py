@@ -100,6 +100,25 @@ class Looker:
         button.press("Enter")
         self.page.locator("[role=dialog]").wait_for(state="detached")
 
+    def unfold(self, title: str, label: str) -> None:
+        """Opens a folder, so that the label in it is seen."""
+        inside = self.page.locator(f"xpath=//label[normalize-space()='{label}']").first
+        header = self.page.locator(f"xpath=//*[normalize-space(text())='{title}']").first
+
+        def is_open() -> bool:
+            if not inside.is_visible():
+                header.dispatch_event("click")  # it may be moving
+                self.page.wait_for_timeout(300.0)
+            return bool(inside.is_visible())
+
+        def at_rest() -> bool:
+            before = inside.bounding_box()
+            self.page.wait_for_timeout(200.0)
+            return bool(before == inside.bounding_box())
+
+        until(is_open, f"the folder {title}")
+        until(at_rest, f"the end of opening {title}")
+
     def check(self, label: str) -> None:
         """Clicks the box beside a label."""
         self.click(f"xpath=//label[normalize-space()='{label}']/following::input[@type='checkbox'][1]")
@@ -149,7 +168,7 @@ def until(condition: Callable[[], bool], what: str) -> None:
 
 
 def last(studio: Studio) -> m.Snapshot:
-    assert studio.error == ""
+    assert studio.error == "", studio.error
     assert studio.snapshot is not None
     return studio.snapshot
 

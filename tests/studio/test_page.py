@@ -367,6 +367,28 @@ def test_everything_comes_from_this_machine(studio: Studio, looker: Looker) -> N
     assert {netloc for scheme, netloc in places if scheme not in ("blob", "data")} == {here}
 
 
+def test_numbers_and_choices_are_set_on_the_page(studio: Studio, looker: Looker) -> None:
+    before = last(studio).numbers["barrier"]
+    looker.tab("Method")
+    looker.type("stiffness [1/s²]", "3")
+    until(lambda: last(studio).numbers["barrier"]["stiffness"] == 3.0, "the stiffness")
+    looker.unfold("Torque program", "slack weight [10^]")
+    looker.type("slack weight [10^]", "2")
+    until(lambda: last(studio).numbers["barrier"]["torque_slack_weight"] == 100.0, "the weight")
+    looker.unfold("Body", "ellipsoids")
+    looker.choose("ellipsoids", "1")
+    until(lambda: last(studio).numbers["barrier"]["ellipsoids"] == 1, "the number of ellipsoids")
+    links = list(studio.view._body_now.links)  # type: ignore[union-attr]
+    assert len(links) == len(set(links))
+    changed = {"stiffness": 3.0, "torque_slack_weight": 100.0, "ellipsoids": 1}
+    assert last(studio).numbers["barrier"] == before | changed
+    looker.press("Recommended values")
+    until(lambda: last(studio).numbers["barrier"]["stiffness"] == before["stiffness"], "the usual stiffness")
+    assert last(studio).numbers["barrier"] == METHODS["barrier"].defaults | {"ellipsoids": 1}
+    studio.send(m.SetNumbers("barrier", before))
+    until(lambda: last(studio).numbers["barrier"] == before, "the numbers of the other tests")
+
+
 def test_the_system_is_exported_as_python(studio: Studio, looker: Looker) -> None:
     now = last(studio)
     looker.tab("Method")
