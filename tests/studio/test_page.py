@@ -21,7 +21,7 @@ from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.page.obstacles import gizmo_pose
 from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.page.surface import on_surface
-from sidestep.studio.page.view import WORDS_HEIGHT, in_box, stamped
+from sidestep.studio.page.words import WORDS_HEIGHT, in_box, stamped
 from sidestep.studio.snippet import python_snippet
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio

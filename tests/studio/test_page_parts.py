@@ -37,7 +37,8 @@ from sidestep.studio.page.surface import (
     open_faces,
     seen,
 )
-from sidestep.studio.page.view import begun, live_row
+from sidestep.studio.page.view import live_row
+from sidestep.studio.page.words import begun
 from sidestep.studio.session import Session
 from sidestep.studio.systems import build_system
 from sidestep.studio.things import ball, cloud, thing_of

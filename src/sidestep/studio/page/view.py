@@ -32,6 +32,7 @@ from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
+from sidestep.studio.page.words import begun, in_box, stamped
 from sidestep.studio.systems import Recipe, make_body, numbers_of, recipe_of
 from sidestep.studio.things import Thing, thing_of
 from sidestep.studio.tip import tip_of
@@ -44,10 +45,6 @@ GRID_DEPTH = 0.05  # [m] below the base: a planar arm, half as thick, does not l
 NEAR = 2.0  # of the arm's reach: obstacles farther off need not be in the window as it opens
 SKY_LIGHT = 2.4  # so that lit faces have about the colour that the legend shows
 MAIN_WIDTH, PLOT_WIDTH = 365, 290  # [px]
-WORDS_HEIGHT = 214  # [px] at least, what the longest words usually take: what is below them stays where it is
-STYLE = (
-    "<style>.mantine-Slider-markLabel{translate:0 3px}</style>"  # else a slider's knob covers its least value
-)
 
 
 class View:
@@ -381,23 +378,3 @@ class View:
 def live_row(snapshot: m.Snapshot) -> m.Row:
     """The state of the loop as a moment."""
     return m.Row(snapshot.time, snapshot.q, snapshot.things, snapshot.poses, snapshot.metric)
-
-
-def in_box(words: str, facts: str = "") -> str:
-    """Words about the state above smaller facts; names that are long are broken, and nothing is cut off."""
-    return (
-        f'<div style="min-height:{WORDS_HEIGHT}px;overflow-wrap:anywhere;padding:2px 10px;line-height:1.35">'
-        f'<div style="font-size:14px;font-weight:600">{words}</div>'
-        f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
-    )
-
-
-def begun(words: str) -> str:
-    """A sentence with its first letter large, unless it begins with the name of a link."""
-    first = words.split(" ", 1)[0].rstrip(":,")
-    return words[:1].upper() + words[1:] if first.isalpha() else words
-
-
-def stamped(text: str, stamp: int) -> str:
-    """The words with a number by which it is known that a browser has them."""
-    return f'{STYLE}<div id="words" data-stamp="{stamp}">{text}</div>'

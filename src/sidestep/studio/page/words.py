@@ -1,0 +1,28 @@
+"""The words about the state, as HTML."""
+
+from __future__ import annotations
+
+WORDS_HEIGHT = 214  # [px] at least, what the longest words usually take: what is below them stays where it is
+STYLE = (
+    "<style>.mantine-Slider-markLabel{translate:0 3px}</style>"  # else a slider's knob covers its least value
+)
+
+
+def in_box(words: str, facts: str = "") -> str:
+    """Words about the state above smaller facts; names that are long are broken, and nothing is cut off."""
+    return (
+        f'<div style="min-height:{WORDS_HEIGHT}px;overflow-wrap:anywhere;padding:2px 10px;line-height:1.35">'
+        f'<div style="font-size:14px;font-weight:600">{words}</div>'
+        f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
+    )
+
+
+def begun(words: str) -> str:
+    """A sentence with its first letter large, unless it begins with the name of a link."""
+    first = words.split(" ", 1)[0].rstrip(":,")
+    return words[:1].upper() + words[1:] if first.isalpha() else words
+
+
+def stamped(text: str, stamp: int) -> str:
+    """The words with a number by which it is known that a browser has them."""
+    return f'{STYLE}<div id="words" data-stamp="{stamp}">{text}</div>'
