@@ -196,7 +196,7 @@ def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
         (lambda: {"damping": [1.0, 1.0, 1.0]}, r"damping has shape \(3,\), expected \(2,\)"),
         (lambda: {"damping_form": "strong"}, "damping_form is 'strong', must be one of: plain, metric"),
         (lambda: {"switch": ss.BinarySwitch(np.nan)}, "switch threshold must be finite"),
-        (lambda: {"switch": ss.SigmoidSwitch(1.0, 0.0)}, "switch slope is 0.0*, must be positive and finite"),
+        (lambda: {"switch": ss.SigmoidSwitch(1.0, 0.0)}, "switch slope is 0.0*, must be finite and positive"),
         (lambda: {"switch": ss.SigmoidSwitch(np.inf, 1.0)}, "switch threshold must be finite"),
         (
             lambda: {"switch": ss.DistanceSwitch([0.1], 1.0)},
@@ -208,7 +208,7 @@ def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
         ),
         (
             lambda: {"switch": ss.DistanceSwitch([0.1, 0.1], -1.0)},
-            "switch slope is -1.0*, must be positive and finite",
+            "switch slope is -1.0*, must be finite and positive",
         ),
     ],
 )

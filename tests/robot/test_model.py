@@ -3,7 +3,6 @@
 import importlib.metadata
 import importlib.util
 import re
-import time
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +23,7 @@ def test_catalogue_lists_what_is_asked_for() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_named_robot_is_complete(name: str) -> None:
-    start = time.perf_counter()
     robot = Robot.named(name)
-    # loading takes 0.03 s at most where this was written; 1 s leaves room for a slow disk
-    assert time.perf_counter() - start < 1.0
     entry = next(item for item in robots() if item.name == name)
     assert (robot.name, robot.num_coordinates, entry.available, entry.reason) == (
         name, entry.num_coordinates, True, "",

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "../settings.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// The speed w >= 0 with D(w) + c w T = distance >= 0. On the segment n of D the left side grows from
 /// (n^2/2 + c n) A T^2 with slope ((2n + 1)/2 + c) T.

@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
+#include "../settings.hpp"
 #include "cholesky.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // A constraint counts as violated beyond this fraction of the terms that cancel in it: about 1e4 roundings, which is
 // what factors of ill-conditioned but usable data lose.

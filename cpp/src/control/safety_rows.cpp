@@ -2,23 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
-#include <string>
 
+#include "../settings.hpp"
 #include "cholesky.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // A clearance whose gradient is shorter than this [m/rad] is one that no joint can change.
 constexpr double shortest_gradient = 1e-9;
 // Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
 constexpr double smallest_deceleration = 1e-6;
 
 /// The speed w with p(w) + delay w = room; with delay = 0 the inverse of p. Odd in the room.
-double speed_within(double room, double delay, double A, double rate) noexcept {
+double profile_speed(double room, double delay, double A, double rate) noexcept {
   const double size = std::abs(room);
   double speed = size / (1.0 / rate + delay);
   if (speed > A / rate) {
@@ -33,22 +30,15 @@ double room_needed(double speed, double A, double rate) noexcept {
   return std::copysign(size > A / rate ? 0.5 * (size * size / A + A / (rate * rate)) : size / rate, speed);
 }
 
-void check(bool allowed, const char* setting, double value, const char* range) {
-  if (!allowed) {
-    throw std::invalid_argument(std::string("safety: ") + setting + " is " + std::to_string(value) + ", must be " +
-                                range);
-  }
-}
-
 }  // namespace
 
 double demanded_deceleration(double room, double u, const ClosingLimits& limits, double period) noexcept {
   const double A = limits.comfortable, rate = limits.rate;
   const bool braking = room_needed(u, A, rate) + u * period > room;
   const double c = braking ? 0.5 : 1.0;
-  const double next = speed_within(room - (1.0 - c) * u * period, c * period, A, rate);
+  const double next = profile_speed(room - (1.0 - c) * u * period, c * period, A, rate);
   const double at_once = (u - next) / period;
-  const double allowed = speed_within(room, 0.0, A, rate);
+  const double allowed = profile_speed(room, 0.0, A, rate);
   if (u <= allowed) {
     return at_once;
   }
@@ -57,11 +47,11 @@ double demanded_deceleration(double room, double u, const ClosingLimits& limits,
 }
 
 void SafetySettings::validate() const {
-  check(margin >= 0.0 && margin < infinity, "margin", margin, "finite and >= 0");
-  check(rate > 0.0 && rate < infinity, "rate", rate, "finite and positive");
-  check(braking_fraction > 0.0 && braking_fraction <= 1.0, "braking_fraction", braking_fraction, "in (0, 1]");
-  check(correction > 0.0 && correction <= 1.0, "correction", correction, "in (0, 1]");
-  check(max_rows >= 0, "max_rows", max_rows, ">= 0");
+  require(margin >= 0.0 && margin < infinity, "safety: margin", margin, "finite and >= 0");
+  require_positive(rate, "safety: rate");
+  require(braking_fraction > 0.0 && braking_fraction <= 1.0, "safety: braking_fraction", braking_fraction, "in (0, 1]");
+  require(correction > 0.0 && correction <= 1.0, "safety: correction", correction, "in (0, 1]");
+  require(max_rows >= 0, "safety: max_rows", max_rows, ">= 0");
 }
 
 SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)

@@ -7,12 +7,12 @@
 #include <string>
 #include <utility>
 
+#include "../settings.hpp"
 #include "cholesky.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 // A mass matrix that differs from its transpose by more than this fraction of its largest entry is not rounding but
@@ -45,13 +45,6 @@ void check_weight(const Eigen::VectorXd& weight, const char* setting, int num, b
       throw std::invalid_argument(owner + " is " + std::to_string(w) + ", must be finite and " +
                                   (zero_allowed ? ">= 0" : "positive"));
     }
-  }
-}
-
-void check_positive(double value, const char* setting) {
-  if (!(value > 0.0) || value == infinity) {
-    throw std::invalid_argument(std::string("torque controller: ") + setting + " is " + std::to_string(value) +
-                                ", must be finite and positive");
   }
 }
 
@@ -93,14 +86,14 @@ TorqueSolution::TorqueSolution(int num_coordinates, int max_safety_rows)
 
 void TorqueControllerSettings::validate(const Robot& robot) const {
   const int nv = robot.num_coordinates();
-  check_positive(period, "period");
+  require_positive(period, "torque controller: period");
   check_weight(tracking_weight, "tracking_weight", nv, false);
   check_weight(torque_weight, "torque_weight", nv, true);
-  check_positive(slack_weight, "slack_weight");
-  check_positive(safety_weight, "safety_weight");
+  require_positive(slack_weight, "torque controller: slack_weight");
+  require_positive(safety_weight, "torque controller: safety_weight");
   safety.validate();
-  check_positive(stop_time, "stop_time");
-  check_positive(stop_damping, "stop_damping");
+  require_positive(stop_time, "torque controller: stop_time");
+  require_positive(stop_damping, "torque controller: stop_damping");
   if (!(position_margin >= 0.0)) {
     throw std::invalid_argument("torque controller: position_margin is " + std::to_string(position_margin) +
                                 ", must be >= 0");

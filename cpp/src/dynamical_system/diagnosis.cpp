@@ -44,7 +44,7 @@ Parties parties(const Diagnosis& d, const CoordinateLabel& label) {
   return {"the arm", "an obstacle or a limit (a density does not tell which)"};
 }
 
-std::string way_left(const Diagnosis& d) {
+std::string remaining(const Diagnosis& d) {
   if (!std::isnan(d.joint_error)) {
     return number("%.2f rad", d.joint_error);
   }
@@ -88,16 +88,16 @@ std::string Diagnosis::describe(const CoordinateLabel& label) const {
   const bool known = coordinate >= 0;
   switch (state) {
     case MotionState::free:
-      return "on the way, " + way_left(*this) + " from the goal";
+      return "on the way, " + remaining(*this) + " from the goal";
     case MotionState::sliding:
       return p.who + " slides along " + p.what;
     case MotionState::arriving:
-      return "arriving, " + way_left(*this) + " from the goal";
+      return "arriving, " + remaining(*this) + " from the goal";
     case MotionState::stuck:
-      return "stuck " + way_left(*this) + " from the goal: " +
+      return "stuck " + remaining(*this) + " from the goal: " +
              (known ? p.who + " against " + p.what : "nothing is in the way, so the pose is out of reach");
     case MotionState::blocked_at_goal:
-      return "stopped " + way_left(*this) + " from the goal, which is itself blocked: " + p.who + " against " + p.what;
+      return "stopped " + remaining(*this) + " from the goal, which is itself blocked: " + p.who + " against " + p.what;
     case MotionState::inside_barrier:
       return p.who + " is inside the barrier of " + p.what + ", and moves out";
     case MotionState::fallback:

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "../settings.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -29,12 +31,6 @@ void check_gain(const Eigen::MatrixXd& gain, const char* name, int nv) {
   if (!gain.allFinite() || !((gain - gain.transpose()).cwiseAbs().maxCoeff() <= margin) ||
       shifted.llt().info() != Eigen::Success) {
     throw std::invalid_argument(std::string(name) + " must be finite, symmetric and positive semi-definite");
-  }
-}
-
-void check_positive(double value, const char* name) {
-  if (!(value > 0.0) || !std::isfinite(value)) {
-    throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) + ", must be positive and finite");
   }
 }
 
@@ -68,7 +64,7 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
   }
   check_gain(settings_.stiffness, "stiffness", nv);
   check_gain(settings_.damping, "damping", nv);
-  check_positive(settings_.fallback_rate, "fallback rate");
+  require_positive(settings_.fallback_rate, "fallback rate");
   settings_.recovery.validate();
   floors_ = Eigen::VectorXd::NullaryExpr(num_embedding_coordinates_, [this](Eigen::Index k) {
     return labels_[static_cast<std::size_t>(k)].floor;
@@ -78,10 +74,10 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
                  [](const BinarySwitch& s) { check_finite(s.threshold, "switch threshold"); },
                  [](const SigmoidSwitch& s) {
                    check_finite(s.threshold, "switch threshold");
-                   check_positive(s.slope, "switch slope");
+                   require_positive(s.slope, "switch slope");
                  },
                  [&](const DistanceSwitch& s) {
-                   check_positive(s.slope, "switch slope");
+                   require_positive(s.slope, "switch slope");
                    if (s.thresholds.size() != nv || !s.thresholds.allFinite()) {
                      throw std::invalid_argument("switch thresholds: expected " + std::to_string(nv) +
                                                  " finite values, got " + std::to_string(s.thresholds.size()));

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "../settings.hpp"
 
 namespace sidestep {
 namespace {
@@ -16,20 +16,13 @@ double smoothstep(double x) noexcept {
   return x * x * (3.0 - 2.0 * x);
 }
 
-void check(bool allowed, const char* setting, double value, const char* range) {
-  if (!allowed || !std::isfinite(value)) {
-    throw std::invalid_argument(std::string("recovery: ") + setting + " is " + std::to_string(value) +
-                                ", must be finite and " + range);
-  }
-}
-
 }  // namespace
 
 void Recovery::validate() const {
-  check(speed > 0.0, "speed", speed, "positive");
-  check(rate >= 0.0, "rate", rate, "not negative");
-  check(margin > 0.0, "margin", margin, "positive");
-  check(rebound >= 0.0, "rebound", rebound, "not negative");
+  require_positive(speed, "recovery: speed");
+  require(rate >= 0.0 && std::isfinite(rate), "recovery: rate", rate, "finite and not negative");
+  require_positive(margin, "recovery: margin");
+  require(rebound >= 0.0 && std::isfinite(rebound), "recovery: rebound", rebound, "finite and not negative");
 }
 
 RecoveryWorkspace::RecoveryWorkspace(int nv, int m)

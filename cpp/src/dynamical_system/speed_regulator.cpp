@@ -2,30 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "../settings.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-void check(bool allowed, const char* setting, double value, const char* range) {
-  if (!allowed) {
-    throw std::invalid_argument(std::string("speed regulator: ") + setting + " is " + std::to_string(value) +
-                                ", must be " + range);
-  }
-}
 
 double power7(double x) noexcept { return x * x * x * x * x * x * x; }
 
 }  // namespace
 
 void SpeedRegulatorSettings::validate() const {
-  check(joint_fraction > 0.0, "joint_fraction", joint_fraction, "positive");
-  check(rate > 0.0 && rate < infinity, "rate", rate, "finite and positive");
-  check(closing_speed > 0.0, "closing_speed", closing_speed, "positive");
-  check(closing_slope >= 0.0 && closing_slope < infinity, "closing_slope", closing_slope, "finite and >= 0");
+  require(joint_fraction > 0.0, "speed regulator: joint_fraction", joint_fraction, "positive");
+  require_positive(rate, "speed regulator: rate");
+  require(closing_speed > 0.0, "speed regulator: closing_speed", closing_speed, "positive");
+  require(closing_slope >= 0.0 && closing_slope < infinity, "speed regulator: closing_slope", closing_slope,
+          "finite and >= 0");
 }
 
 SpeedRegulator::SpeedRegulator(SpeedRegulatorSettings settings) : settings_((settings.validate(), settings)) {}

@@ -3,10 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
+#include "../settings.hpp"
 #include "kernels/clearance_kernel.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
 #include "sidestep/embedding/instruction_set.hpp"
@@ -14,7 +14,6 @@
 namespace sidestep {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 kernels::AddLeaf add_leaf() noexcept {
 #if defined(SIDESTEP_X86_KERNELS)

@@ -3,9 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
+#include "../settings.hpp"
 #include "kernels/distance_kernel.hpp"
 #include "sidestep/embedding/ellipsoid_gap.hpp"
 
@@ -13,7 +13,6 @@ namespace sidestep {
 namespace {
 
 constexpr const char* owner = "body clearance";
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double cover_overshoot = 0.02;      // [m] of the balls that cover an ellipsoid
 constexpr double closest_centres = 1e-6;      // [m] of which a direction is taken
 

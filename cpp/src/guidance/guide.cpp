@@ -9,7 +9,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double widen = 1.5;   // the margin grows by this factor each time the arm was stuck
+constexpr double widening = 1.5;   // the margin grows by this factor each time the arm was stuck
 constexpr int widenings = 4;    // and begins anew after so many
 
 }  // namespace
@@ -218,7 +218,7 @@ void Guide::look(const State& state) {
   if (state.stops != seen_stops_) {
     seen_stops_ = state.stops;
     stuck = true;
-    margin_ = settings_.planner.margin * std::pow(widen, static_cast<double>(state.stops % widenings));
+    margin_ = settings_.planner.margin * std::pow(widening, static_cast<double>(state.stops % widenings));
   }
   // Straight to the goal where that is free with the margin; not where the arm was stuck, which needs another way.
   // To let go of a path it must be wide, as barriers may stop what goes straight through a narrow place.

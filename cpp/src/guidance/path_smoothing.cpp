@@ -34,7 +34,7 @@ std::vector<double> stations(const Waypoints& path) {
 }
 
 constexpr double sample = 0.1;       // between clearances on an edge [rad]
-constexpr double farthest = 0.3;     // that a waypoint is shifted at a time [rad]
+constexpr double shift = 0.3;        // that a waypoint is shifted at a time [rad]
 constexpr int shifts = 8;            // tried for a waypoint
 constexpr double slowest = 0.25;     // share of the speed that is left where there is no clearance
 constexpr int misses = 3;            // share of the attempts to shorten that may fail in a row: one in three
@@ -126,7 +126,7 @@ Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, co
     for (int i = 0; i < shifts && best > least; ++i) {
       Eigen::VectorXd q = way.col(k);
       for (Eigen::Index j = 0; j < q.size(); ++j) {
-        q[j] = std::clamp(q[j] + random.uniform(-farthest, farthest), low[j], high[j]);
+        q[j] = std::clamp(q[j] + random.uniform(-shift, shift), low[j], high[j]);
       }
       const double found = around(k, q);
       if (found < best && body.edge_free(way.col(k - 1), q, obstacles, margins, workspace) &&

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numeric>
+
+#include "../settings.hpp"
 
 namespace sidestep {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Spreads the lowest 21 bits of x three apart.
 std::uint64_t spread_bits(std::uint64_t x) noexcept {

@@ -3,19 +3,18 @@
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
-#include <limits>
 
 #include "support/allocations.hpp"
+#include "support/numbers.hpp"
 #include "support/random.hpp"
 #include "support/serial_arm.hpp"
 
 using namespace sidestep;
+using test::not_a_number;
+using test::nv;
 using test::Random;
 
 namespace {
-
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-constexpr int nv = 7;
 
 /// Half-spaces of the joint space, each moving along its normal: h_k = n_k·q + b_k + s_k t.
 struct Walls {

@@ -6,15 +6,16 @@
 #include <stdexcept>
 
 #include "support/allocations.hpp"
+#include "support/numbers.hpp"
 #include "support/random.hpp"
 
 using namespace sidestep;
+using test::infinity;
 using test::Random;
 using boost::test_tools::tolerance;
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // Conditioning of H up to 1e8 and of active sets up to about 1e3 leave this much of the 1e-16 of a rounding.
 constexpr double optimality = 1e-9;
 

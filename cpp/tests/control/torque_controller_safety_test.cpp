@@ -5,15 +5,15 @@
 
 #include "sidestep/control/torque_controller.hpp"
 #include "support/allocations.hpp"
+#include "support/numbers.hpp"
 #include "support/random.hpp"
 #include "support/serial_arm.hpp"
 
 using namespace sidestep;
+using test::nv;
 using test::Random;
 
 namespace {
-
-constexpr int nv = 7;
 
 /// One clearance that joint 2 alone changes, h' = 0.5 q̇_2, closing with 0.1 m/s at 10 mm: 5 mm before the margin.
 struct Approach {

@@ -2,22 +2,21 @@
 
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
 #include "support/allocations.hpp"
+#include "support/numbers.hpp"
 #include "support/random.hpp"
 #include "support/serial_arm.hpp"
 
 using namespace sidestep;
+using test::infinity;
+using test::not_a_number;
+using test::nv;
 using test::Random;
 
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-constexpr int nv = 7;
 
 struct Input {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = Eigen::VectorXd::Zero(nv), a = Eigen::VectorXd::Zero(nv);
@@ -265,7 +264,7 @@ BOOST_AUTO_TEST_CASE(arms_without_limits) {
   BOOST_TEST(solution.torque[0] == -2.0);  // a damping of 1 where no limits give one
 }
 
-BOOST_AUTO_TEST_CASE(settings_are_checked) {
+BOOST_AUTO_TEST_CASE(settings_of_the_torque_controller_are_checked) {
   const Robot arm = test::serial_arm(test::arm_limits(nv));
   const auto message_of = [&](auto&& change) {
     TorqueControllerSettings settings;
