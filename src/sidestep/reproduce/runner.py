@@ -101,7 +101,7 @@ def _write(item: Item, folder: Path) -> list[Path]:
         for kind in ("png", "svg"):
             path = folder / f"{item.name}.{kind}"
             item.drawing.savefig(path, dpi=style.DPI, metadata={"Date": None} if kind == "svg" else None)
-            item.drawing.set_layout_engine("none")  # as laid out for the first file; it takes as long as drawing
+            item.drawing.set_layout_engine("none")  # as laid out for the first file
             written.append(path)
     if item.data:
         written.append(_write_data(item.data, folder / item.name))
