@@ -783,8 +783,9 @@ class Escape:
     """
     Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],
     it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):
-    one uniform within `spread` [rad] of every joint's position and within the limits. fraction: of its potential that counts as nearer; seed: of the random
-    configurations. Raises ValueError that names the setting at fault.
+    one uniform within `spread` [rad] of every joint's position and within the limits. Within 0.01 [rad | m] of its
+    goal it has arrived. fraction: of its potential that counts as nearer; seed: of the random configurations.
+    Raises ValueError that names the setting at fault.
     """
 
     def __init__(self, robot: Robot, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 2.0, spread: float = 1.7, seed: int = 0) -> None: ...

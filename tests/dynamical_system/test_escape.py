@@ -33,6 +33,25 @@ def test_goal_is_followed_while_it_gets_nearer(robot):
     assert escape.count == 0
 
 
+def test_an_arm_that_has_arrived_is_not_stuck(robot):
+    escape = ss.Escape(robot, patience=0.1)
+    followed = pursue(escape, GOAL + np.tile([0.009, -0.009], (500, 1)))
+    np.testing.assert_array_equal(followed, np.tile(GOAL, (500, 1)))
+    pursue(escape, GOAL + np.tile([0.011, 0.0], (15, 1)))
+    assert escape.count == 1
+
+
+def test_patience_begins_anew_with_another_goal(robot):
+    escape = ss.Escape(robot, patience=0.2)
+    pursue(escape, GOAL + (AWAY - GOAL) * 0.98 ** np.arange(100)[:, None])
+    state, other = GOAL + (AWAY - GOAL) * 0.98**100, np.array([-2.5, -2.0])
+    followed = [escape.pursue(other, state, np.nan, PERIOD).position for _ in range(19)]
+    np.testing.assert_array_equal(followed, np.tile(other, (19, 1)))
+    for _ in range(3):
+        escape.pursue(other, state, np.nan, PERIOD)
+    assert escape.count == 1
+
+
 def test_sub_goal_comes_after_patience_and_is_given_up_after_half_of_it(robot):
     escape = ss.Escape(robot, patience=0.2, leg=10.0, spread=0.7, seed=3)
     followed = pursue(escape, at_rest(45))

@@ -11,6 +11,8 @@ namespace {
 
 constexpr double half_patience = 0.5;    // a sub-goal need not be reached: half the patience is enough for it
 constexpr double near_sub_goal = 0.2;    // [rad | m] is as good as there
+constexpr double at_goal = 0.01;         // [rad | m] nothing is left to be stuck on the way to
+constexpr double jump = 2.0;             // a squared distance that grows so much in one step is one to another goal
 
 const EscapeSettings& validated(const EscapeSettings& settings) {
   settings.validate();
@@ -21,6 +23,15 @@ const EscapeSettings& validated(const EscapeSettings& settings) {
 double way_left(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential) noexcept {
   const auto* joint = std::get_if<JointGoal>(&goal);
   return joint == nullptr ? potential : (q - joint->position).squaredNorm();
+}
+
+/// The way_left() within which the arm has arrived: at_goal of every joint, or of a pose's position and rotation.
+bool arrived(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential) noexcept {
+  if (const auto* joint = std::get_if<JointGoal>(&goal)) {
+    return (q - joint->position).cwiseAbs().maxCoeff() <= at_goal;
+  }
+  const PoseGoalSettings& s = std::get<PoseGoal>(goal).settings;
+  return potential <= 0.5 * (s.position_stiffness + (s.position_only ? 0.0 : s.orientation_stiffness)) * at_goal * at_goal;
 }
 
 /// Uniform in [0, 1), the same on every machine (the standard's distributions are not).
@@ -55,6 +66,10 @@ const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q
   if (!escaping_) {
     const double way = way_left(goal, q, turned_ ? std::numeric_limits<double>::quiet_NaN() : potential);
     turned_ = false;
+    if (way > jump * way_ || arrived(goal, q, way)) {
+      stuck_.reset();
+    }
+    way_ = way;
     if (!std::isnan(way) && stuck_.update(time_, way)) {
       turn(true, q);
     }
@@ -73,6 +88,7 @@ void Escape::turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept {
   since_ = time_;
   stuck_.reset();
   halted_.reset();
+  way_ = std::numeric_limits<double>::infinity();
   if (escape) {
     ++count_;
     Eigen::VectorXd& position = std::get<JointGoal>(sub_goal_).position;

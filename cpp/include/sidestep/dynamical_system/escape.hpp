@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <random>
 
 #include "sidestep/dynamical_system/goal.hpp"
@@ -26,7 +27,8 @@ struct EscapeSettings {
 ///
 /// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so that whether it
 /// arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system, so
-/// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits.
+/// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits. An arm within
+/// 0.01 [rad | m] of its goal has arrived and is not stuck; patience begins anew with a goal that has jumped away.
 class Escape {
  public:
   explicit Escape(const Robot& robot, EscapeSettings settings = {});
@@ -52,6 +54,7 @@ class Escape {
   ProgressMonitor stuck_, halted_;  // on the way to the goal, and to a sub-goal
   Goal sub_goal_;
   double time_ = 0.0, since_ = 0.0;
+  double way_ = std::numeric_limits<double>::infinity();  // left to the goal in the step before
   bool escaping_ = false;
   bool turned_ = true;  // the potential of the step before is that of another goal
   int count_ = 0;
