@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sidestep as ss
 from sidestep import Scenario
 from sidestep.scenario import shipped_scenarios
 from sidestep.scenario.assembly import assemble
@@ -110,6 +111,10 @@ def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
     if METHODS[name].covering:
         system = system.relaxed_at(place, parts.seen)
     written = system.acceleration(parts.start, rest, place, parts.seen)
+    assert max(len(line) for line in python_snippet(at_start).splitlines() if "[" not in line) <= 100
+    np.testing.assert_array_equal(variables["q"], at_start.q)
+    free = variables["system"].acceleration(at_start.q, at_start.v, variables["goal"], ss.Obstacles.none())
+    np.testing.assert_array_equal(variables["step"].acceleration, free.acceleration)
     # A rotation in degrees has lost its last digits, and with it the pose, but not the posture.
     np.testing.assert_array_equal(again._step.acceleration, expected)  # type: ignore[union-attr]
     np.testing.assert_array_equal(run.acceleration, expected)

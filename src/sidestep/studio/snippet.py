@@ -1,4 +1,4 @@
-"""The system that moves an arm, as Python."""
+"""What moves an arm, as Python."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
 from sidestep.studio.systems import as_file
 
+WIDTH = 80  # [characters] that a window on the page shows
+
 
 def python_snippet(snapshot: Snapshot) -> str:
-    """Python that makes the system that moves the arm, as `system`, its `goal`, and what the loop has beside it.
+    """Python that makes the system that moves the arm, as `system`, and its `goal`, and takes a step without obstacles.
 
-    That is `escape` or `motion`, where the method has sub-goals or a guide, and `controller`, the torque program.
+    Beside it are `escape` or `motion`, where the method has sub-goals or a guide, and `controller`, the torque program.
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
@@ -28,34 +30,62 @@ def python_snippet(snapshot: Snapshot) -> str:
         count = written.barriers.ellipsoids
         lines += [f"body = ss.Body.cover(robot{'' if count is None else f', components={count}'})"]
         own = {entry.name: getattr(written.barriers, entry.name) for entry in dataclasses.fields(Barriers)}
-        lines += [f"numbers = Barriers({_arguments(own)})"]
+        lines += _call("numbers = Barriers", own)
         lines += ["system = barrier_system(robot, body, numbers=numbers)"]
     else:
         lines += _written_code(written)
     if method.escapes:
-        lines += [f"escape = ss.Escape(robot, {_arguments(dataclasses.asdict(written.escape))})"]
+        lines += _call("escape = ss.Escape", dataclasses.asdict(written.escape), "robot")
     if method.guided:
         lines += [
-            f"planner = ss.PlannerSettings({_arguments(dataclasses.asdict(written.guide.planner))})",
-            f"route = ss.RouteSettings({_arguments(dataclasses.asdict(written.guide.route))})",
+            *_call("planner = ss.PlannerSettings", dataclasses.asdict(written.guide.planner)),
+            *_call("route = ss.RouteSettings", dataclasses.asdict(written.guide.route)),
             "motion = ss.GuidedMotion(robot, body, system=system, planner=planner, route=route)",
         ]
     torque = dataclasses.asdict(written.torque)
     safety = torque.pop("safety")
-    lines += [
-        f"safety = ss.SafetySettings({_arguments(safety)})",
-        f"controller = ss.TorqueController(robot, period={written.simulation.period!r}, safety=safety, "
-        f"{_arguments(torque)})",
-    ]
+    period = f"period={written.simulation.period!r}"
+    lines += _call("safety = ss.SafetySettings", safety)
+    lines += _call("controller = ss.TorqueController", torque, "robot", period, "safety=safety")
     lines += _goal_code(snapshot)
-    if method.covering:
-        place = "goal" if snapshot.goal_pose is None else "posture"
-        lines += [f"# among obstacles at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_step_code(snapshot)]) + "\n"
 
 
-def _arguments(values: dict[str, Any]) -> str:
-    return ", ".join(f"{name}={value!r}" for name, value in values.items())
+def _call(head: str, values: dict[str, Any], *first: str) -> list[str]:
+    """`head(first, name=value, ...)`, in as many lines as it takes."""
+    arguments = [*first, *(f"{name}={value!r}" for name, value in values.items())]
+    whole = f"{head}({', '.join(arguments)})"
+    if len(whole) <= WIDTH:
+        return [whole]
+    lines = [f"{head}("]
+    for argument in arguments:
+        if lines[-1].endswith("(") or len(lines[-1]) + len(argument) + 2 > WIDTH:
+            lines.append(f"    {argument},")
+        else:
+            lines[-1] += f" {argument},"
+    return [*lines, ")"]
+
+
+def _step_code(snapshot: Snapshot) -> list[str]:
+    method = METHODS[snapshot.method]
+    place = "goal" if snapshot.goal_pose is None else "posture"
+    lines = [
+        "",
+        "# what is seen: ss.Obstacles(points, radii), of (n, 3) and (n,) [m]",
+        "obstacles = ss.Obstacles.none()",
+        "# what is measured",
+        f"q = {snapshot.q.tolist()}",
+        f"v = {snapshot.v.tolist()}",
+    ]
+    if method.guided:
+        lines += [f"motion.set_goal({place})", "step = motion.step(q, v, obstacles)"]
+    else:
+        if method.escapes:
+            lines += ["# where it is stuck: goal = escape.pursue(goal, q, step.goal_potential, period)"]
+        if method.covering:
+            lines += [f"# among what is at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]
+        lines += ["step = system.acceleration(q, v, goal, obstacles)"]
+    return [*lines, "# controller.solve(q, v, step.acceleration, mass_matrix, bias).torque"]
 
 
 def _robot_code(robot: RobotChoice, scenario: Scenario) -> str:
@@ -77,39 +107,40 @@ def _robot_code(robot: RobotChoice, scenario: Scenario) -> str:
 def _goal_code(snapshot: Snapshot) -> list[str]:
     posture = snapshot.posture.q.tolist()
     if snapshot.goal_pose is None:
-        return [f"goal = {posture}  # [rad | m]"]
+        return ["# [rad | m]", f"goal = {posture}"]
     numbers = snapshot.numbers[snapshot.method]
     stiffness = numbers.get("stiffness", snapshot.scenario.system.stiffness)
-    pull = (
-        f"position_stiffness={POSITION_SHARE * stiffness!r}, orientation_stiffness={TURN_SHARE * stiffness!r}"
-    )
-    lines = [
-        f"pose = {snapshot.goal_pose.tolist()}",
-        f"goal = ss.PoseGoal(robot, {snapshot.tip!r}, pose, {pull})",
-    ]
-    says = f"that has the pose: the goal until the tip is within {1e3 * ENTER[0]:g} mm and {ENTER[1]:g} rad of it"
+    pull = {
+        "position_stiffness": POSITION_SHARE * stiffness,
+        "orientation_stiffness": TURN_SHARE * stiffness,
+    }
+    rows = [f"    {row}," for row in snapshot.goal_pose.tolist()]
+    lines = ["pose = [", *rows, "]", *_call("goal = ss.PoseGoal", pull, "robot", repr(snapshot.tip), "pose")]
+    says = f"that has the pose: the goal until the tip is within {1e3 * ENTER[0]:g} mm and {ENTER[1]:g} rad"
     if not snapshot.posture.found:
         says = "the nearest found to the pose, which is out of reach: the goal"
-    return [*lines, f"posture = {posture}  # {says}"]
+    return [*lines, f"# {says}", f"posture = {posture}"]
 
 
 def _written_code(written: Scenario) -> list[str]:
     body, embedding, system = written.body, written.embedding, written.system
-    psi = [f"ss.CollisionDensity(robot, body, average={embedding.density == 'average'})"]
+    density = f"density = ss.CollisionDensity(robot, body, average={embedding.density == 'average'})"
+    lines, names = [density], "density"
     if embedding.joint_limits is not None:
-        limits = embedding.joint_limits
-        psi += [f"ss.JointLimitPotential(robot, slope={limits.slope!r}, height={limits.height!r})"]
-    together = f"[{', '.join(psi)}]"
-    if embedding.combine == "sum" and len(psi) > 1:
-        together = f"[ss.Sum({together})]"
-    spring = (
-        f"stiffness={system.stiffness!r}, damping={system.damping!r}, damping_form={system.damping_form!r}"
-    )
+        lines += _call("limits = ss.JointLimitPotential", dataclasses.asdict(embedding.joint_limits), "robot")
+        names += ", limits"
+    together = f"[ss.Sum([{names}])]" if embedding.combine == "sum" and len(lines) > 1 else f"[{names}]"
+    spring = {
+        "stiffness": system.stiffness,
+        "damping": system.damping,
+        "damping_form": system.damping_form,
+    }
     return [
-        f"body = ss.Body.fit(robot, components={body.components!r}, covariance={body.covariance!r}, "
-        f"seed={body.seed!r})",
+        *_call("body = ss.Body.fit", dataclasses.asdict(body), "robot"),
+        *lines,
         f"psi = {together}",
-        f"system = ss.GeometricSystem(psi, {spring}, switch={_switch_code(system.switch)})",
+        f"switch = {_switch_code(system.switch)}",
+        *_call("system = ss.GeometricSystem", spring, "psi", "switch=switch"),
     ]
 
 

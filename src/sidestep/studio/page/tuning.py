@@ -40,7 +40,11 @@ class TuningPanel:
         self._timer: threading.Timer | None = None
         gui.add_button("Export as Python").on_click(self._export)
         gui.add_button("Recommended values").on_click(self._reset)
-        add_note(gui, "Of what the folders below hold, but for the body, which takes time to make.")
+        add_note(
+            gui,
+            "Of what the folders below hold, but for the body, which takes time to make. Every method has "
+            "numbers of its own.",
+        )
         gui.add_divider()
 
     def show(self, snapshot: m.Snapshot) -> None:
