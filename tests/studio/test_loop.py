@@ -200,6 +200,49 @@ def test_a_drag_is_not_shown_more_often_than_thirty_times_a_second(
     assert np.median(between) < 1.2 * FRAME < IDLE_FRAME  # and paused it is shown as often: the hand sees it
 
 
+class LoadingPage(Hand):
+    """A page that asks for a scenario at 0.2 s, and shows it when it has loaded its meshes; None: never."""
+
+    def __init__(self, clock: Clock, scenario: Scenario, drawn: float | None) -> None:
+        super().__init__(clock, 1.2)
+        self._load, self._drawn, self._next = m.Load(scenario), drawn, 0.2
+
+    def recv(self) -> m.Command:
+        if self._unseen:
+            self._unseen -= 1
+            return m.Seen()
+        edition = max(message.edition for _, message in self.sent if isinstance(message, m.Snapshot))
+        asked = self._next == 0.2
+        self._next = self._drawn if asked and self._drawn is not None else np.inf
+        return self._load if asked else m.Drawn(edition)
+
+
+@pytest.mark.parametrize(("drawn", "begins"), [(0.6, 0.6), (None, 0.7)])
+def test_a_scenario_that_is_loaded_waits_for_the_page(
+    make_session: Callable[..., Session],
+    scenario: Scenario,
+    monkeypatch: pytest.MonkeyPatch,
+    drawn: float | None,
+    begins: float,
+) -> None:
+    """But no longer than the limit, here half a second: there may be no page."""
+    session = make_session(scenario, method="unswitched")
+    clock = Clock()
+    monkeypatch.setattr(loop_module, "clock", clock)
+    monkeypatch.setattr(loop_module, "LONGEST_HOLD", 0.5)
+    page = LoadingPage(clock, scenario, drawn)
+    with pytest.raises(EOFError):
+        _Pacer(session, page).run()  # type: ignore[arg-type]
+    shown = [(at, message) for at, message in page.sent if isinstance(message, m.Snapshot)]
+    of_second = [(at, message) for at, message in shown if message.edition > shown[0][1].edition]
+    waiting = [message.time for at, message in of_second if at < begins]
+    assert len(waiting) > 10
+    assert waiting == [0.0] * len(waiting)
+    going = [message.time for at, message in of_second if at > begins]
+    assert going[-1] == pytest.approx(1.2 - begins, abs=3 * FRAME)
+    assert np.diff(going).max() < 3 * FRAME  # and nothing is made up for
+
+
 def test_a_loop_that_fails_holds_the_arm_and_says_why(
     make_session: Callable[..., Session], scenario: Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,6 +18,7 @@ from sidestep.studio import messages as m
 from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, take_pictures
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import RIGHT
+from sidestep.studio.page.marks import GAP
 from sidestep.studio.page.obstacles import gizmo_pose
 from sidestep.studio.page.placing import CLEAR
 from sidestep.studio.page.surface import on_surface
@@ -258,6 +259,7 @@ def test_the_thesis_is_one_click_away_with_its_arm_of_seven_joints(studio: Studi
     until(lambda: last(studio).scenario == thesis, "the scenario")
     assert last(studio).method == "written"
     until(lambda: last(studio).time > 0.2, "some steps")
+    assert studio.view.plots.rows[0, 0] < GAP  # [s] seen from its start, however long its meshes took to load
     studio.send(m.SetRunning(False))
     until(lambda: not last(studio).running, "the pause")
     robot, now = studio.view.robot, last(studio)

@@ -33,6 +33,7 @@ UNSEEN = 2  # snapshots on their way at most; further ones are dropped until the
 BEHIND = (
     0.1  # [s] of simulated time that is made up for; more is let go, and the loop runs slower than real time
 )
+LONGEST_HOLD = 10.0  # [s] for which a scenario that was loaded waits for a page; there may be none
 LEAST_WAIT = 2e-4  # [s] shorter waits are not worth a system call
 
 
@@ -195,6 +196,7 @@ class _Pacer:
         self._unseen = 0
         self._sent, self._next_frame = -FRAME, 0.0
         self._said = ""
+        self._awaited, self._hold_end = 0, 0.0  # edition that the page has to draw before the time goes on
         self._marks: list[tuple[float, float]] = []
 
     def run(self) -> None:
@@ -205,7 +207,8 @@ class _Pacer:
                 self._answer()
                 due = max(due, clock.perf_counter() - BEHIND)
             now = clock.perf_counter()
-            if session.running:
+            going = session.running and not self._awaits_page(now)
+            if going:
                 due = max(due, now - BEHIND)
                 until = now + FRAME / 2.0
                 while due <= now < until:
@@ -218,10 +221,15 @@ class _Pacer:
                 due = now
             if now >= self._next_frame and self._unseen < UNSEEN:
                 self._send(now)
-            wait = (
-                min(due, self._next_frame) if session.running else self._next_frame
-            ) - clock.perf_counter()
+            wait = (min(due, self._next_frame) if going else self._next_frame) - clock.perf_counter()
             self._connection.poll(wait if wait > LEAST_WAIT else 0.0)
+
+    def _awaits_page(self, now: float) -> bool:
+        """Whether the page, which may load meshes for seconds, does not show yet what was loaded: nothing of the
+        motion is to be missed."""
+        if now >= self._hold_end:
+            self._awaited = 0
+        return self._awaited > 0
 
     def _step(self) -> None:
         try:
@@ -238,8 +246,15 @@ class _Pacer:
             if isinstance(command, m.Seen):
                 self._unseen -= 1
                 continue
+            if isinstance(command, m.Drawn):
+                if command.edition >= self._awaited:
+                    self._awaited = 0
+                continue
             try:
                 self._session.handle(command)
+                if isinstance(command, m.Load):
+                    self._awaited = self._session.edition
+                    self._hold_end = clock.perf_counter() + LONGEST_HOLD
                 self._said = ""
             except (ValueError, OSError) as error:
                 self._connection.send(m.Failed(str(error), refused=command))

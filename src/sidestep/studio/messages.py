@@ -114,6 +114,13 @@ class Seen:
     """The page has taken a snapshot: it may have another."""
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """The page shows an edition: the loop, which holds the time after `Load` until then, may go on."""
+
+    edition: int
+
+
 Command: TypeAlias = (
     SetJointGoal
     | SetPoseGoal
@@ -128,6 +135,7 @@ Command: TypeAlias = (
     | Restart
     | Load
     | Seen
+    | Drawn
 )
 
 

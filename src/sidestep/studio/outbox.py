@@ -68,7 +68,7 @@ def add(waiting: list[m.Command], command: m.Command) -> None:
             if other == stream:
                 del waiting[index]
                 break
-            if other is None and not isinstance(waiting[index], m.Seen):
+            if other is None and not isinstance(waiting[index], m.Seen | m.Drawn):
                 break
     waiting.append(command)
 

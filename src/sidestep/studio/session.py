@@ -63,6 +63,7 @@ class Session:
     Attributes:
         robot, tip: the arm and the link whose pose is a goal. stage: the physics.
         period: of control [s]. time: simulated [s]. running: or paused.
+        edition: grows when obstacles come or go, or a scenario is loaded.
     """
 
     robot: Robot
@@ -71,6 +72,7 @@ class Session:
     period: float
     time: float
     running: bool
+    edition: int
     _bodies: dict[str, Body]
     _pursuit: Pursuit
     _controller: TorqueController
@@ -93,7 +95,7 @@ class Session:
         self._prepare, self._usual_ellipsoids = prepare, ellipsoids
         self._numbers = {name: method.defaults for name, method in METHODS.items()}
         self._method = method_named(method)
-        self._edition = 0
+        self.edition = 0
         self._rows = []
         self._load(scenario, self._method, numbers or {})
 
@@ -147,7 +149,7 @@ class Session:
                 self.running, self._until = until > 0.0, until
             case m.Load(scenario, asked):
                 self._load(scenario, self._method if asked is None else method_named(asked), {})
-            case m.Seen():
+            case m.Seen() | m.Drawn():
                 return
         if not self.running and self._step is not None:
             self._look_again()
@@ -207,7 +209,7 @@ class Session:
             torque = float((np.abs(self._solution.torque) / limits.effort).max())
         return m.Snapshot(
             scenario=self.scenario,
-            edition=self._edition,
+            edition=self.edition,
             time=self.time,
             running=self.running,
             q=q.copy(),
@@ -257,7 +259,7 @@ class Session:
     def _load(self, scenario: Scenario, method: Method, given: Mapping[str, Mapping[str, Any]]) -> None:
         robot = load_robot(scenario)
         bodies: dict[str, Body] = {}
-        if self._edition and robot.fingerprint == self.robot.fingerprint:
+        if self.edition and robot.fingerprint == self.robot.fingerprint:
             robot, bodies = self.robot, dict(self._bodies)
         start = coordinates(scenario.start, robot, "start.position")
         velocity = start_velocity(scenario.start, robot)
@@ -304,7 +306,7 @@ class Session:
 
     def _set_actors(self, actors: list[Actor]) -> None:
         self.stage.set_things(actors)
-        self._edition += 1
+        self.edition += 1
         self._look()
 
     def _use(self, method: Method, numbers: Numbers) -> None:

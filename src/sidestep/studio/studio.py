@@ -138,6 +138,8 @@ class Studio:
                     self._draw(snapshot)
                 except Exception as error:  # the page goes on with the next state
                     self.view.report("drawing failed", error)
+                if self.snapshot is None or snapshot.edition != self.snapshot.edition:
+                    self.send(m.Drawn(snapshot.edition))
                 self.snapshot = snapshot  # after it is on the page
             if self._loop.ended:
                 self.view.tell(m.Failed(self.error or "the process of the loop ended", fatal=True))

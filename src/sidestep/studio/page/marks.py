@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 LONGEST_LINE = 1.0  # [m] nearest line that is drawn: nothing farther off matters to the arm
 TRAIL_POINTS = 150
 TRAIL_STEP = 0.01  # [m] of the tip between two points
+GAP = 0.3  # [s] between two states, ten frames: how the arm moved between them is not known, and no line is drawn
 METRIC_SIZE = (
     0.25  # of the reach: half axis of the metric's ellipsoid where the tip moves as freely as in flat space
 )
@@ -35,8 +36,9 @@ class Marks:
 
     def __init__(self, server: viser.ViserServer, robot: Robot, tip: str) -> None:
         self._robot, self._tip = robot, tip
-        self._trail_points: deque[Array] = deque(maxlen=TRAIL_POINTS)
-        none = np.zeros((1, 2, 3), dtype=np.float32)
+        self._trail_points: deque[Array] = deque(maxlen=TRAIL_POINTS)  # NaN between two that are not joined
+        self._last = np.nan  # [s] time of the last state of the trail
+        none = self._lines = np.zeros((1, 2, 3), dtype=np.float32)
         self.nearest = server.scene.add_line_segments(
             "/marks/nearest",
             none,
@@ -67,25 +69,28 @@ class Marks:
             ends = np.array([[found[0].point_on_link, found[0].point_on_obstacle]])
             self.nearest.points = ends.astype(np.float32)
 
-    def show_trail(self, q: Array, *, visible: bool) -> None:
-        """Adds where the tip is at q (nv,)."""
+    def show_trail(self, q: Array, time: float, *, visible: bool) -> None:
+        """Adds where the tip is at q (nv,) and a time [s]."""
         here = self._robot.pose(q, self._tip)[:3, 3]
         points = self._trail_points
         if not points or np.linalg.norm(here - points[-1]) > TRAIL_STEP:
+            if points and not time - self._last <= GAP:
+                points.append(np.full(3, np.nan))
             points.append(here)
-            self._draw_trail(visible)
-        self.trail.visible = visible and len(points) > 1
+        self._last = time
+        self._draw_trail(visible)
 
     def _draw_trail(self, visible: bool) -> None:
-        line = np.array(self._trail_points)
-        if len(line) > 1:
-            self.trail.points = np.stack([line[:-1], line[1:]], axis=1).astype(np.float32)
-        self.trail.visible = visible and len(line) > 1
+        lines = segments(np.array(self._trail_points).reshape(-1, 3))
+        if len(lines) and not np.array_equal(lines, self._lines):
+            self.trail.points = self._lines = lines
+        self.trail.visible = visible and len(lines) > 0
 
     def show_way(self, way: Sequence[Array], *, visible: bool) -> None:
         """In place of the trail: where the tip is at some of many configurations (nv,), in their order."""
         some = np.unique(np.linspace(0, len(way) - 1, TRAIL_POINTS).astype(int))
         self.clear_trail()
+        self._last = np.nan
         self._trail_points.extend(self._robot.pose(way[k], self._tip)[:3, 3] for k in some)
         self._draw_trail(visible)
 
@@ -108,6 +113,12 @@ class Marks:
     def remove(self) -> None:
         for mark in (self.nearest, self.trail, self.metric):
             mark.remove()
+
+
+def segments(points: Array) -> npt.NDArray[np.float32]:
+    """Lines (n, 2, 3) from each point (m, 3) to the next, none from or to a point of NaN."""
+    lines = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+    return lines[np.isfinite(lines).all(axis=(1, 2))]
 
 
 def metric_ellipsoid(robot: Robot, tip: str, q: Array, metric: Array) -> tuple[Array, Array]:

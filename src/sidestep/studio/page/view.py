@@ -136,7 +136,7 @@ class View:
             self.obstacle_panel.follow(snapshot)
             now = clock.monotonic()
             if index is None:
-                self.marks.show_trail(row.q, visible=self._trail.value)
+                self.marks.show_trail(row.q, row.time, visible=self._trail.value)
                 self.goal.show(snapshot.goal, snapshot.goal_pose, snapshot.posture)
                 self.goal.ghost.hide_where_at(row.q)
                 self.surface.show(snapshot, self.robot, self._body_now, self._pair(), self._viewpoint)
