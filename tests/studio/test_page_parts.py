@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import threading
 from collections.abc import Callable
@@ -20,10 +21,10 @@ from sidestep.studio.page import colours
 from sidestep.studio.page import surface as surface_module
 from sidestep.studio.page.arm import reach, short_names
 from sidestep.studio.page.camera import HALF, HIGH, LOW, RIGHT, UP, VIEW, Viewpoint
-from sidestep.studio.page.marks import METRIC_SIZE, metric_ellipsoid
+from sidestep.studio.page.marks import GAP, METRIC_SIZE, Marks, metric_ellipsoid
 from sidestep.studio.page.obstacles import FASTEST_THROW, throw_velocity
 from sidestep.studio.page.plots import Plots
-from sidestep.studio.page.recorder import as_npz
+from sidestep.studio.page.recorder import Recorder, as_npz
 from sidestep.studio.page.surface import (
     CELLS,
     SIDE,
@@ -171,6 +172,24 @@ def test_the_metric_of_flat_space_is_drawn_at_full_size() -> None:
     np.testing.assert_allclose(pose[:3, 3], robot.pose(q, "tip")[:3, 3])
     _, smaller = metric_ellipsoid(robot, "tip", q, 4.0 * np.eye(3))
     assert smaller.max() == pytest.approx(0.5 * METRIC_SIZE * reach(robot), rel=1e-9)  # G = 4: half the speed
+
+
+def test_a_trail_is_not_drawn_over_a_time_that_nobody_saw() -> None:
+    robot = Robot.named("planar2")
+    scene = SimpleNamespace(
+        add_line_segments=lambda *_, **__: SimpleNamespace(points=None, visible=False),
+        add_mesh_simple=lambda *_, **__: None,
+    )
+    marks = Marks(SimpleNamespace(scene=scene), robot, "tip")  # type: ignore[arg-type]
+    at = [0.0, 0.1, 0.2, 0.2 + 2.0 * GAP, 0.3 + 2.0 * GAP]  # [s]
+    ways = [np.array([time, 0.0]) for time in at]  # 1 rad/s
+    tips = [robot.pose(q, "tip")[:3, 3] for q in ways]
+    for time, q in zip(at, ways, strict=True):
+        marks.show_trail(q, time, visible=True)
+    drawn = [[tips[0], tips[1]], [tips[1], tips[2]], [tips[3], tips[4]]]
+    np.testing.assert_allclose(marks.trail.points, drawn, atol=1e-6)  # single precision
+    marks.show_trail(ways[-1], at[-1] + 2.0 * GAP, visible=True)  # it rests
+    np.testing.assert_allclose(marks.trail.points, drawn, atol=1e-6)
 
 
 def test_a_window_shows_arm_goal_and_obstacles_and_the_surface_beside_them() -> None:
@@ -413,3 +432,28 @@ def test_a_sentence_begins_large_but_a_name_stays_as_it_is() -> None:
     assert begun("on the way, 0.3 rad from the goal") == "On the way, 0.3 rad from the goal"
     assert begun("fr3_link5 slides along ball3, 53 mm away") == "fr3_link5 slides along ball3, 53 mm away"
     assert begun("guide: idle; arriving") == "Guide: idle; arriving"
+
+
+def test_live_lets_the_loop_go_on_only_if_it_ran(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="unswitched")
+    sent: list[m.Command] = []
+    control = SimpleNamespace(on_click=lambda _: None, on_update=lambda _: None, content="", value=0.0)
+    names = "add_button_group", "add_slider", "add_button", "add_markdown", "add_html"
+    gui = SimpleNamespace(**dict.fromkeys(names, lambda *_, **__: control))
+    view = SimpleNamespace(send=sent.append, last=None, telling=lambda _: contextlib.nullcontext())
+    recorder = Recorder(SimpleNamespace(gui=gui), view)  # type: ignore[arg-type]
+    recorder.take([live_row(session.snapshot())] * 2)
+
+    def press(*names: str) -> list[bool]:
+        sent.clear()
+        for name in names:
+            view.last = session.snapshot()
+            recorder._on_replay(SimpleNamespace(target=SimpleNamespace(value=name), client=None))
+            for command in sent:
+                session.handle(command)
+        return [command.running for command in sent if isinstance(command, m.SetRunning)]
+
+    assert press("Play", "Play", "Live") == [False, False, True]  # it ran before the first
+    assert press("Live") == []
+    session.handle(m.SetRunning(False))
+    assert press("Play", "Live") == [False]

@@ -32,6 +32,7 @@ class Recorder:
         self.rows: list[m.Row] = []
         self.plotted: list[tuple[float, ...]] = []
         self._replaying, self._since, self._of_this_arm = False, 0.0, True
+        self._ran = False  # the loop, before the replay paused it
         gui = server.gui
         gui.add_button_group("record", ("Record", "Stop")).on_click(self._on_record)
         gui.add_button_group("replay", ("Play", "Live")).on_click(self._on_replay)
@@ -43,8 +44,9 @@ class Recorder:
         self.state: Any = gui.add_markdown("nothing recorded")
         add_note(
             gui,
-            "200 states a second; Restart and loading end a recording. Play shows it, Live the loop. The download is "
-            "NumPy's .npz: time [s], q [rad], poses and names of obstacles.",
+            "200 states a second; Restart and loading end a recording. Play shows it while the loop is paused; Live "
+            "shows the loop, which goes on if it ran. The download is NumPy's .npz: time [s], q [rad], "
+            "poses and names of obstacles.",
         )
 
     @property
@@ -69,7 +71,7 @@ class Recorder:
         if self.rows or recording:
             text = f"{'recording' if recording else 'recorded'} {self.length:.1f} s"
             if not self._of_this_arm:
-                text += " of another arm"
+                text += " of another robot model"
             if text != self.state.content:
                 self.state.content = text
 
@@ -108,13 +110,17 @@ class Recorder:
 
     def _on_replay(self, event: Any) -> None:
         if event.target.value == "Live":
+            if self._replaying and self._ran:
+                self._view.send(m.SetRunning(True))
             self.show_live()
             return
         with self._view.telling(event.client):
             if not self._of_this_arm:
-                raise ValueError("the recording is of another arm; it can be downloaded")
+                raise ValueError("the recording is of another robot model; it can be downloaded")
             if len(self.rows) < 2:
                 raise ValueError("nothing is recorded: press Record, then Stop")
+            if not self._replaying:
+                self._ran = self._view.last is not None and self._view.last.running
             self._view.send(m.SetRecording(False))
             self._view.send(m.SetRunning(False))
             self._slider.max = max(round(self.length, 2), 0.01)
