@@ -44,6 +44,21 @@ def test_the_arm_is_on_the_page(studio: Studio, looker: Looker) -> None:
     assert changed[round(y) - 12 : round(y) + 12, round(x) - 12 : round(x) + 12].any()
 
 
+def test_the_axes_of_the_plots_can_be_read(studio: Studio, looker: Looker) -> None:
+    run_to(studio, last(studio).time + 0.3)
+    axes = (
+        "() => Object.values(window.__viserTestpoints.uplots).map(plot => plot.chart)"
+        ".map(chart => [chart.axes[1]._values, chart.scales.y.max])"
+    )
+
+    def can_be_read() -> bool:
+        found = looker.page.evaluate(axes)
+        full = [most for _, most in found[2:4]]  # of speed and torque, within their limits
+        return full == [100.0, 100.0] and all(own and "0" in own and len(own) > 1 for own, _ in found)
+
+    until(can_be_read, "zero and one label more at each")
+
+
 def test_a_goal_set_on_the_page_is_reached(studio: Studio, looker: Looker) -> None:
     looker.tab("Goal")
     looker.type("joint1 [°]", "-20")

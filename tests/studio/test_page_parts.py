@@ -6,6 +6,7 @@ import contextlib
 import io
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -259,6 +260,25 @@ def test_an_unknown_clearance_does_not_empty_its_plot(make_session: MakeSession,
     np.testing.assert_allclose(times, [-0.001, 0.0], atol=1e-12)
     np.testing.assert_allclose(values, [300.0, 200.0])  # [mm]
     assert len(plots._handles[1].data[0]) == 3
+
+
+def test_plots_do_not_join_what_lies_on_both_sides_of_a_time_that_nobody_saw(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    gui = SimpleNamespace(
+        add_uplot=lambda *_, **__: SimpleNamespace(data=None), add_html=lambda *_, **__: None
+    )
+    plots = Plots(SimpleNamespace(gui=gui))  # type: ignore[arg-type]
+    session = make_session(scenario, method="unswitched")
+    session.step()
+    snapshot = session.snapshot()
+    for time in (0.0, 0.1, 0.2 + GAP, 0.3 + GAP):
+        plots.add(replace(snapshot, time=time), 0.4)
+    plots.draw(1.0)
+    np.testing.assert_allclose(plots._handles[0].data[0], [-0.1, 0.0], atol=1e-12)
+    assert len(plots.rows) == 4
+    plots.draw_past(2.0, [tuple(row) for row in plots.rows], 0.1)
+    np.testing.assert_allclose(plots._handles[0].data[0], [-0.1, 0.0], atol=1e-12)  # before it
 
 
 def test_links_change_colour_towards_contact() -> None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from sidestep.drawing import palette
 from sidestep.studio.page import colours
+from sidestep.studio.page.marks import GAP
 
 if TYPE_CHECKING:
     import viser
@@ -23,13 +24,14 @@ SPAN = 12.0  # [s] that is shown
 EVERY = 0.4  # [s] of the wall clock between two drawings
 HEIGHT, TIMES = 53, 24  # [px] of a plot, and of the times below the last one
 
-# name, title with unit, factor, decimals (no finer: an arm at rest has labels that can be read), colour
+# name, title with unit, factor, decimals (no finer: an arm at rest has labels that can be read), colour, and up to
+# where the axis reaches at least: it contains zero, and so much, that two of its labels can always be read
 PLOTS = (
-    ("clearance", "exact clearance [mm]", 1e3, 0, colours.NEAR),
-    ("psi", "height of the embedding |ψ|", 1.0, 1, palette.BLACK),
-    ("speed", "fastest joint [% of its limit]", 1e2, 1, palette.BLACK),
-    ("torque", "largest torque [% of its limit]", 1e2, 1, palette.BLACK),
-    ("step", "time of a step, p99 [ms]", 1e-3, 2, palette.BLACK),
+    ("clearance", "exact clearance [mm]", 1e3, 0, colours.NEAR, 100.0),
+    ("psi", "height of the embedding |ψ|", 1.0, 1, palette.BLACK, 2.0),
+    ("speed", "fastest joint [% of its limit]", 1e2, 1, palette.BLACK, 100.0),
+    ("torque", "largest torque [% of its limit]", 1e2, 1, palette.BLACK, 100.0),
+    ("step", "time of a step, p99 [ms]", 1e-3, 2, palette.BLACK, 1.0),
 )
 NOTHING = (np.array([-SPAN, 0.0]), np.array([np.nan, np.nan]))  # a plot without a line
 
@@ -41,14 +43,14 @@ class Plots:
         self._rows: deque[tuple[float, ...]] = deque()
         self._drawn, self._stale = 0.0, False
         self._handles: list[Any] = []
-        for name, title, _, _, colour in PLOTS:
+        for name, title, _, _, colour, least in PLOTS:
             last = name == PLOTS[-1][0]
             self._handles.append(
                 server.gui.add_uplot(
                     NOTHING,
                     ({"label": "t"}, {"label": title, "stroke": colour, "width": 2}),
                     title=title,
-                    scales={"x": {"time": False, "range": (-SPAN, 0.0)}},
+                    scales={"x": {"time": False, "range": (-SPAN, 0.0)}, "y": {"range": range_to(least)}},
                     axes=({"show": last, "size": TIMES, "space": 30}, {"size": 62, "space": 18}),
                     legend={"show": False},
                     cursor={"show": False},
@@ -97,6 +99,9 @@ class Plots:
             self._send(np.array([row for row in rows if time - SPAN <= row[0] <= time]))
 
     def _send(self, rows: Array) -> None:
+        if len(rows):  # what is before a gap is left out: viser's lines cannot be broken
+            gaps = np.flatnonzero(np.diff(rows[:, 0]) > GAP)
+            rows = rows[gaps[-1] + 1 :] if len(gaps) else rows
         if len(rows) < 2:
             for handle in self._handles:
                 handle.data = NOTHING
@@ -105,7 +110,7 @@ class Plots:
         before_now = (
             columns[0] - columns[0, -1]
         )  # the scales stay as they are: changing them is slow in the browser
-        for handle, values, (_, _, factor, decimals, _) in zip(
+        for handle, values, (_, _, factor, decimals, _, _) in zip(
             self._handles, columns[1:], PLOTS, strict=True
         ):
             known = np.isfinite(values)  # a single unknown value would empty the plot
@@ -116,3 +121,8 @@ class Plots:
     def rows(self) -> Array:
         """What is shown, (n, 6): time and the five quantities, in SI units (the step in microseconds)."""
         return np.array(self._rows).reshape(-1, 1 + len(PLOTS))
+
+
+def range_to(least: float) -> dict[str, Any]:
+    """The range of an axis, as uPlot has it: from 0 to `least`, and beyond where values are."""
+    return {"min": {"pad": 0.1, "soft": 0.0, "mode": 1}, "max": {"pad": 0.1, "soft": least, "mode": 1}}
