@@ -339,7 +339,10 @@ def test_a_cloud_is_saved_beside_its_scenario(
     )
     folder = tmp_path / "saved"
     folder.mkdir()
-    path = save_scenario(scenario_now(session.snapshot(), name="mine"), folder)
+    now = scenario_now(session.snapshot(), name="mine")
+    path = save_scenario(replace(now, folder=folder), folder)  # as of a studio that was started there
+    assert Scenario.load(path).obstacles[1].shape.file == "mine-cloud.npy"
+    path = save_scenario(now, folder, replace=True)
     source.unlink()
     loaded = Scenario.load(path)
     assert loaded.obstacles[1].shape.file == "mine-cloud.npy"

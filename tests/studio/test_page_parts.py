@@ -18,11 +18,12 @@ from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
 from sidestep.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS
-from sidestep.studio.page import colours
+from sidestep.studio.page import colours, obstacle_panel
 from sidestep.studio.page import surface as surface_module
 from sidestep.studio.page.arm import reach, short_names
 from sidestep.studio.page.camera import HALF, HIGH, LOW, RIGHT, UP, VIEW, Viewpoint
 from sidestep.studio.page.marks import GAP, METRIC_SIZE, Marks, metric_ellipsoid
+from sidestep.studio.page.obstacle_panel import ObstaclePanel
 from sidestep.studio.page.obstacles import FASTEST_THROW, throw_velocity
 from sidestep.studio.page.plots import Plots
 from sidestep.studio.page.recorder import Recorder, as_npz
@@ -39,7 +40,7 @@ from sidestep.studio.page.surface import (
     open_faces,
     seen,
 )
-from sidestep.studio.page.view import live_row
+from sidestep.studio.page.view import begins_anew, live_row
 from sidestep.studio.page.words import begun
 from sidestep.studio.session import Session
 from sidestep.studio.systems import build_system
@@ -477,3 +478,44 @@ def test_live_lets_the_loop_go_on_only_if_it_ran(make_session: MakeSession, scen
     assert press("Live") == []
     session.handle(m.SetRunning(False))
     assert press("Play", "Live") == [False]
+
+
+def test_the_least_clearance_is_of_one_motion(make_session: MakeSession, scenario: Scenario) -> None:
+    session = make_session(scenario, method="unswitched")
+    first = session.snapshot()
+    session.handle(m.Restart())
+    assert begins_anew(first, session.snapshot())
+    session.step()
+    before = session.snapshot()
+    session.handle(m.RemoveThing("ball"))
+    session.step()
+    assert not begins_anew(before, session.snapshot())  # an obstacle less, and the same motion
+    session.handle(m.Restart())
+    assert begins_anew(before, session.snapshot())
+
+
+def test_the_place_of_an_obstacle_that_flies_is_followed(
+    make_session: MakeSession, scenario: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = make_session(scenario, method="unswitched")
+    panel = ObstaclePanel.__new__(ObstaclePanel)
+    view, now = SimpleNamespace(last=session.snapshot()), [10.0]
+    monkeypatch.setattr(obstacle_panel, "clock", SimpleNamespace(monotonic=lambda: now[0]))
+    vars(panel).update(
+        _view=view,
+        _chosen=SimpleNamespace(value="ball"),
+        _place=SimpleNamespace(value=None),
+        _shown=("", 0.0, 0.0, 0.0),
+        _followed=0.0,
+    )
+    panel.follow(view.last)
+    session.handle(m.ThrowThing("ball", np.array([0.0, 0.5, 0.0])))
+    shown = []
+    for _ in range(4):
+        for _ in range(100):
+            session.step()
+        now[0] += 0.15  # [s] of which 0.2 are to pass
+        view.last = session.snapshot()
+        panel.follow(view.last)
+        shown.append(np.allclose(panel._place.value, view.last.poses[0][:3, 3], atol=6e-4))  # of 1 mm
+    assert shown == [False, True, False, True]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import os
 import tempfile
 import zipfile
 from collections.abc import Collection
@@ -111,7 +112,10 @@ def save_scenario(scenario: Scenario, folder: Path, *, replace: bool = False) ->
             if source not in copies:
                 name = f"{scenario.name}-{source.name.removeprefix(f'{scenario.name}-')}"
                 copies[source] = _unused(folder / name, copies.values())
-            shape = dataclasses.replace(shape, file=str(copies[source]))
+            beside = os.path.relpath(
+                copies[source], scenario.folder.resolve()
+            )  # as its folder is the saved one's
+            shape = dataclasses.replace(shape, file=Path(beside).as_posix())
             item = dataclasses.replace(item, shape=shape)
         obstacles.append(item)
     contents = {copy: source.read_bytes() for source, copy in copies.items()}  # one may be another's place

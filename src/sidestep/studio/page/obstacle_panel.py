@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
+import time as clock
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 NONE = "(none)"
+PLACE_EVERY = 0.2  # [s] between two places that are shown of an obstacle that moves
 GIZMO_ROOM = 1.2  # of the length of its arrows: it is drawn on top of all, and takes the mouse
 
 
@@ -71,6 +73,7 @@ class ObstaclePanel:
         self._chosen.on_update(self._chose)
         self._count = 0
         self._shown = (NONE, 0.0, 0.0, 0.0)
+        self._followed = 0.0
         self._sent: list[tuple[str, Ball]] = []  # added, and not there yet
 
     def select(self, name: str) -> None:
@@ -104,9 +107,13 @@ class ObstaclePanel:
                 self._place.value = (x, y, z)
 
     def follow(self, snapshot: m.Snapshot) -> None:
-        """Shows where the chosen obstacle has come to rest, or is while the loop is paused."""
-        index = self._index()
-        if index is not None and (not snapshot.running or not snapshot.velocities[index].any()):
+        """Shows where the chosen obstacle is; one that moves not so often that the numbers cannot be read."""
+        index, now = self._index(), clock.monotonic()
+        if index is None:
+            return
+        moves = snapshot.running and snapshot.velocities[index].any()
+        if not moves or now - self._followed >= PLACE_EVERY:
+            self._followed = now
             self._show_place()
 
     def _chose(self, _: Any) -> None:

@@ -169,7 +169,8 @@ class View:
         if before is None or snapshot.edition != before.edition:
             self._forget_clearances()
             self.obstacle_panel.set_names(tuple(thing.name for thing in snapshot.things))
-        if before is not None and (snapshot.time < before.time or snapshot.scenario != before.scenario):
+        if before is not None and begins_anew(before, snapshot):
+            self.least_clearance = np.inf
             self.marks.clear_trail()
             self.surface.clear_trail()
 
@@ -190,8 +191,6 @@ class View:
         """What was measured is of other obstacles, or of another time."""
         self.epoch += 1
         self._clearances, self._measured = (), np.nan
-        if not self._replayed:
-            self.least_clearance = np.inf
 
     def stamp(self) -> int:
         """Sends what is not sent yet, and a number after it: a browser that has the number has all of it."""
@@ -373,6 +372,12 @@ class View:
                 self._send(m.SetRunning(False))
             case _:
                 self._send(m.Restart())
+
+
+def begins_anew(before: m.Snapshot, now: m.Snapshot) -> bool:
+    """Whether the motion of the state before has ended with a restart, or another scenario."""
+    still_begins = before.time == 0.0 and now.edition != before.edition
+    return now.time < before.time or now.scenario != before.scenario or still_begins
 
 
 def live_row(snapshot: m.Snapshot) -> m.Row:
