@@ -91,14 +91,17 @@ def test_every_mode_and_damping_form(name: str, kind: str) -> None:
         for form, system in systems.items():
             step = system.acceleration(state.q, state.v, case.robot.neutral, state.obstacles)
             h, g, psi = parts(case, state, embeddings, form)
-            weights = {
-                "unswitched": np.ones(nv),
-                "harmonic": np.ones(nv),
-                "geodesic": np.zeros(nv),
-                "binary": np.full(nv, float(psi <= threshold)),
-                "sigmoid": np.full(nv, 1.0 - sigmoid(5.0 / (threshold + 1.0) * (psi - 0.8 * threshold))),
-                "distance": sigmoid(12.0 * (distances(case, state) - np.linspace(0.05, 0.4, nv))),
-            }[kind]
+            match kind:
+                case "unswitched" | "harmonic":
+                    weights = np.ones(nv)
+                case "geodesic":
+                    weights = np.zeros(nv)
+                case "binary":
+                    weights = np.full(nv, float(psi <= threshold))
+                case "sigmoid":
+                    weights = np.full(nv, 1.0 - sigmoid(5.0 / (threshold + 1.0) * (psi - 0.8 * threshold)))
+                case "distance":
+                    weights = sigmoid(12.0 * (distances(case, state) - np.linspace(0.05, 0.4, nv)))
             a = h + g if kind == "unswitched" else weights * h + (1.0 - weights) * g
             scale = max(1.0, np.abs(h).max(), np.abs(g).max())
             assert step.status == ss.StepStatus.ok
