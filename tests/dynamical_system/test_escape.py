@@ -45,6 +45,7 @@ def test_patience_begins_anew_with_another_goal(robot):
     escape = ss.Escape(robot, patience=0.2)
     pursue(escape, GOAL + (AWAY - GOAL) * 0.98 ** np.arange(100)[:, None])
     state, other = GOAL + (AWAY - GOAL) * 0.98**100, np.array([-2.5, -2.0])
+    pursue(escape, np.tile(state, (15, 1)))  # three quarters of the patience
     followed = [escape.pursue(other, state, np.nan, PERIOD).position for _ in range(19)]
     np.testing.assert_array_equal(followed, np.tile(other, (19, 1)))
     for _ in range(3):
