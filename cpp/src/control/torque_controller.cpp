@@ -94,10 +94,7 @@ void TorqueControllerSettings::validate(const Robot& robot) const {
   safety.validate();
   require_positive(stop_time, "torque controller: stop_time");
   require_positive(stop_damping, "torque controller: stop_damping");
-  if (!(position_margin >= 0.0)) {
-    throw std::invalid_argument("torque controller: position_margin is " + std::to_string(position_margin) +
-                                ", must be >= 0");
-  }
+  require(position_margin >= 0.0, "torque controller: position_margin", position_margin, ">= 0");
   for (int i = 0; i < nv; ++i) {
     const double width = robot.limits().upper[i] - robot.limits().lower[i];
     if (!(2.0 * position_margin < width) && position_margin > 0.0) {

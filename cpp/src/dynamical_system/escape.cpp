@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <string>
+
+#include "../settings.hpp"
 
 namespace sidestep {
 namespace {
@@ -25,7 +25,7 @@ double way_left(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double po
   return joint == nullptr ? potential : (q - joint->position).squaredNorm();
 }
 
-/// The way_left() within which the arm has arrived: at_goal of every joint, or of a pose's position and rotation.
+/// Whether every joint, or a pose's position and rotation together, is within at_goal of the goal.
 bool arrived(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     return (q - joint->position).cwiseAbs().maxCoeff() <= at_goal;
@@ -40,15 +40,10 @@ double uniform(std::mt19937_64& random) noexcept { return static_cast<double>(ra
 }  // namespace
 
 void EscapeSettings::validate() const {
-  const auto require = [](bool good, const char* name, double value, const char* allowed) {
-    if (!good) {
-      throw std::invalid_argument(std::string("escape: ") + name + " is " + std::to_string(value) + ", must be " + allowed);
-    }
-  };
-  require(patience > 0.0 && std::isfinite(patience), "patience", patience, "positive and finite");
-  require(leg > 0.0 && std::isfinite(leg), "leg", leg, "positive and finite");
-  require(spread > 0.0 && std::isfinite(spread), "spread", spread, "positive and finite");
-  require(fraction > 0.0 && fraction < 1.0, "fraction", fraction, "between 0 and 1");
+  require(patience > 0.0 && std::isfinite(patience), "escape: patience", patience, "positive and finite");
+  require(leg > 0.0 && std::isfinite(leg), "escape: leg", leg, "positive and finite");
+  require(spread > 0.0 && std::isfinite(spread), "escape: spread", spread, "positive and finite");
+  require(fraction > 0.0 && fraction < 1.0, "escape: fraction", fraction, "between 0 and 1");
 }
 
 Escape::Escape(const Robot& robot, EscapeSettings settings)

@@ -1,21 +1,15 @@
 #include "sidestep/embedding/joint_limit_potential.hpp"
 
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "../settings.hpp"
 
 namespace sidestep {
 
 JointLimitPotential::JointLimitPotential(const Robot& robot, double slope, double height)
     : Embedding(robot), lower_(robot.limits().lower), upper_(robot.limits().upper), slope_(slope), height_(height) {
-  if (!(slope > 0.0) || !std::isfinite(slope)) {
-    throw std::invalid_argument("joint limit potential: slope is " + std::to_string(slope) +
-                                ", must be positive and finite");
-  }
-  if (!(height > 0.0) || !std::isfinite(height)) {
-    throw std::invalid_argument("joint limit potential: height is " + std::to_string(height) +
-                                ", must be positive and finite");
-  }
+  require(slope > 0.0 && slope < infinity, "joint limit potential: slope", slope, "positive and finite");
+  require(height > 0.0 && height < infinity, "joint limit potential: height", height, "positive and finite");
 }
 
 void JointLimitPotential::add_to(EmbeddingView out, const KinematicState& state,

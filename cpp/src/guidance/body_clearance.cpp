@@ -220,7 +220,8 @@ BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obst
     return {gap < gap_asked.cap ? gap - item.contact : asked.cap, -1};  // exactly the cap where nothing is nearer
   }
   if (item.plane >= 0) {
-    return {look_at_plane(links_[static_cast<std::size_t>(item.link)], planes_[static_cast<std::size_t>(item.plane)], asked.cap, w), -1};
+    const Link& link = links_[static_cast<std::size_t>(item.link)];
+    return {look_at_plane(link, planes_[static_cast<std::size_t>(item.plane)], asked.cap, w), -1};
   }
   return look_at_points(item, obstacles, asked, w);
 }

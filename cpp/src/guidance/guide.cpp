@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "../settings.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -32,15 +34,13 @@ void GuideSettings::validate() const {
   planner.validate();
   route.validate();
   const auto positive = [](double value, const char* what) {
-    if (!(value > 0.0)) {
-      throw std::invalid_argument(std::string("guide: ") + what + " is " + std::to_string(value) + ", must be positive");
-    }
+    require(value > 0.0, what, value, "positive");
   };
-  positive(period, "period");
-  positive(patience, "patience");
-  positive(retry, "retry");
-  positive(tolerance, "tolerance");
-  positive(duration, "duration");
+  positive(period, "guide: period");
+  positive(patience, "guide: patience");
+  positive(retry, "guide: retry");
+  positive(tolerance, "guide: tolerance");
+  positive(duration, "guide: duration");
 }
 
 Guide::Guide(BodyClearance body, const GuideSettings& settings)

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "../settings.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -15,17 +17,14 @@ constexpr Eigen::Index first = 20;  // samples among which an arm that moved whi
 
 void RouteSettings::validate() const {
   const auto positive = [](double value, const char* what) {
-    if (!(value > 0.0) || !std::isfinite(value)) {
-      throw std::invalid_argument(std::string("route: ") + what + " is " + std::to_string(value) +
-                                  ", must be positive and finite");
-    }
+    require(value > 0.0 && value < infinity, what, value, "positive and finite");
   };
-  positive(speed, "speed");
-  positive(speed_share, "speed_share");
-  positive(acceleration, "acceleration");
-  positive(wide, "wide");
-  positive(slowest, "slowest");
-  positive(lead, "lead");
+  positive(speed, "route: speed");
+  positive(speed_share, "route: speed_share");
+  positive(acceleration, "route: acceleration");
+  positive(wide, "route: wide");
+  positive(slowest, "route: slowest");
+  positive(lead, "route: lead");
   if (slowest > 1.0 || speed_share > 1.0) {
     throw std::invalid_argument("route: slowest is " + std::to_string(slowest) + " and speed_share " +
                                 std::to_string(speed_share) + ", shares must be at most 1");

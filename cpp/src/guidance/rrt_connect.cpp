@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "../settings.hpp"
 #include "sidestep/guidance/path_smoothing.hpp"
 #include "sidestep/guidance/random_stream.hpp"
 
@@ -38,16 +39,14 @@ std::vector<Eigen::VectorXd> to_root(const SearchTree& tree, int node) {
 
 void PlannerSettings::validate() const {
   const auto positive = [](double value, const char* what) {
-    if (!(value > 0.0)) {
-      throw std::invalid_argument(std::string("planner: ") + what + " is " + std::to_string(value) + ", must be positive");
-    }
+    require(value > 0.0, what, value, "positive");
   };
-  positive(slack, "slack");
-  positive(fade, "fade");
-  positive(range, "range");
-  positive(max_seconds, "max_seconds");
-  positive(max_nodes - 1.0, "max_nodes less one");
-  positive(max_iterations, "max_iterations");
+  positive(slack, "planner: slack");
+  positive(fade, "planner: fade");
+  positive(range, "planner: range");
+  positive(max_seconds, "planner: max_seconds");
+  positive(max_nodes - 1.0, "planner: max_nodes less one");
+  positive(max_iterations, "planner: max_iterations");
   if (!(floor >= 0.0) || !(margin >= floor) || !std::isfinite(margin)) {
     throw std::invalid_argument("planner: floor is " + std::to_string(floor) + " m and margin " + std::to_string(margin) +
                                 " m; 0 <= floor <= margin is needed");

@@ -140,7 +140,9 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         escape=_at("escape", scenario, partial(escape_of, scenario.escape, robot))
         if scenario.method == "barrier"
         else None,
-        guide=_at("guide", scenario, partial(_guide, scenario, robot, body, system)) if guided else None,
+        guide=_at("guide", scenario, partial(guide_of, scenario.guide, robot, body, system, synchronous=True))
+        if guided
+        else None,
         pose=_pose_aim(scenario, robot, posture),
         torque_program=_at(
             "torque", scenario, partial(torque_program_of, scenario.torque, robot, scenario.simulation.period)
@@ -162,10 +164,6 @@ def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> Posture:
     if choice.posture is not None:
         return Posture(coordinates(choice.posture, robot, "goal.posture.position"))
     return posture_at(robot, choice.frame, pose_of(choice), start, starts=POSTURE_STARTS)
-
-
-def _guide(scenario: Scenario, robot: Robot, body: Body, system: GeometricSystem) -> GuidedMotion:
-    return guide_of(scenario.guide, robot, body, system, synchronous=True)
 
 
 def _pose_aim(scenario: Scenario, robot: Robot, posture: Posture) -> PoseAim | None:

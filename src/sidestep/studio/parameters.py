@@ -11,7 +11,14 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from sidestep import presets
-from sidestep.scenario.scenario import BarrierChoice, BodyChoice, JointLimitChoice, Scenario, SystemChoice
+from sidestep.scenario.scenario import (
+    BarrierChoice,
+    BodyChoice,
+    EmbeddingChoice,
+    JointLimitChoice,
+    Scenario,
+    SystemChoice,
+)
 from sidestep.scenario.settings import EscapeChoice, PlannerChoice, RouteChoice, SafetyChoice, TorqueChoice
 
 Value: TypeAlias = float | int | str | None
@@ -60,7 +67,7 @@ class Parameter:
     @property
     def folder(self) -> str:
         """Where it is on the page."""
-        return "Body" if self.body else FOLDERS[self.place]
+        return FOLDERS["body" if self.body else self.place]
 
     @property
     def allowed(self) -> str:
@@ -124,10 +131,10 @@ def _number(kind: type, place: str, prefix: str = "", **options: Any) -> Any:
 
 
 def _choice(
-    kind: type, place: str, name: str, field: str, options: tuple[Value, ...], sentence: str, **more: Any
+    kind: type, place: str, field: str, options: tuple[Value, ...], sentence: str, **more: Any
 ) -> Parameter:
     default = more.pop("default", _default(kind, field))
-    return Parameter(name, place, field, "", 0.0, 0.0, default, sentence, options=options, **more)
+    return Parameter(field, place, field, "", 0.0, 0.0, default, sentence, options=options, **more)
 
 
 _b = _number(BarrierChoice, "barriers")
@@ -146,7 +153,6 @@ BARRIERS: tuple[Parameter, ...] = (
     _choice(
         BarrierChoice,
         "barriers",
-        "ellipsoids",
         "ellipsoids",
         (None, 1, 2, 3, 4, 6, 8, 12),
         "Of the body per link: more fit it closer, and cost time in every step.",
@@ -229,7 +235,6 @@ def spring(stiffness: str, damping: str) -> tuple[Parameter, ...]:
             SystemChoice,
             "system",
             "damping_form",
-            "damping_form",
             ("plain", "metric"),
             "plain: D v, the same everywhere; metric: G⁻¹ D v, weaker where space is steep.",
         ),
@@ -241,39 +246,27 @@ def switch(name: str, unit: str, lower: float, upper: float, default: float, sen
     return Parameter(name, "system.switch", name, unit, lower, upper, default, sentence)
 
 
+_l = _number(JointLimitChoice, "embedding.joint_limits", "limit_")
 DENSITY: tuple[Parameter, ...] = (
-    Parameter(
-        "density",
+    _choice(
+        EmbeddingChoice,
         "embedding",
         "density",
-        "",
-        0.0,
-        0.0,
-        "sum",
+        ("sum", "average"),
         "sum: every point adds to ψ, so finer views push harder; average: they do not, and few of many vanish.",
-        options=("sum", "average"),
     ),
-    Parameter(
-        "combine",
+    _choice(
+        EmbeddingChoice,
         "embedding",
         "combine",
-        "",
-        0.0,
-        0.0,
-        "sum",
+        ("sum", "stack"),
         "sum: obstacles and limits make one ψ, in which they can cancel; stack: one coordinate each.",
-        options=("sum", "stack"),
     ),
-    _number(JointLimitChoice, "embedding.joint_limits", "limit_")(
-        "slope", "1/rad", 5.0, 100.0, "Higher rises later and steeper before a joint limit."
-    ),
-    _number(JointLimitChoice, "embedding.joint_limits", "limit_")(
-        "height", "", 0.05, 10.0, "Higher turns away from joint limits more."
-    ),
+    _l("slope", "1/rad", 5.0, 100.0, "Higher rises later and steeper before a joint limit."),
+    _l("height", "", 0.05, 10.0, "Higher turns away from joint limits more."),
     _choice(
         BodyChoice,
         "body",
-        "components",
         "components",
         (1, 2, 3, 4, 5, 6, 8, "aic", "bic"),
         "Gaussians per link: more fit it closer, and cost time in every step; aic and bic choose.",
@@ -283,7 +276,6 @@ DENSITY: tuple[Parameter, ...] = (
     _choice(
         BodyChoice,
         "body",
-        "covariance",
         "covariance",
         ("spherical", "diagonal", "full"),
         "Shape of the Gaussians: simpler ones need more of them.",

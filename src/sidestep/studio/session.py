@@ -35,7 +35,7 @@ from sidestep.studio.parameters import Numbers
 from sidestep.studio.pursuit import Pursuit
 from sidestep.studio.stage import Actor, Stage
 from sidestep.studio.systems import Recipe, as_file, build_system, numbers_of, recipe_of
-from sidestep.studio.things import things_of
+from sidestep.studio.things import check_names, things_of
 from sidestep.studio.tip import at_tip, tip_of
 from sidestep.studio.words import in_words
 
@@ -115,8 +115,7 @@ class Session:
                     target, posture_at(self.robot, self.tip, target, near, starts=starts, free=free)
                 )
             case m.AddThing(thing):
-                if any(actor.thing.name == thing.name for actor in self.stage.actors):
-                    raise ValueError(f"two obstacles are called {thing.name!r}; names must differ")
+                check_names([*(actor.thing for actor in self.stage.actors), thing])
                 self._set_actors([*self.stage.actors, Actor(thing)])
             case m.RemoveThing(name):
                 gone = self.actor(name)

@@ -146,10 +146,17 @@ def things_of(scenario: Scenario) -> tuple[Thing, ...]:
         Thing(item.name or f"obstacle{index}", item, scenario.folder)
         for index, item in enumerate(scenario.obstacles)
     )
-    for index, thing in enumerate(things):
-        if any(other.name == thing.name for other in things[:index]):
-            raise ValueError(f"two obstacles are called {thing.name!r}; names must differ")
+    check_names(things)
     return things
+
+
+def check_names(things: Iterable[Thing]) -> None:
+    """Raises ValueError where two obstacles share a name."""
+    names: set[str] = set()
+    for thing in things:
+        if thing.name in names:
+            raise ValueError(f"two obstacles are called {thing.name!r}; names must differ")
+        names.add(thing.name)
 
 
 def thing_of(solid: str, things: Iterable[Thing]) -> str:
