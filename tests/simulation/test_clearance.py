@@ -191,7 +191,7 @@ def test_travel_bound_holds(name: str) -> None:
         mesh = robot.collision_mesh(link.name)
         if mesh is None:
             continue
-        bound = travel_per_joint(robot, link.name, mesh)
+        bound = travel_per_joint(robot, link.name, mesh.vertices)
         for _ in range(20):
             q = robot.random_configuration(rng)
             step = rng.normal(size=q.shape) * 0.2

@@ -13,6 +13,7 @@ from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
 from sidestep.robot import Robot
 from sidestep.simulation import ExactClearance, SelfCollision
+from sidestep.simulation.clearance import FINEST
 from sidestep.simulation.evaluation import excess_over
 
 Array = npt.NDArray[np.float64]
@@ -125,9 +126,10 @@ class Judge:
                     clearance = measured
                     pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
                     when = (first + worst.sample) * settings.period
-        own = self._self.minimum_over(q, tolerance=TOLERANCE)
-        if 0.0 < own.distance <= TOLERANCE:  # too close to say at this tolerance
-            own = self._self.minimum_over(q, tolerance=own.distance / 2.0)
+        own, tolerance = self._self.minimum_over(q, tolerance=TOLERANCE), TOLERANCE
+        while FINEST < own.distance <= tolerance:  # too close to say at this tolerance
+            tolerance = own.distance / 2.0
+            own = self._self.minimum_over(q, tolerance=tolerance)
         return Outcome(
             index=problem.index,
             arrived=motion.arrived,

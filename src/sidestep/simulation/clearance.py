@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import coal
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 from sidestep._core import JointType
 from sidestep.pose import from_quaternion, moved, pose_vector
@@ -96,7 +95,7 @@ class ExactClearance:
             if mesh is None or (joint_of[link.name] < 0 and not include_immobile):
                 continue
             self._links.append(mesh_solid(link.name, mesh))
-            self._travel.append(travel_per_joint(robot, link.name, mesh))
+            self._travel.append(travel_per_joint(robot, link.name, mesh.vertices))
         if not self._links:
             raise ValueError(f"robot {robot.name!r} has no moving link with a collision mesh to measure from")
         self._objects = [object_solid(item) for item in self.objects]
@@ -188,7 +187,7 @@ class ExactClearance:
         for (i, j), so_far in travel.items():
             s = 0.0
             while True:
-                q, pose = _interpolate(path, s), _interpolate_pose(poses[:, j], s)
+                q, pose = interpolate(path, s), _interpolate_pose(poses[:, j], s)
                 X_WL = self.robot.pose(q, self._links[i].name)
                 at_least = self._balls_apart(i, j, X_WL, pose)
                 if at_least <= best.distance:
@@ -310,14 +309,12 @@ class ExactClearance:
         return Clearance(float(value), link.name, item.name, on_link, on_item)
 
 
-def travel_per_joint(
-    robot: Robot, link: str, mesh: trimesh.Trimesh, *, beyond: Collection[int] = ()
-) -> Array:
-    """Bound (nv,) on how far any point of a link moves per unit of each joint coordinate, at any
-    configuration.
+def travel_per_joint(robot: Robot, link: str, points: Array, *, beyond: Collection[int] = ()) -> Array:
+    """Bound (nv,) on how far points (N, 3) of a link, in its frame, move per unit of each joint coordinate, at
+    any configuration.
 
     For a revolute joint it is the longest lever arm, at most the stretched length of the chain from the joint
-    to the link plus the radius of the link; for a prismatic joint 1. [m/rad] or [m/m].
+    to the link plus the distance of the farthest point; for a prismatic joint 1. [m/rad] or [m/m].
     Only the joints beyond the ones in `beyond` (indices of `robot.joints`) count: motion relative to them.
 
     Raises:
@@ -326,7 +323,7 @@ def travel_per_joint(
     frame = next(f for f in robot.frames if f.name == link)
     bound = np.zeros(robot.num_coordinates)
     limits = robot.limits
-    vertices = moved(mesh.vertices, frame.placement)
+    vertices = moved(points, frame.placement)
     reach = float(np.linalg.norm(vertices, axis=1).max())
     index, first = frame.joint, True
     while index >= 0 and index not in beyond:
@@ -366,7 +363,8 @@ def _object_travel(poses: Array, radius: float) -> Array:
     return turned
 
 
-def _interpolate(samples: Array, s: float) -> Array:
+def interpolate(samples: Array, s: float) -> Array:
+    """The row of samples (T, n) at a position along them, linear between two of them."""
     k = min(int(s), len(samples) - 1)
     f = s - k
     value: Array = samples[k] if f == 0.0 else (1.0 - f) * samples[k] + f * samples[k + 1]
@@ -374,7 +372,7 @@ def _interpolate(samples: Array, s: float) -> Array:
 
 
 def _interpolate_pose(poses: Array, s: float) -> Array:
-    pose = _interpolate(poses, s)
+    pose = interpolate(poses, s)
     k = min(int(s), len(poses) - 1)
     if s == k or np.array_equal(poses[k, 3:], poses[k + 1, 3:]):
         return pose
@@ -390,7 +388,7 @@ def _interpolate_pose(poses: Array, s: float) -> Array:
 
 def _advance(so_far: Array, s: float, budget: float) -> float | None:
     """The position along the path at which the travel has grown by `budget`; None past the end."""
-    target = float(_interpolate(so_far[:, None], s)[0]) + budget
+    target = float(interpolate(so_far[:, None], s)[0]) + budget
     if target >= so_far[-1]:
         return None
     k = int(np.searchsorted(so_far, target, side="right")) - 1

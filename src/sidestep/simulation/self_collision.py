@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.robot import Robot, read_srdf
-from sidestep.simulation.clearance import FINE_CHECKS, travel_per_joint
+from sidestep.simulation.clearance import FINE_CHECKS, interpolate
+from sidestep.simulation.link_parts import LinkPair, PairsOfParts
 from sidestep.simulation.solid import mesh_model
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +24,10 @@ Reason = Literal["rigid", "adjacent", "always", "allowed"]
 
 SAMPLES = 200  # configurations by which a pair that always touches is found
 ALWAYS = 0.95  # share of them: SRDF tools take the same, since a rare pose may part what is meant to touch
-FIRST_LOOKS = 16  # samples of a motion at which every pair is measured, for a good first guess of the minimum
+LOOKS = (
+    256  # moments of a motion, evenly over its travel, at which bounding balls show which pairs are near when
+)
+FIRST_LOOKS = 16  # of these, at which the closest pair is measured, for a good first guess of the minimum
 
 
 @dataclass(frozen=True)
@@ -38,13 +43,6 @@ class SelfClearance:
     distance: float
     pair: tuple[str, ...]
     sample: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class _PairOfLinks:
-    first: int
-    second: int
-    travel: Array  # (nv,) how far points of the two can come towards each other per unit of each joint
 
 
 class SelfCollision:
@@ -81,7 +79,8 @@ class SelfCollision:
             self._centers.append(center)
             self._radii.append(float(np.linalg.norm(mesh.vertices - center, axis=1).max()))
         self.left_out: dict[Pair, Reason] = {}
-        self._pairs: list[_PairOfLinks] = []
+        self._pairs: list[LinkPair] = []
+        self._moved_by: dict[Pair, tuple[int, ...]] = {}
         for i, j in itertools.combinations(range(len(self._names)), 2):
             a, b = self._names[i], self._names[j]
             above_a, above_b = (_joints_above(robot, joint_of[name]) for name in (a, b))
@@ -93,13 +92,8 @@ class SelfCollision:
             elif len(apart) == 1:
                 self.left_out[a, b] = "adjacent"
             else:
-                shared = above_a & above_b
-                travel = np.zeros(robot.num_coordinates)
-                for name in (a, b):
-                    mesh = meshes[name]
-                    assert mesh is not None
-                    travel += travel_per_joint(robot, name, mesh, beyond=shared)
-                self._pairs.append(_PairOfLinks(i, j, travel))
+                self._pairs.append(LinkPair(i, j, above_a & above_b))
+                self._moved_by[a, b] = tuple(sorted({robot.joints[joint].coordinate for joint in apart}))
         self._leave_out_what_always_touches(samples, np.random.default_rng(seed))
         self._by_name = {self._name(pair): pair for pair in self._pairs}
 
@@ -122,7 +116,7 @@ class SelfCollision:
 
     def coordinates_between(self, first: str, second: str) -> tuple[int, ...]:
         """The coordinates that move one link of a checked pair relative to the other."""
-        return tuple(int(j) for j in np.flatnonzero(self._find(first, second).travel))
+        return self._moved_by[self._name(self._find(first, second))]
 
     def distance_between(self, q: Array, first: str, second: str) -> float:
         """The distance [m] of a checked pair at q (nv,); 0 when they touch or overlap.
@@ -156,14 +150,17 @@ class SelfCollision:
     def minimum_over(self, trajectory: Array, *, tolerance: float = 1e-3) -> SelfClearance:
         """The smallest distance of a motion (T, nv) that is linear in the joints between samples.
 
-        A pair comes closer by at most sum_j L_j |dq_j|, with L_j the lever arms of the joints between the two
-        links, so after a distance d it is skipped until that sum has grown to d - (smallest so far) +
-        tolerance [m]: the true minimum lies in [reported - tolerance, reported]. Ends at the first touch. After
-        `FINE_CHECKS` checks, which only a motion that diverged needs, the tolerance is at least the whole travel
-        over `FINE_CHECKS`.
+        Links are held by convex parts. Two parts come closer by at most sum_j L_j |dq_j|, with L_j the lever arms of
+        the joints between the two links, so after a lower bound d of their distance they are skipped until that sum
+        has grown to d - (smallest so far) + tolerance [m]: the true minimum lies in [reported - tolerance, reported].
+        d is the gap of their bounding balls, else of their hulls, and where this could be below the smallest so far
+        by half of the tolerance, the distance of the links' meshes. Ends at the first touch. After `FINE_CHECKS`
+        checks, which only a motion that diverged needs, the tolerance is at least twice the whole travel of all
+        pairs of parts over `FINE_CHECKS`.
 
         Raises:
-            ValueError: wrong shape, values that are not finite, or a tolerance that is not positive.
+            ValueError: wrong shape, values that are not finite, a tolerance that is not positive, or a prismatic
+                joint between the links that has no position limits.
         """
         path = np.asarray(trajectory, dtype=float)
         if path.ndim != 2 or path.shape[1] != self.robot.num_coordinates or len(path) == 0:
@@ -174,31 +171,60 @@ class SelfCollision:
             raise ValueError("trajectory must be finite")
         if not tolerance > 0.0:
             raise ValueError(f"tolerance must be positive, got {tolerance}")
+        if not self._pairs:
+            return SelfClearance(float("inf"), ())
+        parts, samples = self._parts, np.arange(len(path), dtype=float)
+        walked = np.concatenate(
+            [np.zeros((1, path.shape[1])), np.cumsum(np.abs(np.diff(path, axis=0)), axis=0)]
+        )
+        total = walked.sum(axis=1)
+        at = np.interp(np.linspace(0.0, total[-1], LOOKS), total, samples)
+        balls = parts.balls_apart(np.array([list(self._poses(interpolate(path, s)).values()) for s in at]))
         best = SelfClearance(float("inf"), ())
-        for sample in np.unique(np.linspace(0, len(path) - 1, FIRST_LOOKS).astype(int)):
-            best = self._closest(path[sample], best, float(sample))
-        moved = np.abs(np.diff(path, axis=0))
-        coarse = max(tolerance, sum(float((moved @ p.travel).sum()) for p in self._pairs) / FINE_CHECKS)
+        for look in range(0, LOOKS, LOOKS // FIRST_LOOKS):
+            for k in map(int, np.argsort(balls[look])):
+                if balls[look, k] >= best.distance:
+                    break
+                _, best = self._closer(k, path, float(at[look]), best, below=best.distance)
+        travel = np.array([interpolate(walked, s) for s in at]) @ parts.travel.T
+        at_least = 0.5 * (balls[:-1] + balls[1:] - np.diff(travel, axis=0))  # from each look to the next
+        coarse = max(tolerance, 2.0 * float(travel[-1].sum()) / FINE_CHECKS)
         checks = 0
-        for pair in self._pairs:
-            so_far = np.concatenate([[0.0], np.cumsum(moved @ pair.travel)])
-            here = 0.0  # of so_far
-            while here < so_far[-1]:
-                if best.distance == 0.0:
-                    return best
-                k = min(int(np.searchsorted(so_far, here, side="right")) - 1, len(path) - 2)
-                share = (here - so_far[k]) / (so_far[k + 1] - so_far[k])
-                poses = self._poses(path[k] + share * (path[k + 1] - path[k]), pair)
-                at_least = self._balls_apart(pair, poses)
-                if at_least <= best.distance:
-                    at_least = self._measure(pair, poses)
-                    if at_least < best.distance:
-                        best = SelfClearance(at_least, self._name(pair), k + share)
-                checks += 1
-                if checks == FINE_CHECKS:
-                    tolerance = coarse
-                here += at_least - best.distance + tolerance
+        for k in map(int, np.argsort(at_least.min(axis=0))):
+            near = np.flatnonzero(at_least[:, k] <= best.distance - tolerance)
+            if len(near) == 0 or best.distance == 0.0:  # so it is for those that follow
+                break
+            so_far, here = walked @ parts.travel[k], 0.0
+            for look in map(int, near):
+                here = max(here, float(travel[look, k]))
+                while here < travel[look + 1, k] and best.distance > 0.0:
+                    sample = float(np.interp(here, so_far, samples))
+                    apart, best = self._closer(k, path, sample, best, below=best.distance - 0.5 * tolerance)
+                    checks += 1
+                    if checks == FINE_CHECKS:
+                        tolerance = coarse
+                    here += apart - best.distance + tolerance
         return best
+
+    @cached_property
+    def _parts(self) -> PairsOfParts:
+        return PairsOfParts(self.robot, self._names, self._pairs)
+
+    def _closer(
+        self, k: int, path: Array, sample: float, best: SelfClearance, *, below: float
+    ) -> tuple[float, SelfClearance]:
+        """A lower bound of the distance in pair of parts k, and the links' distance where it is the best so far.
+
+        The links are measured where the bound is not above `below`, or not above 0.
+        """
+        pair = self._pairs[self._parts.links[k]]
+        poses = self._poses(interpolate(path, sample), pair)
+        at_least = self._parts.hulls_apart(k, poses[pair.first], poses[pair.second])
+        if at_least <= max(0.0, below):
+            at_least = self._measure(pair, poses)
+            if at_least < best.distance:
+                best = SelfClearance(at_least, self._name(pair), sample)
+        return at_least, best
 
     def _leave_out_what_always_touches(self, samples: int, rng: np.random.Generator) -> None:
         touches = np.zeros(len(self._pairs))
@@ -210,16 +236,16 @@ class SelfCollision:
                 self.left_out[self._name(pair)] = "always"
         self._pairs = [pair for pair in self._pairs if self._name(pair) not in self.left_out]
 
-    def _find(self, first: str, second: str) -> _PairOfLinks:
+    def _find(self, first: str, second: str) -> LinkPair:
         for a, b in ((first, second), (second, first)):
             if (a, b) in self._by_name:
                 return self._by_name[a, b]
         raise ValueError(f"the pair ({first}, {second}) is not checked; see `pairs` and `left_out`")
 
-    def _name(self, pair: _PairOfLinks) -> Pair:
+    def _name(self, pair: LinkPair) -> Pair:
         return self._names[pair.first], self._names[pair.second]
 
-    def _poses(self, q: Array, pair: _PairOfLinks | None = None) -> dict[int, Array]:
+    def _poses(self, q: Array, pair: LinkPair | None = None) -> dict[int, Array]:
         wanted = range(len(self._names)) if pair is None else (pair.first, pair.second)
         return {index: self.robot.pose(q, self._names[index]) for index in wanted}
 
@@ -233,7 +259,7 @@ class SelfCollision:
                     best = SelfClearance(distance, self._name(pair), sample)
         return best
 
-    def _balls_apart(self, pair: _PairOfLinks, poses: dict[int, Array]) -> float:
+    def _balls_apart(self, pair: LinkPair, poses: dict[int, Array]) -> float:
         """The gap between the bounding balls of two links: no more than their distance."""
         a, b = (
             poses[index][:3, :3] @ self._centers[index] + poses[index][:3, 3]
@@ -241,19 +267,19 @@ class SelfCollision:
         )
         return float(np.linalg.norm(a - b)) - self._radii[pair.first] - self._radii[pair.second]
 
-    def _measure(self, pair: _PairOfLinks, poses: dict[int, Array]) -> float:
+    def _measure(self, pair: LinkPair, poses: dict[int, Array]) -> float:
         request, result = coal.DistanceRequest(), coal.DistanceResult()
         request.enable_signed_distance = False
         return max(0.0, float(coal.distance(*self._placed(pair, poses), request, result)))
 
-    def _touch(self, pair: _PairOfLinks, poses: dict[int, Array], *, margin: float = 0.0) -> bool:
+    def _touch(self, pair: LinkPair, poses: dict[int, Array], *, margin: float = 0.0) -> bool:
         if self._balls_apart(pair, poses) > margin:
             return False
         request, result = coal.CollisionRequest(), coal.CollisionResult()
         request.security_margin = margin
         return bool(coal.collide(*self._placed(pair, poses), request, result))
 
-    def _placed(self, pair: _PairOfLinks, poses: dict[int, Array]) -> tuple[object, ...]:
+    def _placed(self, pair: LinkPair, poses: dict[int, Array]) -> tuple[object, ...]:
         placed: list[object] = []
         for index in (pair.first, pair.second):
             X = poses[index]

@@ -62,6 +62,14 @@ def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
     return model
 
 
+def hull_model(points: Array) -> coal.Convex:
+    """The convex hull of points (N, 3) for Coal: solid."""
+    vertices = coal.StdVec_Vec3s()
+    for point in np.asarray(points, dtype=float):
+        vertices.append(point)
+    return coal.Convex.convexHull(vertices, True, "Qt")
+
+
 def mesh_solid(name: str, mesh: trimesh.Trimesh) -> Solid:
     radius = float(np.linalg.norm(mesh.vertices, axis=1).max())
     triangles = np.array(mesh.triangles, dtype=float)
