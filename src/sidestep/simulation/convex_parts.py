@@ -69,8 +69,9 @@ def _hull(triangles: Array) -> ConvexHull | None:
     """The convex hull; None where there is no volume."""
     if len(triangles) == 0:
         return None
+    corners = np.ascontiguousarray(triangles).reshape(-1, 3).view("V24").ravel().tolist()
     try:
-        return ConvexHull(triangles.reshape(-1, 3))
+        return ConvexHull(np.frombuffer(b"".join(dict.fromkeys(corners))).reshape(-1, 3))  # each corner once
     except QhullError:
         return None
 
