@@ -1,4 +1,4 @@
-"""Makes the covering bodies and pairs of links that come with Sidestep, in src/sidestep/body/covers; a minute each.
+"""Makes what comes with Sidestep in src/sidestep/body/covers: bodies, pairs of links, clearance tables; a minute each.
 
     python benchmarks/ship_covers.py
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import shutil
 
-from sidestep import Body, Robot
+from sidestep import Body, Robot, clearance_tables
 from sidestep.body import cache
 from sidestep.body.cover import CoverSettings
 from sidestep.link_pairs import barrier_pairs, stored_at
@@ -25,7 +25,13 @@ def main() -> None:
         robot = Robot.named(name)
         body = Body.cover(robot)
         barrier_pairs(robot, body)
-        for path in (cache.cache_path(robot, CoverSettings()), stored_at(robot, body)):
+        clearance_tables.clearance_tables(robot)
+        stored = (
+            cache.cache_path(robot, CoverSettings()),
+            stored_at(robot, body),
+            clearance_tables.stored_at(robot),
+        )
+        for path in stored:
             shutil.copy(path, cache.SHIPPED / path.name)
             print(f"{name}: {path.name}")
 

@@ -81,12 +81,16 @@ Eigen::MatrixXd as_square_matrix(nb::handle value, const char* name, Eigen::Inde
 
 Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols) {
   const Array array = as_array(value, name);
-  if (array.ndim() != 2 || static_cast<Eigen::Index>(array.shape(0)) != rows ||
-      static_cast<Eigen::Index>(array.shape(1)) != cols) {
-    raise_shape(name, array, "(" + std::to_string(rows) + ", " + std::to_string(cols) + ")");
+  const auto fits = [&array](std::size_t axis, Eigen::Index size) {
+    return size < 0 || static_cast<Eigen::Index>(array.shape(axis)) == size;
+  };
+  if (array.ndim() != 2 || !fits(0, rows) || !fits(1, cols)) {
+    const auto expected = [](Eigen::Index size, const char* any) { return size < 0 ? any : std::to_string(size); };
+    raise_shape(name, array, "(" + expected(rows, "N") + ", " + expected(cols, "M") + ")");
   }
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  return Eigen::Map<const RowMajor>(array.data(), rows, cols);
+  return Eigen::Map<const RowMajor>(array.data(), static_cast<Eigen::Index>(array.shape(0)),
+                                    static_cast<Eigen::Index>(array.shape(1)));
 }
 
 Eigen::Matrix3Xd as_points(nb::handle value, const char* name) {

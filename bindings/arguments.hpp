@@ -42,7 +42,7 @@ Eigen::MatrixXd as_square_matrix(nb::handle value, const char* name, Eigen::Inde
 /// An (N, 3) array of points as 3 × N.
 Eigen::Matrix3Xd as_points(nb::handle value, const char* name);
 
-/// A matrix argument of exactly this shape.
+/// A matrix argument of exactly this shape; -1: any number of rows or columns.
 Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols);
 
 /// Pairs of links as (first, second) or (first, second, contact).

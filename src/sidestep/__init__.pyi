@@ -1,6 +1,8 @@
 from ._core import BatchEvaluation as BatchEvaluation
 from ._core import BinarySwitch as BinarySwitch
 from ._core import ClearanceBarrier as ClearanceBarrier
+from ._core import ClearanceTable as ClearanceTable
+from ._core import ClearanceTableBarrier as ClearanceTableBarrier
 from ._core import CollisionDensity as CollisionDensity
 from ._core import CoordinateKind as CoordinateKind
 from ._core import DampingForm as DampingForm

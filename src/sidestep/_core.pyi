@@ -310,6 +310,50 @@ class SelfCollisionBarrier(Embedding):
 
     def __init__(self, robot: Robot, body: Body, pairs: Sequence[tuple[str, str] | tuple[str, str, float]], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0) -> None: ...
 
+class ClearanceTable:
+    """
+    The clearance h [m] of two links that only two coordinates x, y [rad | m] move relative to each other, as a
+    function of these: a uniform cubic B-spline in either, h(x, y) = sum_ij B_i(x) B_j(y) control[i, j]. Control
+    point i is at begin + i spacing; beyond the ends h and its derivatives stay as they are there, and where
+    periodic the points span one turn. first, second: names of the links; coordinates, begin, spacing, periodic: two
+    each; control (n, m) [m], at least 4 each. Raises ValueError that names what is wrong.
+    """
+
+    def __init__(self, first: str, second: str, *, coordinates: Sequence[int], begin: Sequence[float], spacing: Sequence[float], periodic: Sequence[bool], control: numpy.typing.ArrayLike) -> None: ...
+
+    @property
+    def first(self) -> str: ...
+
+    @property
+    def second(self) -> str: ...
+
+    @property
+    def coordinates(self) -> tuple[int, int]: ...
+
+    @property
+    def begin(self) -> tuple[float, float]: ...
+
+    @property
+    def spacing(self) -> tuple[float, float]: ...
+
+    @property
+    def periodic(self) -> tuple[bool, bool]: ...
+
+    @property
+    def control(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(n, m) [m]."""
+
+    def at(self, x: float, y: float) -> tuple[float, numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """h [m], its gradient (2,) and Hessian (2, 2) by x and y."""
+
+class ClearanceTableBarrier(Embedding):
+    """
+    One coordinate per table, a barrier of the clearance it holds: self-collision of links with two joints between
+    them, see sidestep.clearance_tables. Other parameters as in ClearanceBarrier.
+    """
+
+    def __init__(self, robot: Robot, tables: Sequence[ClearanceTable], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, reach: float = 0.0) -> None: ...
+
 class PlaneBarrier(Embedding):
     """
     One coordinate per link, a barrier of its clearance to a plane (a floor, a table, a wall). point (3,) [m] on

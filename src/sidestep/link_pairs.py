@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sidestep._core import Obstacles, SelfCollisionBarrier
 from sidestep.body import Body, cache
 from sidestep.body.file import write_text
+from sidestep.clearance_tables import clearance_tables
 from sidestep.robot import Robot
 from sidestep.simulation import SelfCollision
 
@@ -28,13 +29,14 @@ SHARE = 0.95  # of samples in which the meshes are apart that the ellipsoids mus
 
 
 def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
-    """The pairs of links for `SelfCollisionBarrier`, with the gap at which they touch: (first, second, contact).
+    """The pairs of links that may touch, with the gap at which they do: (first, second, contact).
 
     Covering ellipsoids are larger than links: neighbours but one overlap while their meshes are apart. Where at most
     three coordinates lie between two links that touch in 20 random configurations at least, `contact` is the largest
     gap between their ellipsoids at which their meshes come within 2 mm, on straight ways from 200 configurations in
     which they touch to others: an estimate by samples. Else it is zero, which is safe. Pairs whose clearance is then
-    below zero in more than 5 % of the samples, though they do not touch, are left out.
+    below zero in more than 5 % of the samples, though they do not touch, are left out, and those that touch nowhere
+    (`clearance_tables`).
 
     That takes seconds, so the pairs are kept beside the bodies in the user's cache; those of the covers that come with
     Sidestep come with it too. Warns about an entry that cannot be read or written.
@@ -46,12 +48,12 @@ def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
     stored = cache.read_stored(
         path, _read_pairs, "the cached pairs of links are unreadable and are made again"
     )
-    if stored is not None:
-        return stored
-    pairs = _find_pairs(robot, body)
-    text = json.dumps(pairs, indent=1) + "\n"
-    cache.write_stored(path, lambda file: write_text(file, text), "the pairs of links are not cached")
-    return pairs
+    if stored is None:
+        stored = _find_pairs(robot, body)
+        text = json.dumps(stored, indent=1) + "\n"
+        cache.write_stored(path, lambda file: write_text(file, text), "the pairs of links are not cached")
+    apart = clearance_tables(robot).apart
+    return tuple(pair for pair in stored if pair[:2] not in apart)
 
 
 def _read_pairs(path: Path) -> tuple[LinkPair, ...]:

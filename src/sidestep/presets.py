@@ -8,6 +8,7 @@ import numpy as np
 
 from sidestep._core import (
     ClearanceBarrier,
+    ClearanceTableBarrier,
     CollisionDensity,
     DistanceSwitch,
     Embedding,
@@ -19,6 +20,7 @@ from sidestep._core import (
 )
 from sidestep.barriers import Barriers as Barriers
 from sidestep.body import Body
+from sidestep.clearance_tables import ClearanceTables, clearance_tables
 from sidestep.link_pairs import barrier_pairs
 from sidestep.robot import Robot
 
@@ -66,7 +68,21 @@ def barrier_system(
             robot, activation=numbers.limit_activation, strength=numbers.limit_strength, power=numbers.power
         ),
     ]
-    pairs = barrier_pairs(robot, body) if self_collision else ()
+    exact = clearance_tables(robot) if self_collision else ClearanceTables((), ())
+    if exact.tables:
+        parts.append(
+            ClearanceTableBarrier(
+                robot,
+                exact.tables,
+                activation=numbers.self_activation,
+                strength=numbers.self_strength,
+                power=numbers.power,
+                floor=numbers.floor,
+            )
+        )
+    pairs = (
+        [pair for pair in barrier_pairs(robot, body) if pair[:2] not in exact.pairs] if self_collision else []
+    )
     if pairs:
         parts.append(
             SelfCollisionBarrier(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep import Body, Robot
+from sidestep import Body, Robot, clearance_tables
 from sidestep.body import cache
 from sidestep.body.cover import CoverSettings
 from sidestep.link_pairs import stored_at
@@ -30,6 +30,7 @@ def test_it_is_taken_and_holds_every_link(path: Path, monkeypatch: pytest.Monkey
     body = Body.cover(robot)
     assert len(body.links) <= 80
     assert (cache.SHIPPED / stored_at(robot, body).name).is_file()
+    assert (cache.SHIPPED / clearance_tables.stored_at(robot).name).is_file()
     for link in dict.fromkeys(body.links):
         mesh = robot.collision_mesh(link)
         assert mesh is not None

@@ -50,11 +50,28 @@ def barrier_cases() -> dict[str, Callable[[ss.Robot, ss.Body], ss.Embedding]]:
             robot, body, point=[0, 0, -0.4], normal=[0.1, -0.2, 1.0], links=[pairs_of(robot)[0][1]], **wide
         ),
         "limits": lambda robot, body: ss.JointLimitBarrier(robot, activation=2.0, floor=0.02),
+        "tables": lambda robot, body: ss.ClearanceTableBarrier(
+            robot, [table_of(robot)], activation=0.8, floor=0.02
+        ),
     }
 
 
+def table_of(robot: ss.Robot) -> ss.ClearanceTable:
+    """Of random control points, one axis of which is one turn."""
+    control = np.random.default_rng(2).uniform(0.15, 1.2, (12, 4))
+    turn = 2.0 * np.pi / 4
+    return ss.ClearanceTable(
+        *pairs_of(robot)[1],
+        coordinates=(2, 1),
+        begin=(-8.0, 0.1),
+        spacing=(1.6, turn),
+        periodic=(False, True),
+        control=control,
+    )
+
+
 @pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("kind", ["obstacles", "self", "plane", "limits"])
+@pytest.mark.parametrize("kind", ["obstacles", "self", "plane", "limits", "tables"])
 def test_derivatives(name: str, kind: str) -> None:
     robot = ss.Robot.named(name)
     barrier = barrier_cases()[kind](robot, covering(robot, 0))

@@ -81,11 +81,16 @@ def write(path: str | Path, contents: BodyContents) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
+    """Writes a file in one piece, as `write_bytes`."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
     """Writes a file in one piece: a reader sees the old file or the new one, never a part."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
         Path(name).chmod(0o644)  # mkstemp makes files that only their owner reads
         os.replace(name, path)
     except BaseException:

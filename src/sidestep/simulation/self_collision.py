@@ -118,6 +118,14 @@ class SelfCollision:
         """The coordinates that move one link of a checked pair relative to the other."""
         return self._moved_by[self._name(self._find(first, second))]
 
+    def travel_between(self, first: str, second: str) -> Array:
+        """How far points of a checked pair can come towards each other per unit of each joint (nv,), at most.
+
+        Raises:
+            ValueError: the pair is not checked.
+        """
+        return self._find(first, second).travel.copy()
+
     def distance_between(self, q: Array, first: str, second: str) -> float:
         """The distance [m] of a checked pair at q (nv,); 0 when they touch or overlap.
 

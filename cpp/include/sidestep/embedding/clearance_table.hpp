@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+
+namespace sidestep {
+
+/// The clearance of two links that only two joints move relative to each other, as a function of these.
+///
+/// A uniform cubic B-spline in either coordinate, h(x, y) = Σ_ij B_i(x) B_j(y) c_ij, so twice continuously differentiable.
+/// Beyond its ends it and its derivatives stay as they are there.
+struct ClearanceTable {
+  /// Where the control points are: the one of number i at begin + i·spacing.
+  struct Axis {
+    int coordinate = 0;     ///< of the robot
+    double begin = 0.0;     ///< [rad | m]
+    double spacing = 1.0;   ///< [rad | m]
+    bool periodic = false;  ///< the last is followed by the first: they span one turn
+  };
+  /// h [m] with its first and second derivatives by the two coordinates.
+  struct Sample {
+    double value;
+    Eigen::Vector2d gradient;
+    Eigen::Matrix2d hessian;
+  };
+
+  std::string first, second;  ///< links
+  std::array<Axis, 2> axes;
+  Eigen::MatrixXd control;  ///< c, at least 4 × 4 [m]
+
+  Sample at(double x, double y) const noexcept;
+
+  /// Throws std::invalid_argument that names what is wrong, in a robot of `coordinates` coordinates.
+  void validate(int coordinates) const;
+};
+
+}  // namespace sidestep

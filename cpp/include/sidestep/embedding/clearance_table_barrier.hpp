@@ -1,0 +1,30 @@
+#pragma once
+
+#include <vector>
+
+#include "sidestep/embedding/barrier.hpp"
+#include "sidestep/embedding/clearance_table.hpp"
+
+namespace sidestep {
+
+/// One coordinate per table, a barrier of the clearance it holds: self-collision of links with two joints between them.
+///
+/// Such links are always close to each other, and ellipsoids too coarse: a table is exact, and faster.
+class ClearanceTableBarrier final : public Barrier {
+ public:
+  /// Clearances are given up to `reach` [m], at least to the activation distance, as in ClearanceBarrier. Throws
+  /// std::invalid_argument if there is no table, a link is unknown, or a table or a setting is at fault, which it names.
+  ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables, BarrierFunction barrier,
+                        double reach = 0.0);
+
+  void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
+  CoordinateLabel label(int k) const override;
+
+ private:
+  std::shared_ptr<Barrier> clone() const override { return std::make_shared<ClearanceTableBarrier>(*this); }
+
+  double reach_;
+  std::vector<ClearanceTable> tables_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,251 @@
+"""The exact clearance of links with two joints between them, as tables over these two joints."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import distance_transform_edt, maximum_filter
+
+from sidestep._core import ClearanceTable, JointType
+from sidestep.body import cache
+from sidestep.body.file import write_bytes
+from sidestep.robot import Robot
+from sidestep.simulation import SelfCollision
+
+Array: TypeAlias = npt.NDArray[np.float64]
+Mask: TypeAlias = npt.NDArray[np.bool_]
+Pair: TypeAlias = tuple[str, str]
+
+ALGORITHM_VERSION = 1
+SPACING = 0.1  # [rad | m] of control points, at most
+BEYOND = 2  # control points beyond a limit: with one a spline ends at the limit
+NEAR = 0.03  # [m] clearance below which the error is measured
+CHECKS = 400  # random configurations by which what is left of it is taken off everywhere
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class ClearanceTables:
+    """What is known of the pairs of links that two coordinates move relative to each other.
+
+    Attributes:
+        tables: of those that may touch; for `ClearanceTableBarrier`.
+        apart: those that touch nowhere within the position limits, which is proven.
+    """
+
+    tables: tuple[ClearanceTable, ...]
+    apart: tuple[Pair, ...]
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The pairs of both kinds, which need no other barrier."""
+        return (*((table.first, table.second) for table in self.tables), *self.apart)
+
+
+def clearance_tables(robot: Robot) -> ClearanceTables:
+    """Measures the distance of the exact meshes of pairs with two coordinates between, over these.
+
+    Neighbours but one are always close, and covering ellipsoids, which are larger than links, overlap there. Their
+    distance is measured at points 0.1 rad apart that serve as control points of a cubic B-spline, which smooths the
+    creases of a distance and does not overshoot; where links overlap, it falls on into them as it does outside. What
+    exceeds the distance at a random point of every cell near contact is taken off there, and the largest excess that is
+    left at 400 more everywhere: an estimate by samples.
+
+    A pair whose distance at every point exceeds what it can lose halfway to the next, by the lever arms of the joints,
+    touches nowhere. A coordinate needs limits, unless it turns all its joints at its own rate.
+
+    That takes seconds a pair, so the tables are kept beside the bodies in the user's cache; those of the robots whose
+    covers come with Sidestep come with it too. Warns about an entry that cannot be read or written.
+
+    Args:
+        robot: with collision meshes.
+    """
+    path = stored_at(robot)
+    stored = cache.read_stored(path, _read, "the cached clearance tables are unreadable and are made again")
+    if stored is not None:
+        return stored
+    tables = _measure(robot)
+    cache.write_stored(path, lambda file: _write(file, tables), "the clearance tables are not cached")
+    return tables
+
+
+def stored_at(robot: Robot) -> Path:
+    """The file of the tables of a robot; its name is a hash of what they are made from."""
+    numbers = (robot.name, robot.fingerprint, ALGORITHM_VERSION, SPACING, BEYOND, NEAR, CHECKS)
+    return cache.cache_directory() / f"tables-{hashlib.sha256(repr(numbers).encode()).hexdigest()}.npz"
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """Where the control points of a coordinate are."""
+
+    coordinate: int
+    begin: float
+    spacing: float
+    count: int
+    periodic: bool
+
+    @classmethod
+    def of(cls, robot: Robot, coordinate: int) -> _Axis | None:
+        moved = [joint for joint in robot.joints if joint.coordinate == coordinate]
+        turns = all(joint.type == JointType.revolute and abs(joint.multiplier) == 1.0 for joint in moved)
+        lower, upper = robot.limits.lower[coordinate], robot.limits.upper[coordinate]
+        if turns and not upper - lower < TURN:
+            count = int(np.ceil(TURN / SPACING))
+            return cls(coordinate, -np.pi, TURN / count, count, periodic=True)
+        if not np.isfinite(upper - lower):
+            return None
+        cells = max(1, int(np.ceil((upper - lower) / SPACING)))
+        spacing = (upper - lower) / cells
+        return cls(coordinate, lower - BEYOND * spacing, spacing, cells + 2 * BEYOND + 1, periodic=False)
+
+    @property
+    def points(self) -> Array:
+        return self.begin + self.spacing * np.arange(self.count, dtype=np.float64)
+
+    def inside(self) -> slice:
+        """Those within the limits."""
+        return slice(None) if self.periodic else slice(BEYOND, self.count - BEYOND)
+
+
+def _measure(robot: Robot) -> ClearanceTables:
+    check = SelfCollision(robot)
+    tables: list[ClearanceTable] = []
+    apart: list[Pair] = []
+    for pair in check.pairs:
+        between = check.coordinates_between(*pair)
+        axes = [axis for c in between if (axis := _Axis.of(robot, c)) is not None]
+        if len(between) != 2 or len(axes) != 2:
+            continue
+        q = robot.neutral.copy()
+
+        def distance(
+            x: float, y: float, q: Array = q, pair: Pair = pair, between: tuple[int, ...] = between
+        ) -> float:
+            q[list(between)] = x, y
+            return check.distance_between(q, *pair)
+
+        grid = np.array([[distance(x, y) for y in axes[1].points] for x in axes[0].points])
+        travel = check.travel_between(*pair)
+        least = grid - sum(
+            0.5 * axis.spacing * travel[axis.coordinate] for axis in axes
+        )  # halfway to the next points
+        if least[axes[0].inside(), axes[1].inside()].min() > 0.0:
+            apart.append(pair)
+        else:
+            tables.append(_table(pair, axes, _continued(grid, axes), distance, _near(least, axes)))
+    return ClearanceTables(tuple(tables), tuple(apart))
+
+
+def _continued(grid: Array, axes: list[_Axis]) -> Array:
+    """The distances (n, m) with those of links that overlap, 0, replaced by what lies as far on inside."""
+    ways = [(axis.count if axis.periodic else 0,) * 2 for axis in axes]
+    wide = np.pad(np.pad(grid, (ways[0], (0, 0)), mode="wrap"), ((0, 0), ways[1]), mode="wrap")
+    overlap = wide <= 0.0
+    if not overlap.any() or overlap.all():
+        return grid
+    spacing = [axis.spacing for axis in axes]
+    slopes = np.hypot(*(_steepest(wide, axis, step) for axis, step in enumerate(spacing)))
+    way, nearest = distance_transform_edt(overlap, sampling=spacing, return_indices=True)
+    wide = np.where(overlap, -slopes[tuple(nearest)] * way, wide)
+    inner = tuple(slice(before, size - after) for (before, after), size in zip(ways, wide.shape, strict=True))
+    continued: Array = wide[inner]
+    return continued
+
+
+def _steepest(values: Array, axis: int, step: float) -> Array:
+    """The larger of the two slopes to the neighbours along an axis."""
+    slope = np.abs(np.diff(values, axis=axis)) / step
+    nothing = np.zeros_like(np.take(slope, [0], axis=axis))
+    steepest: Array = np.maximum(
+        np.concatenate([nothing, slope], axis), np.concatenate([slope, nothing], axis)
+    )
+    return steepest
+
+
+def _table(
+    pair: Pair, axes: list[_Axis], control: Array, distance: Callable[[float, float], float], near: Mask
+) -> ClearanceTable:
+    """With the excess over the distance taken off: where it was found, then the largest that is left everywhere."""
+    rng, cells = np.random.default_rng(0), np.argwhere(near)
+
+    def excess(table: ClearanceTable, cell: npt.NDArray[np.int_]) -> float:
+        x, y = (axis.points[k] + axis.spacing * rng.uniform() for axis, k in zip(axes, cell, strict=True))
+        exact = distance(x, y)
+        return max(0.0, table.at(x, y)[0] - exact) if exact > 0.0 else 0.0
+
+    table, found = _spline(pair, axes, control), np.zeros_like(control)
+    for cell in cells:
+        found[tuple(cell)] = excess(table, cell)
+    # A cell has the control points from one before it to two after it, and values between theirs.
+    ends = ["wrap" if axis.periodic else "constant" for axis in axes]
+    control = control - maximum_filter(found, size=4, mode=ends)
+    table = _spline(pair, axes, control)
+    checked = cells[rng.integers(len(cells), size=CHECKS)] if len(cells) else cells
+    return _spline(pair, axes, control - max((excess(table, cell) for cell in checked), default=0.0))
+
+
+def _near(least: Array, axes: list[_Axis]) -> Mask:
+    """Which cells, named by their first corner, are within the limits and may hold a distance below `NEAR`."""
+    close = least < NEAR
+    for k, axis in enumerate(axes):
+        close = close | np.roll(close, -1, axis=k)
+        if not axis.periodic:
+            within = np.zeros(axis.count, dtype=bool)
+            within[BEYOND : axis.count - BEYOND - 1] = True
+            close = close & np.expand_dims(within, 1 - k)
+    return close
+
+
+def _spline(pair: Pair, axes: list[_Axis], control: Array) -> ClearanceTable:
+    return ClearanceTable(
+        *pair,
+        coordinates=(axes[0].coordinate, axes[1].coordinate),
+        begin=(axes[0].begin, axes[1].begin),
+        spacing=(axes[0].spacing, axes[1].spacing),
+        periodic=(axes[0].periodic, axes[1].periodic),
+        control=control,
+    )
+
+
+def _write(path: Path, tables: ClearanceTables) -> None:
+    """As arrays of their own for every table, in micrometres: far below the error of a table."""
+    arrays: dict[str, npt.NDArray[np.generic]] = {"apart": np.array(tables.apart, dtype=str).reshape(-1, 2)}
+    for k, table in enumerate(tables.tables):
+        arrays[f"pair{k}"] = np.array((table.first, table.second))
+        arrays[f"coordinates{k}"] = np.array(table.coordinates)
+        arrays[f"axes{k}"] = np.array([table.begin, table.spacing, table.periodic], dtype=float)
+        arrays[f"control{k}"] = np.floor(1e6 * table.control).astype(np.int32)
+    content = io.BytesIO()
+    np.savez_compressed(content, **arrays)  # type: ignore[arg-type]
+    write_bytes(path, content.getvalue())
+
+
+def _read(path: Path) -> ClearanceTables:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            count = sum(name.startswith("pair") for name in stored)
+            tables = tuple(_stored_table(stored, k) for k in range(count))
+            return ClearanceTables(tables, tuple((a, b) for a, b in stored["apart"].tolist()))
+    except (KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"not a file of clearance tables: {error!r}") from error
+
+
+def _stored_table(stored: Mapping[str, npt.NDArray[Any]], k: int) -> ClearanceTable:
+    begin, spacing, periodic = stored[f"axes{k}"].tolist()
+    return ClearanceTable(
+        *stored[f"pair{k}"].tolist(),
+        coordinates=stored[f"coordinates{k}"].tolist(),
+        begin=begin,
+        spacing=spacing,
+        periodic=[bool(turn) for turn in periodic],
+        control=1e-6 * stored[f"control{k}"],
+    )
