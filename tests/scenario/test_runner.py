@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sidestep.scenario import Scenario, run_scenario
-from sidestep.simulation import clearance
+from sidestep.simulation import sweep
 
 # Without obstacles the system is e'' = -0.5 e - 1.5 e', so e(t) = e0 (2 exp(-t/2) - exp(-t)). With e0 = 1 it
 # passes 0.05 where exp(-t/2) = 1 - sqrt(0.95).
@@ -83,7 +83,7 @@ def test_a_run_that_ends_too_early_fails_and_says_so() -> None:
 
 def test_a_run_that_diverges_is_judged_and_said_in_short(monkeypatch: pytest.MonkeyPatch) -> None:
     """A spring far too stiff for the period: the joints turn more often than anyone can check for clearance."""
-    monkeypatch.setattr(clearance, "FINE_CHECKS", 1_000)  # this much sooner it is given up
+    monkeypatch.setattr(sweep, "FINE_CHECKS", 1_000)  # this much sooner it is given up
     text = FREE.format(mode="kinematic", period=0.005).replace("12.0", "1.0")
     text += "system: {stiffness: 1.0e+12, switch: {type: harmonic_only}}\n"
     text += "obstacles: [{name: ball, shape: {type: sphere, radius: 0.03}, position: [0.0, 0.0, 0.8]}]\n"

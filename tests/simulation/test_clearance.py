@@ -8,8 +8,8 @@ import trimesh
 
 from sidestep import ExactClearance, Robot, SceneObject
 from sidestep.pose import from_quaternion, pose_vector
-from sidestep.simulation import clearance
-from sidestep.simulation.clearance import travel_per_joint
+from sidestep.simulation import sweep
+from sidestep.simulation.travel import travel_per_joint
 
 STRETCHED = np.zeros(2)  # planar2: link2 is a box from x = 0.5 to 1, y and z within half its width
 
@@ -118,6 +118,28 @@ def test_thin_obstacle_between_two_samples_is_found() -> None:
     assert worst.sample * np.pi / 2 == pytest.approx(0.7, abs=0.1)  # the link is 0.1 rad wide from there
 
 
+@pytest.mark.parametrize("kind", ["flat", "box", "needle", "inside"])
+def test_objects_of_every_shape_bound_the_distance_from_below(kind: str) -> None:
+    """The motion's minimum is the distance where it was found, and dense samples have none smaller."""
+    box = trimesh.creation.box(extents=(0.1, 0.1, 0.1))
+    flat = trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0.1, 0.1, 0]], [[0, 1, 2], [1, 3, 2]])
+    item = {
+        "flat": SceneObject("item", "mesh", pose=_placed(0.6, 0.7, 0.3), mesh=flat),  # no volume
+        "box": SceneObject("item", "mesh", pose=_placed(0.6, 0.7, 0.3), mesh=box),
+        "needle": SceneObject("item", "cylinder", size=(5e-4, 0.5), pose=_placed(0.8, 0.8, 0.0)),
+        "inside": SceneObject(
+            "item", "mesh", mesh=trimesh.creation.box(extents=(4, 4, 4))
+        ),  # hollow, around all
+    }[kind]
+    exact = ExactClearance(Robot.named("planar2"), [item])
+    samples = np.array([[0.0, 0.0], [np.pi / 2, 0.3]])
+    worst = exact.minimum_over(samples)
+    dense = exact.series(np.linspace(*samples, 2001)).min()
+    assert dense - 1e-3 <= worst.clearance.distance <= dense + 1e-3
+    at = samples[0] + worst.sample * (samples[1] - samples[0])
+    assert exact.distance(at).distance == pytest.approx(worst.clearance.distance, abs=1e-9)
+
+
 def test_flying_ball_between_two_samples_is_found() -> None:
     robot = Robot.named("planar2")
     ball = SceneObject.ball("ball", [0.7, -1.0, 0.0], radius=1e-3)
@@ -162,7 +184,7 @@ def test_minimum_agrees_with_brute_force_on_the_fr3(seed: int) -> None:
 
 def test_a_diverged_motion_ends_with_an_honest_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     """A ball above the base is 0.71 m from link 1 at every angle, so that each check gains one tolerance only."""
-    monkeypatch.setattr(clearance, "FINE_CHECKS", 500)
+    monkeypatch.setattr(sweep, "FINE_CHECKS", 500)
     exact = ExactClearance(Robot.named("planar2"), [SceneObject.ball("ball", [0.0, 0.0, 0.8], radius=0.05)])
     still = exact.minimum_over(np.zeros((2, 2)))
     for turns in (1e3, 1e12, 1e300):  # at 1e12 the finer steps are below the rounding of the travel

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 from sidestep import Robot, SelfCollision
-from sidestep.simulation.link_parts import LinkPart, PairsOfParts, link_parts
+from sidestep.simulation.link_parts import LinkParts, hulls_apart
+
+Array = np.ndarray
 
 
 @pytest.fixture(scope="module")
@@ -15,9 +18,23 @@ def checked() -> SelfCollision:
     return SelfCollision(Robot.named("ur10"), samples=20)
 
 
+def _hulls(checked: SelfCollision, q: Array) -> Array:
+    """(K,) lower bounds of all pairs of parts."""
+    placed = [
+        coal.Transform3s(X[:3, :3], X[:3, 3]) for X in (checked.robot.pose(q, n) for n in checked._names)
+    ]
+    link, parts = checked._parts.link, checked._parts.parts
+    return np.array(
+        [
+            hulls_apart(parts[a].shape, placed[link[a]], parts[b].shape, placed[link[b]])
+            for _, a, b in checked._pairs_of_parts
+        ]
+    )
+
+
 def test_parts_hold_the_mesh() -> None:
     robot = Robot.named("ur10")
-    parts = link_parts(robot, "upper_arm_link")
+    (parts,) = LinkParts(robot, ["upper_arm_link"]).of_link
     assert len(parts) > 1
     mesh = robot.collision_mesh("upper_arm_link")
     assert mesh is not None
@@ -31,55 +48,52 @@ def test_parts_hold_the_mesh() -> None:
 
 
 def test_gaps_of_parts_are_no_more_than_the_distance(checked: SelfCollision) -> None:
-    robot, parts = checked.robot, checked._parts
-    assert len(parts.links) > len(checked.pairs)
-    names = checked._names
+    assert len(checked._pairs_of_parts) > len(checked.pairs)
+    _, a, b = np.array(checked._pairs_of_parts).T
+    of_pair = np.array([index for index, _, _ in checked._pairs_of_parts])
     rng = np.random.default_rng(1)
     tight = []
     for _ in range(5):
-        q = robot.random_configuration(rng)
-        poses = np.array([robot.pose(q, name) for name in names])
-        balls = parts.balls_apart(poses[None])[0]
+        q = checked.robot.random_configuration(rng)
+        centers, hulls = checked._parts.centers(q[None], np.zeros(1))[0], _hulls(checked, q)
+        balls = (
+            np.linalg.norm(centers[a] - centers[b], axis=1)
+            - checked._parts.radii[a]
+            - checked._parts.radii[b]
+        )
+        assert np.all(
+            np.maximum(balls, 0.0) <= np.maximum(hulls, 0.0) + 2e-5
+        )  # the error taken off, and GJK's own
         for index, pair in enumerate(checked.pairs):
-            a, b = (names.index(name) for name in pair)
-            of_pair = np.flatnonzero(parts.links == index)
-            hulls = np.array([parts.hulls_apart(int(k), poses[a], poses[b]) for k in of_pair])
             distance = checked.distance_between(q, *pair)
-            assert np.all(balls[of_pair] <= hulls + 2e-5)  # the error taken off, and GJK's own
-            assert hulls.min() <= distance
-            tight.append(distance - hulls.min())
-    assert np.median(tight) < 1e-3  # of 5 to 1000 mm: that is why they are worth it
+            assert hulls[of_pair == index].min() <= distance
+            tight.append(distance - hulls[of_pair == index].min())
+    assert np.median(tight) < 1e-3  # [m] of 5 to 1000 mm: that is why they are worth it
 
 
 def test_parts_come_closer_by_no_more_than_their_travel(checked: SelfCollision) -> None:
-    robot, parts, names = checked.robot, checked._parts, checked._names
     rng = np.random.default_rng(2)
     for _ in range(5):
-        q = robot.random_configuration(rng)
+        q = checked.robot.random_configuration(rng)
         step = 0.1 * rng.normal(size=q.shape)
-        apart = []
-        for at in (q, q + step):
-            poses = {name: robot.pose(at, name) for name in names}
-            ends = [checked.pairs[index] for index in parts.links]
-            apart.append([parts.hulls_apart(k, poses[a], poses[b]) for k, (a, b) in enumerate(ends)])
-        change = np.abs(np.diff(np.maximum(apart, 0.0), axis=0)[0])
-        assert np.all(change <= parts.travel @ np.abs(step) + 2e-5)  # GJK's error, twice
-        assert np.any(change > 0.1 * parts.travel @ np.abs(step))
+        before, after = (np.maximum(_hulls(checked, at), 0.0) for at in (q, q + step))
+        allowed = checked._travel @ np.abs(step)
+        assert np.all(np.abs(after - before) <= allowed + 2e-5)  # GJK's error, twice
+        assert np.any(np.abs(after - before) > 0.1 * allowed)
 
 
 def test_a_part_far_from_the_joints_travels_more(checked: SelfCollision) -> None:
     """The upper arm seen from the base: its parts have lever arms of their own about the shoulder."""
     index = checked.pairs.index(("base_link", "upper_arm_link"))
-    shoulder = checked._parts.travel[checked._parts.links == index][:, 1]
+    shoulder = checked._travel[[i == index for i, _, _ in checked._pairs_of_parts]][:, 1]
     assert shoulder.min() < 0.4 < 0.6 < shoulder.max()  # [m]: the hub and the elbow, 0.612 m from it
 
 
-def test_a_flat_link_is_its_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_link_without_volume_is_its_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sidestep.simulation.link_parts.convex_parts", lambda triangles: ())
+    monkeypatch.setattr("sidestep.simulation.link_parts.hull_model", lambda corners: None)
     robot = Robot.named("planar3")
-    (part,) = link_parts(robot, "link1")
-    assert isinstance(part, LinkPart)
-    pairs = SelfCollision(robot)
-    assert isinstance(pairs._parts, PairsOfParts)
+    ((part,),) = LinkParts(robot, ["link1"]).of_link
+    assert isinstance(part.shape, coal.BVHModelOBBRSS)
     folded, straight = np.array([0.0, 2.6, 2.6]), np.zeros(3)
-    assert pairs.minimum_over(np.array([straight, folded])).distance == 0.0
+    assert SelfCollision(robot).minimum_over(np.array([straight, folded])).distance == 0.0

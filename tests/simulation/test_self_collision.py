@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sidestep import Robot, SelfCollision
-from sidestep.simulation import self_collision
+from sidestep.simulation import self_collision, sweep
 
 
 @pytest.fixture(scope="module")
@@ -65,10 +65,10 @@ def test_the_minimum_of_a_motion_is_that_of_dense_samples(fr3: SelfCollision) ->
 
 
 def test_a_diverged_motion_ends(monkeypatch: pytest.MonkeyPatch, planar: SelfCollision) -> None:
-    monkeypatch.setattr(self_collision, "FINE_CHECKS", 300)
+    monkeypatch.setattr(sweep, "FINE_CHECKS", 300)
     calls = []
-    closer = planar._closer
-    monkeypatch.setattr(planar, "_closer", lambda *a, **k: calls.append(1) or closer(*a, **k))
+    apart = self_collision.hulls_apart
+    monkeypatch.setattr(self_collision, "hulls_apart", lambda *given: calls.append(1) or apart(*given))
     waving = np.zeros((10_000, 3))
     waving[1::2, 2] = 2.0  # there and back; link 3 never comes to link 1
     least = planar.distance(waving[1]).distance
@@ -77,7 +77,7 @@ def test_a_diverged_motion_ends(monkeypatch: pytest.MonkeyPatch, planar: SelfCol
     assert least <= found.distance  # how far above, no tolerance says any more; but it occurs
     there = planar.distance(np.array([0.0, 0.0, 2.0 * (1.0 - abs(found.sample % 2.0 - 1.0))]))
     assert found.distance == pytest.approx(there.distance, abs=1e-9)
-    first_looks = 16 * len(planar._parts.links)
+    first_looks = 16 * len(planar._pairs_of_parts)
     assert 300 < len(calls) <= 2 * 300 + first_looks + 1  # fine, coarse, the first guess, one above
 
 

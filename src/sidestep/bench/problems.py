@@ -204,7 +204,7 @@ class ProblemGenerator:
         velocities = np.array(
             [drift.uniform(0.0, settings.moving) * self.workspace.direction(drift) for _ in centers]
         ).reshape(-1, 3)
-        line = clearance.minimum_over(np.array(ends), tolerance=TOLERANCE)
+        line = clearance.decided_minimum(np.array(ends), tolerance=TOLERANCE)
         return ReachProblem(
             robot=settings.robot,
             seed=settings.seed,

@@ -8,7 +8,7 @@ the triangles of the collision meshes.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 
@@ -16,16 +16,23 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import JointType
-from sidestep.pose import from_quaternion, moved, pose_vector
+from sidestep.pose import from_quaternion, pose_vector
 from sidestep.robot import Robot
+from sidestep.simulation.link_parts import LinkParts, hulls_apart
 from sidestep.simulation.scene import SceneObject, check_scene
 from sidestep.simulation.solid import POINT_RADIUS, Solid, mesh_solid, object_solid, penetration
+from sidestep.simulation.sweep import smallest_distance
+from sidestep.simulation.travel import (
+    interpolate,
+    interpolate_many,
+    interpolate_pose,
+    object_travel,
+    travel_per_joint,
+)
 
 Array = npt.NDArray[np.float64]
 
 FINEST = 1e-6  # [m] clearance below which a motion counts as touching, undecided or not
-FINE_CHECKS = 100_000  # distances at the tolerance asked for, some ten seconds; a thesis run takes a thousand
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +61,7 @@ class PathClearance:
         sample: its position along the trajectory, in samples (4.25: a quarter of the way from 4 to 5).
         lower_bound: [m] no moment of the motion has a smaller clearance than this.
         checks: number of looks at a pair that this took.
-        tolerance: [m] the one asked for, or a larger one after `FINE_CHECKS` (a run that diverged).
+        tolerance: [m] the one asked for, or a larger one after `sweep.FINE_CHECKS` (a run that diverged).
     """
 
     clearance: Clearance
@@ -98,6 +105,7 @@ class ExactClearance:
             self._travel.append(travel_per_joint(robot, link.name, mesh.vertices))
         if not self._links:
             raise ValueError(f"robot {robot.name!r} has no moving link with a collision mesh to measure from")
+        self._parts = LinkParts(robot, [link.name for link in self._links])
         self._objects = [object_solid(item) for item in self.objects]
 
     def among(self, objects: Sequence[SceneObject]) -> ExactClearance:
@@ -150,16 +158,14 @@ class ExactClearance:
     ) -> PathClearance:
         """The smallest clearance of a motion that is linear in the joints from each sample to the next.
 
-        Between two checks of a pair, neither can come closer than the distance its points can travel,
+        Links are held by convex parts. Between two checks of a part and an object, neither can come closer than
+        the distance its points can travel,
             |d(t) - d(t')| <= sum_j L_j |q_j(t) - q_j(t')| + (travel of the object),
-        with L_j the longest lever arm of the link about joint j. So after a check that found d, the pair is
-        skipped until that bound has grown to d - (smallest so far) + tolerance. Nothing is missed: the true
-        minimum lies in [reported - tolerance, reported]; where the reported one is above `tolerance`, nothing
-        touched, however thin. (Below zero the lower end holds for balls only, see the class.)
-
-        The number of checks is bounded by the travel over the tolerance, which a diverging motion makes endless.
-        So after `FINE_CHECKS` of them the tolerance becomes at least the whole travel over `FINE_CHECKS`: no
-        motion takes more than twice that many checks and one per pair, and `lower_bound` says what is known.
+        with L_j the longest lever arm of the part about joint j: the bound by which `smallest_distance` skips
+        what is far. Nothing is missed: the true minimum lies in [reported - tolerance, reported]; where the
+        reported one is above `tolerance`, nothing touched, however thin. (Below zero the lower end holds for
+        balls only, see the class.) Only a motion that diverged is measured less finely, see there;
+        `lower_bound` says what is known.
 
         Args:
             trajectory: (T, nv) samples.
@@ -173,36 +179,11 @@ class ExactClearance:
         if not tolerance > 0.0:
             raise ValueError(f"tolerance must be positive, got {tolerance}")
         path, poses = self._check_path(trajectory, object_poses)
-        best, where, checks = _nothing(), 0.0, 0
-        for sample in np.unique(
-            np.linspace(0, len(path) - 1, 16).astype(int)
-        ):  # a good first guess of the minimum
-            found = self.distance(path[sample], poses[sample])
-            checks += len(self._links) * len(self._objects)
-            if found.distance < best.distance:
-                best, where = found, float(sample)
-
-        travel = self._travel_along(path, poses)
-        coarse = max(tolerance, sum(float(so_far[-1]) for so_far in travel.values()) / FINE_CHECKS)
-        for (i, j), so_far in travel.items():
-            s = 0.0
-            while True:
-                q, pose = interpolate(path, s), _interpolate_pose(poses[:, j], s)
-                X_WL = self.robot.pose(q, self._links[i].name)
-                at_least = self._balls_apart(i, j, X_WL, pose)
-                if at_least <= best.distance:
-                    found = self._pair(i, j, X_WL, pose)
-                    at_least = found.distance
-                    if found.distance < best.distance:
-                        best, where = found, s
-                checks += 1
-                if checks >= FINE_CHECKS:
-                    tolerance = coarse
-                following = _advance(so_far, s, at_least - best.distance + tolerance)
-                if following is None:
-                    break
-                s = following
-        return PathClearance(best, where, best.distance - tolerance, checks, tolerance)
+        found = smallest_distance(_AlongPath(self, path, poses), tolerance=tolerance)
+        closest = _nothing() if found.pair < 0 else self._at(found.pair, path, poses, found.position)
+        return PathClearance(
+            closest, max(found.position, 0.0), found.distance - found.tolerance, found.checks, found.tolerance
+        )
 
     def decided_minimum(
         self, trajectory: Array, object_poses: Array | None = None, *, tolerance: float = 1e-3
@@ -263,14 +244,19 @@ class ExactClearance:
         """Of each pair (link, object): how far its points can have come towards each other, (T,) from 0."""
         steps = np.abs(np.diff(path, axis=0))
         link_travel = [steps @ travel for travel in self._travel]
-        object_travel = [
-            _object_travel(poses[:, j], item.bounding_radius) for j, item in enumerate(self._objects)
-        ]
+        moved = [object_travel(poses[:, j], item.bounding_radius) for j, item in enumerate(self._objects)]
         return {
             (i, j): np.concatenate([[0.0], np.cumsum(of_link + of_object)])
             for i, of_link in enumerate(link_travel)
-            for j, of_object in enumerate(object_travel)
+            for j, of_object in enumerate(moved)
         }
+
+    def _at(self, k: int, path: Array, poses: Array, position: float) -> Clearance:
+        """The link of pair k of `_AlongPath` and its object at a position along a path."""
+        part, j = divmod(k, len(self._objects))
+        i = int(self._parts.link[part])
+        X_WL = self.robot.pose(interpolate(path, position), self._links[i].name)
+        return self._pair(i, j, X_WL, interpolate_pose(poses[:, j], position))
 
     def _start_poses(self) -> Array:
         return np.array([pose_vector(item.pose) for item in self.objects]).reshape(-1, 7)
@@ -309,40 +295,55 @@ class ExactClearance:
         return Clearance(float(value), link.name, item.name, on_link, on_item)
 
 
-def travel_per_joint(robot: Robot, link: str, points: Array, *, beyond: Collection[int] = ()) -> Array:
-    """Bound (nv,) on how far points (N, 3) of a link, in its frame, move per unit of each joint coordinate, at
-    any configuration.
+class _AlongPath:
+    """Parts of links and objects along a path, see `sweep.Pairs`; pair k is part k // N and object k % N of N."""
 
-    For a revolute joint it is the longest lever arm, at most the stretched length of the chain from the joint
-    to the link plus the distance of the farthest point; for a prismatic joint 1. [m/rad] or [m/m].
-    Only the joints beyond the ones in `beyond` (indices of `robot.joints`) count: motion relative to them.
+    def __init__(self, exact: ExactClearance, path: Array, poses: Array) -> None:
+        self._exact, self._path, self._poses = exact, path, poses
+        self._walked = np.concatenate(
+            [np.zeros((1, path.shape[1])), np.cumsum(np.abs(np.diff(path, axis=0)), axis=0)]
+        )
+        steps = [object_travel(poses[:, j], item.bounding_radius) for j, item in enumerate(exact._objects)]
+        self._moved = np.concatenate(
+            [
+                np.zeros((1, len(steps))),
+                np.cumsum(np.array(steps).reshape(len(steps), len(path) - 1).T, axis=0),
+            ]
+        )
 
-    Raises:
-        ValueError: a prismatic joint between a revolute one and the link has no position limits.
-    """
-    frame = next(f for f in robot.frames if f.name == link)
-    bound = np.zeros(robot.num_coordinates)
-    limits = robot.limits
-    vertices = moved(points, frame.placement)
-    reach = float(np.linalg.norm(vertices, axis=1).max())
-    index, first = frame.joint, True
-    while index >= 0 and index not in beyond:
-        joint = robot.joints[index]
-        if joint.type == JointType.revolute:
-            arm = float(np.linalg.norm(np.cross(vertices, joint.axis), axis=1).max()) if first else reach
-            bound[joint.coordinate] += abs(joint.multiplier) * arm
-        else:
-            bound[joint.coordinate] += abs(joint.multiplier)
-            ends = (limits.lower[joint.coordinate], limits.upper[joint.coordinate])
-            stroke = max(abs(joint.multiplier * e + joint.offset) for e in ends)
-            if not np.isfinite(stroke) and joint.parent >= 0:
-                raise ValueError(
-                    f"prismatic joint {joint.name!r} needs finite position limits to bound its motion"
-                )
-            reach += stroke if np.isfinite(stroke) else 0.0
-        reach += float(np.linalg.norm(joint.placement[:3, 3]))
-        index, first = joint.parent, False
-    return bound
+    def progress(self) -> Array:
+        total: Array = self._walked.sum(axis=1) + self._moved.sum(axis=1)
+        return total
+
+    def gaps(self, positions: Array) -> Array:
+        parts = self._exact._parts
+        at = interpolate_many(self._poses[:, :, :3], positions)
+        away = np.linalg.norm(parts.centers(self._path, positions)[:, :, None] - at[:, None], axis=3)
+        radii = np.array([item.bounding_radius for item in self._exact._objects])
+        apart: Array = away - parts.radii[:, None] - radii
+        return apart.reshape(len(positions), -1)
+
+    def travel_to(self, positions: Array) -> Array:
+        walked, moved = (interpolate_many(samples, positions) for samples in (self._walked, self._moved))
+        travel: Array = (walked @ self._exact._parts.travel.T)[:, :, None] + moved[:, None]
+        return travel.reshape(len(positions), -1)
+
+    def travel(self, k: int) -> Array:
+        part, j = divmod(k, len(self._exact._objects))
+        travel: Array = self._walked @ self._exact._parts.travel[part] + self._moved[:, j]
+        return travel
+
+    def at_least(self, k: int, position: float) -> float:
+        part, j = divmod(k, len(self._exact._objects))
+        exact = self._exact
+        X = exact.robot.pose(interpolate(self._path, position), exact._links[exact._parts.link[part]].name)
+        pose, item = interpolate_pose(self._poses[:, j], position), exact._objects[j]
+        X_part = coal.Transform3s(X[:3, :3], X[:3, 3])
+        X_item = coal.Transform3s(from_quaternion(pose[3:]), pose[:3])
+        return hulls_apart(exact._parts.parts[part].shape, X_part, item.hull, X_item) - item.radius
+
+    def measure(self, k: int, position: float) -> float:
+        return self._exact._at(k, self._path, self._poses, position).distance
 
 
 def _nothing() -> Clearance:
@@ -352,44 +353,3 @@ def _nothing() -> Clearance:
 def _world(X: Array, point: Array) -> Array:
     moved: Array = X[:3, :3] @ point + X[:3, 3]
     return moved
-
-
-def _object_travel(poses: Array, radius: float) -> Array:
-    """Bound (T - 1,) on the travel of any point of an object between samples: shift plus angle times
-    radius."""
-    shift = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
-    overlap = np.abs(np.einsum("ij,ij->i", poses[1:, 3:], poses[:-1, 3:]))
-    turned: Array = shift + radius * 2.0 * np.arccos(np.clip(overlap, 0.0, 1.0))
-    return turned
-
-
-def interpolate(samples: Array, s: float) -> Array:
-    """The row of samples (T, n) at a position along them, linear between two of them."""
-    k = min(int(s), len(samples) - 1)
-    f = s - k
-    value: Array = samples[k] if f == 0.0 else (1.0 - f) * samples[k] + f * samples[k + 1]
-    return value
-
-
-def _interpolate_pose(poses: Array, s: float) -> Array:
-    pose = interpolate(poses, s)
-    k = min(int(s), len(poses) - 1)
-    if s == k or np.array_equal(poses[k, 3:], poses[k + 1, 3:]):
-        return pose
-    start, end, f = poses[k, 3:], poses[k + 1, 3:], s - k
-    overlap = float(start @ end)
-    end = end if overlap >= 0.0 else -end
-    angle = float(np.arccos(min(abs(overlap), 1.0)))
-    if angle < 1e-9:  # [rad] no turn worth dividing by
-        return np.concatenate([pose[:3], start])
-    turned = (np.sin((1.0 - f) * angle) * start + np.sin(f * angle) * end) / np.sin(angle)
-    return np.concatenate([pose[:3], turned])
-
-
-def _advance(so_far: Array, s: float, budget: float) -> float | None:
-    """The position along the path at which the travel has grown by `budget`; None past the end."""
-    target = float(interpolate(so_far[:, None], s)[0]) + budget
-    if target >= so_far[-1]:
-        return None
-    k = int(np.searchsorted(so_far, target, side="right")) - 1
-    return float(k + (target - so_far[k]) / (so_far[k + 1] - so_far[k]))

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import coal
 import numpy as np
 import numpy.typing as npt
 
 from sidestep.robot import Robot
-from sidestep.simulation.clearance import travel_per_joint
 from sidestep.simulation.convex_parts import convex_parts
 from sidestep.simulation.solid import hull_model, mesh_model
+from sidestep.simulation.travel import interpolate_many, travel_per_joint
 
 Array = npt.NDArray[np.float64]
 
@@ -45,75 +44,68 @@ class LinkPart:
         return float(np.linalg.norm(self.corners - self.center, axis=1).max())
 
 
-def link_parts(robot: Robot, link: str) -> tuple[LinkPart, ...]:
-    """The parts of a link that has a collision mesh."""
-    mesh = robot.collision_mesh(link)
-    assert mesh is not None
-    parts = convex_parts(np.array(mesh.triangles, dtype=float))
-    if not parts:
-        return (LinkPart(np.asarray(mesh.vertices, dtype=float), mesh_model(mesh)),)
-    return tuple(LinkPart(corners, hull_model(corners)) for corners in parts)
-
-
-class LinkPair(NamedTuple):
-    """Two links.
-
-    Attributes:
-        first, second: their numbers.
-        shared: the joints that both hang on: these do not move one against the other.
-    """
-
-    first: int
-    second: int
-    shared: Collection[int]
-
-
-class PairsOfParts:
-    """Every part of one link with every part of the other, for pairs of links.
+class LinkParts:
+    """The parts of links with collision meshes; made when they are first asked for.
 
     Args:
-        robot: the arm. names: of its links. pairs: of links, as indices of `names`.
-
-    Attributes:
-        links: (K,) index of `pairs` for each of the K pairs of parts.
-        travel: (K, nv) how far points of the two can come towards each other per unit of each joint.
+        robot: the arm. names: of the links.
     """
 
-    def __init__(self, robot: Robot, names: Sequence[str], pairs: Sequence[LinkPair]) -> None:
-        of_link = [link_parts(robot, name) for name in names]
-        first_of_link = np.concatenate([[0], np.cumsum([len(parts) for parts in of_link])])
-        self._parts = [part for parts in of_link for part in parts]
-        self._link = np.repeat(np.arange(len(names)), [len(parts) for parts in of_link])
-        self._radii = np.array([part.radius for part in self._parts])
-        links, ends, travel = [], [], []
-        for index, pair in enumerate(pairs):
-            moved = {
-                part: travel_per_joint(robot, names[link], self._parts[part].corners, beyond=pair.shared)
-                for link in (pair.first, pair.second)
-                for part in range(first_of_link[link], first_of_link[link + 1])
-            }
-            for a in range(first_of_link[pair.first], first_of_link[pair.first + 1]):
-                for b in range(first_of_link[pair.second], first_of_link[pair.second + 1]):
-                    links.append(index)
-                    ends.append((a, b))
-                    travel.append(moved[a] + moved[b])
-        self.links = np.array(links, dtype=int)
-        self._ends = np.array(ends, dtype=int).reshape(-1, 2)
-        self.travel = np.array(travel).reshape(-1, robot.num_coordinates)
+    def __init__(self, robot: Robot, names: Sequence[str]) -> None:
+        self.robot = robot
+        self._names = tuple(names)
 
-    def balls_apart(self, poses: Array) -> Array:
-        """The gaps (M, K) [m] between bounding balls, for poses (M, L, 4, 4) of all links."""
-        local = np.array([np.append(part.center, 1.0) for part in self._parts]).reshape(-1, 4)
-        centers = np.einsum("mpij,pj->mpi", poses[:, self._link, :3], local)
-        a, b = self._ends.T
-        gaps: Array = np.linalg.norm(centers[:, a] - centers[:, b], axis=2) - self._radii[a] - self._radii[b]
-        return gaps
+    @cached_property
+    def of_link(self) -> tuple[tuple[LinkPart, ...], ...]:
+        """Those of each link."""
+        return tuple(self._of(name) for name in self._names)
 
-    def hulls_apart(self, k: int, X_first: Array, X_second: Array) -> float:
-        """No more than the distance [m] of the surfaces in pair k, with the links at poses (4, 4); may be below 0."""
-        placed: list[object] = []
-        for part, X in zip(self._ends[k], (X_first, X_second), strict=True):
-            placed += [self._parts[part].shape, coal.Transform3s(X[:3, :3], X[:3, 3])]
-        request, result = coal.DistanceRequest(), coal.DistanceResult()
-        request.enable_signed_distance = False
-        return float(coal.distance(*placed, request, result)) - GJK_ERROR
+    @cached_property
+    def parts(self) -> tuple[LinkPart, ...]:
+        """All P, link by link."""
+        return tuple(part for parts in self.of_link for part in parts)
+
+    @cached_property
+    def link(self) -> npt.NDArray[np.int_]:
+        """(P,) number of the link of each."""
+        return np.repeat(np.arange(len(self._names)), [len(parts) for parts in self.of_link])
+
+    @cached_property
+    def radii(self) -> Array:
+        """(P,) [m] of balls around them."""
+        return np.array([part.radius for part in self.parts])
+
+    @cached_property
+    def travel(self) -> Array:
+        """(P, nv) how far points of each move per unit of each joint, see `travel_per_joint`."""
+        return np.array([self.travel_of(p, ()) for p in range(len(self.parts))]).reshape(len(self.parts), -1)
+
+    def travel_of(self, p: int, beyond: Collection[int]) -> Array:
+        """The same (nv,) for one, by the joints beyond some."""
+        return travel_per_joint(self.robot, self._names[self.link[p]], self.parts[p].corners, beyond=beyond)
+
+    def centers(self, path: Array, positions: Array) -> Array:
+        """The centres (M, P, 3) [m] of those balls at positions (M,) along a path (T, nv)."""
+        local = np.array([np.append(part.center, 1.0) for part in self.parts]).reshape(-1, 4)
+        poses = np.array(
+            [[self.robot.pose(q, name) for name in self._names] for q in interpolate_many(path, positions)]
+        )
+        world: Array = np.einsum("mpij,pj->mpi", poses[:, self.link, :3], local)
+        return world
+
+    def _of(self, link: str) -> tuple[LinkPart, ...]:
+        mesh = self.robot.collision_mesh(link)
+        assert mesh is not None
+        parts = convex_parts(np.array(mesh.triangles, dtype=float)) or (
+            np.asarray(mesh.vertices, dtype=float),
+        )
+        return tuple(LinkPart(corners, hull_model(corners) or mesh_model(mesh)) for corners in parts)
+
+
+def hulls_apart(
+    a: coal.CollisionGeometry, X_a: coal.Transform3s, b: coal.CollisionGeometry, X_b: coal.Transform3s
+) -> float:
+    """A lower bound of the distance [m] of two convex shapes; not above 0 where they may overlap."""
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.enable_signed_distance = False
+    return float(coal.distance(a, X_a, b, X_b, request, result)) - GJK_ERROR

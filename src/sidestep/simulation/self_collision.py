@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.robot import Robot, read_srdf
-from sidestep.simulation.clearance import FINE_CHECKS, interpolate
-from sidestep.simulation.link_parts import LinkPair, PairsOfParts
+from sidestep.simulation.link_parts import LinkParts, hulls_apart
 from sidestep.simulation.solid import mesh_model
+from sidestep.simulation.sweep import smallest_distance
+from sidestep.simulation.travel import interpolate, interpolate_many
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]
@@ -43,6 +45,13 @@ class SelfClearance:
     distance: float
     pair: tuple[str, ...]
     sample: float = 0.0
+
+
+@dataclass(frozen=True)
+class _PairOfLinks:
+    first: int
+    second: int
+    shared: frozenset[int]  # joints that both hang on: these do not move one against the other
 
 
 class SelfCollision:
@@ -79,7 +88,7 @@ class SelfCollision:
             self._centers.append(center)
             self._radii.append(float(np.linalg.norm(mesh.vertices - center, axis=1).max()))
         self.left_out: dict[Pair, Reason] = {}
-        self._pairs: list[LinkPair] = []
+        self._pairs: list[_PairOfLinks] = []
         self._moved_by: dict[Pair, tuple[int, ...]] = {}
         for i, j in itertools.combinations(range(len(self._names)), 2):
             a, b = self._names[i], self._names[j]
@@ -92,9 +101,10 @@ class SelfCollision:
             elif len(apart) == 1:
                 self.left_out[a, b] = "adjacent"
             else:
-                self._pairs.append(LinkPair(i, j, above_a & above_b))
+                self._pairs.append(_PairOfLinks(i, j, above_a & above_b))
                 self._moved_by[a, b] = tuple(sorted({robot.joints[joint].coordinate for joint in apart}))
         self._leave_out_what_always_touches(samples, np.random.default_rng(seed))
+        self._parts = LinkParts(robot, self._names)
         self._by_name = {self._name(pair): pair for pair in self._pairs}
 
     @classmethod
@@ -159,12 +169,9 @@ class SelfCollision:
         """The smallest distance of a motion (T, nv) that is linear in the joints between samples.
 
         Links are held by convex parts. Two parts come closer by at most sum_j L_j |dq_j|, with L_j the lever arms of
-        the joints between the two links, so after a lower bound d of their distance they are skipped until that sum
-        has grown to d - (smallest so far) + tolerance [m]: the true minimum lies in [reported - tolerance, reported].
-        d is the gap of their bounding balls, else of their hulls, and where this could be below the smallest so far
-        by half of the tolerance, the distance of the links' meshes. Ends at the first touch. After `FINE_CHECKS`
-        checks, which only a motion that diverged needs, the tolerance is at least twice the whole travel of all
-        pairs of parts over `FINE_CHECKS`.
+        the joints between the two links: the bound by which `smallest_distance` skips what is far. The true minimum
+        lies in [reported - tolerance, reported]. Ends at the first touch. Only a motion that diverged is measured less
+        finely, see there.
 
         Raises:
             ValueError: wrong shape, values that are not finite, a tolerance that is not positive, or a prismatic
@@ -179,60 +186,31 @@ class SelfCollision:
             raise ValueError("trajectory must be finite")
         if not tolerance > 0.0:
             raise ValueError(f"tolerance must be positive, got {tolerance}")
-        if not self._pairs:
+        found = smallest_distance(_AlongPath(self, path), tolerance=tolerance, enough=0.0)
+        if found.pair < 0:
             return SelfClearance(float("inf"), ())
-        parts, samples = self._parts, np.arange(len(path), dtype=float)
-        walked = np.concatenate(
-            [np.zeros((1, path.shape[1])), np.cumsum(np.abs(np.diff(path, axis=0)), axis=0)]
-        )
-        total = walked.sum(axis=1)
-        at = np.interp(np.linspace(0.0, total[-1], LOOKS), total, samples)
-        balls = parts.balls_apart(np.array([list(self._poses(interpolate(path, s)).values()) for s in at]))
-        best = SelfClearance(float("inf"), ())
-        for look in range(0, LOOKS, LOOKS // FIRST_LOOKS):
-            for k in map(int, np.argsort(balls[look])):
-                if balls[look, k] >= best.distance:
-                    break
-                _, best = self._closer(k, path, float(at[look]), best, below=best.distance)
-        travel = np.array([interpolate(walked, s) for s in at]) @ parts.travel.T
-        at_least = 0.5 * (balls[:-1] + balls[1:] - np.diff(travel, axis=0))  # from each look to the next
-        coarse = max(tolerance, 2.0 * float(travel[-1].sum()) / FINE_CHECKS)
-        checks = 0
-        for k in map(int, np.argsort(at_least.min(axis=0))):
-            near = np.flatnonzero(at_least[:, k] <= best.distance - tolerance)
-            if len(near) == 0 or best.distance == 0.0:  # so it is for those that follow
-                break
-            so_far, here = walked @ parts.travel[k], 0.0
-            for look in map(int, near):
-                here = max(here, float(travel[look, k]))
-                while here < travel[look + 1, k] and best.distance > 0.0:
-                    sample = float(np.interp(here, so_far, samples))
-                    apart, best = self._closer(k, path, sample, best, below=best.distance - 0.5 * tolerance)
-                    checks += 1
-                    if checks == FINE_CHECKS:
-                        tolerance = coarse
-                    here += apart - best.distance + tolerance
-        return best
+        pair = self._pairs[self._pairs_of_parts[found.pair][0]]
+        return SelfClearance(found.distance, self._name(pair), found.position)
 
     @cached_property
-    def _parts(self) -> PairsOfParts:
-        return PairsOfParts(self.robot, self._names, self._pairs)
+    def _pairs_of_parts(self) -> tuple[tuple[int, int, int], ...]:
+        """Of each part of one link with each part of the other: which of the pairs, and the numbers of the parts."""
+        numbers = [np.flatnonzero(self._parts.link == link).tolist() for link in range(len(self._names))]
+        return tuple(
+            (index, a, b)
+            for index, pair in enumerate(self._pairs)
+            for a, b in itertools.product(numbers[pair.first], numbers[pair.second])
+        )
 
-    def _closer(
-        self, k: int, path: Array, sample: float, best: SelfClearance, *, below: float
-    ) -> tuple[float, SelfClearance]:
-        """A lower bound of the distance in pair of parts k, and the links' distance where it is the best so far.
-
-        The links are measured where the bound is not above `below`, or not above 0.
-        """
-        pair = self._pairs[self._parts.links[k]]
-        poses = self._poses(interpolate(path, sample), pair)
-        at_least = self._parts.hulls_apart(k, poses[pair.first], poses[pair.second])
-        if at_least <= max(0.0, below):
-            at_least = self._measure(pair, poses)
-            if at_least < best.distance:
-                best = SelfClearance(at_least, self._name(pair), sample)
-        return at_least, best
+    @cached_property
+    def _travel(self) -> Array:
+        """(K, nv) how far points of those can come towards each other per unit of each joint."""
+        beyond = functools.cache(self._parts.travel_of)
+        rows = [
+            beyond(a, self._pairs[index].shared) + beyond(b, self._pairs[index].shared)
+            for index, a, b in self._pairs_of_parts
+        ]
+        return np.array(rows).reshape(-1, self.robot.num_coordinates)
 
     def _leave_out_what_always_touches(self, samples: int, rng: np.random.Generator) -> None:
         touches = np.zeros(len(self._pairs))
@@ -244,16 +222,16 @@ class SelfCollision:
                 self.left_out[self._name(pair)] = "always"
         self._pairs = [pair for pair in self._pairs if self._name(pair) not in self.left_out]
 
-    def _find(self, first: str, second: str) -> LinkPair:
+    def _find(self, first: str, second: str) -> _PairOfLinks:
         for a, b in ((first, second), (second, first)):
             if (a, b) in self._by_name:
                 return self._by_name[a, b]
         raise ValueError(f"the pair ({first}, {second}) is not checked; see `pairs` and `left_out`")
 
-    def _name(self, pair: LinkPair) -> Pair:
+    def _name(self, pair: _PairOfLinks) -> Pair:
         return self._names[pair.first], self._names[pair.second]
 
-    def _poses(self, q: Array, pair: LinkPair | None = None) -> dict[int, Array]:
+    def _poses(self, q: Array, pair: _PairOfLinks | None = None) -> dict[int, Array]:
         wanted = range(len(self._names)) if pair is None else (pair.first, pair.second)
         return {index: self.robot.pose(q, self._names[index]) for index in wanted}
 
@@ -267,7 +245,7 @@ class SelfCollision:
                     best = SelfClearance(distance, self._name(pair), sample)
         return best
 
-    def _balls_apart(self, pair: LinkPair, poses: dict[int, Array]) -> float:
+    def _balls_apart(self, pair: _PairOfLinks, poses: dict[int, Array]) -> float:
         """The gap between the bounding balls of two links: no more than their distance."""
         a, b = (
             poses[index][:3, :3] @ self._centers[index] + poses[index][:3, 3]
@@ -275,19 +253,19 @@ class SelfCollision:
         )
         return float(np.linalg.norm(a - b)) - self._radii[pair.first] - self._radii[pair.second]
 
-    def _measure(self, pair: LinkPair, poses: dict[int, Array]) -> float:
+    def _measure(self, pair: _PairOfLinks, poses: dict[int, Array]) -> float:
         request, result = coal.DistanceRequest(), coal.DistanceResult()
         request.enable_signed_distance = False
         return max(0.0, float(coal.distance(*self._placed(pair, poses), request, result)))
 
-    def _touch(self, pair: LinkPair, poses: dict[int, Array], *, margin: float = 0.0) -> bool:
+    def _touch(self, pair: _PairOfLinks, poses: dict[int, Array], *, margin: float = 0.0) -> bool:
         if self._balls_apart(pair, poses) > margin:
             return False
         request, result = coal.CollisionRequest(), coal.CollisionResult()
         request.security_margin = margin
         return bool(coal.collide(*self._placed(pair, poses), request, result))
 
-    def _placed(self, pair: LinkPair, poses: dict[int, Array]) -> tuple[object, ...]:
+    def _placed(self, pair: _PairOfLinks, poses: dict[int, Array]) -> tuple[object, ...]:
         placed: list[object] = []
         for index in (pair.first, pair.second):
             X = poses[index]
@@ -302,3 +280,43 @@ def _joints_above(robot: Robot, joint: int) -> frozenset[int]:
         found.add(joint)
         joint = robot.joints[joint].parent
     return frozenset(found)
+
+
+class _AlongPath:
+    """Pairs of parts along a path, see `sweep.Pairs`."""
+
+    def __init__(self, check: SelfCollision, path: Array) -> None:
+        self._check, self._path = check, path
+        self._walked = np.concatenate(
+            [np.zeros((1, path.shape[1])), np.cumsum(np.abs(np.diff(path, axis=0)), axis=0)]
+        )
+
+    def progress(self) -> Array:
+        total: Array = self._walked.sum(axis=1)
+        return total
+
+    def gaps(self, positions: Array) -> Array:
+        parts = self._check._parts
+        _, a, b = np.array(self._check._pairs_of_parts, dtype=int).reshape(-1, 3).T
+        centers = parts.centers(self._path, positions)
+        apart: Array = np.linalg.norm(centers[:, a] - centers[:, b], axis=2) - parts.radii[a] - parts.radii[b]
+        return apart
+
+    def travel_to(self, positions: Array) -> Array:
+        travel: Array = interpolate_many(self._walked, positions) @ self._check._travel.T
+        return travel
+
+    def travel(self, k: int) -> Array:
+        travel: Array = self._walked @ self._check._travel[k]
+        return travel
+
+    def at_least(self, k: int, position: float) -> float:
+        index, a, b = self._check._pairs_of_parts[k]
+        pair, parts = self._check._pairs[index], self._check._parts.parts
+        poses = self._check._poses(interpolate(self._path, position), pair)
+        X_a, X_b = (coal.Transform3s(X[:3, :3], X[:3, 3]) for X in (poses[pair.first], poses[pair.second]))
+        return hulls_apart(parts[a].shape, X_a, parts[b].shape, X_b)
+
+    def measure(self, k: int, position: float) -> float:
+        pair = self._check._pairs[self._check._pairs_of_parts[k][0]]
+        return self._check._measure(pair, self._check._poses(interpolate(self._path, position), pair))

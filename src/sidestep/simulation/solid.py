@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import coal
 import numpy as np
 import numpy.typing as npt
 import trimesh
+from scipy.spatial import ConvexHull, QhullError
 
 from sidestep.simulation.scene import SceneObject
 
@@ -46,6 +47,7 @@ class Solid:
     surface: Surface | None  # hollow for Coal; None for primitives, which are solid
     reference: Array  # (3,) a point of the shape, in its frame
     bounding_radius: float
+    hull: coal.CollisionGeometry | None = None  # of objects: what is solid and holds it, if it has volume
 
 
 def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
@@ -62,12 +64,20 @@ def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
     return model
 
 
-def hull_model(points: Array) -> coal.Convex:
-    """The convex hull of points (N, 3) for Coal: solid."""
-    vertices = coal.StdVec_Vec3s()
-    for point in np.asarray(points, dtype=float):
-        vertices.append(point)
-    return coal.Convex.convexHull(vertices, True, "Qt")
+def hull_model(points: Array) -> coal.Convex | None:
+    """The convex hull of points (N, 3) for Coal: solid; None where they have no volume."""
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return None
+    number = np.empty(len(hull.points), dtype=int)  # of a point among the corners
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    corners, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in hull.points[hull.vertices]:
+        corners.append(point)
+    for a, b, c in number[hull.simplices].tolist():
+        triangles.append(coal.Triangle(a, b, c))
+    return coal.Convex(corners, triangles)
 
 
 def mesh_solid(name: str, mesh: trimesh.Trimesh) -> Solid:
@@ -78,12 +88,14 @@ def mesh_solid(name: str, mesh: trimesh.Trimesh) -> Solid:
 
 def object_solid(item: SceneObject) -> Solid:
     if item.mesh is not None:
-        return mesh_solid(item.name, item.mesh)
+        solid = mesh_solid(item.name, item.mesh)
+        return replace(solid, hull=hull_model(item.mesh.vertices) or solid.shape)
     origin, bound = np.zeros(3), item.bounding_radius
     if item.kind == "sphere":
-        return Solid(item.name, coal.Sphere(POINT_RADIUS), item.size[0], None, origin, bound)
+        point = coal.Sphere(POINT_RADIUS)
+        return Solid(item.name, point, item.size[0], None, origin, bound, point)
     shape = coal.Box(*item.size) if item.kind == "box" else coal.Cylinder(*item.size)
-    return Solid(item.name, shape, 0.0, None, origin, bound)
+    return Solid(item.name, shape, 0.0, None, origin, bound, shape)
 
 
 def penetration(
