@@ -13,8 +13,9 @@ namespace sidestep {
 namespace {
 
 constexpr const char* owner = "body clearance";
-constexpr double cover_overshoot = 0.02;      // [m] of the balls that cover an ellipsoid
+constexpr double cover_overshoot = 0.04;      // [m] of the balls that cover an ellipsoid
 constexpr double closest_centres = 1e-6;      // [m] of which a direction is taken
+constexpr int planes_of_pair = 3;             // tried before the gap of two ellipsoids is looked for
 
 static_assert(kernels::most_balls == PointTree::leaf_size);
 
@@ -96,7 +97,11 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
                                 " links, pairs and planes; at most " + std::to_string(max_items) + " are allowed");
   }
   reach_ = Eigen::VectorXd::Zero(nv);
-  for (const Item& i : items_) {
+  reaches_.resize(num_items(), nv);
+  bends_.resize(num_items(), nv * nv);
+  for (Eigen::Index k = 0; const Item& i : items_) {
+    reaches_.row(k) = i.reach.transpose();
+    bends_.row(k++) = i.bend.transpose().reshaped().transpose();
     if (!i.reach.allFinite()) {
       throw std::invalid_argument(std::string(owner) + ": a prismatic joint above link '" + i.label.name +
                                   "' has no position limits, so that no edge could be proven free");
@@ -171,8 +176,10 @@ void BodyClearance::add_reach(Item& item, const Link& link) const {
 BodyClearance::Workspace::Workspace(const BodyClearance& body)
     : poses_(body.robot_.joints().size()),
       centres_(body.links_.size()),
-      motions_(body.items_.size()),
-      curvatures_(body.items_.size()),
+      motions_(body.num_items()),
+      curvatures_(body.num_items()),
+      lengths_(body.robot_.num_coordinates()),
+      products_(body.robot_.num_coordinates() * body.robot_.num_coordinates()),
       q_(body.robot_.num_coordinates()),
       difference_(body.robot_.num_coordinates()) {
   std::size_t most = 0;
@@ -310,9 +317,15 @@ double BodyClearance::look_at_pair(const Item& item, const Asked& asked, const W
         continue;
       }
       const bool apart = distance > closest_centres * closest_centres;
-      const Eigen::Vector3d n = apart ? Eigen::Vector3d(d / std::sqrt(distance)) : Eigen::Vector3d::UnitX().eval();
-      const Eigen::Vector3d n_b = R_XY.transpose() * n;
-      const double bound = n.dot(d) - std::sqrt(n.dot(e.shape * n)) - std::sqrt(n_b.dot(f.shape * n_b));
+      Eigen::Vector3d n = apart ? Eigen::Vector3d(d / std::sqrt(distance)) : Eigen::Vector3d::UnitX().eval();
+      // A plane across n supports both; the next lies across what is between the places where it touches them.
+      double bound = -infinity;
+      for (int k = 0; k < planes_of_pair && bound < std::min(asked.near, least); ++k) {
+        const Eigen::Vector3d on_a = e.shape * n, on_b = R_XY * (f.shape * (R_XY.transpose() * n));
+        const double reach_a = std::sqrt(n.dot(on_a)), reach_b = std::sqrt(n.dot(on_b));
+        bound = std::max(bound, n.dot(d) - reach_a - reach_b);
+        n = (d - on_a / reach_a - on_b / reach_b).normalized();
+      }
       if (bound < least) {
         const double gap =
             bound < asked.near ? ellipsoid_gap(d, e.shape, R_XY * f.shape * R_XY.transpose()).value : bound;

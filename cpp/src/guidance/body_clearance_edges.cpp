@@ -46,33 +46,34 @@ double BodyClearance::speed(const Item& item, const Workspace& w) const noexcept
   const Workspace::Pose& base = pose(w, item.base);
   double sum = 0.0;
   for (const int n : {item.link, item.other}) {
-    if (n >= 0) {
-      const Link& link = links_[static_cast<std::size_t>(n)];
-      const Workspace::Pose& X = pose(w, link.joint);
-      const Eigen::Vector3d centre = X.R * link.centre;
-      const Eigen::Vector3d turning = X.angular - base.angular;
-      sum += (X.linear + X.angular.cross(centre) - base.linear - base.angular.cross(X.p + centre - base.p)).norm() +
-             turning.norm() * link.radius;
+    if (n < 0 || links_[static_cast<std::size_t>(n)].joint == item.base) {
+      continue;
     }
+    const Link& link = links_[static_cast<std::size_t>(n)];
+    const Workspace::Pose& X = pose(w, link.joint);
+    const Eigen::Vector3d& centre = w.centres_[static_cast<std::size_t>(n)];
+    const Eigen::Vector3d linear = X.linear + X.angular.cross(centre - X.p) - base.linear - base.angular.cross(centre - base.p);
+    sum += linear.norm() + (X.angular - base.angular).norm() * link.radius;
   }
   return sum;
 }
 
-double BodyClearance::curvature(int item, Eigen::Ref<const Eigen::VectorXd> displacement) const noexcept {
-  const Eigen::MatrixXd& bend = items_[static_cast<std::size_t>(item)].bend;
-  double sum = 0.0;
-  for (Eigen::Index i = 0; i < bend.rows(); ++i) {
-    sum += std::abs(displacement[i]) * bend.row(i).dot(displacement.cwiseAbs());
+void BodyClearance::bound_motions(Eigen::Ref<const Eigen::VectorXd> displacement, Workspace& w) const noexcept {
+  const Eigen::Index nv = displacement.size();
+  w.lengths_ = displacement.cwiseAbs();
+  w.motions_.noalias() = reaches_ * w.lengths_;
+  for (Eigen::Index i = 0, k = 0; i < nv; k += nv, ++i) {
+    w.products_.segment(k, nv) = w.lengths_[i] * w.lengths_;
   }
-  return sum;
+  w.curvatures_.noalias() = bends_ * w.products_;
 }
 
 double BodyClearance::motion(int item, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> displacement,
                              Workspace& w) const noexcept {
   place(q, w);
   move(displacement, w);
-  const Motion moved{motion(item, displacement), 0.0, speed(items_[static_cast<std::size_t>(item)], w),
-                     curvature(item, displacement)};
+  bound_motions(displacement, w);
+  const Motion moved{w.motions_[item], 0.0, speed(items_[static_cast<std::size_t>(item)], w), w.curvatures_[item]};
   return moved.distance(1.0);
 }
 
@@ -120,10 +121,8 @@ bool BodyClearance::edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<co
   std::array<std::uint64_t, max_items / 64> all{};
   for (int i = 0; i < num_items(); ++i) {
     all[static_cast<std::size_t>(i / 64)] |= std::uint64_t{1} << (i % 64);
-    const auto k = static_cast<std::size_t>(i);
-    w.motions_[k] = motion(i, w.difference_);
-    w.curvatures_[k] = curvature(i, w.difference_);
   }
+  bound_motions(w.difference_, w);
   // Breadth first: what is in the way is found early.
   w.intervals_.clear();
   w.intervals_.push_back({0.5, 0.5, all});
@@ -141,8 +140,7 @@ bool BodyClearance::edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<co
         const Item& item = items_[static_cast<std::size_t>(i)];
         double slope = 0.0;
         const double least = margin_at(i, w.q_, margins, slope);
-        const Motion moved{w.motions_[static_cast<std::size_t>(i)], slope, speed(item, w),
-                           w.curvatures_[static_cast<std::size_t>(i)]};
+        const Motion moved{w.motions_[i], slope, speed(item, w), w.curvatures_[i]};
         const double enough = least - margins.slack + moved.distance(at.half);
         const double clearance =
             look(item, obstacles, {std::max(least, enough), least + exact_within, least}, w).clearance;

@@ -48,9 +48,9 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
   if ((x.array().abs() < farthest).all()) {
     std::uint64_t key = 0;
     for (int i = 0; i < 3; ++i) {
-      const double block = std::floor(x[i] / block_edge);
-      corner[i] = block * block_edge;
-      key = key << 21 | static_cast<std::uint64_t>(static_cast<int>(block) + offset);
+      const int block = static_cast<int>(x[i] * (1.0 / block_edge) + offset);  // positive, so that it is rounded down
+      corner[i] = (block - offset) * block_edge;
+      key = key << 21 | static_cast<std::uint64_t>(block);
     }
     known = block_of(key);
   }
@@ -60,11 +60,11 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
   const Eigen::Vector3d inside = x - corner;
   double best = -std::numeric_limits<double>::infinity(), limit = PointTree::padding;
   for (const int cells : levels) {
-    const double cell = block_edge / cells;
+    const double cell = block_edge / cells, per_length = cells / block_edge;
     int at = 0;
     Eigen::Vector3d centre;
     for (int i = 0; i < 3; ++i) {
-      const int number = std::clamp(static_cast<int>(inside[i] / cell), 0, cells - 1);
+      const int number = std::clamp(static_cast<int>(inside[i] * per_length), 0, cells - 1);
       at = at * cells + number;
       centre[i] = (number + 0.5) * cell;
     }
@@ -83,6 +83,9 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
 }
 
 float* DistanceField::block_of(std::uint64_t key) noexcept {
+  if (key == last_.key && last_.generation == generation_) {
+    return blocks_[static_cast<std::size_t>(last_.block)].data();
+  }
   for (std::uint64_t at = key * 0x9E3779B97F4A7C15u >> 40;; ++at) {
     Slot& slot = slots_[at % slots];
     if (slot.generation != generation_) {
@@ -93,6 +96,7 @@ float* DistanceField::block_of(std::uint64_t key) noexcept {
       blocks_[static_cast<std::size_t>(slot.block)].fill(unknown);
     }
     if (slot.key == key) {
+      last_ = slot;
       return blocks_[static_cast<std::size_t>(slot.block)].data();
     }
   }

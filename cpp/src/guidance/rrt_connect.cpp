@@ -19,7 +19,7 @@ constexpr double pi = 3.14159265358979323846;
 constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
 constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
 constexpr double short_step = 0.25;      // of the range
-constexpr double domain = 1.0;           // of the range: how far samples may be from a node that was trapped
+constexpr double domain = 2.0;           // of the range: how far samples may be from a node that was trapped
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
 constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
 
@@ -235,7 +235,10 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
         return;
       }
     }
-    std::swap(one, other);
+    // The smaller tree is the one in a narrow place: it needs the samples.
+    if (one->size() > other->size()) {
+      std::swap(one, other);
+    }
   }
 }
 

@@ -93,7 +93,8 @@ class BodyClearance {
     std::vector<Pose> poses_;
     std::vector<Eigen::Vector3d> centres_;  // of the balls around the links
     std::vector<Interval> intervals_;
-    std::vector<double> motions_, curvatures_;  // of the items along an edge
+    Eigen::VectorXd motions_, curvatures_;  // of the items along an edge
+    Eigen::VectorXd lengths_, products_;    // |Δq_i|, |Δq_i| |Δq_j|
     DistanceField field_;
     std::vector<double> bounds_;  // of the ellipsoids of a link
     Eigen::VectorXd q_, difference_;
@@ -164,7 +165,7 @@ class BodyClearance {
     int plane = -1;          // planes_
     int base = -1;           // joint that moves both of a pair alike
     Eigen::VectorXd reach;   // R of every coordinate
-    Eigen::MatrixXd bend;    // R of the later one of two
+    Eigen::MatrixXd bend;    // R of the later one of two, row by row in bends_
     double contact = 0.0;    // of a pair [m]
   };
   struct Plane {
@@ -181,7 +182,7 @@ class BodyClearance {
   void place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept;
   void move(Eigen::Ref<const Eigen::VectorXd> velocity, Workspace& w) const noexcept;
   double speed(const Item& item, const Workspace& w) const noexcept;
-  double curvature(int item, Eigen::Ref<const Eigen::VectorXd> displacement) const noexcept;
+  void bound_motions(Eigen::Ref<const Eigen::VectorXd> displacement, Workspace& w) const noexcept;
   const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
   // How exact a clearance must be: not above `cap`, a lower bound from `near` on, and any that is below `stop`.
   struct Asked {
@@ -198,6 +199,7 @@ class BodyClearance {
   std::vector<Plane> planes_;
   std::vector<Item> items_;
   Eigen::VectorXd reach_;
+  Eigen::MatrixXd reaches_, bends_;  // of all items: (items × nv), (items × nv²)
   struct Rotation {
     Eigen::Matrix3d fixed, cosine, sine;  // as in KinematicState
   };

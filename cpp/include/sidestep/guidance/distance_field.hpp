@@ -43,6 +43,7 @@ class DistanceField {
   float* block_of(std::uint64_t key) noexcept;
 
   std::vector<Slot> slots_;
+  Slot last_;  // that was asked for last: places asked for one after another are often near each other
   std::vector<Block> blocks_;
   int used_ = 0;
   std::uint64_t generation_ = 1;
