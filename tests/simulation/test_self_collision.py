@@ -95,3 +95,17 @@ def test_bad_trajectories_are_refused(planar: SelfCollision) -> None:
         planar.minimum_over(np.full((2, 3), np.nan))
     with pytest.raises(ValueError, match="tolerance"):
         planar.minimum_over(np.zeros((2, 3)), tolerance=0.0)
+
+
+def test_travel_bounds_how_far_two_links_approach() -> None:
+    robot = Robot.named("planar3")
+    check, rng = SelfCollision(robot), np.random.default_rng(0)
+    travel = check.travel_between("link1", "link3")
+    assert travel[0] == 0.0  # turns both
+    assert (travel[1:] > 0.2).all()  # [m/rad] levers of links of some 0.3 m
+    for _ in range(200):
+        q, step = robot.random_configuration(rng), rng.uniform(-0.3, 0.3, 3)
+        lost = check.distance_between(q, "link1", "link3") - check.distance_between(
+            q + step, "link1", "link3"
+        )
+        assert lost <= travel @ np.abs(step) + 1e-9  # rounding

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep.bench.motion import Motion, MotionSettings
-from sidestep.bench.problem import Problem
+from sidestep.bench.problem import Problem, between_jumps
 from sidestep.bench.step_times import StepTimes
+from sidestep.bench.way_out import WayOut, find_way_out
 from sidestep.robot import Robot
 from sidestep.simulation import ExactClearance, SelfCollision
 from sidestep.simulation.clearance import FINEST
@@ -18,7 +18,6 @@ from sidestep.simulation.evaluation import excess_over
 
 Array = npt.NDArray[np.float64]
 
-JUMP = 1.0  # [m] between two samples: what moves so far came or went
 TOLERANCE = 1e-3  # [m] of minimum clearances: the true one is at most this much smaller than the one reported
 
 
@@ -37,6 +36,7 @@ class Outcome:
         self_pair: between which.
         limits: worst excess of the limits that were broken at a sample, by name, in the limit's unit.
         diverged: the state was not finite any more; the motion ends there.
+        way_out: of a collision of a safe method with what moves, see `find_way_out`; None elsewhere.
     """
 
     index: int
@@ -53,6 +53,7 @@ class Outcome:
     self_pair: str
     limits: dict[str, float]
     diverged: bool
+    way_out: WayOut | None = None
 
     @property
     def collision(self) -> bool:
@@ -85,6 +86,7 @@ class Outcome:
             found.append(
                 f"collision: {self.clearance_pair} {1e3 * clearance:.1f} mm"
                 f" at {self.clearance_time_s:.2f} s{counted}"
+                + (f"; {self.way_out.sentence}" if self.way_out else "")
             )
         if self.self_collision:
             found.append(f"self-collision: {self.self_pair}")
@@ -116,7 +118,7 @@ class Judge:
         clearance, pair, when = None, "", 0.0
         if problem.objects:
             exact = self._clearance.among(problem.objects)
-            for first, last in _between_jumps(motion.object_poses[:end]):
+            for first, last in between_jumps(motion.object_poses[:end]):
                 worst = exact.decided_minimum(
                     q[first:last], motion.object_poses[first:last], tolerance=TOLERANCE
                 )
@@ -130,6 +132,9 @@ class Judge:
         while FINEST < own.distance <= tolerance:  # too close to say at this tolerance
             tolerance = own.distance / 2.0
             own = self._self.minimum_over(q, tolerance=tolerance)
+        way_out = None
+        if settings.safe and clearance is not None and clearance <= 0.0 and end == len(motion.q):
+            way_out = self._find_way_out(problem, motion, pair, when, settings.period)
         return Outcome(
             index=problem.index,
             arrived=motion.arrived,
@@ -145,6 +150,23 @@ class Judge:
             self_pair=" - ".join(own.pair),
             limits=self._limits(motion, end),
             diverged=end < len(motion.q),
+            way_out=way_out,
+        )
+
+    def _find_way_out(
+        self, problem: Problem, motion: Motion, pair: str, when: float, period: float
+    ) -> WayOut | None:
+        (touched,) = (item for item in problem.objects if item.name == pair.split(" - ")[1])
+        if touched.motion != "moving":
+            return None
+        return find_way_out(
+            problem,
+            motion,
+            touched,
+            when,
+            period=period,
+            clearance=self._clearance,
+            self_collision=self._self,
         )
 
     def _limits(self, motion: Motion, end: int) -> dict[str, float]:
@@ -158,13 +180,6 @@ class Judge:
         if motion.torque is not None:
             beyond["torque"] = excess_over(np.abs(motion.torque[:end]), limits.effort)
         return {name: worst for name, (count, worst) in beyond.items() if count > 0}
-
-
-def _between_jumps(poses: Array) -> list[tuple[int, int]]:
-    """The stretches [first, last) of poses (T, N, 7) in which no solid comes or goes: no path leads there."""
-    shifts = np.abs(np.diff(poses[:, :, :3], axis=0)).max(axis=(1, 2), initial=0.0)
-    cuts = [0, *(np.flatnonzero(shifts > JUMP) + 1).tolist(), len(poses)]
-    return list(itertools.pairwise(cuts))
 
 
 def times_of(motion: Motion) -> StepTimes:

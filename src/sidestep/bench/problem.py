@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,7 @@ from sidestep.simulation.scene import AWAY
 
 Array = npt.NDArray[np.float64]
 
+JUMP = 1.0  # [m] between two samples: what moves so far came or went
 LINE_TOLERANCE = 5e-3  # [m] of the clearance of a straight line, which only says whether a problem is easy
 
 
@@ -63,6 +65,13 @@ def poses_over(objects: Sequence[SceneObject], times: Array) -> Array:
             poses[:, k, :3] += since[:, None] * item.velocity
             poses[:, k, 2] -= AWAY * ((times < item.present[0]) | (times >= item.present[1]))
     return poses
+
+
+def between_jumps(poses: Array) -> list[tuple[int, int]]:
+    """The stretches [first, last) of poses (T, N, 7) in which no solid comes or goes: no path leads there."""
+    shifts = np.abs(np.diff(poses[:, :, :3], axis=0)).max(axis=(1, 2), initial=0.0)
+    cuts = [0, *(np.flatnonzero(shifts > JUMP) + 1).tolist(), len(poses)]
+    return list(itertools.pairwise(cuts))
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,6 +62,7 @@ class BenchResult:
     def to_document(self, *, failures: bool = False) -> dict[str, Any]:
         """The figures for JSON; counts are numbers of problems, with `failures` also which and why.
 
+        Collisions with a way out are those in which a search found one (`find_way_out`), where balls move.
         Each problem is one of success, collision or self_collision (or both), stuck; limit_violations counts
         problems in which a position, velocity, acceleration or torque limit was broken at any step.
         """
@@ -77,6 +78,9 @@ class BenchResult:
             "problems": len(outcomes),
             "success": sum(item.success for item in outcomes),
             "collision": sum(item.collision for item in outcomes),
+            "collision_with_way_out": sum(
+                item.way_out is not None and item.way_out.found for item in outcomes
+            ),
             "stuck": sum(item.stuck for item in outcomes),
             "self_collision": sum(item.self_collision for item in outcomes),
             "limit_violations": sum(bool(item.limits) for item in outcomes),

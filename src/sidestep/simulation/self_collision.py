@@ -18,7 +18,7 @@ from sidestep.robot import Robot, read_srdf
 from sidestep.simulation.link_parts import LinkParts, hulls_apart
 from sidestep.simulation.solid import mesh_model
 from sidestep.simulation.sweep import smallest_distance
-from sidestep.simulation.travel import interpolate, interpolate_many
+from sidestep.simulation.travel import interpolate, interpolate_many, travel_per_joint
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]
@@ -134,7 +134,13 @@ class SelfCollision:
         Raises:
             ValueError: the pair is not checked.
         """
-        return self._find(first, second).travel.copy()
+        pair = self._find(first, second)
+        travel = np.zeros(self.robot.num_coordinates)
+        for name in self._name(pair):
+            mesh = self.robot.collision_mesh(name)
+            assert mesh is not None
+            travel += travel_per_joint(self.robot, name, mesh.vertices, beyond=pair.shared)
+        return travel
 
     def distance_between(self, q: Array, first: str, second: str) -> float:
         """The distance [m] of a checked pair at q (nv,); 0 when they touch or overlap.
