@@ -14,8 +14,9 @@ constexpr double rounding = 1e-6;  // of distances in single precision, relative
 constexpr int offset = 1 << 20;    // of blocks, so that their numbers are positive
 constexpr double farthest = 1e5;   // [m] that a place may be away to have a block
 
-/// Below a distance that was rounded.
+/// Below and above a distance that was rounded.
 double below(double distance) noexcept { return distance - rounding * (std::abs(distance) + 1.0); }
+double above(double distance) noexcept { return distance + rounding * (std::abs(distance) + 1.0); }
 
 }  // namespace
 
@@ -58,7 +59,8 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
     return below(distance_to_obstacles(x, obstacles, PointTree::padding));
   }
   const Eigen::Vector3d inside = x - corner;
-  double best = -std::numeric_limits<double>::infinity(), limit = PointTree::padding;
+  double best = -std::numeric_limits<double>::infinity(), coarser = PointTree::padding;
+  Eigen::Vector3d coarser_centre = Eigen::Vector3d::Zero();
   for (const int cells : levels) {
     const double cell = block_edge / cells, per_length = cells / block_edge;
     int at = 0;
@@ -69,14 +71,15 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
       centre[i] = (number + 0.5) * cell;
     }
     if (known[at] == unknown) {
+      const double limit = above(coarser + (centre - coarser_centre).norm());
       known[at] = static_cast<float>(distance_to_obstacles(corner + centre, obstacles, limit));
     }
-    const double away = (inside - centre).norm();
-    best = std::max(best, below(known[at]) - away);
+    best = std::max(best, below(known[at]) - (inside - centre).norm());
     if (best >= enough) {
       break;
     }
-    limit = known[at] + block_edge;  // two centres of a block are not that far apart
+    coarser = known[at];
+    coarser_centre = centre;
     known += cells * cells * cells;
   }
   return best;

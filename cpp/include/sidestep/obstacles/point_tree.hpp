@@ -57,7 +57,11 @@ class PointTree {
   Nearest nearest(double limit, double stop, Measure&& measure) const noexcept {
     Nearest found{limit, -1};
     if (!levels_.empty()) {
-      descend_to_nearest(static_cast<int>(levels_.size()) - 1, 0, stop, measure, found);
+      std::size_t top = levels_.size() - 1;  // of levels that one measurement holds the lowest
+      while (top > 0 && levels_[top - 1].size <= leaf_size) {
+        --top;
+      }
+      descend_to_nearest(top, 0, levels_[top].size, stop, measure, found);
     }
     return found;
   }
@@ -127,24 +131,12 @@ class PointTree {
     }
   }
 
+  /// Among the points below nodes [first, first + count) of a level, at most `leaf_size`.
   template <class Measure>
-  void descend_to_nearest(int level, int node, double stop, Measure& measure, Nearest& found) const noexcept {
-    const int first = node * (level == 0 ? leaf_size : fan_out);
+  void descend_to_nearest(std::size_t level, int first, int count, double stop, Measure& measure,
+                          Nearest& found) const noexcept {
     alignas(64) std::array<float, leaf_size> values;
-    if (level == 0) {
-      const Balls points{coordinate(0), coordinate(1), coordinate(2), radii()};
-      unsigned near = measure(points, first, std::min(leaf_size, size() - first), found.distance, values.data());
-      for (; near != 0; near &= near - 1) {
-        const int i = std::countr_zero(near);
-        if (values[static_cast<std::size_t>(i)] < found.distance) {
-          found = {values[static_cast<std::size_t>(i)], first + i};
-        }
-      }
-      return;
-    }
-    const Level& below = levels_[static_cast<std::size_t>(level) - 1];
-    const int count = std::min(fan_out, below.size - first);
-    unsigned near = measure(below.boxes(), first, count, found.distance, values.data());
+    unsigned near = measure(levels_[level].boxes(), first, count, found.distance, values.data());
     while (near != 0 && !(found.distance < stop)) {
       int nearest = std::countr_zero(near);
       for (unsigned left = near & (near - 1); left != 0; left &= left - 1) {
@@ -155,7 +147,27 @@ class PointTree {
         return;
       }
       near &= ~(1u << nearest);
-      descend_to_nearest(level - 1, first + nearest, stop, measure, found);
+      const int node = first + nearest;
+      if (level == 0) {
+        look_at_leaf(node, measure, found);
+      } else {
+        const int below = node * fan_out;
+        descend_to_nearest(level - 1, below, std::min(fan_out, levels_[level - 1].size - below), stop, measure, found);
+      }
+    }
+  }
+
+  template <class Measure>
+  void look_at_leaf(int node, Measure& measure, Nearest& found) const noexcept {
+    alignas(64) std::array<float, leaf_size> values;
+    const Balls points{coordinate(0), coordinate(1), coordinate(2), radii()};
+    const int first = node * leaf_size;
+    unsigned near = measure(points, first, std::min(leaf_size, size() - first), found.distance, values.data());
+    for (; near != 0; near &= near - 1) {
+      const int i = std::countr_zero(near);
+      if (values[static_cast<std::size_t>(i)] < found.distance) {
+        found = {values[static_cast<std::size_t>(i)], first + i};
+      }
     }
   }
 
