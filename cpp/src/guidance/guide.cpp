@@ -55,6 +55,10 @@ Guide::Guide(BodyClearance body, const GuideSettings& settings)
       obstacles_(newest_),
       margin_(settings.planner.margin) {
   if (!settings_.synchronous) {
+    planner_.interrupt_when([this] {
+      newer_ = states_.update() || newer_;
+      return stopping_.load() || states_.get().goal_number != seen_goal_;
+    });
     thread_ = std::thread([this] { run(); });
   }
 }

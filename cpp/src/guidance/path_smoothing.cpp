@@ -113,14 +113,15 @@ class Stretch {
 }  // namespace
 
 Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                      const Margins& margins, double wide, RandomStream& random, BodyClearance::Workspace& workspace) {
+                      const Margins& margins, double wide, RandomStream& random, BodyClearance::Workspace& workspace,
+                      const Interrupted& interrupted) {
   Eigen::MatrixXd way = path;
   const Eigen::VectorXd &low = body.robot().limits().lower, &high = body.robot().limits().upper;
   const auto around = [&](Eigen::Index k, const Eigen::VectorXd& q) {
     return duration(way.col(k - 1), q, body, obstacles, wide, workspace) +
            duration(q, way.col(k + 1), body, obstacles, wide, workspace);
   };
-  for (Eigen::Index k = 1; k + 1 < way.cols(); ++k) {
+  for (Eigen::Index k = 1; k + 1 < way.cols() && !interrupted(); ++k) {
     double best = around(k, way.col(k));
     const double least = (way.col(k) - way.col(k - 1)).norm() + (way.col(k + 1) - way.col(k)).norm();
     for (int i = 0; i < shifts && best > least; ++i) {
@@ -140,7 +141,8 @@ Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, co
 }
 
 Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                        const Margins& margins, int attempts, RandomStream& random, BodyClearance::Workspace& workspace) {
+                        const Margins& margins, int attempts, RandomStream& random, BodyClearance::Workspace& workspace,
+                        const Interrupted& interrupted) {
   Waypoints way;
   for (Eigen::Index k = 0; k < path.cols(); ++k) {
     way.push_back(path.col(k));
@@ -155,7 +157,8 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
     return true;
   };
   int missed = 0;
-  for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2; ++attempt) {
+  for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2 && !interrupted();
+       ++attempt) {
     const Stretch stretch(way, random);
     ++missed;
     if (!stretch.bends()) {
@@ -170,7 +173,9 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
       }
     }
   }
-  way = skip(way, body, obstacles, margins, workspace);
+  if (!interrupted()) {
+    way = skip(way, body, obstacles, margins, workspace);
+  }
   Eigen::MatrixXd result(path.rows(), static_cast<Eigen::Index>(way.size()));
   for (std::size_t k = 0; k < way.size(); ++k) {
     result.col(static_cast<Eigen::Index>(k)) = way[k];

@@ -163,10 +163,10 @@ void RrtConnect::improve(Plan& plan, const Obstacles& obstacles, std::uint64_t s
       }
     }
   }
-  if (plan.path.cols() > 2 && settings_.shortcuts > 0) {
+  if (plan.path.cols() > 2 && settings_.shortcuts > 0 && !interrupted_()) {
     const Margins kept = margins(plan.margin, start, goal, obstacles);
-    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_);
-    plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_);
+    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_, interrupted_);
+    plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_, interrupted_);
   }
   plan.improvement_seconds = seconds() - begin;
 }
@@ -200,7 +200,7 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
   for (int i = 0; i < iterations && !one->full() && !other->full(); ++i) {
     ++plan.iterations;
     plan.nodes = nodes_before + one->size() + other->size();
-    if (seconds() > deadline) {
+    if (seconds() > deadline || interrupted_()) {
       plan.status = PlanStatus::timeout;
       return;
     }

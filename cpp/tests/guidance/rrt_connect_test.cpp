@@ -211,6 +211,25 @@ BOOST_AUTO_TEST_CASE(ends_that_are_slightly_inside_are_left_and_reached) {
   BOOST_TEST(name(strict_planner.plan(joints(0.8), joints(0.0), index, 0).status) == "goal_in_collision");
 }
 
+BOOST_AUTO_TEST_CASE(what_is_no_longer_wanted_ends_with_what_there_is) {
+  const Robot robot = planar(3);
+  const BodyClearance body(robot, along_links(robot));
+  RrtConnect planner(body, {});
+  const Plan first = planner.find(joints(0.5), joints(-0.5), wall(), 3);
+  BOOST_TEST_REQUIRE(name(first.status) == "found");
+  int asked = 0;
+  planner.interrupt_when([&asked] { return ++asked > 0; });
+  Plan plan = first;
+  planner.improve(plan, wall(), 3, planner.settings().margin);
+  BOOST_TEST(name(plan.status) == "found");
+  BOOST_TEST((plan.path == first.path));
+  BOOST_TEST(name(planner.find(joints(0.5), joints(-0.5), wall(), 3).status) == "timeout");
+  BOOST_TEST(asked > 0);
+  planner.interrupt_when(never_interrupted);
+  planner.improve(plan, wall(), 3, planner.settings().margin);
+  BOOST_TEST(length(plan.path) < length(first.path));
+}
+
 BOOST_AUTO_TEST_CASE(a_closed_way_ends_with_the_budget) {
   const Robot robot = planar(1);
   const BodyClearance body(robot, along_links(robot));

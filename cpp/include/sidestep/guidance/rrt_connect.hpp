@@ -3,8 +3,10 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "sidestep/guidance/body_clearance.hpp"
+#include "sidestep/guidance/path_smoothing.hpp"
 #include "sidestep/guidance/plan.hpp"
 #include "sidestep/guidance/random_stream.hpp"
 #include "sidestep/guidance/search_tree.hpp"
@@ -47,6 +49,9 @@ class RrtConnect {
   Plan find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
   void improve(Plan& plan, const Obstacles& obstacles, std::uint64_t seed, double margin);
 
+  /// Ends what is under way once it says so: as if time ran out in `find`, with what there is by then in `improve`.
+  void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
+
   const PlannerSettings& settings() const noexcept { return settings_; }
   const BodyClearance& body() const noexcept { return *body_; }
   BodyClearance::Workspace& workspace() noexcept { return workspace_; }
@@ -69,6 +74,7 @@ class RrtConnect {
   const BodyClearance* body_;
   PlannerSettings settings_;
   BodyClearance::Workspace workspace_;
+  Interrupted interrupted_ = never_interrupted;
   SearchTree from_start_, from_goal_;
   Eigen::VectorXd sample_, next_, near_, clearances_;
 };
