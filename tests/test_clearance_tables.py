@@ -10,7 +10,7 @@ import pytest
 from sidestep import Body, ClearanceTable, ClearanceTableBarrier, Obstacles, Robot, SelfCollision
 from sidestep.barriers import Barriers
 from sidestep.body import cache
-from sidestep.clearance_tables import ClearanceTables, clearance_tables, stored_at
+from sidestep.clearance_tables import clearance_tables, stored_at
 from sidestep.link_pairs import barrier_pairs
 from sidestep.presets import barrier_system
 
@@ -137,5 +137,4 @@ def test_what_is_wrong_with_a_barrier_of_tables_is_named() -> None:
     evaluation = barrier.evaluate(np.zeros(2), np.zeros(2), Obstacles.none())
     # 0.02 (0.05/0.02 - 1)^2 of the default barrier
     assert evaluation.values[0] == pytest.approx(0.045, abs=1e-12)
-    assert isinstance(clearance_tables(Robot.named("planar2")), ClearanceTables)
-    assert clearance_tables(Robot.named("planar2")).pairs == ()
+    assert clearance_tables(robot).pairs == ()

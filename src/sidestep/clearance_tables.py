@@ -111,6 +111,7 @@ class _Axis:
     def points(self) -> Array:
         return self.begin + self.spacing * np.arange(self.count, dtype=np.float64)
 
+    @property
     def inside(self) -> slice:
         """Those within the limits."""
         return slice(None) if self.periodic else slice(BEYOND, self.count - BEYOND)
@@ -135,10 +136,9 @@ def _measure(robot: Robot) -> ClearanceTables:
 
         grid = np.array([[distance(x, y) for y in axes[1].points] for x in axes[0].points])
         travel = check.travel_between(*pair)
-        least = grid - sum(
-            0.5 * axis.spacing * travel[axis.coordinate] for axis in axes
-        )  # halfway to the next points
-        if least[axes[0].inside(), axes[1].inside()].min() > 0.0:
+        # Halfway to the next points.
+        least = grid - sum(0.5 * axis.spacing * travel[axis.coordinate] for axis in axes)
+        if least[axes[0].inside, axes[1].inside].min() > 0.0:
             apart.append(pair)
         else:
             tables.append(_table(pair, axes, _continued(grid, axes), distance, _near(least, axes)))

@@ -20,7 +20,7 @@ from sidestep._core import (
 )
 from sidestep.barriers import Barriers as Barriers
 from sidestep.body import Body
-from sidestep.clearance_tables import ClearanceTables, clearance_tables
+from sidestep.clearance_tables import clearance_tables
 from sidestep.link_pairs import barrier_pairs
 from sidestep.robot import Robot
 
@@ -68,35 +68,27 @@ def barrier_system(
             robot, activation=numbers.limit_activation, strength=numbers.limit_strength, power=numbers.power
         ),
     ]
-    exact = clearance_tables(robot) if self_collision else ClearanceTables((), ())
-    if exact.tables:
-        parts.append(
-            ClearanceTableBarrier(
-                robot,
-                exact.tables,
-                activation=numbers.self_activation,
-                strength=numbers.self_strength,
-                power=numbers.power,
-                floor=numbers.floor,
-            )
-        )
-    pairs = (
-        [pair for pair in barrier_pairs(robot, body) if pair[:2] not in exact.pairs] if self_collision else []
-    )
-    if pairs:
-        parts.append(
-            SelfCollisionBarrier(
-                robot,
-                body,
-                pairs,
-                activation=numbers.self_activation,
-                strength=numbers.self_strength,
-                power=numbers.power,
-                floor=numbers.floor,
-                temperature=numbers.temperature,
-            )
-        )
+    if self_collision:
+        parts += _self_collision(robot, body, numbers)
     return GeometricSystem(parts, stiffness=numbers.stiffness, damping=numbers.damping, pull_form="one_sided")
+
+
+def _self_collision(robot: Robot, body: Body, numbers: Barriers) -> list[Embedding]:
+    """By tables where there are any, by covers between other links that may touch."""
+    settings = {
+        "activation": numbers.self_activation,
+        "strength": numbers.self_strength,
+        "power": numbers.power,
+        "floor": numbers.floor,
+    }
+    parts: list[Embedding] = []
+    exact = clearance_tables(robot)
+    if exact.tables:
+        parts.append(ClearanceTableBarrier(robot, exact.tables, **settings))
+    pairs = [pair for pair in barrier_pairs(robot, body) if pair[:2] not in exact.pairs]
+    if pairs:
+        parts.append(SelfCollisionBarrier(robot, body, pairs, temperature=numbers.temperature, **settings))
+    return parts
 
 
 def thesis_system(

@@ -115,7 +115,7 @@ class Judge:
         finite = np.isfinite(motion.q).all(axis=1) & np.isfinite(motion.v).all(axis=1)
         end = len(motion.q) if finite.all() else int(finite.argmin())
         q = motion.q[:end]
-        clearance, pair, when = None, "", 0.0
+        clearance, pair, touched, when = None, "", "", 0.0
         if problem.objects:
             exact = self._clearance.among(problem.objects)
             for first, last in between_jumps(motion.object_poses[:end]):
@@ -126,7 +126,8 @@ class Judge:
                 measured = measured if worst.lower_bound > 0.0 else min(measured, worst.lower_bound)
                 if clearance is None or measured < clearance:
                     clearance = measured
-                    pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
+                    touched = worst.clearance.obstacle
+                    pair = f"{worst.clearance.link} - {touched}"
                     when = (first + worst.sample) * settings.period
         own, tolerance = self._self.minimum_over(q, tolerance=TOLERANCE), TOLERANCE
         while FINEST < own.distance <= tolerance:  # too close to say at this tolerance
@@ -134,7 +135,7 @@ class Judge:
             own = self._self.minimum_over(q, tolerance=tolerance)
         way_out = None
         if settings.safe and clearance is not None and clearance <= 0.0 and end == len(motion.q):
-            way_out = self._find_way_out(problem, motion, pair, when, settings.period)
+            way_out = self._find_way_out(problem, motion, touched, when, settings.period)
         return Outcome(
             index=problem.index,
             arrived=motion.arrived,
@@ -154,15 +155,15 @@ class Judge:
         )
 
     def _find_way_out(
-        self, problem: Problem, motion: Motion, pair: str, when: float, period: float
+        self, problem: Problem, motion: Motion, touched: str, when: float, period: float
     ) -> WayOut | None:
-        (touched,) = (item for item in problem.objects if item.name == pair.split(" - ")[1])
-        if touched.motion != "moving":
+        (item,) = (item for item in problem.objects if item.name == touched)
+        if item.motion != "moving":
             return None
         return find_way_out(
             problem,
             motion,
-            touched,
+            item,
             when,
             period=period,
             clearance=self._clearance,
