@@ -180,7 +180,7 @@ def _under_torque(
     settings: MotionSettings,
     guided: _Led | None,
 ) -> Motion:
-    simulation = Simulation(robot, problem.objects, timestep=settings.period)
+    simulation = Simulation(robot, problem.objects, timestep=settings.period, visuals=False)
     relaxed, escape = _prepared(robot, system, problem, settings)
     timer = _Timer()
     run = simulation.run(

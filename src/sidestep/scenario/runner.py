@@ -82,7 +82,7 @@ def _arrival(scenario: Scenario) -> Arrival:
 
 def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
     choice = scenario.simulation
-    simulation = Simulation(parts.robot, parts.objects, timestep=choice.period)
+    simulation = Simulation(parts.robot, parts.objects, timestep=choice.period, visuals=False)
     return simulation.run(
         parts.system if parts.guide is None else _Guided(parts.guide, parts.goal, choice.period),
         parts.torque_program,

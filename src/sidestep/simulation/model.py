@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -59,9 +60,8 @@ class SimulationModel:
 
     def state(self, data: mujoco.MjData) -> tuple[Array, Array]:
         """Coordinates q and v (nv,) of the robot."""
-        own = self.coordinate[self.leaders, np.arange(len(self.leaders))]
-        q = (data.qpos[self.joint_positions[self.leaders]] - self.offset[self.leaders]) / own
-        return q, data.qvel[self.joint_velocities[self.leaders]] / own
+        positions, velocities, offset, ratio = self._read
+        return (data.qpos[positions] - offset) / ratio, data.qvel[velocities] / ratio
 
     def set_state(self, data: mujoco.MjData, q: Array, v: Array) -> None:
         """Puts the robot, mimic joints included, at (q, v)."""
@@ -72,14 +72,34 @@ class SimulationModel:
         """M (nv, nv) in the robot's coordinates, after the forward kinematics of `data`."""
         full = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, data, full)
-        joints = full[np.ix_(self.joint_velocities, self.joint_velocities)]
-        projected: Array = self.coordinate.T @ joints @ self.coordinate
+        projected: Array = self.coordinate.T @ full[self._rows, self.joint_velocities] @ self.coordinate
         return projected
 
     def bias(self, data: mujoco.MjData) -> Array:
         """C(q, v) v + g(q) (nv,) in the robot's coordinates."""
         projected: Array = self.coordinate.T @ data.qfrc_bias[self.joint_velocities]
         return projected
+
+    def object_poses(self, data: mujoco.MjData) -> Array:
+        """Position and quaternion (w, x, y, z) in the world of each scene object, (N, 7)."""
+        poses = np.empty((len(self._bodies), 7))
+        poses[:, :3], poses[:, 3:] = data.xpos[self._bodies], data.xquat[self._bodies]
+        return poses
+
+    @cached_property
+    def _read(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array, Array]:
+        """Where each coordinate is in qpos and qvel, and its joint's offset and multiplier."""
+        ratio = self.coordinate[self.leaders, np.arange(len(self.leaders))]
+        positions, velocities = self.joint_positions[self.leaders], self.joint_velocities[self.leaders]
+        return positions, velocities, self.offset[self.leaders], ratio
+
+    @cached_property
+    def _rows(self) -> npt.NDArray[np.intp]:
+        return self.joint_velocities[:, None]
+
+    @cached_property
+    def _bodies(self) -> npt.NDArray[np.intp]:
+        return np.array(self.object_bodies, dtype=np.intp)
 
 
 def build_model(

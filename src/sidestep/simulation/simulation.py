@@ -51,7 +51,7 @@ class Simulation:
         objects: the scene: fixed, free and moving solids. See `build_model` for what touches what.
         timestep: control period [s].
         substeps: physics steps per control period; the torque is held over them.
-        floor_height, joint_damping, joint_friction: see `build_model`.
+        floor_height, joint_damping, joint_friction, visuals: see `build_model`.
 
     Raises:
         ValueError: see `build_model`; or substeps < 1.
@@ -67,6 +67,7 @@ class Simulation:
         floor_height: float | None = None,
         joint_damping: float = 0.0,
         joint_friction: float = 0.0,
+        visuals: bool = True,
     ) -> None:
         if substeps < 1:
             raise ValueError(f"substeps must be at least 1, got {substeps}")
@@ -81,6 +82,7 @@ class Simulation:
             floor_height=floor_height,
             joint_damping=joint_damping,
             joint_friction=joint_friction,
+            visuals=visuals,
         )
 
     def run(
@@ -146,7 +148,7 @@ class Simulation:
                 q, v, step.acceleration, built.mass_matrix(data), built.bias(data), **kept
             )
             torque = np.asarray(solution.torque)
-            poses = self._object_poses(data)
+            poses = built.object_poses(data)
             data.ctrl[built.actuators] = torque
             for substep in range(self.substeps):
                 if substep > 0:
@@ -200,10 +202,6 @@ class Simulation:
         for item, body in zip(self.objects, self.built.object_bodies, strict=True):
             if item.motion == "moving":
                 data.mocap_pos[self.built.model.body_mocapid[body]] = item.pose_at(time)[:3, 3]
-
-    def _object_poses(self, data: mujoco.MjData) -> Array:
-        bodies = list(self.built.object_bodies)
-        return np.hstack([data.xpos[bodies], data.xquat[bodies]]) if bodies else np.zeros((0, 7))
 
     def _contacts(self, data: mujoco.MjData, time: float) -> list[Contact]:
         found = []

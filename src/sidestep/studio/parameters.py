@@ -171,7 +171,7 @@ ESCAPE: tuple[Parameter, ...] = (
         "spread",
         "rad",
         0.1,
-        3.1,
+        6.3,
         "Higher takes sub-goals farther off: out of deeper dead ends, on longer ways.",
     ),
 )
