@@ -40,20 +40,24 @@ Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
 void bind_goals(nb::module_& m) {
   nb::class_<JointGoal>(m, "JointGoal",
                         "A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.\n"
-                        "position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] of a goal that moves, zero by default.")
+                        "position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] and acceleration (nv,) [rad/s^2] of a goal that moves,\n"
+                        "zero by default.")
       .def(
           "__init__",
-          [](JointGoal* self, const ArrayLike& position, nb::handle velocity) {
+          [](JointGoal* self, const ArrayLike& position, nb::handle velocity, nb::handle acceleration) {
             Eigen::VectorXd q = as_vector(position, "position");
             const Eigen::Index nv = q.size();
-            new (self) JointGoal(std::move(q), velocity.is_none() ? Eigen::VectorXd(Eigen::VectorXd::Zero(nv))
-                                                                  : as_vector(velocity, "velocity", nv));
+            const auto rate = [nv](nb::handle value, const char* name) {
+              return value.is_none() ? Eigen::VectorXd(Eigen::VectorXd::Zero(nv)) : as_vector(value, name, nv);
+            };
+            new (self) JointGoal(std::move(q), rate(velocity, "velocity"), rate(acceleration, "acceleration"));
           },
-          nb::arg("position"), nb::arg("velocity") = nb::none(),
-          nb::sig("def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None) "
-                  "-> None"))
+          nb::arg("position"), nb::arg("velocity") = nb::none(), nb::arg("acceleration") = nb::none(),
+          nb::sig("def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None, "
+                  "acceleration: numpy.typing.ArrayLike | None = None) -> None"))
       .def_prop_ro("position", [](const JointGoal& g) { return to_numpy(g.position); })
-      .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); });
+      .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); })
+      .def_prop_ro("acceleration", [](const JointGoal& g) { return to_numpy(g.acceleration); });
 
   nb::class_<PoseGoal>(
       m, "PoseGoal",

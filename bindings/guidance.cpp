@@ -116,18 +116,20 @@ void bind_settings(nb::module_& m) {
       "How fast the attractor of a Guide passes a path. speed [rad/s]: fastest |dq*/dt|; speed_share: of the joints'\n"
       "velocity limits that it may ask for; acceleration [rad/s^2]: at which it slows down ahead. wide [m]: clearance\n"
       "from which it goes at full speed; slowest: share of the speed that is left where there is none. lead [rad]:\n"
-      "|q - q*| at which it waits for the arm. Raises ValueError that names the setting at fault.")
+      "|q - q*| at which it waits for the arm. delay [s]: an arm leaves a corner by this times the change of velocity;\n"
+      "corners are passed so slowly that there is room for it. Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
           [](RouteSettings* self, double speed, double speed_share, double acceleration, double wide, double slowest,
-             double lead) {
-            const RouteSettings s{speed, speed_share, acceleration, wide, slowest, lead};
+             double lead, double delay) {
+            const RouteSettings s{speed, speed_share, acceleration, wide, slowest, lead, delay};
             s.validate();
             new (self) RouteSettings(s);
           },
           nb::kw_only(), nb::arg("speed") = RouteSettings{}.speed, nb::arg("speed_share") = RouteSettings{}.speed_share,
           nb::arg("acceleration") = RouteSettings{}.acceleration, nb::arg("wide") = RouteSettings{}.wide,
-          nb::arg("slowest") = RouteSettings{}.slowest, nb::arg("lead") = RouteSettings{}.lead)
+          nb::arg("slowest") = RouteSettings{}.slowest, nb::arg("lead") = RouteSettings{}.lead,
+          nb::arg("delay") = RouteSettings{}.delay)
       .def_ro("speed", &RouteSettings::speed)
       .def_ro("lead", &RouteSettings::lead);
 }
@@ -151,13 +153,18 @@ void bind_guide(nb::module_& m) {
 
   nb::class_<Guidance>(m, "Guidance", "Where a guide draws the arm to, and what the motion is about.")
       .def_ro("status", &Guidance::status)
-      .def_prop_ro("goal", [](const Guidance& g) { return JointGoal(g.attractor.position, g.attractor.velocity); },
+      .def_prop_ro("goal", [](const Guidance& g) { const Guide::Attractor& a = g.attractor;
+                     return JointGoal(a.position, a.velocity, a.acceleration); },
                    "The attractor, as a goal for a GeometricSystem.")
-      .def_prop_ro("tight", [](const Guidance& g) { return to_numpy(g.attractor.tight); },
-                   "Where barriers are to leave room (nv,): the tightest place of the path that the arm is about to pass, else\n"
-                   "the goal. See GeometricSystem.relaxed_at.")
+      .def_prop_ro("places",
+                   [](const Guidance& g) {
+                     const Guide::Attractor& a = g.attractor;
+                     return to_numpy_matrix(a.places.leftCols(a.num_places).transpose());
+                   },
+                   "Where barriers are to leave room (k, nv): the narrow places of the path that the arm is about to pass, or the\n"
+                   "goal where there is none. See GeometricSystem.relaxed_at.")
       .def_prop_ro("arrives", [](const Guidance& g) { return g.attractor.arrives; },
-                   "Whether barriers are to leave room at the goal as well: `tight` is another place, and the end of the path is\n"
+                   "Whether barriers are to leave room at the goal as well: `places` are others, and the end of the path is\n"
                    "within the lead.");
 
   nb::class_<Guide>(
@@ -198,7 +205,7 @@ void bind_guide(nb::module_& m) {
       .def(
           "step",
           [](Guide& g, const ArrayLike& q, double time) {
-            Guidance guidance;
+            Guidance guidance{GuideStatus::idle, Guide::Attractor(g.body().robot().num_coordinates())};
             const Eigen::VectorXd at = as_vector(q, "q", g.body().robot().num_coordinates());
             const nb::gil_scoped_release release;
             guidance.status = g.step(at, time, guidance.attractor);

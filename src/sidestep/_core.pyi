@@ -456,16 +456,20 @@ class DistanceSwitch:
 class JointGoal:
     """
     A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.
-    position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] of a goal that moves, zero by default.
+    position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] and acceleration (nv,) [rad/s^2] of a goal that moves,
+    zero by default.
     """
 
-    def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None) -> None: ...
+    def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None, acceleration: numpy.typing.ArrayLike | None = None) -> None: ...
 
     @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
     def velocity(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
 class PoseGoal:
     """
@@ -1420,10 +1424,11 @@ class RouteSettings:
     How fast the attractor of a Guide passes a path. speed [rad/s]: fastest |dq*/dt|; speed_share: of the joints'
     velocity limits that it may ask for; acceleration [rad/s^2]: at which it slows down ahead. wide [m]: clearance
     from which it goes at full speed; slowest: share of the speed that is left where there is none. lead [rad]:
-    |q - q*| at which it waits for the arm. Raises ValueError that names the setting at fault.
+    |q - q*| at which it waits for the arm. delay [s]: an arm leaves a corner by this times the change of velocity;
+    corners are passed so slowly that there is room for it. Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, *, speed: float = 2.0, speed_share: float = 0.7, acceleration: float = 4.0, wide: float = 0.03, slowest: float = 0.35, lead: float = 0.4) -> None: ...
+    def __init__(self, *, speed: float = 2.0, speed_share: float = 0.7, acceleration: float = 4.0, wide: float = 0.03, slowest: float = 0.35, lead: float = 0.4, delay: float = 0.18) -> None: ...
 
     @property
     def speed(self) -> float: ...
@@ -1469,16 +1474,16 @@ class Guidance:
         """The attractor, as a goal for a GeometricSystem."""
 
     @property
-    def tight(self) -> numpy.typing.NDArray[numpy.float64]:
+    def places(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Where barriers are to leave room (nv,): the tightest place of the path that the arm is about to pass, else
-        the goal. See GeometricSystem.relaxed_at.
+        Where barriers are to leave room (k, nv): the narrow places of the path that the arm is about to pass, or the
+        goal where there is none. See GeometricSystem.relaxed_at.
         """
 
     @property
     def arrives(self) -> bool:
         """
-        Whether barriers are to leave room at the goal as well: `tight` is another place, and the end of the path is
+        Whether barriers are to leave room at the goal as well: `places` are others, and the end of the path is
         within the lead.
         """
 

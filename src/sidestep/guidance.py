@@ -96,7 +96,7 @@ class GuidedMotion:
     def moving(self) -> GeometricSystem:
         """The system with barriers that leave room where the arm has to come close, as of the last step.
 
-        Relaxed at the tightest place of the path ahead, and at the goal where there is none and at the end, as long as
+        Relaxed at the narrow places of the path ahead, and at the goal where there is none and at the end, as long as
         all that is seen is at rest; never below the barriers' floors, see `GeometricSystem.relaxed_at`.
         """
         return self._moving
@@ -142,7 +142,7 @@ class GuidedMotion:
         if guidance.status is GuideStatus.idle or np.any(obstacles.velocities):
             self._moving, self._relaxed = self.system, None
             return
-        places = [guidance.tight, *([self._goal] if guidance.arrives else [])]
+        places = [*guidance.places, *([self._goal] if guidance.arrives else [])]
         key = np.concatenate(places).tobytes()
         if self._relaxed is None or key != self._relaxed[0] or not _same(obstacles, self._relaxed[1]):
             self._moving = self.system

@@ -122,7 +122,7 @@ def test_barriers_leave_a_goal_free_once_it_is_free(robot: ss.Robot, body: _core
     assert pull(motion.moving) == pytest.approx(free, rel=1e-9)  # rounding
 
 
-def test_barriers_leave_room_at_the_tightest_place_of_the_path(robot: ss.Robot, body: _core.Body) -> None:
+def test_barriers_leave_room_at_the_narrow_places_of_the_path(robot: ss.Robot, body: _core.Body) -> None:
     motion = guided(robot, body, planner=ss.PlannerSettings(margin=0.01, floor=0.01))
     motion.set_goal(GOAL)
     q, v, rest, values = START, np.zeros(3), np.zeros(3), []
@@ -130,10 +130,10 @@ def test_barriers_leave_room_at_the_tightest_place_of_the_path(robot: ss.Robot, 
         step = motion.step(q, v, WALL, time=PERIOD * k)
         if step.status == ss.GuideStatus.arrived:
             break
-        tight = motion.lead(q, WALL, PERIOD * k).tight
-        if not np.array_equal(tight, GOAL):
-            systems = (motion.moving, motion.system)
-            values.append([s.acceleration(tight, rest, GOAL, WALL).values.max() for s in systems])
+        for place in motion.lead(q, WALL, PERIOD * k).places:
+            if not np.array_equal(place, GOAL):
+                systems = (motion.moving, motion.system)
+                values.append([s.acceleration(place, rest, GOAL, WALL).values.max() for s in systems])
         v = v + PERIOD * step.acceleration
         q = q + PERIOD * v
     assert step.status == ss.GuideStatus.arrived

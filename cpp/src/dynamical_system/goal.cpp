@@ -36,12 +36,18 @@ Frame moved_frame(const Robot& robot, const std::string& name) {
 
 }  // namespace
 
-JointGoal::JointGoal(Eigen::VectorXd q) : position(std::move(q)), velocity(Eigen::VectorXd::Zero(position.size())) {}
+JointGoal::JointGoal(Eigen::VectorXd q)
+    : position(std::move(q)), velocity(Eigen::VectorXd::Zero(position.size())), acceleration(velocity) {}
 
-JointGoal::JointGoal(Eigen::VectorXd q, Eigen::VectorXd v) : position(std::move(q)), velocity(std::move(v)) {
-  if (velocity.size() != position.size()) {
-    throw std::invalid_argument("joint goal: velocity has " + std::to_string(velocity.size()) +
-                                " entries, position " + std::to_string(position.size()) + "; must be equal");
+JointGoal::JointGoal(Eigen::VectorXd q, Eigen::VectorXd v)
+    : JointGoal(std::move(q), v, Eigen::VectorXd::Zero(v.size())) {}
+
+JointGoal::JointGoal(Eigen::VectorXd q, Eigen::VectorXd v, Eigen::VectorXd a)
+    : position(std::move(q)), velocity(std::move(v)), acceleration(std::move(a)) {
+  if (velocity.size() != position.size() || acceleration.size() != position.size()) {
+    throw std::invalid_argument("joint goal: velocity has " + std::to_string(velocity.size()) + " and acceleration " +
+                                std::to_string(acceleration.size()) + " entries, position " +
+                                std::to_string(position.size()) + "; must be equal");
   }
 }
 
@@ -89,7 +95,8 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
 
 void advance(Goal& goal, double duration) noexcept {
   if (auto* joint = std::get_if<JointGoal>(&goal)) {
-    joint->position += duration * joint->velocity;
+    joint->position += duration * joint->velocity + 0.5 * duration * duration * joint->acceleration;
+    joint->velocity += duration * joint->acceleration;
     return;
   }
   PoseGoal& frame = std::get<PoseGoal>(goal);
@@ -103,9 +110,10 @@ void advance(Goal& goal, double duration) noexcept {
 
 GoalFault check(const Goal& goal, const Robot& robot) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
-    if (joint->position.size() != robot.num_coordinates() || joint->velocity.size() != robot.num_coordinates() ||
-        !joint->position.allFinite() || !joint->velocity.allFinite()) {
-      return GoalFault::invalid;
+    for (const Eigen::VectorXd* part : {&joint->position, &joint->velocity, &joint->acceleration}) {
+      if (part->size() != robot.num_coordinates() || !part->allFinite()) {
+        return GoalFault::invalid;
+      }
     }
     const bool outside = (joint->position.array() < robot.limits().lower.array()).any() ||
                          (joint->position.array() > robot.limits().upper.array()).any();
@@ -138,6 +146,7 @@ void GoalPull::update(const JointGoal& goal, const KinematicState& state, const 
   displacement_ = state.q() - goal.position;
   gradient = stiffness.lazyProduct(displacement_);
   potential = 0.5 * displacement_.dot(gradient);
+  gradient -= goal.acceleration;
   velocity = goal.velocity;
   joint_error = displacement_.lpNorm<Eigen::Infinity>();
   position_error = rotation_error = nan;

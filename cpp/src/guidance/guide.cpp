@@ -13,6 +13,7 @@ namespace {
 
 constexpr double widening = 1.5;   // the margin grows by this factor each time the arm was stuck
 constexpr int widenings = 4;    // and begins anew after so many
+constexpr double back = 0.05;   // between places behind the attractor where an arm may find back to its path [rad]
 
 }  // namespace
 
@@ -47,6 +48,8 @@ Guide::Guide(BodyClearance body, const GuideSettings& settings)
     : body_(std::move(body)),
       settings_((settings.validate(), settings)),
       goal_(Eigen::VectorXd::Zero(body_.robot().num_coordinates())),
+      last_q_(goal_),
+      velocity_(goal_),
       progress_(settings.patience),
       states_(State{goal_, goal_}),
       answers_(Answer{}),
@@ -98,7 +101,9 @@ void Guide::set_obstacles(const Obstacles& obstacles) {
 
 GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept {
   attractor.velocity.setZero(goal_.size());
-  attractor.tight = goal_;
+  attractor.acceleration.setZero(goal_.size());
+  attractor.places.col(0) = goal_;
+  attractor.num_places = 1;
   attractor.arrives = false;
   if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite()) {
     attractor.position = goal_;
@@ -111,6 +116,11 @@ GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attrac
   if (first) {
     started_ = true;
     begin_ = last_time_ = next_look_ = time;
+    last_q_ = q;
+    velocity_.setZero();
+  } else if (time > last_time_) {
+    velocity_ = (q - last_q_) / (time - last_time_);
+    last_q_ = q;
   }
   // Tell the guide; in a thread it looks at its own pace, and at once at a new goal.
   if (!settings_.synchronous || time >= next_look_) {
@@ -136,12 +146,13 @@ GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attrac
   if (ours && answer.status == PlanStatus::found && !answer.direct) {
     if (answer.route_number != followed_) {
       followed_ = answer.route_number;
-      follower_.enter(answer.route, q);
+      follower_.enter(answer.route, q, velocity_);
     }
     attractor.position.resize(goal_.size());
-    follower_.advance(answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity);
-    if (const Eigen::Index tightest = follower_.tightest(answer.route, settings_.route); tightest >= 0) {
-      attractor.tight = answer.route.q.col(tightest);
+    follower_.advance(answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity,
+                      attractor.acceleration);
+    if (const Eigen::Index num = follower_.narrow(answer.route, settings_.route, attractor.places); num > 0) {
+      attractor.num_places = num;
       attractor.arrives = answer.route.length() - follower_.station <= settings_.route.lead;
     }
   } else {
@@ -156,7 +167,11 @@ GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attrac
   }
   const double left = ours && !answer.direct ? answer.route.length() - follower_.station : 0.0;
   const double away = (attractor.position - q).norm() + left;
-  if (progress_.update(time, away * away)) {
+  if (ours && answer.path_number != measured_) {  // another way may be longer
+    measured_ = answer.path_number;
+    progress_.reset();
+  }
+  if (progress_.update(time, std::exp(away))) {  // it goes with what is left, however long the way
     ++stops_;
     progress_.reset();
   }
@@ -229,22 +244,24 @@ void Guide::look(const State& state) {
   const PlannerSettings& asked = settings_.planner;
   const double wide = have_path_ ? asked.margin : std::sqrt(asked.margin * asked.floor);
   const bool straight = state.stops == 0 && !stuck &&
-                        body_.edge_free(state.q, state.goal, obstacles,
-                                        planner_.margins(wide, state.q, state.goal, obstacles), planner_.workspace());
+                        planner_.sees(state.q, state.goal, wide, obstacles);
   if (straight) {
     Obstruction found;
     if (!planner_.obstructed(state.goal, obstacles, found) && !planner_.obstructed(state.q, obstacles, found)) {
       if (!direct_ || new_goal || status_ != PlanStatus::found) {
         direct_ = true;
         have_path_ = failed_ = false;
+        ++path_number_;
         answer(state, PlanStatus::found, true);
       }
       return;
     }
   }
-  const bool follows = have_path_ && state.route_number == route_number_;
-  if (have_path_ && !stuck && !direct_ && (!follows || way_is_free(state, obstacles, changed))) {
-    return;
+  if (have_path_ && !stuck && !direct_) {
+    const bool follows = state.route_number == route_number_;
+    if (!follows || ((!changed || ahead_is_free(state, obstacles)) && holds_on(state, obstacles))) {
+      return;
+    }
   }
   direct_ = false;
   const bool out_of_budget = status_ == PlanStatus::no_path || status_ == PlanStatus::timeout;
@@ -254,28 +271,28 @@ void Guide::look(const State& state) {
   search(state, obstacles);
 }
 
-bool Guide::way_is_free(const State& state, const Obstacles& obstacles, bool changed) {
-  // What is still ahead, from the attractor on, with what the path was made with.
-  Eigen::Index next = 1;
-  while (next + 1 < path_.cols() && stations_[next] <= state.station) {
-    ++next;
-  }
-  const double length = stations_[next] - stations_[next - 1];
-  const double share = length > 0.0 ? std::clamp((state.station - stations_[next - 1]) / length, 0.0, 1.0) : 1.0;
-  Eigen::VectorXd from = path_.col(next - 1) + share * (path_.col(next) - path_.col(next - 1));
-  // An obstacle that comes a little nearer bends the motion, it does not block the path: half the margin is enough.
+Eigen::VectorXd Guide::on_route(double station) const {
+  const Eigen::VectorXd& at = route_.station;
+  const Eigen::Index last = at.size() - 1;
+  const Eigen::Index next = std::clamp<Eigen::Index>(std::upper_bound(at.begin(), at.end(), station) - at.begin(), 1, last);
+  const double length = at[next] - at[next - 1];
+  const double share = length > 0.0 ? std::clamp((station - at[next - 1]) / length, 0.0, 1.0) : 1.0;
+  return route_.q.col(next - 1) + share * (route_.q.col(next) - route_.q.col(next - 1));
+}
+
+Eigen::Index Guide::waypoint_after(double station) const {
+  const auto next = std::upper_bound(stations_.begin(), stations_.end(), station) - stations_.begin();
+  return std::min<Eigen::Index>(next, stations_.size() - 1);
+}
+
+bool Guide::ahead_is_free(const State& state, const Obstacles& obstacles) {
+  // With what the path was made with. An obstacle that comes a little nearer bends the motion, it does not block the path:
+  // half the margin is enough.
   Margins margins = path_margins_;
   margins.margin *= 0.5;
   margins.pair_margin *= 0.5;
-  // Barriers may have pushed the arm off the path, to where the attractor cannot be gone to straight.
-  if (!body_.edge_free(state.q, from, obstacles, planner_.margins(settings_.planner.floor, state.q, from, obstacles),
-                       planner_.workspace())) {
-    return false;
-  }
-  if (!changed) {
-    return true;
-  }
-  for (; next < path_.cols(); ++next) {
+  Eigen::VectorXd from = on_route(state.station);
+  for (Eigen::Index next = waypoint_after(state.station); next < path_.cols(); ++next) {
     if (!body_.edge_free(from, path_.col(next), obstacles, margins, planner_.workspace())) {
       return false;
     }
@@ -284,31 +301,62 @@ bool Guide::way_is_free(const State& state, const Obstacles& obstacles, bool cha
   return true;
 }
 
+bool Guide::holds_on(const State& state, const Obstacles& obstacles) {
+  const double floor = settings_.planner.floor;
+  if (planner_.sees(state.q, on_route(state.station), floor, obstacles)) {
+    return true;
+  }
+  const Eigen::VectorXd here = within_limits(state.q);
+  Obstruction obstruction;
+  if (planner_.obstructed(here, obstacles, obstruction)) {
+    return false;
+  }
+  Eigen::MatrixXd path = path_;
+  if (!planner_.enter(path, waypoint_after(state.station), path_margins_.margin, here, obstacles)) {
+    double station = state.station;
+    const double earliest = std::max(0.0, station - settings_.route.lead);
+    do {
+      if (station <= earliest) {
+        return false;
+      }
+      station = std::max(earliest, station - back);
+    } while (!planner_.sees(here, on_route(station), floor, obstacles));
+    const Eigen::Index rest = path_.cols() - waypoint_after(station);
+    path.resize(path_.rows(), rest + 2);
+    path << here, on_route(station), path_.rightCols(rest);
+  }
+  path_margins_ = planner_.margins(path_margins_.margin, here, state.goal, obstacles);
+  follow(state, path, obstacles, true);
+  return true;
+}
+
 void Guide::search(const State& state, const Obstacles& obstacles) {
-  const JointLimits& limits = body_.robot().limits();
-  const Eigen::VectorXd start = state.q.cwiseMax(limits.lower).cwiseMin(limits.upper);
   const double margin = std::max(margin_, settings_.planner.floor);
   const std::uint64_t seed = settings_.seed + searches_++;
-  Plan plan = planner_.find(start, state.goal, obstacles, seed);
+  Plan plan = planner_.find(within_limits(state.q), state.goal, obstacles, seed);
   const PlanStatus status = plan.status;
   const bool found = status == PlanStatus::found;
   have_path_ = found;
   failed_ = !found;
   failed_at_ = state.time;
   if (found) {
+    ++path_number_;
     const Plan first = plan;
     if (!settings_.synchronous) {  // to begin with
-      follow(state, plan, obstacles, false);
+      follow(state, plan.path, obstacles, false);
     }
     planner_.improve(plan, obstacles, seed, margin);
     if (!settings_.synchronous) {
       newer_ = true;
-      if (!enter(plan, states_.get().q, obstacles)) {
+      const Eigen::VectorXd here = within_limits(states_.get().q);
+      Obstruction obstruction;
+      if (planner_.obstructed(here, obstacles, obstruction) || !planner_.enter(plan.path, 0, plan.margin, here, obstacles)) {
         plan = first;
       }
     }
+    ++path_number_;
     path_margins_ = planner_.margins(plan.margin, plan.path.col(0), state.goal, obstacles);
-    follow(state, plan, obstacles, true);
+    follow(state, plan.path, obstacles, true);
   }
   {
     const std::lock_guard lock(mutex_);
@@ -321,27 +369,8 @@ void Guide::search(const State& state, const Obstacles& obstacles) {
   }
 }
 
-bool Guide::enter(Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles) {
-  const JointLimits& limits = body_.robot().limits();
-  const Eigen::VectorXd here = q.cwiseMax(limits.lower).cwiseMin(limits.upper);
-  Obstruction obstruction;
-  if (planner_.obstructed(here, obstacles, obstruction)) {
-    return false;
-  }
-  for (Eigen::Index k = plan.path.cols() - 1; k >= 0; --k) {
-    if (body_.edge_free(here, plan.path.col(k), obstacles, planner_.margins(plan.margin, here, plan.path.col(k), obstacles),
-                        planner_.workspace())) {
-      Eigen::MatrixXd path(plan.path.rows(), plan.path.cols() - k + 1);
-      path << here, plan.path.rightCols(plan.path.cols() - k);
-      plan.path = std::move(path);
-      return true;
-    }
-  }
-  return false;
-}
-
-void Guide::follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured) {
-  path_ = plan.path;
+void Guide::follow(const State& state, const Eigen::MatrixXd& path, const Obstacles& obstacles, bool measured) {
+  path_ = path;
   stations_ = Eigen::VectorXd::Zero(path_.cols());
   for (Eigen::Index k = 1; k < path_.cols(); ++k) {
     stations_[k] = stations_[k - 1] + (path_.col(k) - path_.col(k - 1)).norm();
@@ -358,6 +387,7 @@ void Guide::answer(const State& state, PlanStatus status, bool direct) {
   answer.status = status;
   answer.direct = direct;
   answer.route_number = route_number_;
+  answer.path_number = path_number_;
   if (status == PlanStatus::found && !direct) {
     answer.route = route_;
   }

@@ -11,7 +11,26 @@ namespace sidestep {
 namespace {
 
 constexpr double spacing = 0.05;   // of the samples [rad]
+constexpr double crawl = 0.1;      // speed that is left at the narrowest corner [rad/s]
+constexpr double seen = 0.2;       // clearance from which a corner is wide [m]
 constexpr Eigen::Index first = 20;  // samples among which an arm that moved while the route was made enters it
+
+/// The speed at which a path may turn at a waypoint: what follows it with a delay leaves it there by the change of
+/// velocity times that delay, and may by the clearance of what leaves.
+double corner_speed(const Eigen::VectorXd& q, const Eigen::VectorXd& turn, double delay, const BodyClearance& body,
+                    const Obstacles& obstacles, BodyClearance::Workspace& workspace) {
+  const Eigen::VectorXd off = delay * turn;
+  Eigen::VectorXd clearances(body.num_items());
+  body.clearances(q, obstacles, seen, workspace, clearances);
+  double speed = infinity;
+  for (int i = 0; i < body.num_items(); ++i) {
+    const double motion = body.motion(i, q, off, workspace);  // at 1 rad/s
+    if (clearances[i] < seen && motion > 0.0) {
+      speed = std::min(speed, std::max(0.0, clearances[i]) / motion);
+    }
+  }
+  return std::max(crawl, speed);
+}
 
 }  // namespace
 
@@ -25,6 +44,7 @@ void RouteSettings::validate() const {
   positive(wide, "route: wide");
   positive(slowest, "route: slowest");
   positive(lead, "route: lead");
+  positive(delay, "route: delay");
   if (slowest > 1.0 || speed_share > 1.0) {
     throw std::invalid_argument("route: slowest is " + std::to_string(slowest) + " and speed_share " +
                                 std::to_string(speed_share) + ", shares must be at most 1");
@@ -45,7 +65,7 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const O
   const Eigen::VectorXd& limit = body.robot().limits().velocity;
   Eigen::Index at = 0;
   route.q.col(0) = path.col(0);
-  Eigen::VectorXd before = Eigen::VectorXd::Zero(path.rows());
+  Eigen::VectorXd before = Eigen::VectorXd::Zero(path.rows()), corner = Eigen::VectorXd::Constant(num, infinity);
   for (Eigen::Index k = 0; k + 1 < path.cols(); ++k) {
     const Eigen::VectorXd edge = path.col(k + 1) - path.col(k);
     const double length = edge.norm();
@@ -54,6 +74,9 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const O
     const double fastest = std::min(settings.speed, settings.speed_share / (along.cwiseAbs().cwiseQuotient(limit)).maxCoeff());
     const double straight = k == 0 ? 1.0 : std::max(settings.slowest, before.dot(along));
     route.speed[at] = std::min(k == 0 ? fastest : route.speed[at], fastest) * straight;
+    if (k > 0 && measured) {
+      corner[at] = corner_speed(path.col(k), along - before, settings.delay, body, obstacles, workspace);
+    }
     const Eigen::Index count = pieces(k);
     for (Eigen::Index i = 1; i <= count; ++i) {
       ++at;
@@ -67,7 +90,7 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const O
     if (measured) {
       route.clearance[k] = body.nearest(route.q.col(k), obstacles, settings.wide, workspace).clearance;
     }
-    route.speed[k] *= std::clamp(route.clearance[k] / settings.wide, settings.slowest, 1.0);
+    route.speed[k] = std::min(corner[k], route.speed[k] * std::clamp(route.clearance[k] / settings.wide, settings.slowest, 1.0));
   }
   // Slow down in time: v² of the next and 2 a Δs.
   route.speed[num - 1] = 0.0;
@@ -78,7 +101,8 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const O
   return route;
 }
 
-void RouteFollower::enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q) noexcept {
+void RouteFollower::enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q,
+                          Eigen::Ref<const Eigen::VectorXd> v) noexcept {
   at = 0;
   double nearest = (route.q.col(0) - q).squaredNorm();
   for (Eigen::Index k = 1; k < std::min(first, route.q.cols()); ++k) {
@@ -89,23 +113,36 @@ void RouteFollower::enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> 
     }
   }
   station = route.station[at];
+  const Eigen::Index next = std::min(at + 1, route.q.cols() - 1);
+  const double length = route.station[next] - station;
+  rate = length > 0.0 ? std::max(0.0, v.dot(route.q.col(next) - route.q.col(at)) / length) : 0.0;
 }
 
-Eigen::Index RouteFollower::tightest(const Route& route, const RouteSettings& settings) const noexcept {
-  Eigen::Index tightest = -1;
-  double least = settings.wide;
-  for (Eigen::Index k = std::min(at + 1, route.q.cols() - 1); k >= 0 && route.station[k] >= station - settings.lead; --k) {
-    if (route.clearance[k] < least) {
-      least = route.clearance[k];
-      tightest = k;
+Eigen::Index RouteFollower::narrow(const Route& route, const RouteSettings& settings,
+                                   Eigen::Ref<Eigen::MatrixXd> places) const noexcept {
+  const Eigen::Index from = std::min(at + 1, route.q.cols() - 1);
+  const auto visit = [&](auto&& place) {
+    for (Eigen::Index k = from; k >= 0 && route.station[k] >= station - settings.lead; --k) {
+      if (route.clearance[k] < settings.wide) {
+        place(k);
+      }
     }
-  }
-  return tightest;
+  };
+  Eigen::Index all = 0, count = 0, next = 0;
+  visit([&](Eigen::Index) { ++all; });
+  const Eigen::Index every = std::max<Eigen::Index>(1, (all + most_places - 1) / most_places);
+  visit([&](Eigen::Index k) {
+    if (next++ % every == 0) {
+      places.col(count++) = route.q.col(k);
+    }
+  });
+  return count;
 }
 
 void RouteFollower::advance(const Route& route, const RouteSettings& settings, Eigen::Ref<const Eigen::VectorXd> q,
                             double duration, Eigen::Ref<Eigen::VectorXd> position,
-                            Eigen::Ref<Eigen::VectorXd> velocity) noexcept {
+                            Eigen::Ref<Eigen::VectorXd> velocity,
+                            Eigen::Ref<Eigen::VectorXd> acceleration) noexcept {
   const Eigen::Index last = route.q.cols() - 1;
   const auto share = [&]() {
     return at < last ? (station - route.station[at]) / std::max(route.station[at + 1] - route.station[at], 1e-12) : 0.0;
@@ -118,7 +155,10 @@ void RouteFollower::advance(const Route& route, const RouteSettings& settings, E
   const double lag = (position - q).norm();
   const double wait = std::clamp(2.0 - 2.0 * lag / settings.lead, 0.0, 1.0);
   const double t = share();
-  const double allowed = at < last ? (1.0 - t) * route.speed[at] + t * route.speed[at + 1] : 0.0;
+  // Constant acceleration between two samples: v² is linear.
+  const auto squared = [&](Eigen::Index k) { return route.speed[k] * route.speed[k]; };
+  const double allowed = at < last ? std::sqrt((1.0 - t) * squared(at) + t * squared(at + 1)) : 0.0;
+  const double before = rate;
   rate = std::min(wait * allowed, rate + settings.acceleration * duration);
   station = std::min(station + rate * duration, route.length());
   while (at < last && station >= route.station[at + 1]) {
@@ -127,11 +167,15 @@ void RouteFollower::advance(const Route& route, const RouteSettings& settings, E
   if (at >= last) {
     position = route.q.col(last);
     velocity.setZero();
+    acceleration.setZero();
     return;
   }
   const double length = std::max(route.station[at + 1] - route.station[at], 1e-12);
   velocity = (route.q.col(at + 1) - route.q.col(at)) / length;
   position = route.q.col(at) + (station - route.station[at]) * velocity;
+  // No more than it may have: what waits for the arm stops at once.
+  const double change = duration > 0.0 ? (rate - before) / duration : 0.0;
+  acceleration = std::clamp(change, -settings.acceleration, settings.acceleration) * velocity;
   velocity *= rate;
 }
 

@@ -112,6 +112,23 @@ Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const
   return margins;
 }
 
+bool RrtConnect::sees(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double margin, const Obstacles& obstacles) {
+  return body_->edge_free(from, to, obstacles, margins(margin, from, to, obstacles), workspace_);
+}
+
+bool RrtConnect::enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here,
+                       const Obstacles& obstacles) {
+  for (Eigen::Index k = path.cols() - 1; k >= first; --k) {
+    if (sees(here, path.col(k), margin, obstacles)) {
+      Eigen::MatrixXd rest(path.rows(), path.cols() - k + 1);
+      rest << here, path.rightCols(path.cols() - k);
+      path = std::move(rest);
+      return true;
+    }
+  }
+  return false;
+}
+
 Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
                       std::uint64_t seed) {
   Plan plan = find(start, goal, obstacles, seed);

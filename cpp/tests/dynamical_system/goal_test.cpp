@@ -157,6 +157,12 @@ BOOST_AUTO_TEST_CASE(a_moving_goal_is_followed_without_lag) {
   const Rollout motion = rollout(system, start, Eigen::VectorXd::Constant(7, 0.05), joints, Obstacles::none(), {0.01, 500});
   const Eigen::VectorXd expected = start + 5.0 * Eigen::VectorXd::Constant(7, 0.05);
   BOOST_TEST((motion.q.row(500).transpose() - expected).norm() < 1e-12);  // it starts on the goal and stays: rounding
+
+  // From rest, with the acceleration of the goal: what is left is the step of the integration, ½ dt a t.
+  const Goal faster = JointGoal(start, Eigen::VectorXd::Zero(7), Eigen::VectorXd::Constant(7, 0.1));
+  const Rollout ahead = rollout(system, start, Eigen::VectorXd::Zero(7), faster, Obstacles::none(), {0.001, 2000});
+  const Eigen::VectorXd there = start + 0.5 * 2.0 * 2.0 * Eigen::VectorXd::Constant(7, 0.1);
+  BOOST_TEST((ahead.q.row(2000).transpose() - there).lpNorm<Eigen::Infinity>() < 1e-4);
 }
 
 BOOST_AUTO_TEST_CASE(what_is_wrong_with_a_goal_is_said) {
@@ -168,6 +174,9 @@ BOOST_AUTO_TEST_CASE(what_is_wrong_with_a_goal_is_said) {
   BOOST_TEST((check(PoseGoal(other, "tip", pose), robot) == GoalFault::invalid));
   BOOST_TEST((check(JointGoal(Eigen::VectorXd::Zero(5)), robot) == GoalFault::invalid));
   BOOST_TEST((check(JointGoal(Eigen::VectorXd::Constant(7, nan)), robot) == GoalFault::invalid));
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(7);
+  BOOST_TEST((check(JointGoal(rest, rest, Eigen::VectorXd::Constant(7, nan)), robot) == GoalFault::invalid));
+  BOOST_CHECK_THROW(JointGoal(rest, rest, Eigen::VectorXd::Zero(6)), std::invalid_argument);
   BOOST_TEST((check(JointGoal(Eigen::VectorXd::Constant(7, 2.6)), robot) == GoalFault::outside_limits));
   pose.translation().z() = nan;
   BOOST_TEST((check(PoseGoal(robot, "tip", pose), robot) == GoalFault::invalid));

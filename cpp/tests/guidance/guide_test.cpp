@@ -42,7 +42,7 @@ Obstacles point(double x, double y) {
 
 /// An arm that is drawn to the attractor without delay.
 GuideStatus follow(Guide& guide, Eigen::VectorXd& q, double& time, double duration) {
-  Guide::Attractor attractor{q, q, q};
+  Guide::Attractor attractor(2);
   GuideStatus status = GuideStatus::idle;
   for (const double end = time + duration; time < end; time += 0.01) {
     status = guide.step(q, time, attractor);
@@ -60,7 +60,7 @@ BOOST_AUTO_TEST_CASE(arrives_around_an_obstacle_and_tells_of_a_blocked_goal) {
   Guide guide(body_of(robot), settings);
   guide.set_obstacles(point(0.5, 0.0));
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  Guide::Attractor attractor{q, q, q};
+  Guide::Attractor attractor(2);
   BOOST_TEST(name(guide.step(q, 0.0, attractor)) == "idle");
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   double time = 0.0;
@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
   guide.set_obstacles(point(0.5, 0.0));
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  Guide::Attractor attractor{q, q, q};
+  Guide::Attractor attractor(2);
   GuideStatus status = GuideStatus::idle;
   double time = 0.0;
   // Until it has searched, however slow the machine is.
@@ -117,31 +117,46 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
   BOOST_TEST(name(status) == "arrived");
 }
 
-BOOST_AUTO_TEST_CASE(the_tightest_place_between_arm_and_attractor_is_known) {
+BOOST_AUTO_TEST_CASE(the_narrow_places_between_arm_and_attractor_are_known) {
   const Robot robot = turning();
   const BodyClearance body = body_of(robot);
   BodyClearance::Workspace w(body);
   const RouteSettings settings;
   Eigen::MatrixXd path(2, 2);
   path << 0.0, 2.0, 0.0, 0.0;
-  // Beyond the tip, stretched towards 1 rad: the tip ends at 0.61 m, the point begins at 0.63 m.
-  const Route route = make_route(path, body, point(0.65 * std::cos(1.0), 0.65 * std::sin(1.0)), settings, w);
+  // Beyond the tip, stretched towards 1 rad: the tip ends at 0.61 m, the points begin at 0.63 m; others follow, farther.
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 5);
+  for (Eigen::Index k = 0; k < 5; ++k) {
+    const double angle = 1.0 + 0.05 * static_cast<double>(k - 2), away = k == 2 ? 0.65 : 0.655;
+    points.col(k) << away * std::cos(angle), away * std::sin(angle), 0.0;
+  }
+  const Obstacles row(points, Eigen::VectorXd::Constant(5, 0.02), Eigen::Matrix3Xd::Zero(3, 5));
+  const Route route = make_route(path, body, row, settings, w);
   Eigen::Index narrowest = 0;
   BOOST_TEST(std::abs(route.clearance.minCoeff(&narrowest) - 0.02) < 1e-3);  // the tip passes between two samples
   BOOST_TEST(std::abs(route.q(0, narrowest) - 1.0) < 0.05);                  // their spacing
   BOOST_TEST(route.speed[narrowest] <= 0.021 / settings.wide * settings.speed);  // as the clearance, within 1 mm
   RouteFollower follower;
-  Eigen::VectorXd q = Eigen::Vector2d::Zero(), position(2), velocity(2);
-  follower.enter(route, q);
-  BOOST_TEST(follower.tightest(route, settings) == -1);  // it is wide there
+  Eigen::VectorXd q = Eigen::Vector2d::Zero(), position(2), velocity(2), acceleration(2);
+  follower.enter(route, q, Eigen::Vector2d::Zero());
+  Eigen::MatrixXd places(2, RouteFollower::most_places);
+  const auto narrow = [&] { return places.leftCols(follower.narrow(route, settings, places)); };
+  BOOST_TEST(narrow().cols() == 0);  // it is wide there
   while (follower.station < 1.2) {
-    follower.advance(route, settings, position = Eigen::Vector2d(follower.station, 0.0), 0.01, position, velocity);
+    follower.advance(route, settings, position = Eigen::Vector2d(follower.station, 0.0), 0.01, position, velocity, acceleration);
   }
-  BOOST_TEST(follower.tightest(route, settings) == narrowest);  // behind the attractor, ahead of the arm
+  // Behind the attractor, ahead of the arm: all, as they are few, or every second.
+  const auto num_narrow = (route.clearance.array() < settings.wide).count();
+  BOOST_TEST(num_narrow > 2);
+  const Eigen::Index every = num_narrow > RouteFollower::most_places ? 2 : 1;
+  BOOST_TEST(narrow().cols() == (num_narrow + every - 1) / every);
+  const Eigen::VectorXd off = (narrow().colwise() - route.q.col(narrowest)).colwise().norm();
+  BOOST_TEST(off.minCoeff() < (every == 1 ? 1e-12 : 0.051));  // their spacing
+  BOOST_TEST(off.maxCoeff() < 0.2);
   while (follower.station < 1.9) {
-    follower.advance(route, settings, position = Eigen::Vector2d(follower.station, 0.0), 0.01, position, velocity);
+    follower.advance(route, settings, position = Eigen::Vector2d(follower.station, 0.0), 0.01, position, velocity, acceleration);
   }
-  BOOST_TEST(follower.tightest(route, settings) == -1);
+  BOOST_TEST(narrow().cols() == 0);
   const Route quick = make_route(path, body, Obstacles::none(), settings, w, false);
   BOOST_TEST(quick.clearance.maxCoeff() == 0.0);
   BOOST_TEST(quick.speed.maxCoeff() <= settings.slowest * settings.speed);
@@ -159,15 +174,115 @@ BOOST_AUTO_TEST_CASE(the_attractor_waits_for_the_arm_and_slows_at_the_end) {
   BOOST_TEST(route.speed.maxCoeff() <= settings.speed);
   BOOST_TEST(route.speed[route.speed.size() - 1] == 0.0);
   RouteFollower follower;
-  Eigen::VectorXd q = Eigen::Vector2d::Zero(), position(2), velocity(2);
-  follower.enter(route, q);
+  Eigen::VectorXd q = Eigen::Vector2d::Zero(), position(2), velocity(2), acceleration(2);
+  follower.enter(route, q, Eigen::Vector2d::Zero());
   for (int i = 0; i < 2000; ++i) {
-    follower.advance(route, settings, q, 0.01, position, velocity);  // the arm does not move
+    follower.advance(route, settings, q, 0.01, position, velocity, acceleration);  // the arm does not move
   }
   BOOST_TEST((position - q).norm() <= settings.lead + 1e-9);  // rounding
   BOOST_TEST((position - q).norm() > 0.5 * settings.lead);
   for (int i = 0; i < 2000; ++i) {
-    follower.advance(route, settings, position, 0.01, position, velocity);
+    follower.advance(route, settings, position, 0.01, position, velocity, acceleration);
   }
   BOOST_TEST((position - Eigen::Vector2d(1.0, 1.0)).norm() < 1e-3);  // it slows down towards the end
+}
+
+BOOST_AUTO_TEST_CASE(the_attractor_says_how_it_speeds_up_and_begins_as_fast_as_the_arm) {
+  const Robot robot = turning();
+  const BodyClearance body = body_of(robot);
+  BodyClearance::Workspace w(body);
+  const RouteSettings settings;
+  Eigen::MatrixXd path(2, 2);
+  path << 0.0, 2.0, 0.0, 0.0;
+  const Route route = make_route(path, body, Obstacles::none(), settings, w);
+  RouteFollower follower;
+  Eigen::VectorXd position(2), velocity(2), acceleration(2), before = Eigen::Vector2d::Zero();
+  follower.enter(route, path.col(0), Eigen::Vector2d(0.5, 3.0));
+  BOOST_TEST(follower.rate == 0.5);  // what leads along the route
+  follower.enter(route, path.col(0), Eigen::Vector2d(-0.5, 0.0));
+  BOOST_TEST(follower.rate == 0.0);
+  const double step = 0.001;
+  double most = 0.0;
+  while (follower.station < 1.99) {
+    const double rate = follower.rate;
+    follower.advance(route, settings, Eigen::Vector2d(follower.station, 0.0), step, position, velocity, acceleration);
+    BOOST_TEST(std::abs(velocity[0] - follower.rate) < 1e-12);  // rounding
+    // 4 rad/s² there, and back but for the samples at which speeds are given.
+    BOOST_TEST(std::abs(acceleration[0] - (follower.rate - rate) / step) < 0.2);
+    BOOST_TEST(acceleration[1] == 0.0);
+    most = std::max(most, std::abs(acceleration[0]));
+  }
+  BOOST_TEST(std::abs(most - settings.acceleration) < 1e-9);  // rounding
+}
+
+BOOST_AUTO_TEST_CASE(corners_are_passed_slowly_where_there_is_little_room) {
+  const Robot robot = turning();
+  const BodyClearance body = body_of(robot);
+  BodyClearance::Workspace w(body);
+  const RouteSettings settings;
+  Eigen::MatrixXd path(2, 3);
+  path << 0.0, 1.0, 1.5, 0.0, 0.0, -0.5;  // a turn of 45°
+  const auto speed = [&](double distance) {
+    const Route route = make_route(path, body, point(distance * std::cos(1.0), distance * std::sin(1.0)), settings, w);
+    return route.speed[20];  // 1 rad, by 0.05 rad
+  };
+  // The tip ends at 0.61 m, the point begins 2 cm farther; the tip is 0.61 m from the first joint, 0.31 m from the second.
+  const double room = 0.02, swing = settings.delay * (0.61 * (1.0 - std::sqrt(0.5)) + 0.31 * std::sqrt(0.5));
+  BOOST_TEST(speed(0.65) <= 1.01 * room / swing);  // the clearance is a lower bound, to 1 %
+  BOOST_TEST(speed(0.65) >= 0.8 * room / swing);   // the bound of the motion knows no direction of it
+  BOOST_TEST(speed(0.9) > 2.0 * speed(0.65));
+  BOOST_TEST(speed(2.0) == settings.speed * std::sqrt(0.5), boost::test_tools::tolerance(1e-9));  // by the angle alone
+}
+
+BOOST_AUTO_TEST_CASE(an_arm_that_is_off_its_path_finds_back_to_it) {
+  const Robot robot = turning();
+  GuideSettings settings;
+  settings.synchronous = true;
+  settings.route.lead = 3.0;
+  settings.patience = 20.0;
+  Guide guide(body_of(robot), settings);
+  const Obstacles obstacles = point(0.5, 0.0);
+  guide.set_obstacles(obstacles);
+  guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
+  RrtConnect eyes(guide.body(), settings.planner);
+  Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
+  Guide::Attractor attractor(2);
+  double time = 0.0;
+  // The arm stands still: the attractor goes around the obstacle until the arm no longer sees it.
+  bool seen = true;
+  for (; time < 15.0 && seen; time += 0.001) {
+    static_cast<void>(guide.step(q, time, attractor));
+    seen = eyes.sees(q, attractor.position, settings.planner.floor, obstacles);
+  }
+  BOOST_TEST(!seen);
+  for (int i = 0; i < 30; ++i, time += 0.001) {  // past its next look
+    static_cast<void>(guide.step(q, time, attractor));
+  }
+  BOOST_TEST(eyes.sees(q, attractor.position, settings.planner.floor, obstacles));
+  BOOST_TEST(guide.counts().searches == 1);
+  BOOST_TEST(name(follow(guide, q, time, 20.0)) == "arrived");
+  BOOST_TEST(guide.counts().searches == 1);
+}
+
+BOOST_AUTO_TEST_CASE(an_arm_that_is_slow_is_not_stuck) {
+  const Robot robot = turning();
+  GuideSettings settings;
+  settings.synchronous = true;
+  Guide guide(body_of(robot), settings);
+  guide.set_obstacles(point(0.5, 0.0));
+  guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
+  Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
+  Guide::Attractor attractor(2);
+  double time = 0.0;
+  const auto move = [&](double speed, double duration) {
+    for (const double end = time + duration; time < end; time += 0.01) {
+      static_cast<void>(guide.step(q, time, attractor));
+      const Eigen::VectorXd away = attractor.position - q;
+      q += std::min(1.0, 0.01 * speed / std::max(away.norm(), 1e-9)) * away;
+    }
+  };
+  move(0.03, 5.0);  // at 0.03 rad/s, about a 100th of the way a second
+  BOOST_TEST(guide.counts().searches == 1);
+  move(0.01, 5.0);
+  BOOST_TEST(guide.counts().searches > 1);
 }

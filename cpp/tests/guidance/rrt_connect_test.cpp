@@ -96,6 +96,43 @@ BOOST_AUTO_TEST_CASE(finds_a_free_way_around_and_the_same_every_time) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(a_path_begins_anew_where_an_arm_is_that_has_moved_on) {
+  const Robot robot = planar(3);
+  const BodyClearance body(robot, along_links(robot));
+  RrtConnect planner(body, {});
+  const Obstacles points = wall();
+  const Plan plan = planner.plan(joints(0.5), joints(-0.5), points, 0);
+  const Eigen::Index last = plan.path.cols() - 1;
+  BOOST_REQUIRE(last > 1);
+  const double floor = planner.settings().floor;
+
+  // From beside the goal it goes there straight.
+  Eigen::MatrixXd path = plan.path;
+  const Eigen::VectorXd beside = joints(-0.6);
+  BOOST_TEST(planner.enter(path, 0, floor, beside, points));
+  BOOST_TEST(path.cols() == 2);
+  BOOST_TEST((path.col(0) == beside));
+  BOOST_TEST((path.col(1) == plan.path.col(last)));
+
+  // From beside the start it goes to the last waypoint that is seen from there, and on as before.
+  path = plan.path;
+  const Eigen::VectorXd here = joints(0.6);
+  BOOST_TEST(planner.enter(path, 0, floor, here, points));
+  BOOST_TEST((path.col(0) == here));
+  const Eigen::Index kept = path.cols() - 1;
+  BOOST_TEST(kept > 1);  // the wall hides the goal
+  BOOST_TEST((path.rightCols(kept) == plan.path.rightCols(kept)));
+  BOOST_TEST(planner.sees(here, path.col(1), floor, points));
+  for (Eigen::Index k = 2; k <= kept; ++k) {
+    BOOST_TEST(!planner.sees(here, path.col(k), floor, points));
+  }
+
+  // No waypoint before the first that is asked for is gone back to.
+  path = plan.path;
+  BOOST_TEST(!planner.enter(path, last, floor, here, points));
+  BOOST_TEST((path == plan.path));
+}
+
 BOOST_AUTO_TEST_CASE(smoothing_makes_a_path_shorter_and_wide_where_there_is_room) {
   const Robot robot = planar(3);
   const BodyClearance body(robot, along_links(robot));

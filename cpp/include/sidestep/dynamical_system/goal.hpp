@@ -13,18 +13,21 @@ namespace sidestep {
 // Where the arm is drawn to. A goal is a potential U(q, t) over the joints: its gradient takes the place of K (q − q*)
 // in the damped spring,
 //
-//     h = −G⁻¹ ∂U/∂q − D (v − v*),
+//     h = −G⁻¹ (∂U/∂q − a*) − D (v − v*),
 //
-// and v* is the joint velocity that follows a goal that moves: with it a moving goal is followed without the lag D v*
-// would cause. Goals are values, made anew or advanced as they move.
+// and v* is the joint velocity that follows a goal that moves, a* its rate: with them a moving goal is followed without the
+// lag that D v* and a* would cause. Goals are values, made anew or advanced as they move.
 
-/// A configuration: U = ½ (q − q*)ᵀ K (q − q*), with the system's own stiffness K; v* = dq*/dt.
+/// A configuration: U = ½ (q − q*)ᵀ K (q − q*), with the system's own stiffness K; v* = dq*/dt, a* = dv*/dt.
 struct JointGoal {
   explicit JointGoal(Eigen::VectorXd position);
   JointGoal(Eigen::VectorXd position, Eigen::VectorXd velocity);
+  /// Throws std::invalid_argument on different sizes.
+  JointGoal(Eigen::VectorXd position, Eigen::VectorXd velocity, Eigen::VectorXd acceleration);
 
-  Eigen::VectorXd position;  ///< q* (nv) [rad | m]
-  Eigen::VectorXd velocity;  ///< dq*/dt (nv) [rad/s | m/s]
+  Eigen::VectorXd position;      ///< q* (nv) [rad | m]
+  Eigen::VectorXd velocity;      ///< dq*/dt (nv) [rad/s | m/s]
+  Eigen::VectorXd acceleration;  ///< d²q*/dt² (nv) [rad/s² | m/s²]
 };
 
 struct PoseGoalSettings {
@@ -75,7 +78,7 @@ struct PoseGoal {
 
 using Goal = std::variant<JointGoal, PoseGoal>;
 
-/// Moves a goal along its velocity for `duration` [s]. No allocation.
+/// Moves a goal for `duration` [s] as its velocity and acceleration say. No allocation.
 void advance(Goal& goal, double duration) noexcept;
 
 /// What is wrong with a goal.
@@ -95,7 +98,7 @@ struct GoalPull {
   void update(const Goal& goal, const KinematicState& state, const Eigen::MatrixXd& stiffness) noexcept;
 
   double potential = 0.0;      ///< U, without the posture pull
-  Eigen::VectorXd gradient;    ///< ∂U/∂q (nv), posture pull included
+  Eigen::VectorXd gradient;    ///< ∂U/∂q − a* (nv), posture pull included
   Eigen::VectorXd velocity;    ///< v* (nv)
   // How far the goal is; NaN where the goal has no such part.
   double joint_error = nan;     ///< largest |q − q*| [rad | m]

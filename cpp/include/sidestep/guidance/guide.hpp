@@ -69,11 +69,20 @@ class Guide {
   /// The same points again are no change.
   void set_obstacles(const Obstacles& obstacles);
 
-  /// Where to be drawn to: position (nv) and velocity (nv) of a JointGoal; and where barriers are to leave room (nv), see
-  /// GeometricSystem::relaxed_at: the tightest place of the path that the arm is about to pass, else the goal; at the goal
-  /// as well where that is another place and the arm `arrives`: the end of the path is within the lead.
+  /// Where to be drawn to: position, velocity and acceleration (nv) of a JointGoal; and where barriers are to leave room, see
+  /// GeometricSystem::relaxed_at: at the first `num_places` columns of `places` (nv), the narrow places of the path that the
+  /// arm is about to pass, or the goal where there is none; at the goal as well where the arm `arrives`: there are some, and
+  /// the end of the path is within the lead.
   struct Attractor {
-    Eigen::VectorXd position, velocity, tight;
+    explicit Attractor(Eigen::Index nv)
+        : position(Eigen::VectorXd::Zero(nv)),
+          velocity(position),
+          acceleration(position),
+          places(Eigen::MatrixXd::Zero(nv, RouteFollower::most_places)) {}
+
+    Eigen::VectorXd position, velocity, acceleration;
+    Eigen::MatrixXd places;
+    Eigen::Index num_places = 0;
     bool arrives = false;
   };
 
@@ -101,7 +110,7 @@ class Guide {
   };
   /// What the guide tells the loop.
   struct Answer {
-    std::uint64_t goal_number = 0, route_number = 0;
+    std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
     PlanStatus status = PlanStatus::no_path;
     bool direct = true;  // straight to the goal
     Route route;
@@ -110,23 +119,29 @@ class Guide {
   void run();
   void look(const State& state);
   void search(const State& state, const Obstacles& obstacles);
-  bool way_is_free(const State& state, const Obstacles& obstacles, bool changed);
-  /// Lets a path begin where the arm is, which has moved while it was made. False where no straight way leads there.
-  bool enter(Plan& plan, const Eigen::VectorXd& q, const Obstacles& obstacles);
-  void follow(const State& state, const Plan& plan, const Obstacles& obstacles, bool measured);
+  /// Whether the rest of the path is still free.
+  bool ahead_is_free(const State& state, const Obstacles& obstacles);
+  /// Whether the arm sees the attractor, or else finds back to the path, which begins where it is then.
+  bool holds_on(const State& state, const Obstacles& obstacles);
+  void follow(const State& state, const Eigen::MatrixXd& path, const Obstacles& obstacles, bool measured);
+  Eigen::VectorXd on_route(double station) const;
+  Eigen::Index waypoint_after(double station) const;
+  Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const {
+    return q.cwiseMax(body_.robot().limits().lower).cwiseMin(body_.robot().limits().upper);
+  }
   void answer(const State& state, PlanStatus status, bool direct);
 
   BodyClearance body_;
   GuideSettings settings_;
 
   // Of the loop.
-  Eigen::VectorXd goal_;
+  Eigen::VectorXd goal_, last_q_, velocity_;
   std::uint64_t goal_number_ = 0;
   double begin_ = 0.0, last_time_ = 0.0, next_look_ = 0.0;
   bool started_ = false;
   ProgressMonitor progress_;
   RouteFollower follower_;
-  std::uint64_t stops_ = 0, followed_ = 0;
+  std::uint64_t stops_ = 0, followed_ = 0, measured_ = 0;
 
   // Between the two.
   Handover<State> states_;
@@ -142,7 +157,7 @@ class Guide {
   // Of the guide.
   RrtConnect planner_;
   std::shared_ptr<const Obstacles> obstacles_;  // that it plans among
-  std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, searches_ = 0;
+  std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, path_number_ = 0, searches_ = 0;
   bool newer_ = false;  // a state was taken that it has not looked at
   bool have_path_ = false, direct_ = false, failed_ = false;
   double margin_, failed_at_ = 0.0;

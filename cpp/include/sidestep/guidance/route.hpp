@@ -13,6 +13,7 @@ struct RouteSettings {
   double wide = 0.03;         ///< clearance from which it goes at full speed [m]
   double slowest = 0.35;      ///< share of the speed that is left where there is none
   double lead = 0.4;          ///< |q − q*| at which it waits for the arm [rad]
+  double delay = 0.18;        ///< an arm leaves a corner by this times the change of velocity [s]: 1 / (e √K) if critically damped
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
@@ -39,15 +40,18 @@ struct RouteFollower {
   double rate = 0.0;    ///< its speed along the route [rad/s]
   Eigen::Index at = 0;  ///< the sample before it
 
-  /// Onto a new route, at the sample nearest to q among the first ones.
-  void enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q) noexcept;
+  /// Onto a new route, at the sample nearest to q among the first ones, as fast as the arm moves along it at v (nv).
+  void enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v) noexcept;
 
-  /// The sample with the least clearance between the attractor and as far behind it as the arm may be; −1 where all are wide.
-  Eigen::Index tightest(const Route& route, const RouteSettings& settings) const noexcept;
+  static constexpr Eigen::Index most_places = 5;
+  /// The narrow samples between the attractor and as far behind it as the arm may be, or every second, third, … of them:
+  /// writes them into the columns of (nv × most_places), and says how many they are.
+  Eigen::Index narrow(const Route& route, const RouteSettings& settings, Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
 
-  /// Moves on for `duration` [s]; writes attractor and its velocity (nv).
+  /// Moves on for `duration` [s]; writes attractor, its velocity and, along the route, its acceleration (nv).
   void advance(const Route& route, const RouteSettings& settings, Eigen::Ref<const Eigen::VectorXd> q, double duration,
-               Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity) noexcept;
+               Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity,
+               Eigen::Ref<Eigen::VectorXd> acceleration) noexcept;
 };
 
 }  // namespace sidestep

@@ -62,6 +62,13 @@ class RrtConnect {
   /// The margins between two ends: of this distance, and less where an end asks for less.
   Margins margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles);
 
+  /// Whether the straight way is free, with this margin [m] but for its ends.
+  bool sees(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double margin, const Obstacles& obstacles);
+
+  /// Lets a path (nv × W) begin `here`: straight to its last waypoint, from `first` on, that is seen. False where none is.
+  bool enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here,
+             const Obstacles& obstacles);
+
  private:
   enum class Growth { trapped, advanced, reached };
 
