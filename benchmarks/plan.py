@@ -24,7 +24,7 @@ from sidestep.bench.motion_bench_maker import read_motion_bench_maker
 from sidestep.bench.parallel import cpu_name
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
-from sidestep.link_pairs import barrier_pairs
+from sidestep.link_pairs import tables_and_pairs
 from sidestep.obstacles import obstacles_from_shapes
 
 
@@ -74,10 +74,13 @@ def summary(seconds: list[float]) -> dict[str, float]:
 
 def planners(robot: ss.Robot, body: ss.Body, names: list[str]) -> dict[str, ss.PathPlanner]:
     """One that is content with the first path, and one that improves it."""
-    pairs = list(barrier_pairs(robot, body))
+    tables, pairs = tables_and_pairs(robot, body)
     floor = ss.PlannerSettings().floor
     settings = {"first_path": ss.PlannerSettings(margin=floor, shortcuts=0), "improved": ss.PlannerSettings()}
-    return {name: ss.PathPlanner(robot, body, pairs=pairs, settings=settings[name]) for name in names}
+    return {
+        name: ss.PathPlanner(robot, body, pairs=pairs, tables=tables, settings=settings[name])
+        for name in names
+    }
 
 
 def reach_tasks(given: argparse.Namespace, names: list[str]) -> Iterator[Task]:

@@ -21,8 +21,9 @@ namespace {
 /// A planner with the body it searches for.
 class PathPlanner {
  public:
-  PathPlanner(const Robot& robot, const Body& body, const Pairs& pairs, const PlannerSettings& settings)
-      : body_(robot, body, link_pairs(pairs)), planner_(body_, settings) {}
+  PathPlanner(const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
+              const PlannerSettings& settings)
+      : body_(robot, body, link_pairs(pairs), {}, std::move(tables)), planner_(body_, settings) {}
   PathPlanner(const PathPlanner&) = delete;
   PathPlanner& operator=(const PathPlanner&) = delete;
 
@@ -171,14 +172,14 @@ void bind_guide(nb::module_& m) {
       m, "Guide",
       "Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.\n"
       "Until there is a path, and where the straight way to the goal is free, the attractor is the goal itself.\n"
-      "robot, body, pairs: as for PathPlanner; planner: PlannerSettings, route: RouteSettings, None for the defaults.\n"
+      "robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: RouteSettings, None for the defaults.\n"
       "period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is\n"
       "searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed\n"
       "for a motion; synchronous: search in step(), the same every time, else in a thread of its own.\n"
       "Raises ValueError that names what is wrong.")
       .def(
           "__init__",
-          [](Guide* self, const Robot& robot, const Body& body, const Pairs& pairs,
+          [](Guide* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
              const std::optional<PlannerSettings>& planner, const std::optional<RouteSettings>& route, double period,
              double patience, double retry, double tolerance, double duration, std::uint64_t seed, bool synchronous) {
             check_fitted_to(robot, body);
@@ -187,9 +188,10 @@ void bind_guide(nb::module_& m) {
             s.route = route.value_or(s.route);
             s.period = period, s.patience = patience, s.retry = retry, s.tolerance = tolerance;
             s.duration = duration, s.seed = seed, s.synchronous = synchronous;
-            new (self) Guide(BodyClearance(robot, body, link_pairs(pairs)), s);
+            new (self) Guide(BodyClearance(robot, body, link_pairs(pairs), {}, std::move(tables)), s);
           },
-          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{}, nb::arg("planner") = nb::none(),
+          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{},
+          nb::arg("tables") = std::vector<ClearanceTable>{}, nb::arg("planner") = nb::none(),
           nb::arg("route") = nb::none(), nb::arg("period") = GuideSettings{}.period,
           nb::arg("patience") = GuideSettings{}.patience, nb::arg("retry") = GuideSettings{}.retry,
           nb::arg("tolerance") = GuideSettings{}.tolerance, nb::arg("duration") = GuideSettings{}.duration,
@@ -237,16 +239,17 @@ void bind_guidance(nb::module_& m) {
       "(Kuffner and LaValle 2000), widened where there is room, and shortened. Deterministic in (start, goal, obstacles,\n"
       "seed) unless time runs out.\n"
       "Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.\n"
-      "robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier;\n"
-      "settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.")
+      "robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier; tables: of other\n"
+      "pairs, as for ClearanceTableBarrier; settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.")
       .def(
           "__init__",
-          [](PathPlanner* self, const Robot& robot, const Body& body, const Pairs& pairs,
+          [](PathPlanner* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
              const std::optional<PlannerSettings>& settings) {
             check_fitted_to(robot, body);
-            new (self) PathPlanner(robot, body, pairs, settings.value_or(PlannerSettings{}));
+            new (self) PathPlanner(robot, body, pairs, std::move(tables), settings.value_or(PlannerSettings{}));
           },
-          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{}, nb::arg("settings") = nb::none())
+          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("pairs") = Pairs{},
+          nb::arg("tables") = std::vector<ClearanceTable>{}, nb::arg("settings") = nb::none())
       .def(
           "plan",
           [](PathPlanner& p, const ArrayLike& start, const ArrayLike& goal, const Obstacles& obstacles,

@@ -836,7 +836,7 @@ class Escape:
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, robot: Robot, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 2.0, spread: float = 1.7, seed: int = 0) -> None: ...
+    def __init__(self, robot: Robot, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 3.0, spread: float = 3.1, seed: int = 0) -> None: ...
 
     def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, potential: float, period: float) -> JointGoal | PoseGoal:
         """
@@ -1491,14 +1491,14 @@ class Guide:
     """
     Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.
     Until there is a path, and where the straight way to the goal is free, the attractor is the goal itself.
-    robot, body, pairs: as for PathPlanner; planner: PlannerSettings, route: RouteSettings, None for the defaults.
+    robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: RouteSettings, None for the defaults.
     period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is
     searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed
     for a motion; synchronous: search in step(), the same every time, else in a thread of its own.
     Raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], tables: Sequence[ClearanceTable] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
 
     def set_goal(self, goal: numpy.typing.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to; from the loop that calls step()."""
@@ -1551,11 +1551,11 @@ class PathPlanner:
     (Kuffner and LaValle 2000), widened where there is room, and shortened. Deterministic in (start, goal, obstacles,
     seed) unless time runs out.
     Edges are proven free by bounds of how far the body moves, so that nothing thin is skipped.
-    robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier;
-    settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.
+    robot; body: calibrated (Body.cover); pairs: links that must not touch, as for SelfCollisionBarrier; tables: of other
+    pairs, as for ClearanceTableBarrier; settings: a PlannerSettings, None for the defaults. Raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], settings: PlannerSettings | None = None) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], tables: Sequence[ClearanceTable] = [], settings: PlannerSettings | None = None) -> None: ...
 
     def plan(self, start: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike, obstacles: Obstacles, *, seed: int = 0) -> Plan:
         """

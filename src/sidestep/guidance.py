@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from sidestep import presets
 from sidestep._core import (
+    ClearanceTable,
     GeometricSystem,
     Guidance,
     Guide,
@@ -22,7 +23,7 @@ from sidestep._core import (
     Step,
 )
 from sidestep.body import Body
-from sidestep.link_pairs import barrier_pairs
+from sidestep.link_pairs import tables_and_pairs
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -54,7 +55,7 @@ class GuidedMotion:
         robot: the arm. body: a covering body of it; by default `Body.cover(robot)`.
         system: what moves the arm; by default `presets.barrier_system`.
         planner, route: of the guide; None for the defaults.
-        pairs: links that must not touch; by default `sidestep.link_pairs.barrier_pairs`.
+        pairs, tables: links that must not touch; if neither is given `sidestep.link_pairs.tables_and_pairs`.
         duration: time [s] after which the status is `timeout`.
         seed, synchronous: of the guide; synchronous motions are the same every time.
 
@@ -71,16 +72,20 @@ class GuidedMotion:
         planner: PlannerSettings | None = None,
         route: RouteSettings | None = None,
         pairs: LinkPairs | None = None,
+        tables: Sequence[ClearanceTable] | None = None,
         duration: float = float("inf"),
         seed: int = 0,
         synchronous: bool = False,
     ) -> None:
         body = body if body is not None else Body.cover(robot)
+        if pairs is None and tables is None:
+            tables, pairs = tables_and_pairs(robot, body)
         self.system = system if system is not None else presets.barrier_system(robot, body)
         self.guide = Guide(
             robot,
             body,
-            pairs=list(pairs if pairs is not None else barrier_pairs(robot, body)),
+            pairs=list(pairs or ()),
+            tables=list(tables or ()),
             planner=planner,
             route=route,
             duration=duration,

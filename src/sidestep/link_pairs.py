@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Obstacles, SelfCollisionBarrier
+from sidestep._core import ClearanceTable, Obstacles, SelfCollisionBarrier
 from sidestep.body import Body, cache
 from sidestep.body.file import write_text
 from sidestep.clearance_tables import clearance_tables
@@ -54,6 +54,16 @@ def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
         cache.write_stored(path, lambda file: write_text(file, text), "the pairs of links are not cached")
     apart = clearance_tables(robot).apart
     return tuple(pair for pair in stored if pair[:2] not in apart)
+
+
+def tables_and_pairs(robot: Robot, body: Body) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
+    """What tells how far links are apart: tables (`clearance_tables`), for other pairs covers (`barrier_pairs`).
+
+    Args:
+        robot: with collision meshes. body: a covering body of it.
+    """
+    exact = clearance_tables(robot)
+    return exact.tables, tuple(pair for pair in barrier_pairs(robot, body) if pair[:2] not in exact.pairs)
 
 
 def _read_pairs(path: Path) -> tuple[LinkPair, ...]:

@@ -20,8 +20,7 @@ from sidestep._core import (
 )
 from sidestep.barriers import Barriers as Barriers
 from sidestep.body import Body
-from sidestep.clearance_tables import clearance_tables
-from sidestep.link_pairs import barrier_pairs
+from sidestep.link_pairs import tables_and_pairs
 from sidestep.robot import Robot
 
 
@@ -82,10 +81,9 @@ def _self_collision(robot: Robot, body: Body, numbers: Barriers) -> list[Embeddi
         "floor": numbers.floor,
     }
     parts: list[Embedding] = []
-    exact = clearance_tables(robot)
-    if exact.tables:
-        parts.append(ClearanceTableBarrier(robot, exact.tables, **settings))
-    pairs = [pair for pair in barrier_pairs(robot, body) if pair[:2] not in exact.pairs]
+    tables, pairs = tables_and_pairs(robot, body)
+    if tables:
+        parts.append(ClearanceTableBarrier(robot, tables, **settings))
     if pairs:
         parts.append(SelfCollisionBarrier(robot, body, pairs, temperature=numbers.temperature, **settings))
     return parts

@@ -6,12 +6,14 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import sidestep as ss
 from sidestep import _core
+from sidestep.clearance_tables import clearance_tables
 from support.planar_problems import BODY, balls, free_ends
 
 FLOOR = 0.005  # [m], the default
@@ -92,3 +94,19 @@ def test_finds_a_path_wherever_ompl_does(robot: ss.Robot, body: _core.Body) -> N
     assert sum(by_ompl) >= 15  # so that the comparison says something
     missed = [i for i, (theirs, own) in enumerate(zip(by_ompl, ours, strict=True)) if theirs and not own]
     assert missed == []
+
+
+def test_tables_tell_how_far_links_are_apart(robot: ss.Robot, body: _core.Body) -> None:
+    tables = clearance_tables(robot).tables
+    planner = ss.PathPlanner(robot, body, tables=tables)
+    nothing = ss.Obstacles.none()
+    folded = np.array([0.3, 2.4, 2.4])
+    found = planner.clearance(folded, nothing)
+    assert (found.link, found.other) == ("link1", "link3")
+    assert found.clearance == min(table.at(2.4, 2.4)[0] for table in tables)
+    assert not planner.is_free(folded, nothing, margin=found.clearance + 0.001)
+    assert planner.is_free(folded, nothing, margin=found.clearance)
+    square: dict[str, Any] = {"begin": (0.0, 0.0), "spacing": (1.0, 1.0), "periodic": (False, False)}
+    wrong = ss.ClearanceTable("link1", "no link", coordinates=(1, 2), control=np.zeros((4, 4)), **square)
+    with pytest.raises(ValueError, match="no link"):
+        ss.PathPlanner(robot, body, tables=[wrong])

@@ -48,6 +48,18 @@ ClearanceTable::Sample ClearanceTable::at(double x, double y) const noexcept {
           Eigen::Matrix2d{{a.second.dot(along), mixed}, {mixed, a.value.dot(c * b.second)}}};
 }
 
+Eigen::Vector2d ClearanceTable::steepest() const noexcept {
+  const auto slope = [&](const Eigen::MatrixXd& along, const Axis& axis) {
+    const Eigen::Index last = along.rows() - 1;
+    double most = (along.bottomRows(last) - along.topRows(last)).cwiseAbs().maxCoeff();
+    if (axis.periodic) {
+      most = std::max(most, (along.row(0) - along.row(last)).cwiseAbs().maxCoeff());
+    }
+    return most / axis.spacing;
+  };
+  return {slope(control, axes[0]), slope(control.transpose(), axes[1])};
+}
+
 void ClearanceTable::validate(int coordinates) const {
   const std::string name = "clearance table of links '" + first + "' and '" + second + "': ";
   for (std::size_t k = 0; k < axes.size(); ++k) {

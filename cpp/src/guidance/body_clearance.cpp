@@ -1,6 +1,5 @@
 #include "sidestep/guidance/body_clearance.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -13,7 +12,6 @@ namespace sidestep {
 namespace {
 
 constexpr const char* owner = "body clearance";
-constexpr double cover_overshoot = 0.04;      // [m] of the balls that cover an ellipsoid
 constexpr double closest_centres = 1e-6;      // [m] of which a direction is taken
 constexpr int planes_of_pair = 3;             // tried before the gap of two ellipsoids is looked for
 
@@ -29,13 +27,11 @@ kernels::PlacedEllipsoid placed(const Eigen::Vector3d& centre, const Eigen::Matr
   return ellipsoid;
 }
 
-double across(const Eigen::Vector3d& offset, const Eigen::Vector3d& axis) { return offset.cross(axis).norm(); }
-
 }  // namespace
 
 BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs,
-                             const std::vector<KeptPlane>& planes)
-    : robot_(std::move(robot)) {
+                             const std::vector<KeptPlane>& planes, std::vector<ClearanceTable> tables)
+    : robot_(std::move(robot)), tables_(std::move(tables)) {
   for (const Joint& joint : robot_.joints()) {
     const Eigen::Vector3d& a = joint.axis;
     const Eigen::Matrix3d R_PJ = joint.X_PJ.linear();
@@ -45,9 +41,7 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
   }
   const std::vector<BodyEllipsoid> all = body_ellipsoids(robot_, body, owner);
   const auto nv = robot_.num_coordinates();
-  const auto item = [&](CoordinateLabel label, int link) {
-    return Item{std::move(label), link, -1, -1, -1, Eigen::VectorXd::Zero(nv), Eigen::MatrixXd::Zero(nv, nv), 0.0};
-  };
+  const auto item = [nv](CoordinateLabel label, int link) { return Item(std::move(label), link, nv); };
   // The links far from the base first: they are the likeliest in the way.
   for (auto e = all.rbegin(); e != all.rend(); ++e) {
     const std::string& name = body.links[static_cast<std::size_t>(e->component)];
@@ -92,6 +86,7 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
       add_reach(items_.back(), links_[static_cast<std::size_t>(items_.back().link)]);
     }
   }
+  add_tables();
   if (num_items() > max_items) {
     throw std::invalid_argument(std::string(owner) + ": " + std::to_string(num_items()) +
                                 " links, pairs and planes; at most " + std::to_string(max_items) + " are allowed");
@@ -110,69 +105,6 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
   }
 }
 
-int BodyClearance::add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name) {
-  for (std::size_t i = 0; i < links_.size(); ++i) {
-    if (links_[i].name == name) {
-      return static_cast<int>(i);
-    }
-  }
-  Link link{name, robot_.frames()[static_cast<std::size_t>(robot_.frame_index(name))].joint, {}, Eigen::Vector3d::Zero(), 0.0};
-  for (const BodyEllipsoid& e : all) {
-    if (body.links[static_cast<std::size_t>(e.component)] == name) {
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(e.shape);
-      link.ellipsoids.push_back({e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), e.shape, e.extent,
-                                 cover_by_balls(e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), cover_overshoot)});
-      link.centre += e.mean;
-    }
-  }
-  if (link.ellipsoids.empty()) {
-    throw std::invalid_argument(std::string(owner) + ": the body has no ellipsoid on link '" + name + "'");
-  }
-  link.centre /= static_cast<double>(link.ellipsoids.size());
-  for (const Ellipsoid& e : link.ellipsoids) {
-    link.radius = std::max(link.radius, (e.mean - link.centre).norm() + e.extent);
-  }
-  links_.push_back(std::move(link));
-  return static_cast<int>(links_.size()) - 1;
-}
-
-void BodyClearance::add_reach(Item& item, const Link& link) const {
-  // Up the chain, with a ball around the origin below that holds the link in every configuration.
-  double ball = 0.0;
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // of that origin, from joint j
-  Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link
-  for (int j = link.joint; j != item.base;) {
-    const Joint& joint = robot_.joints()[static_cast<std::size_t>(j)];
-    double radius = 0.0, next = 0.0;  // from the axis; of the ball around j
-    if (j == link.joint) {
-      for (const Ellipsoid& e : link.ellipsoids) {
-        radius = std::max(radius, across(e.mean, joint.axis) + e.extent);
-        next = std::max(next, e.mean.norm() + e.extent);
-      }
-    } else {
-      radius = across(offset, joint.axis) + ball;
-      next = offset.norm() + ball;
-    }
-    const bool turns = joint.type == JointType::revolute;
-    const double factor = std::abs(joint.multiplier), R = factor * (turns ? radius : 1.0);
-    item.reach[joint.coordinate] += R;
-    later[joint.coordinate] += R;
-    if (turns) {
-      // All later ones turn with it, and the pairs (i, j) and (j, i) count alike; itself once.
-      item.bend.row(joint.coordinate) += 2.0 * factor * later.transpose();
-      item.bend(joint.coordinate, joint.coordinate) -= factor * R;
-    } else {
-      const JointLimits& limits = robot_.limits();
-      const double low = joint.multiplier * limits.lower[joint.coordinate] + joint.offset;
-      const double high = joint.multiplier * limits.upper[joint.coordinate] + joint.offset;
-      next += std::max(std::abs(low), std::abs(high));
-    }
-    ball = next;
-    offset = joint.X_PJ.translation();
-    j = joint.parent;
-  }
-}
-
 BodyClearance::Workspace::Workspace(const BodyClearance& body)
     : poses_(body.robot_.joints().size()),
       centres_(body.links_.size()),
@@ -181,7 +113,8 @@ BodyClearance::Workspace::Workspace(const BodyClearance& body)
       lengths_(body.robot_.num_coordinates()),
       products_(body.robot_.num_coordinates() * body.robot_.num_coordinates()),
       q_(body.robot_.num_coordinates()),
-      difference_(body.robot_.num_coordinates()) {
+      difference_(body.robot_.num_coordinates()),
+      placed_(body.robot_.num_coordinates()) {
   std::size_t most = 0;
   for (const Link& link : body.links_) {
     most = std::max(most, link.ellipsoids.size());
@@ -191,6 +124,7 @@ BodyClearance::Workspace::Workspace(const BodyClearance& body)
 }
 
 void BodyClearance::place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept {
+  w.placed_ = q;
   for (std::size_t i = 0; i < rotations_.size(); ++i) {
     const Joint& joint = robot_.joints()[i];
     const Workspace::Pose& parent = pose(w, joint.parent);
@@ -225,6 +159,11 @@ BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obst
     const Asked gap_asked{asked.cap + item.contact, asked.near + item.contact, asked.stop + item.contact};
     const double gap = look_at_pair(item, gap_asked, w);
     return {gap < gap_asked.cap ? gap - item.contact : asked.cap, -1};  // exactly the cap where nothing is nearer
+  }
+  if (item.table >= 0) {
+    const ClearanceTable& table = tables_[static_cast<std::size_t>(item.table)];
+    const double clearance = table.at(w.placed_[table.axes[0].coordinate], w.placed_[table.axes[1].coordinate]).value;
+    return {std::min(clearance, asked.cap), -1};
   }
   if (item.plane >= 0) {
     const Link& link = links_[static_cast<std::size_t>(item.link)];

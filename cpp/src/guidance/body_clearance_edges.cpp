@@ -43,6 +43,9 @@ void BodyClearance::move(Eigen::Ref<const Eigen::VectorXd> velocity, Workspace& 
 }
 
 double BodyClearance::speed(const Item& item, const Workspace& w) const noexcept {
+  if (item.table >= 0) {
+    return item.reach.dot(w.lengths_);
+  }
   const Workspace::Pose& base = pose(w, item.base);
   double sum = 0.0;
   for (const int n : {item.link, item.other}) {
@@ -71,8 +74,8 @@ void BodyClearance::bound_motions(Eigen::Ref<const Eigen::VectorXd> displacement
 double BodyClearance::motion(int item, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> displacement,
                              Workspace& w) const noexcept {
   place(q, w);
-  move(displacement, w);
   bound_motions(displacement, w);
+  move(displacement, w);
   const Motion moved{w.motions_[item], 0.0, speed(items_[static_cast<std::size_t>(item)], w), w.curvatures_[item]};
   return moved.distance(1.0);
 }

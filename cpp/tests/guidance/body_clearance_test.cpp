@@ -216,6 +216,44 @@ BOOST_AUTO_TEST_CASE(an_edge_that_is_free_has_no_gap) {
   BOOST_TEST(thin > 3);  // obstacles that samples 50 times coarser would have stepped over
 }
 
+BOOST_AUTO_TEST_CASE(an_edge_through_a_table_has_no_gap) {
+  Random random(8);
+  int free = 0, refused = 0, beyond = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Robot robot = test::random_tree(random, 6);
+    const Body body = calibrated(random, robot, 0.01);
+    const int nv = robot.num_coordinates();
+    if (nv < 2) {
+      continue;
+    }
+    ClearanceTable table{"link0", "link3", {ClearanceTable::Axis{0, -3.0, 0.5, false}, {nv - 1, -M_PI, M_PI / 4.0, true}}, {}};
+    table.control = 0.03 * random.matrix(13, 8);
+    const BodyClearance checked(robot, body, {}, {}, {table});
+    BodyClearance::Workspace w(checked);
+    const int item = checked.num_items() - 1;
+    BOOST_TEST(checked.label(item).name == "link0");
+    const Eigen::VectorXd a = random.vector(nv), b = a + 0.5 * random.vector(nv);
+    const Margins margins{0.002, 0.002, 0.3, {}, 0.002};
+    const bool edge = checked.edge_free(a, b, Obstacles::none(), margins, w);
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= 400; ++i) {
+      const Eigen::VectorXd q = a + i / 400.0 * (b - a);
+      const double exact = table.at(q[0], q[nv - 1]).value;
+      BOOST_TEST(checked.nearest(item, q, Obstacles::none(), 1.0, w).clearance == exact);
+      least = std::min(least, exact);
+      beyond += std::abs(exact - table.at(a[0], a[nv - 1]).value) > checked.motion(item, q - a) + 1e-12;  // rounding
+    }
+    edge ? ++free : ++refused;
+    if (edge) {
+      BOOST_TEST(least >= 0.0);  // margin less slack
+    } else {
+      BOOST_TEST(least < 0.002 + 1e-6);  // a scan sees the least to second order of its spacing
+    }
+  }
+  BOOST_TEST(beyond == 0);
+  BOOST_TEST(std::min(free, refused) > 50);  // so that both say something
+}
+
 BOOST_AUTO_TEST_CASE(an_edge_keeps_margins_that_ease_at_its_ends) {
   Random random(8);
   int free = 0, blocked = 0;

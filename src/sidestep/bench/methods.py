@@ -9,7 +9,7 @@ from sidestep._core import GeometricSystem
 from sidestep.bench.method import Method
 from sidestep.body import Body
 from sidestep.guidance import GuidedMotion
-from sidestep.link_pairs import barrier_pairs
+from sidestep.link_pairs import tables_and_pairs
 from sidestep.robot import Robot
 
 
@@ -39,5 +39,7 @@ def build_guide(
     if method is not Method.guided:
         return None
     covering = build_body(method, robot) if body is None else body
-    pairs = barrier_pairs(robot, covering)
-    return lambda seed: GuidedMotion(robot, covering, system=system, pairs=pairs, seed=seed, synchronous=True)
+    tables, pairs = tables_and_pairs(robot, covering)
+    return lambda seed: GuidedMotion(
+        robot, covering, system=system, pairs=pairs, tables=tables, seed=seed, synchronous=True
+    )

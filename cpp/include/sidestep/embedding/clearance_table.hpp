@@ -31,6 +31,10 @@ struct ClearanceTable {
 
   Sample at(double x, double y) const noexcept;
 
+  /// The steepest that the spline can be in either coordinate [m/rad | 1]: its derivatives are means of slopes between
+  /// neighbouring control points.
+  Eigen::Vector2d steepest() const noexcept;
+
   /// Throws std::invalid_argument that names what is wrong, in a robot of `coordinates` coordinates.
   void validate(int coordinates) const;
 };

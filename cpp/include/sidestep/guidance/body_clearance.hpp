@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -10,6 +11,7 @@
 #include "sidestep/body/body.hpp"
 #include "sidestep/embedding/embedding.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
+#include "sidestep/embedding/clearance_table.hpp"
 #include "sidestep/embedding/link_pair.hpp"
 #include "sidestep/guidance/ball_cover.hpp"
 #include "sidestep/guidance/distance_field.hpp"
@@ -49,22 +51,24 @@ struct Margins {
 /// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no derivative.
 ///
 /// What must keep apart are items: a link and the obstacles, a link and a plane, two links. The clearances of planes and
-/// pairs are those of PlaneBarrier and SelfCollisionBarrier; that of obstacles is the distance of their balls from the
-/// ellipsoids, signed, by two steps of Newton towards the nearest place: a lower bound, as a supporting plane gives it.
+/// pairs are those of PlaneBarrier and SelfCollisionBarrier, or of ClearanceTableBarrier; that of obstacles is the distance
+/// of their balls from the ellipsoids, signed, by two steps of Newton towards the nearest place: a lower bound, as a
+/// supporting plane gives it.
 ///
 /// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): a share s of it moves no point of an item farther than
 ///
 ///     motion(s Δq) = s Σ_i |Δq_i| R_i      and      s v + s²/2 Σ_i Σ_j |Δq_i| |Δq_j| R_max(i, j),
 ///
 /// R_i the largest distance that the item can have from the axis of joint i and v the speed of its fastest point where the
-/// motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint. An interval of an edge is free as far around its middle as the
+/// motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint; of a table it is the first, with its steepest slopes for R. An
+/// interval of an edge is free as far around its middle as the
 /// clearance there exceeds the smaller of the two; what is left to either side is looked at in the same way.
 class BodyClearance {
  public:
-  /// `pairs` as for SelfCollisionBarrier. Throws std::invalid_argument if the body is not calibrated or no
-  /// joint moves it, a name is unknown, a prismatic joint has no limits, or there are more than `max_items` items.
+  /// `pairs` as for SelfCollisionBarrier, `tables` of other pairs as for ClearanceTableBarrier. Throws
+  /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown, a prismatic joint has no limits, or there are more than `max_items` items.
   BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
-                const std::vector<KeptPlane>& planes = {});
+                const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {});
 
   static constexpr int max_items = 256;
 
@@ -98,6 +102,7 @@ class BodyClearance {
     DistanceField field_;
     std::vector<double> bounds_;  // of the ellipsoids of a link
     Eigen::VectorXd q_, difference_;
+    Eigen::VectorXd placed_;  // where the body is
     int last_ = 0;  // the item that was in the way last: it is looked at first
   };
 
@@ -119,8 +124,7 @@ class BodyClearance {
 
   /// What `margins` ask of an item away from the ends [m].
   double margin(int item, const Margins& margins) const noexcept {
-    const bool pair = items_[static_cast<std::size_t>(item)].other >= 0;
-    return pair && margins.pair_margin < margins.margin ? margins.pair_margin : margins.margin;
+    return label(item).kind == CoordinateLabel::Kind::self ? std::min(margins.pair_margin, margins.margin) : margins.margin;
   }
 
   /// Whether every item keeps its margin at q. Ends at the first that does not.
@@ -160,9 +164,13 @@ class BodyClearance {
     double radius;
   };
   struct Item {
+    Item(CoordinateLabel what, int on, Eigen::Index nv)
+        : label(std::move(what)), link(on), reach(Eigen::VectorXd::Zero(nv)), bend(Eigen::MatrixXd::Zero(nv, nv)) {}
+
     CoordinateLabel label;
-    int link, other = -1;    // links_; other: of a pair
+    int link, other = -1;    // links_; other: of a pair; both -1 for a table
     int plane = -1;          // planes_
+    int table = -1;          // tables_
     int base = -1;           // joint that moves both of a pair alike
     Eigen::VectorXd reach;   // R of every coordinate
     Eigen::MatrixXd bend;    // R of the later one of two, row by row in bends_
@@ -179,6 +187,7 @@ class BodyClearance {
 
   int add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name);
   void add_reach(Item& item, const Link& link) const;
+  void add_tables();
   void place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept;
   void move(Eigen::Ref<const Eigen::VectorXd> velocity, Workspace& w) const noexcept;
   double speed(const Item& item, const Workspace& w) const noexcept;
@@ -197,6 +206,7 @@ class BodyClearance {
   Robot robot_;
   std::vector<Link> links_;
   std::vector<Plane> planes_;
+  std::vector<ClearanceTable> tables_;
   std::vector<Item> items_;
   Eigen::VectorXd reach_;
   Eigen::MatrixXd reaches_, bends_;  // of all items: (items × nv), (items × nv²)
