@@ -117,6 +117,37 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
   BOOST_TEST(name(status) == "arrived");
 }
 
+BOOST_AUTO_TEST_CASE(a_path_that_is_blocked_while_it_is_improved_is_given_up_at_once) {
+  const Robot robot = turning();
+  GuideSettings settings;
+  settings.planner.shortcuts = 1'000'000'000;  // for longer than anybody waits
+  Guide guide(body_of(robot), settings);
+  guide.set_obstacles(point(0.5, 0.0));
+  guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
+  const Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
+  Guide::Attractor attractor(2);
+  GuideStatus status = GuideStatus::idle;
+  double time = 0.0;
+  const auto step = [&] {
+    status = guide.step(q, time, attractor);
+    time += 0.001;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  do {  // until it leads along its first path
+    step();
+  } while (attractor.velocity.isZero());
+  BOOST_TEST(guide.counts().searches == 0);  // none is over
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 2);
+  points.col(0) << 0.5, 0.0, 0.0;
+  points.col(1) << 0.5 * std::cos(-1.0), 0.5 * std::sin(-1.0), 0.0;  // in the goal
+  guide.set_obstacles(Obstacles(points, Eigen::VectorXd::Constant(2, 0.02), Eigen::Matrix3Xd::Zero(3, 2)));
+  for (int i = 0; i < 30000 && status != GuideStatus::goal_in_collision; ++i) {
+    step();
+  }
+  BOOST_TEST(name(status) == "goal_in_collision");
+  BOOST_TEST(guide.counts().searches == 2);
+}
+
 BOOST_AUTO_TEST_CASE(the_narrow_places_between_arm_and_attractor_are_known) {
   const Robot robot = turning();
   const BodyClearance body = body_of(robot);

@@ -119,8 +119,10 @@ class Guide {
   void run();
   void look(const State& state);
   void search(const State& state, const Obstacles& obstacles);
-  /// Whether the rest of the path is still free.
-  bool ahead_is_free(const State& state, const Obstacles& obstacles);
+  /// Whether the rest of the path from a station on is still free.
+  bool ahead_is_free(double station, const Obstacles& obstacles, BodyClearance::Workspace& w) const;
+  /// Whether something new blocks the first path, while a better one is made from it.
+  bool overtaken();
   /// Whether the arm sees the attractor, or else finds back to the path, which begins where it is then.
   bool holds_on(const State& state, const Obstacles& obstacles);
   void follow(const State& state, const Eigen::MatrixXd& path, const Obstacles& obstacles, bool measured);
@@ -160,6 +162,9 @@ class Guide {
   std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, path_number_ = 0, searches_ = 0;
   bool newer_ = false;  // a state was taken that it has not looked at
   bool have_path_ = false, direct_ = false, failed_ = false;
+  bool improving_ = false, overtaken_ = false;
+  std::uint64_t watched_scene_ = 0;
+  BodyClearance::Workspace watch_;  // as the planner's is in use then
   double margin_, failed_at_ = 0.0;
   PlanStatus status_ = PlanStatus::no_path;
   Eigen::MatrixXd path_;
