@@ -28,13 +28,12 @@ void Guide::look(const State& state) {
   if (state.goal_number == 0) {
     return;
   }
-  bool changed = false;
   {
     const std::lock_guard lock(mutex_);
     if (scene_number_ != seen_scene_) {
       obstacles_ = newest_;
       seen_scene_ = scene_number_;
-      changed = true;
+      changed_ = true;
     }
   }
   const Obstacles& obstacles = *obstacles_;
@@ -70,16 +69,20 @@ void Guide::look(const State& state) {
     }
   }
   if (have_path_ && !stuck && !direct_) {
-    const bool follows = state.route_number == route_number_;
-    if (!follows || ((!changed || ahead_is_free(state.station, obstacles, planner_.workspace())) && holds_on(state, obstacles))) {
+    if (state.route_number != route_number_) {  // the loop has yet to take it up
+      return;
+    }
+    if ((!changed_ || ahead_is_free(state.station, obstacles, planner_.workspace())) && holds_on(state, obstacles)) {
+      changed_ = false;
       return;
     }
   }
   direct_ = false;
   const bool out_of_budget = status_ == PlanStatus::no_path || status_ == PlanStatus::timeout;
-  if (failed_ && out_of_budget && !changed && !stuck && state.time - failed_at_ < settings_.retry) {
+  if (failed_ && out_of_budget && !changed_ && !stuck && state.time - failed_at_ < settings_.retry) {
     return;
   }
+  changed_ = false;
   search(state, obstacles);
 }
 

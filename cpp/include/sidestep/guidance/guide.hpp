@@ -162,6 +162,7 @@ class Guide {
   std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, path_number_ = 0, searches_ = 0;
   bool newer_ = false;  // a state was taken that it has not looked at
   bool have_path_ = false, direct_ = false, failed_ = false;
+  bool changed_ = false;  // the scene, since the path was last looked at
   bool improving_ = false, overtaken_ = false;
   std::uint64_t watched_scene_ = 0;
   BodyClearance::Workspace watch_;  // as the planner's is in use then
