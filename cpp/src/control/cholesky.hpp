@@ -5,10 +5,10 @@
 
 namespace sidestep {
 
-/// Writes the lower triangular L with A = L L' into `L` (of A's size; above the diagonal untouched), reading A's lower
-/// triangle. False if A is not positive definite to working precision. Allocates nothing at any size, which Eigen's
-/// blocked factorisation does not promise.
-inline bool cholesky(const Eigen::MatrixXd& A, Eigen::MatrixXd& L) noexcept {
+/// Writes the lower triangular L with A = L L' into the corner of `L` that has A's size (above the diagonal untouched),
+/// reading A's lower triangle. False if A is not positive definite to working precision. Allocates nothing at any size,
+/// which Eigen's blocked factorisation does not promise.
+inline bool cholesky(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>& A, Eigen::MatrixXd& L) noexcept {
   // A pivot below this fraction of its diagonal entry is all cancellation.
   constexpr double singular = 1e-14;
   const Eigen::Index n = A.rows();

@@ -11,7 +11,6 @@
 namespace sidestep {
 namespace {
 
-
 // A constraint counts as violated beyond this fraction of the terms that cancel in it: about 1e4 roundings, which is
 // what factors of ill-conditioned but usable data lose.
 constexpr double feasibility_tolerance = 1e-12;
@@ -55,6 +54,8 @@ QuadraticProgram::QuadraticProgram(int num_variables, int num_rows) : n_(num_var
   R_.setZero(n_, n_);
   x_.setZero(n_);
   multipliers_.setZero(n_ + m_);
+  supports_.setZero(m_, n_);
+  support_sizes_.setZero(m_);
   row_norms_.setZero(m_);
   u_.setZero(n_);
   d_.setZero(n_);
@@ -63,28 +64,88 @@ QuadraticProgram::QuadraticProgram(int num_variables, int num_rows) : n_(num_var
   y_.setZero(n_);
 }
 
-bool QuadraticProgram::factorise(const Eigen::MatrixXd& H) noexcept {
-  if (!cholesky(H, cholesky_)) {
-    return false;
+bool QuadraticProgram::factorise(const QuadraticProgramData& data) noexcept {
+  const Eigen::MatrixXd& H = data.H;
+  num_coupled_ = n_;
+  while (num_coupled_ > 0 && (H.row(num_coupled_ - 1).head(num_coupled_ - 1).array() == 0.0).all()) {
+    --num_coupled_;
   }
-  // J = L^-T: upper triangular, J(j,j) = 1/L(j,j), the rest by back substitution row by row from below.
-  J_.setZero();
-  for (int j = 0; j < n_; ++j) {
-    J_(j, j) = 1.0 / cholesky_(j, j);
-    for (int i = j - 1; i >= 0; --i) {
-      J_(i, j) = -cholesky_.col(i).segment(i + 1, j - i).dot(J_.col(j).segment(i + 1, j - i)) / cholesky_(i, i);
+  for (int i = num_coupled_; i < n_; ++i) {
+    if (!(H(i, i) > 0.0)) {
+      return false;
     }
   }
-  return true;
+  return cholesky(H.topLeftCorner(num_coupled_, num_coupled_), cholesky_);
+}
+
+void QuadraticProgram::start(const QuadraticProgramData& data) noexcept {
+  num_active_ = 0;
+  std::fill(is_active_.begin(), is_active_.end(), char{0});
+  J_.setZero();
+  // Uncoupled variables outside a bound begin there; their columns come first, as those of all that is active.
+  for (int i = num_coupled_; i < n_; ++i) {
+    const double curvature = data.H(i, i), least = -data.g[i] / curvature;
+    if (least >= data.lower[i] && least <= data.upper[i]) {
+      continue;
+    }
+    const double sign = least < data.lower[i] ? 1.0 : -1.0;
+    const double side = sign > 0.0 ? data.lower[i] : data.upper[i];
+    const double scale = 1.0 / std::sqrt(curvature);
+    J_(i, num_active_) = sign * scale;
+    R_.col(num_active_).head(num_active_).setZero();
+    R_(num_active_, num_active_) = scale;
+    active_[static_cast<std::size_t>(num_active_++)] = {i, sign, sign * side, data.lower[i] == data.upper[i]};
+    is_active_[static_cast<std::size_t>(i)] = 1;
+  }
+  // J = L^-T of what is coupled: upper triangular, J(j,j) = 1/L(j,j), the rest by back substitution from below.
+  for (int j = 0; j < num_coupled_; ++j) {
+    auto column = J_.col(num_active_ + j);
+    column[j] = 1.0 / cholesky_(j, j);
+    for (int i = j - 1; i >= 0; --i) {
+      column[i] = -cholesky_.col(i).segment(i + 1, j - i).dot(column.segment(i + 1, j - i)) / cholesky_(i, i);
+    }
+  }
+  for (int i = num_coupled_, j = num_active_ + num_coupled_; i < n_; ++i) {
+    if (!is_active_[static_cast<std::size_t>(i)]) {
+      J_(i, j++) = 1.0 / std::sqrt(data.H(i, i));
+    }
+  }
+}
+
+void QuadraticProgram::find_supports(const QuadraticProgramData& data) noexcept {
+  for (int row = 0; row < m_; ++row) {
+    int size = 0;
+    double squares = 0.0;
+    for (int i = 0; i < n_; ++i) {
+      const double value = data.A(row, i);
+      supports_(row, size) = i;
+      size += value != 0.0 ? 1 : 0;
+      squares += value * value;
+    }
+    support_sizes_[row] = size;
+    row_norms_[row] = std::sqrt(squares);
+  }
+}
+
+double QuadraticProgram::along_row(const QuadraticProgramData& data, int row, const Eigen::VectorXd& x) const noexcept {
+  const int* at = &supports_(row, 0);
+  double value = 0.0;
+  for (int k = 0; k < support_sizes_[row]; ++k) {
+    value += data.A(row, at[k]) * x[at[k]];
+  }
+  return value;
 }
 
 void QuadraticProgram::project_normal(const QuadraticProgramData& data, int constraint, double sign) noexcept {
   if (constraint < n_) {
     d_.noalias() = sign * J_.row(constraint).transpose();
-  } else {
-    for (int j = 0; j < n_; ++j) {
-      d_[j] = sign * data.A.row(constraint - n_).dot(J_.col(j).transpose());
-    }
+    return;
+  }
+  const int row = constraint - n_;
+  d_.setZero();
+  for (int k = 0; k < support_sizes_[row]; ++k) {
+    const int i = supports_(row, k);
+    d_ += sign * data.A(row, i) * J_.row(i).transpose();
   }
 }
 
@@ -94,10 +155,9 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
     if (is_active_[static_cast<std::size_t>(i)]) {
       continue;
     }
-    double value = 0.0, terms = 0.0, norm = 1.0, low = 0.0, high = 0.0;
+    double value = 0.0, norm = 1.0, low = 0.0, high = 0.0;
     if (i < n_) {
       value = x_[i];
-      terms = std::abs(value);
       low = data.lower[i];
       high = data.upper[i];
     } else {
@@ -106,14 +166,16 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
       if (low == -infinity && high == infinity) {
         continue;  // a row that is not in use
       }
-      const auto row = data.A.row(i - n_);
-      value = row.dot(x_);
-      terms = row.cwiseAbs().dot(x_.cwiseAbs().transpose());
+      value = along_row(data, i - n_, x_);
       norm = row_norms_[i - n_];
     }
     const bool below = low - value > value - high;
     const double side = below ? low : high;
     const double violation = below ? low - value : value - high;
+    if (!(violation > 0.0)) {
+      continue;
+    }
+    const double terms = i < n_ ? std::abs(value) : data.A.row(i - n_).cwiseAbs().dot(x_.cwiseAbs().transpose());
     if (!(violation > feasibility_tolerance * (terms + std::abs(side)))) {
       continue;
     }
@@ -201,10 +263,8 @@ void QuadraticProgram::recompute(const QuadraticProgramData& data) noexcept {
 }
 
 QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data) noexcept {
-  num_active_ = 0;
   iterations_ = 0;
   multipliers_.setZero();
-  std::fill(is_active_.begin(), is_active_.end(), char{0});
   if (data.H.rows() != n_ || data.H.cols() != n_ || data.g.size() != n_ || data.lower.size() != n_ ||
       data.upper.size() != n_ || data.A.rows() != m_ || data.A.cols() != n_ || data.row_lower.size() != m_ ||
       data.row_upper.size() != m_) {
@@ -219,13 +279,21 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
       (data.row_lower.array() == infinity).any() || (data.row_upper.array() == -infinity).any()) {
     return QuadraticProgramStatus::infeasible;
   }
-  if (!factorise(data.H)) {
+  if (!factorise(data)) {
     return QuadraticProgramStatus::not_positive_definite;
   }
-  row_norms_ = data.A.rowwise().norm();
-  recompute(data);
+  find_supports(data);
+  const QuadraticProgramStatus status = iterate(data, false);
+  const bool sure = status == QuadraticProgramStatus::solved || status == QuadraticProgramStatus::not_finite;
+  return sure ? status : iterate(data, true);
+}
 
+QuadraticProgramStatus QuadraticProgram::iterate(const QuadraticProgramData& data, bool exactly) noexcept {
+  iterations_ = 0;
+  start(data);
+  recompute(data);
   const int max_iterations = iterations_per_constraint * (n_ + m_) + n_;
+  bool exact = true;  // without the rounding of steps
   while (true) {
     if (!x_.allFinite()) {
       return QuadraticProgramStatus::not_finite;
@@ -233,8 +301,14 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
     int constraint = -1;
     double sign = 1.0;
     if (most_violated(data, constraint, sign) == 0.0) {
-      break;
+      if (exact) {
+        break;
+      }
+      recompute(data);
+      exact = true;
+      continue;
     }
+    exact = false;
     const bool is_bound = constraint < n_;
     const double low = is_bound ? data.lower[constraint] : data.row_lower[constraint - n_];
     const double high = is_bound ? data.upper[constraint] : data.row_upper[constraint - n_];
@@ -268,7 +342,7 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
       const bool independent = curvature > dependence_tolerance * dependence_tolerance * d_.squaredNorm();
       double primal_step = infinity;
       if (independent) {
-        const double value = is_bound ? x_[constraint] : data.A.row(constraint - n_).dot(x_);
+        const double value = is_bound ? x_[constraint] : along_row(data, constraint - n_, x_);
         primal_step = std::max(entering.rhs - sign * value, 0.0) / curvature;
       }
       if (!independent && leaving < 0) {
@@ -290,7 +364,10 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
       }
       drop(leaving);
     }
-    recompute(data);
+    if (exactly) {
+      recompute(data);
+      exact = true;
+    }
   }
   for (int j = 0; j < num_active_; ++j) {
     const Active& active = active_[static_cast<std::size_t>(j)];

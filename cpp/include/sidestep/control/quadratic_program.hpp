@@ -38,6 +38,9 @@ struct QuadraticProgramData {
 /// numerically stable dual method for solving strictly convex quadratic programs", 1983). The factors of the active
 /// set are updated by Givens rotations. The result depends on the data alone: there is no warm start to go stale.
 ///
+/// Slack variables are cheap where they come last: variables that H does not couple to any other start at the bound that
+/// they violate, and of rows only the entries that are not zero are read.
+///
 /// Memory is taken at construction; `solve` allocates nothing. One object per thread.
 class QuadraticProgram {
  public:
@@ -67,7 +70,12 @@ class QuadraticProgram {
     bool equality = false;  // never dropped, multiplier of any sign
   };
 
-  bool factorise(const Eigen::MatrixXd& H) noexcept;
+  bool factorise(const QuadraticProgramData& data) noexcept;
+  /// Exactly: without the rounding of steps at every iteration, not only at the end.
+  QuadraticProgramStatus iterate(const QuadraticProgramData& data, bool exactly) noexcept;
+  void start(const QuadraticProgramData& data) noexcept;
+  void find_supports(const QuadraticProgramData& data) noexcept;
+  double along_row(const QuadraticProgramData& data, int row, const Eigen::VectorXd& x) const noexcept;
   void project_normal(const QuadraticProgramData& data, int constraint, double sign) noexcept;
   double most_violated(const QuadraticProgramData& data, int& constraint, double& sign) const noexcept;
   void add(const Active& active, double multiplier) noexcept;
@@ -79,10 +87,13 @@ class QuadraticProgram {
   int iterations_ = 0;
   std::vector<Active> active_;     // (n), first num_active_ in use
   std::vector<char> is_active_;    // (n + m)
-  Eigen::MatrixXd cholesky_;       // L with H = L L'
+  Eigen::MatrixXd cholesky_;       // L of the coupled part, H = L L'
   Eigen::MatrixXd J_;              // L^-T times an orthogonal matrix, so J' H J = I; J' N = [R; 0]
   Eigen::MatrixXd R_;              // upper triangular, (num_active_, num_active_) in use; N: active normals
   Eigen::VectorXd x_, multipliers_;
+  int num_coupled_ = 0;            // H is diagonal from here on
+  Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;  // (m, n) where rows of A are not zero
+  Eigen::VectorXi support_sizes_;  // (m)
   Eigen::VectorXd row_norms_;      // |row| of A
   Eigen::VectorXd u_;              // multipliers of the active constraints, >= 0 for inequalities
   Eigen::VectorXd d_, r_, z_, y_;  // J' n, R^-1 d_1, step direction J_2 d_2, coordinates of x in J
