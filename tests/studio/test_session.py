@@ -47,14 +47,14 @@ def record(session: Session, seconds: float) -> tuple[m.Snapshot, float]:
 
 def test_the_arm_arrives_past_the_ball(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
-    last, clearance = record(session, 7.0)
+    last, clearance = record(session, 9.0)  # [s] with a way around by a sub-goal, 2.7 rad off
     assert last.goal is not None
     assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
     assert clearance > 0.0
     assert last.touched == 0
     assert "goal" in last.words
     assert last.status == ("ok", "ok")
-    assert last.time == pytest.approx(7.0, abs=1e-9)
+    assert last.time == pytest.approx(9.0, abs=1e-9)
 
 
 def test_a_ball_drawn_into_the_arm_at_rest_does_not_touch_it(
@@ -245,7 +245,7 @@ def test_an_arm_stays_at_its_goal(make_session: MakeSession, scenario: Scenario)
 
 def test_a_guided_arm_arrives(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario, method="guided")
-    last, clearance = record(session, 7.0)
+    last, clearance = record(session, 9.0)  # [s] with a way around by a sub-goal, 2.7 rad off
     assert last.goal is not None
     assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
     assert clearance > 0.0
