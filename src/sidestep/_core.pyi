@@ -831,12 +831,13 @@ class Escape:
     """
     Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],
     it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):
-    one uniform within `spread` [rad] of every joint's position and within the limits. Within 0.01 [rad | m] of its
+    one uniform within `spread` [rad] of every joint's position and within the limits; the n-th time for one goal within
+    n times `spread`, for at most n times `leg`. Within 0.01 [rad | m] of its
     goal it has arrived. fraction: of its potential that counts as nearer; seed: of the random configurations.
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, robot: Robot, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 3.0, spread: float = 3.1, seed: int = 0) -> None: ...
+    def __init__(self, robot: Robot, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 2.0, spread: float = 1.7, seed: int = 0) -> None: ...
 
     def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, potential: float, period: float) -> JointGoal | PoseGoal:
         """

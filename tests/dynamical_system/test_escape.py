@@ -146,3 +146,25 @@ def test_escape_of_another_robot_is_refused(robot):
     zero = np.zeros(3)
     with pytest.raises(ValueError, match="escape is for 2 coordinates, the system has 3"):
         ss.rollout(flat, zero, zero, zero, ss.Obstacles.none(), steps=1, escape=ss.Escape(robot))
+
+
+def test_sub_goals_for_one_goal_lie_farther_off_one_by_one():
+    robot = ss.Robot.named("fr3_arm")
+    spread, period = 0.1, 0.01
+    escape = ss.Escape(robot, patience=0.1, leg=0.1, spread=spread, seed=1)
+    middle = 0.5 * (robot.limits.lower + robot.limits.upper)
+    goal, elsewhere = ss.JointGoal(middle + 0.4), ss.JointGoal(middle - 0.8)
+
+    def farthest_of_next_sub_goal(goal: ss.JointGoal) -> float:
+        count = escape.count
+        while escape.count == count:
+            followed = escape.pursue(goal, middle, np.nan, period)
+        return float(np.abs(followed.position - middle).max())
+
+    offs = [farthest_of_next_sub_goal(goal) for _ in range(6)]
+    # The largest of seven uniform draws within n spreads is above half of that but for one in 2^7.
+    for n, off in enumerate(offs, start=1):
+        assert 0.5 * n * spread < off <= n * spread
+    while escape.escaping:
+        escape.pursue(goal, middle, np.nan, period)
+    assert farthest_of_next_sub_goal(elsewhere) <= spread  # another goal begins anew

@@ -47,7 +47,7 @@ def record(session: Session, seconds: float) -> tuple[m.Snapshot, float]:
 
 def test_the_arm_arrives_past_the_ball(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
-    last, clearance = record(session, 9.0)  # [s] with a way around by a sub-goal, 2.7 rad off
+    last, clearance = record(session, 9.0)  # [s] with a way around by a sub-goal
     assert last.goal is not None
     assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
     assert clearance > 0.0

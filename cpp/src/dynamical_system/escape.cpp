@@ -63,6 +63,7 @@ const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q
     turned_ = false;
     if (way > jump * way_ || arrived(goal, q, way)) {
       stuck_.reset();
+      tries_ = 0;
     }
     way_ = way;
     if (!std::isnan(way) && stuck_.update(time_, way)) {
@@ -70,7 +71,7 @@ const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q
     }
   } else {
     const double error = (q - std::get<JointGoal>(sub_goal_).position).cwiseAbs().maxCoeff();
-    if (halted_.update(time_, way_left(sub_goal_, q, potential)) || error < near_sub_goal || time_ - since_ >= settings_.leg) {
+    if (halted_.update(time_, way_left(sub_goal_, q, potential)) || error < near_sub_goal || time_ - since_ >= tries_ * settings_.leg) {
       turn(false, q);
     }
   }
@@ -86,10 +87,12 @@ void Escape::turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept {
   way_ = std::numeric_limits<double>::infinity();
   if (escape) {
     ++count_;
+    ++tries_;
+    const double spread = tries_ * settings_.spread;
     Eigen::VectorXd& position = std::get<JointGoal>(sub_goal_).position;
     for (Eigen::Index j = 0; j < position.size(); ++j) {
-      const double low = std::max(lower_[j], q[j] - settings_.spread);
-      const double high = std::min(upper_[j], q[j] + settings_.spread);
+      const double low = std::max(lower_[j], q[j] - spread);
+      const double high = std::min(upper_[j], q[j] + spread);
       position[j] = std::clamp(low + uniform(random_) * (high - low), lower_[j], upper_[j]);
     }
   }

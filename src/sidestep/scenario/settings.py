@@ -15,8 +15,8 @@ class EscapeChoice:
 
     patience: float = 0.6
     fraction: float = 0.05
-    leg: float = 3.0
-    spread: float = 3.1
+    leg: float = 2.0
+    spread: float = 1.7
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ namespace sidestep {
 struct EscapeSettings {
   double patience = 0.6;   ///< [s] without progress after which the arm counts as stuck
   double fraction = 0.05;  ///< progress is a goal potential (or squared distance) that falls by this fraction
-  double leg = 3.0;        ///< [s] the longest way towards a sub-goal
-  double spread = 3.1;     ///< [rad | m] how far each joint of a sub-goal is at most from where the arm is
+  double leg = 2.0;        ///< [s] the longest way towards the first sub-goal for a goal, n times that to the n-th
+  double spread = 1.7;     ///< [rad | m] how far each joint of the first is at most from where the arm is, n times that of the n-th
   std::uint64_t seed = 0;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
@@ -27,7 +27,8 @@ struct EscapeSettings {
 ///
 /// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so that whether it
 /// arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system, so
-/// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits. An arm within
+/// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits, the first ones
+/// near: most dead ends are shallow, and out of the others only a long way leads. An arm within
 /// 0.01 [rad | m] of its goal has arrived and is not stuck; patience begins anew with a goal that has jumped away.
 class Escape {
  public:
@@ -58,6 +59,7 @@ class Escape {
   bool escaping_ = false;
   bool turned_ = true;  // the potential of the step before is that of another goal
   int count_ = 0;
+  int tries_ = 0;  // sub-goals for this goal: each is farther off than the one before
 };
 
 }  // namespace sidestep
