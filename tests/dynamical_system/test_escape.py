@@ -167,4 +167,5 @@ def test_sub_goals_for_one_goal_lie_farther_off_one_by_one():
         assert 0.5 * n * spread < off <= n * spread
     while escape.escaping:
         escape.pursue(goal, middle, np.nan, period)
+    escape.pursue(goal, middle, np.nan, period)
     assert farthest_of_next_sub_goal(elsewhere) <= spread  # another goal begins anew
