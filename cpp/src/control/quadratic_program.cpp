@@ -64,8 +64,7 @@ QuadraticProgram::QuadraticProgram(int num_variables, int num_rows) : n_(num_var
   y_.setZero(n_);
 }
 
-bool QuadraticProgram::factorise(const QuadraticProgramData& data) noexcept {
-  const Eigen::MatrixXd& H = data.H;
+bool QuadraticProgram::factorise(const Eigen::MatrixXd& H) noexcept {
   num_coupled_ = n_;
   while (num_coupled_ > 0 && (H.row(num_coupled_ - 1).head(num_coupled_ - 1).array() == 0.0).all()) {
     --num_coupled_;
@@ -279,7 +278,7 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
       (data.row_lower.array() == infinity).any() || (data.row_upper.array() == -infinity).any()) {
     return QuadraticProgramStatus::infeasible;
   }
-  if (!factorise(data)) {
+  if (!factorise(data.H)) {
     return QuadraticProgramStatus::not_positive_definite;
   }
   find_supports(data);

@@ -71,7 +71,8 @@ const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q
     }
   } else {
     const double error = (q - std::get<JointGoal>(sub_goal_).position).cwiseAbs().maxCoeff();
-    if (halted_.update(time_, way_left(sub_goal_, q, potential)) || error < near_sub_goal || time_ - since_ >= tries_ * settings_.leg) {
+    const bool late = time_ - since_ >= tries_ * settings_.leg;
+    if (halted_.update(time_, way_left(sub_goal_, q, potential)) || error < near_sub_goal || late) {
       turn(false, q);
     }
   }

@@ -70,7 +70,7 @@ class QuadraticProgram {
     bool equality = false;  // never dropped, multiplier of any sign
   };
 
-  bool factorise(const QuadraticProgramData& data) noexcept;
+  bool factorise(const Eigen::MatrixXd& H) noexcept;
   /// Exactly: without the rounding of steps at every iteration, not only at the end.
   QuadraticProgramStatus iterate(const QuadraticProgramData& data, bool exactly) noexcept;
   void start(const QuadraticProgramData& data) noexcept;

@@ -14,8 +14,8 @@ namespace sidestep {
 struct EscapeSettings {
   double patience = 0.6;   ///< [s] without progress after which the arm counts as stuck
   double fraction = 0.05;  ///< progress is a goal potential (or squared distance) that falls by this fraction
-  double leg = 2.0;        ///< [s] the longest way towards the first sub-goal for a goal, n times that to the n-th
-  double spread = 1.7;     ///< [rad | m] how far each joint of the first is at most from where the arm is, n times that of the n-th
+  double leg = 2.0;        ///< [s] the longest way towards the first sub-goal for a goal; n times that to the n-th
+  double spread = 1.7;     ///< [rad | m] how far each joint of the first may be from the arm; n times that of the n-th
   std::uint64_t seed = 0;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.

@@ -66,7 +66,8 @@ struct Margins {
 class BodyClearance {
  public:
   /// `pairs` as for SelfCollisionBarrier, `tables` of other pairs as for ClearanceTableBarrier. Throws
-  /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown, a prismatic joint has no limits, or there are more than `max_items` items.
+  /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown, a
+  /// prismatic joint has no limits, or there are more than `max_items` items.
   BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {});
 
