@@ -124,12 +124,12 @@ class ArrivalWatch:
 
     def update(self, time: float, q: Array, v: Array) -> bool:
         """True once error and speed have been small for the rule's hold time; `since` is when that began."""
-        near = bool(np.abs(v).max() < self.rule.speed)
         if isinstance(self.goal, PoseAim):
             distance, angle = self.goal.errors(q)
-            near = near and distance < self.rule.distance and angle < self.rule.position
+            near = distance < self.rule.distance and angle < self.rule.position
         else:
-            near = near and bool(np.abs(q - self.goal).max() < self.rule.position)
+            near = bool(np.abs(q - self.goal).max() < self.rule.position)
+        near = near and bool(np.abs(v).max() < self.rule.speed)
         if not near:
             self.since = None
         elif self.since is None:

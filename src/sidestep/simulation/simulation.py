@@ -84,6 +84,10 @@ class Simulation:
             joint_friction=joint_friction,
             visuals=visuals,
         )
+        ids = self.built.model.body_mocapid[list(self.built.object_bodies)]
+        self._moving = [
+            (item, mocap) for item, mocap in zip(self.objects, ids, strict=True) if item.motion == "moving"
+        ]
 
     def run(
         self,
@@ -133,6 +137,10 @@ class Simulation:
         rows: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         contacts: list[Contact] = []
         arrived, potential = False, float("nan")
+        diverged = data.warning[mujoco.mjtWarning.mjWARN_BADQACC]
+        mujoco.mj_kinematics(built.model, data)
+        poses = built.object_poses(data)  # of objects at rest, for good
+        at_rest = all(item.motion == "fixed" for item in self.objects)
         for k in range(steps):
             time = k * self.timestep
             self._drive(data, time)
@@ -148,7 +156,7 @@ class Simulation:
                 q, v, step.acceleration, built.mass_matrix(data), built.bias(data), **kept
             )
             torque = np.asarray(solution.torque)
-            poses = built.object_poses(data)
+            poses = poses if at_rest else built.object_poses(data)
             data.ctrl[built.actuators] = torque
             for substep in range(self.substeps):
                 if substep > 0:
@@ -157,7 +165,7 @@ class Simulation:
                 mujoco.mj_step2(built.model, data)
                 contacts.extend(self._contacts(data, time))
             _, v_next = built.state(data)
-            if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number or not np.all(np.isfinite(v_next)):
+            if diverged.number or not np.isfinite(v_next).all():
                 raise RuntimeError(
                     f"the physics diverged at {time:.3f} s; shorten the timestep or add substeps"
                 )
@@ -199,9 +207,8 @@ class Simulation:
 
     def _drive(self, data: mujoco.MjData, time: float) -> None:
         """Puts the moving objects where their script says."""
-        for item, body in zip(self.objects, self.built.object_bodies, strict=True):
-            if item.motion == "moving":
-                data.mocap_pos[self.built.model.body_mocapid[body]] = item.pose_at(time)[:3, 3]
+        for item, mocap in self._moving:
+            data.mocap_pos[mocap] = item.pose_at(time)[:3, 3]
 
     def _contacts(self, data: mujoco.MjData, time: float) -> list[Contact]:
         found = []
