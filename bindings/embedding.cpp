@@ -16,7 +16,7 @@
 #include "sidestep/embedding/clearance_barrier.hpp"
 #include "sidestep/embedding/clearance_table_barrier.hpp"
 #include "sidestep/embedding/collision_density.hpp"
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 #include "sidestep/embedding/joint_limit_barrier.hpp"
 #include "sidestep/embedding/joint_limit_potential.hpp"
 #include "sidestep/embedding/self_collision_barrier.hpp"

@@ -1,5 +1,7 @@
 // Takes the given number of steps of one kind and nothing else, for instructions.cmake to count their instructions:
-//   instructions_benchmark density|barriers|filtered STEPS
+//   instructions_benchmark density|barriers|filtered|cloud STEPS
+// density: Table 6.1 of the thesis; barriers: the covered arm among ten balls; filtered: the same with the filter; cloud:
+// the covered arm above a table of 10,000 points, with the filter.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -16,12 +18,14 @@
 int main(int argc, char** argv) {
   using namespace sidestep;
   const bool density = argc == 3 && std::strcmp(argv[1], "density") == 0;
-  const bool filtered = argc == 3 && std::strcmp(argv[1], "filtered") == 0;
+  const bool cloud = argc == 3 && std::strcmp(argv[1], "cloud") == 0;
+  const bool filtered = cloud || (argc == 3 && std::strcmp(argv[1], "filtered") == 0);
   if (argc != 3 || !(density || filtered || std::strcmp(argv[1], "barriers") == 0)) {
-    std::fprintf(stderr, "usage: %s density|barriers|filtered STEPS\n", argv[0]);
+    std::fprintf(stderr, "usage: %s density|barriers|filtered|cloud STEPS\n", argv[0]);
     return 2;
   }
-  const benchmarks::Scene scene = density ? benchmarks::fr3() : benchmarks::covered_fr3(10);
+  const benchmarks::Scene scene =
+      density ? benchmarks::fr3() : benchmarks::covered_fr3(cloud ? benchmarks::table(10'000) : benchmarks::balls(10));
   const Robot& robot = scene.robot;
   const int nv = robot.num_coordinates();
   std::vector<std::shared_ptr<const Embedding>> embeddings;
@@ -46,7 +50,18 @@ int main(int argc, char** argv) {
   AccelerationFilter filter(robot);
   TorqueSolution solution(nv);
   const Eigen::VectorXd goal = 0.5 * (robot.limits().lower + robot.limits().upper);
-  const std::vector<benchmarks::State> states = benchmarks::states(robot, 100, 0);
+  std::vector<benchmarks::State> states = benchmarks::states(robot, 100, 0);
+  if (cloud) {
+    constexpr double room = 0.02;  // [m] that an arm that moves safely has left
+    const ClearanceField field(robot, scene.body);
+    KinematicState kinematics(robot);
+    std::erase_if(states, [&](const benchmarks::State& state) {
+      Clearances clearances(nv, field.size());
+      kinematics.update(robot, state.q, state.v);
+      field.evaluate(kinematics, scene.obstacles, room, {}, clearances.view(0, field.size()));
+      return clearances.values.minCoeff() < room;
+    });
+  }
   int failures = 0;
   for (int k = 0; k < std::atoi(argv[2]); ++k) {
     const benchmarks::State& state = states[static_cast<std::size_t>(k) % states.size()];

@@ -89,8 +89,8 @@ inline Scene fr3() {
   return make_scene("fr3", placements, std::move(limits), {0.4, 0.1, 0.6});
 }
 
-/// The same arm covered by 77 ellipsoids, eleven balls stretched along every link, among balls of 6 cm.
-inline Scene covered_fr3(int num_obstacles) {
+/// The same arm covered by 77 ellipsoids, eleven balls stretched along every link.
+inline Scene covered_fr3(Obstacles obstacles) {
   constexpr int per_link = 11;
   constexpr double half_width = 0.07;  // [m] of a ball across the link
   Scene scene = fr3();
@@ -107,20 +107,36 @@ inline Scene covered_fr3(int num_obstacles) {
     }
   }
   const Eigen::Index num = means.cols();
+  Body body(std::move(links), Eigen::VectorXd::Constant(num, 1.0 / per_link), std::move(means), std::move(covariances),
+            Eigen::VectorXd::Ones(num));
+  return {scene.robot, std::move(body), std::move(obstacles)};
+}
+
+/// Balls of 6 cm at rest, within the arm's reach.
+inline Obstacles balls(int num) {
   std::mt19937_64 engine(1);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  Eigen::Matrix3Xd points(3, num_obstacles);
-  for (Eigen::Index n = 0; n < num_obstacles;) {
+  Eigen::Matrix3Xd points(3, num);
+  for (Eigen::Index n = 0; n < num;) {
     const Eigen::Vector3d p(unit(engine), unit(engine), 0.6 + 0.6 * unit(engine));
     if (p.norm() > 0.5 && p.norm() < 1.2) {
       points.col(n++) = p;
     }
   }
-  Body body(std::move(links), Eigen::VectorXd::Constant(num, 1.0 / per_link), std::move(means), std::move(covariances),
-            Eigen::VectorXd::Ones(num));
-  return {scene.robot, std::move(body),
-          Obstacles(std::move(points), Eigen::VectorXd::Constant(num_obstacles, 0.06),
-                    Eigen::Matrix3Xd::Zero(3, num_obstacles))};
+  return Obstacles(std::move(points), Eigen::VectorXd::Constant(num, 0.06), Eigen::Matrix3Xd::Zero(3, num));
+}
+
+/// As a camera sees a table top before the arm, 0.8 m by 1.2 m, and the front of a box on it.
+inline Obstacles table(int num) {
+  std::mt19937_64 engine(2);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  Eigen::Matrix3Xd points(3, num);
+  for (Eigen::Index n = 0; n < num; ++n) {
+    const double a = unit(engine), b = unit(engine);
+    points.col(n) = n % 20 == 0 ? Eigen::Vector3d(0.5, 0.2 * b, 0.05 + 0.3 * a)
+                                : Eigen::Vector3d(0.25 + 0.8 * a, 1.2 * b - 0.6, 0.05);
+  }
+  return Obstacles(std::move(points), Eigen::VectorXd::Zero(num), Eigen::Matrix3Xd::Zero(3, num));
 }
 
 /// States as a run meets them: configurations in the middle half of the limits, velocities of about 1 rad/s.

@@ -7,7 +7,9 @@
 #include <string>
 #include <utility>
 
+#include "../finite.hpp"
 #include "../settings.hpp"
+#include "outside.hpp"
 
 namespace sidestep {
 namespace {
@@ -40,15 +42,15 @@ void check_finite(double value, const char* name) {
   }
 }
 
-bool outside(Eigen::Ref<const Eigen::VectorXd> q, const JointLimits& limits) noexcept {
-  return (q.array() < limits.lower.array()).any() || (q.array() > limits.upper.array()).any();
-}
-
 }  // namespace
 
 GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const Embedding>> embeddings,
                                  GeometricSystemSettings settings)
-    : robot_(std::move(robot)), embeddings_(std::move(embeddings)), settings_(std::move(settings)) {
+    : robot_(std::move(robot)),
+      embeddings_(std::move(embeddings)),
+      settings_(std::move(settings)),
+      stiffness_(settings_.stiffness),
+      damping_(settings_.damping) {
   const int nv = robot_.num_coordinates();
   bool measures_distances = false;
   for (const auto& embedding : embeddings_) {
@@ -132,7 +134,7 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
 StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
                                          const Goal& goal, const Obstacles& obstacles,
                                          Workspace& w) const noexcept {
-  if (!q.allFinite() || !v.allFinite()) {
+  if (!all_finite(q) || !all_finite(v)) {
     return fall_back(StepStatus::invalid_state, v, w);
   }
   const GoalFault fault = check(goal, robot_);
@@ -146,7 +148,7 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
   w.state_.update(robot_, q, v);
   embed(obstacles, w);
   w.metric.update(w.jacobian_transposed);
-  w.pull.update(goal, w.state_, settings_.stiffness);
+  w.pull.update(goal, w.state_, stiffness_);
 
   // h = −G⁻¹ ∂U − D (v − v*), its first term perhaps one-sided, or with D (v − v*) under G⁻¹ too.
   w.attraction = -w.pull.gradient;
@@ -156,7 +158,7 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
     w.metric.solve_in_place(w.attraction);
   }
   w.relative_velocity_ = v - w.pull.velocity;
-  w.harmonic = settings_.damping.lazyProduct(w.relative_velocity_);
+  damping_.multiply(w.relative_velocity_, w.harmonic);
   if (settings_.damping_form == DampingForm::metric) {
     w.metric.solve_in_place(w.harmonic);
   }
@@ -179,11 +181,11 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
     w.speed = (*settings_.speed)(v, w.acceleration, robot_.limits(), w.clearances);
     w.acceleration += w.speed.drag * v;
   }
-  if (!w.acceleration.allFinite()) {
+  if (!all_finite(w.acceleration)) {
     return fall_back(StepStatus::not_finite, v, w);
   }
   w.status_ = w.inside >= 0                      ? StepStatus::inside_barrier
-              : outside(q, robot_.limits())      ? StepStatus::outside_limits
+              : is_outside(q, robot_.limits())   ? StepStatus::outside_limits
               : fault == GoalFault::out_of_reach ? StepStatus::goal_out_of_reach
                                                  : StepStatus::ok;
   return w.status_;

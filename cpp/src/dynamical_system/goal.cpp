@@ -6,6 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../finite.hpp"
+#include "outside.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -111,13 +114,11 @@ void advance(Goal& goal, double duration) noexcept {
 GoalFault check(const Goal& goal, const Robot& robot) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     for (const Eigen::VectorXd* part : {&joint->position, &joint->velocity, &joint->acceleration}) {
-      if (part->size() != robot.num_coordinates() || !part->allFinite()) {
+      if (part->size() != robot.num_coordinates() || !all_finite(*part)) {
         return GoalFault::invalid;
       }
     }
-    const bool outside = (joint->position.array() < robot.limits().lower.array()).any() ||
-                         (joint->position.array() > robot.limits().upper.array()).any();
-    return outside ? GoalFault::outside_limits : GoalFault::none;
+    return is_outside(joint->position, robot.limits()) ? GoalFault::outside_limits : GoalFault::none;
   }
   const PoseGoal& frame = std::get<PoseGoal>(goal);
   if (frame.num_coordinates() != robot.num_coordinates() || frame.num_joints() != robot.num_joints() ||
@@ -134,7 +135,7 @@ GoalPull::GoalPull(int nv)
       displacement_(gradient),
       jacobian_transposed_(Eigen::MatrixXd::Zero(nv, 6)) {}
 
-void GoalPull::update(const Goal& goal, const KinematicState& state, const Eigen::MatrixXd& stiffness) noexcept {
+void GoalPull::update(const Goal& goal, const KinematicState& state, const Gain& stiffness) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     update(*joint, state, stiffness);
   } else {
@@ -142,9 +143,9 @@ void GoalPull::update(const Goal& goal, const KinematicState& state, const Eigen
   }
 }
 
-void GoalPull::update(const JointGoal& goal, const KinematicState& state, const Eigen::MatrixXd& stiffness) noexcept {
+void GoalPull::update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept {
   displacement_ = state.q() - goal.position;
-  gradient = stiffness.lazyProduct(displacement_);
+  stiffness.multiply(displacement_, gradient);
   potential = 0.5 * displacement_.dot(gradient);
   gradient -= goal.acceleration;
   velocity = goal.velocity;

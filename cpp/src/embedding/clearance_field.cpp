@@ -9,21 +9,21 @@
 #include "../settings.hpp"
 #include "kernels/clearance_kernel.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
 
 
-kernels::AddLeaf add_leaf() noexcept {
+kernels::ClearanceKernel clearance_kernel() noexcept {
 #if defined(SIDESTEP_X86_KERNELS)
   switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::add_leaf_avx512;
-    case InstructionSet::avx2: return kernels::add_leaf_avx2;
+    case InstructionSet::avx512: return kernels::clearance_kernel_avx512();
+    case InstructionSet::avx2: return kernels::clearance_kernel_avx2();
     case InstructionSet::baseline: break;
   }
 #endif
-  return kernels::add_leaf_baseline;
+  return kernels::clearance_kernel_baseline();
 }
 
 void copy(const Eigen::Vector3d& from, double* to) noexcept { Eigen::Vector3d::Map(to) = from; }
@@ -46,27 +46,44 @@ kernels::Points points_of(const PointTree& tree) noexcept {
   return points;
 }
 
-/// The means of a query's points, with wrenches about the world origin.
-struct Means {
-  ClearanceSample nearest, approach;
+/// Whether anything is within reach, or approaches.
+bool is_found(const kernels::Query& query) noexcept { return std::min(query.reference, query.ahead) < infinity; }
 
-  Means(const kernels::Query& query, const Eigen::Vector3d& centre) noexcept {
-    double s[kernels::sums];
+/// The means of a query's points, with wrenches about the world origin.
+class Means {
+ public:
+  Means(const kernels::Query& query, const Eigen::Vector3d& centre) noexcept : query_(query), centre_(centre) {
     for (int i = 0; i < kernels::sums; ++i) {
-      s[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
+      sums_[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
     }
-    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query.axes);
-    const auto wrench = [&](const Eigen::Matrix<double, 6, 1>& gradient) -> WrenchPair {
-      const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
-      return {{centre.cross(force) - axes.transpose() * gradient.tail<3>(), force}, {}};
-    };
-    const auto gradient = [&](int first) { return Eigen::Map<const Eigen::Matrix<double, 6, 1>>(s + first); };
-    nearest = BoltzmannMean::Sums{s[0], s[1], s[2], s[3], s[4], s[5]}.mean();
-    nearest.gradient = wrench((gradient(12) - nearest.value * gradient(6)) / s[0]);
-    nearest.value += query.reference;
-    const double* a = s + kernels::approach;
-    approach = {a[1] / a[0], a[2] / a[0], a[3] / a[0], wrench(gradient(kernels::approach + 4) / a[0])};
   }
+
+  ClearanceSample nearest() const noexcept {
+    const double* s = sums_;
+    ClearanceSample mean = BoltzmannMean::Sums{s[0], s[1], s[2], s[3], s[4], s[5]}.mean();
+    mean.gradient = wrench((gradient(12) - mean.value * gradient(6)) / s[0]);
+    mean.value += query_.reference;
+    return mean;
+  }
+
+  ClearanceSample approach() const noexcept {
+    const double* s = sums_ + kernels::approach;
+    return {s[1] / s[0], s[2] / s[0], s[3] / s[0], wrench(gradient(kernels::approach + 4) / s[0])};
+  }
+
+ private:
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+  Vector6 gradient(int first) const noexcept { return Vector6::Map(sums_ + first); }
+  WrenchPair wrench(const Vector6& gradient) const noexcept {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query_.axes);
+    const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
+    return {{centre_.cross(force) - axes.transpose() * gradient.tail<3>(), force}, {}};
+  }
+
+  const kernels::Query& query_;
+  Eigen::Vector3d centre_;
+  double sums_[kernels::sums];
 };
 
 }  // namespace
@@ -110,7 +127,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
                               const Horizon& horizon, ClearanceView out) const noexcept {
   const PointTree& tree = obstacles.tree();
   const kernels::Points points = points_of(tree);
-  const kernels::AddLeaf add = add_leaf();
+  const kernels::ClearanceKernel kernel = clearance_kernel();
   kernels::QueryGroup group;
   group.inverse_T = 1.0 / temperature_;
   group.window = BoltzmannMean::window * temperature_;
@@ -121,7 +138,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
     const KinematicState::Link& link = state.link(joint);
     const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
     const double turning = link.velocity.angular.norm();
-    double near = reach + group.window, ahead = horizon.distance + group.window;  // the largest of the group
+    double near = reach, ahead = horizon.distance;  // the largest of the group
     const auto matters = [&](const PointTree::Ball& ball) {
       const Eigen::Vector3d at(ball.x, ball.y, ball.z), x = at - centre;
       const double distance = x.norm(), radius = cluster.radius + ball.radius;
@@ -157,27 +174,47 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       }
       placed = true;
     };
-    tree.visit(centre, matters, [&](int first, int count, const PointTree::Ball& ball) {
+    const auto visit = [&](auto&& look) {
+      tree.visit(centre, matters, [&](int first, int count, const PointTree::Ball& ball) {
+        look(kernels::Leaf{first, count, ball.x, ball.y, ball.z, ball.radius});
+      });
+    };
+    const auto limit = [&] {
+      near = *std::max_element(group.near, group.near + cluster.size);
+      ahead = *std::max_element(group.ahead, group.ahead + cluster.size);
+    };
+    visit([&](const kernels::Leaf& leaf) {
       if (!placed) {
         place();
       }
-      if (add(group, points, {first, count, ball.x, ball.y, ball.z, ball.radius})) {
-        near = *std::max_element(group.near, group.near + cluster.size);
-        ahead = *std::max_element(group.ahead, group.ahead + cluster.size);
+      if (kernel.find(group, points, leaf)) {
+        limit();
       }
     });
-    for (int k = 0; placed && k < cluster.size; ++k) {
+    if (!placed) {
+      continue;
+    }
+    for (int k = 0; k < cluster.size; ++k) {
       const kernels::Query& query = group.queries[k];
-      if (!(query.reference < infinity)) {
+      group.near[k] = query.reference < infinity ? query.reference + group.window : -infinity;
+      group.ahead[k] = is_found(query) ? std::min(query.ahead, horizon.distance) + group.window : -infinity;
+    }
+    limit();
+    visit([&](const kernels::Leaf& leaf) { kernel.add(group, points, leaf); });
+    for (int k = 0; k < cluster.size; ++k) {
+      const kernels::Query& query = group.queries[k];
+      if (!is_found(query)) {
         continue;
       }
       const Means means(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]});
-      const bool within = means.nearest.value < reach;
+      const Eigen::Index at = cluster.first + k;
+      const ClearanceSample approach = means.approach();
+      const ClearanceSample nearest = query.reference < infinity ? means.nearest() : approach;
+      const bool within = query.reference < infinity && nearest.value < reach;
       if (within || query.ahead < horizon.distance) {
-        const Eigen::Index at = cluster.first + k;
-        write(within ? means.nearest : means.approach, state, joint, -1, at, out);
-        write(means.approach, state, joint, -1, at, out.approach);
-        out.nearest[at] = tree.order()[static_cast<std::size_t>(query.nearest)];
+        write(within ? nearest : approach, state, joint, -1, at, out);
+        write(approach, state, joint, -1, at, out.approach);
+        out.nearest[at] = tree.order()[static_cast<std::size_t>(within ? query.nearest : query.minded)];
       }
     }
   }

@@ -3,101 +3,139 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <stdexcept>
 
-namespace sidestep {
+#include "kernels/density_kernel.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 
-CollisionDensity::Peak CollisionDensity::Gaussian::widened(double radius) const noexcept {
-  const Eigen::Vector3d inverse = (variances.array() + radius * radius).inverse();
-  constexpr double two_pi = 2.0 * std::numbers::pi;
-  return {axes * inverse.asDiagonal() * axes.transpose(),
-          weight * std::sqrt(inverse.prod() / (two_pi * two_pi * two_pi))};
+namespace sidestep {
+namespace {
+
+kernels::AddDensity add_density() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  switch (instruction_set()) {
+    case InstructionSet::avx512: return kernels::add_density_avx512;
+    case InstructionSet::avx2: return kernels::add_density_avx2;
+    case InstructionSet::baseline: break;
+  }
+#endif
+  return kernels::add_density_baseline;
 }
+
+void set(double (&rows)[3][kernels::most_lanes], int lane, const Eigen::Vector3d& v) {
+  for (int i = 0; i < 3; ++i) {
+    rows[i][lane] = v[i];
+  }
+}
+
+void set(double (&rows)[6][kernels::most_lanes], int lane, const Eigen::Matrix3d& symmetric) {
+  const Eigen::Matrix3d& S = symmetric;
+  const double entries[] = {S(0, 0), S(1, 1), S(2, 2), S(0, 1), S(0, 2), S(1, 2)};
+  for (int i = 0; i < 6; ++i) {
+    rows[i][lane] = entries[i];
+  }
+}
+
+/// Sets the next lane, in the frame of the joint's child.
+void append(kernels::GaussianBlock& block, int joint, double weight, const Eigen::Vector3d& mean,
+            const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+  const Eigen::Matrix3d& axes = eigen.eigenvectors();
+  const Eigen::Vector3d inverse = eigen.eigenvalues().cwiseInverse();
+  constexpr double two_pi = 2.0 * std::numbers::pi;
+  const int lane = block.num++;
+  std::fill(block.joints + lane, block.joints + kernels::most_lanes, joint);  // those without weight have a link too
+  set(block.mean, lane, mean);
+  set(block.variances, lane, eigen.eigenvalues());
+  set(block.precision, lane, axes * inverse.asDiagonal() * axes.transpose());
+  for (int i = 0; i < 3; ++i) {
+    set(block.projections[i], lane, axes.col(i) * axes.col(i).transpose());
+  }
+  block.weight[lane] = weight;
+  block.scale[lane] = weight * std::sqrt(inverse.prod() / (two_pi * two_pi * two_pi));
+}
+
+double sum(const double (&lanes)[kernels::most_lanes]) noexcept {
+  return Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(lanes).sum();
+}
+
+}  // namespace
+
+struct CollisionDensity::Gaussians {
+  std::vector<kernels::GaussianBlock> blocks;
+};
 
 CollisionDensity::CollisionDensity(const Robot& robot, const Body& body, bool average)
     : Embedding(robot), average_(average) {
-  std::vector<std::vector<Gaussian>> of_joint(static_cast<std::size_t>(robot.num_joints()));
+  const auto frame_of = [&](int k) -> const Frame& {
+    return robot.frames()[static_cast<std::size_t>(robot.frame_index(body.links[static_cast<std::size_t>(k)]))];
+  };
+  std::vector<int> moved;
   for (int k = 0; k < body.num_components(); ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    const Frame& frame = robot.frames()[static_cast<std::size_t>(robot.frame_index(body.links[i]))];
-    if (frame.joint < 0) {
-      continue;
-    }
-    const Eigen::Matrix3d R = frame.X_JF.linear();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(R * body.covariances[i] * R.transpose());
-    Gaussian gaussian{frame.X_JF * body.means.col(k), body.weights[k], eigen.eigenvalues(), eigen.eigenvectors(), {}};
-    gaussian.peak = gaussian.widened(0.0);
-    of_joint[static_cast<std::size_t>(frame.joint)].push_back(gaussian);
-  }
-  for (int j = 0; j < robot.num_joints(); ++j) {
-    auto& gaussians = of_joint[static_cast<std::size_t>(j)];
-    if (!gaussians.empty()) {
-      links_.push_back({j, std::move(gaussians)});
+    if (frame_of(k).joint >= 0) {
+      moved.push_back(k);
     }
   }
-  if (links_.empty()) {
+  if (moved.empty()) {
     throw std::invalid_argument("collision density: no Gaussian of the body lies on a link that a joint of robot '" +
                                 robot.name() + "' moves");
   }
+  std::stable_sort(moved.begin(), moved.end(), [&](int a, int b) { return frame_of(a).joint > frame_of(b).joint; });
+  auto gaussians = std::make_shared<Gaussians>();
+  auto& blocks = gaussians->blocks;
+  for (const int k : moved) {
+    if (blocks.empty() || blocks.back().num == kernels::most_lanes) {
+      blocks.emplace_back();
+    }
+    const Frame& frame = frame_of(k);
+    const Eigen::Matrix3d R = frame.X_JF.linear();
+    append(blocks.back(), frame.joint, body.weights[k], frame.X_JF * body.means.col(k),
+           R * body.covariances[static_cast<std::size_t>(k)] * R.transpose());
+  }
+  gaussians_ = std::move(gaussians);
 }
 
 void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
                               const Obstacles& obstacles) const noexcept {
-  const Eigen::Index num_points = obstacles.size();
-  if (num_points == 0) {
+  const kernels::DensityPoints points{static_cast<int>(obstacles.size()), obstacles.points().data(),
+                                      obstacles.radii().data(),
+                                      obstacles.tree().moves() ? obstacles.velocities().data() : nullptr};
+  if (points.num == 0) {
     return;
   }
-  const double share = average_ ? 1.0 / static_cast<double>(num_points) : 1.0;
-  double value = 0.0;
-  double curvature = 0.0;
-  for (const Link& part : links_) {
-    const KinematicState::Link& link = state.link(part.joint);
-    const Eigen::Matrix3d R_LW = link.R_WL.transpose();
-    SpatialForce wrench;
-    for (Eigen::Index n = 0; n < num_points; ++n) {
-      const Eigen::Vector3d x = obstacles.points().col(n);
-      const Eigen::Vector3d x_dot = obstacles.velocities().col(n);
-      // The point seen from the link: y, ẏ and ÿ for q̈ = 0 and ẍ = 0.
-      const Eigen::Vector3d slip = x_dot - link.velocity.linear - link.velocity.angular.cross(x);
-      const Eigen::Vector3d slip_dot = -link.bias.linear - link.bias.angular.cross(x) -
-                                       link.velocity.angular.cross(x_dot) - link.velocity.angular.cross(slip);
-      const Eigen::Vector3d y = R_LW * (x - link.p_WL);
-      const Eigen::Vector3d y_dot = R_LW * slip;
-      const Eigen::Vector3d y_ddot = R_LW * slip_dot;
-      const double radius = obstacles.radii()[n];
-
-      Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-      for (const Gaussian& gaussian : part.gaussians) {
-        const Peak peak = radius > 0.0 ? gaussian.widened(radius) : gaussian.peak;
-        const Eigen::Vector3d e = y - gaussian.mean;
-        const Eigen::Vector3d t = peak.precision * e;
-        const double density = peak.scale * std::exp(-0.5 * e.dot(t));
-        const double slope = t.dot(y_dot);
-        value += density;
-        curvature += density * (slope * slope - y_dot.dot(peak.precision * y_dot) - t.dot(y_ddot));
-        gradient -= density * t;
-      }
-      // δψ = gradient · δy with δy = −R_LW (δv + δω × x): the wrench −(x × f, f) about the world origin.
-      const Eigen::Vector3d f = link.R_WL * gradient;
-      wrench.angular -= x.cross(f);
-      wrench.linear -= f;
+  const double share = average_ ? 1.0 / points.num : 1.0;
+  const kernels::AddDensity add = add_density();
+  kernels::DensitySums sums;
+  std::fill(std::begin(sums.value), std::end(sums.value), 0.0);
+  std::fill(std::begin(sums.curvature), std::end(sums.curvature), 0.0);
+  GeneralisedForce gradient(state, out.jacobian_transposed.col(0));
+  for (const kernels::GaussianBlock& block : gaussians_->blocks) {
+    const double* links[kernels::most_lanes];
+    for (int i = 0; i < kernels::most_lanes; ++i) {
+      links[i] = state.link(block.joints[i]).numbers();
     }
-    wrench.angular *= share;
-    wrench.linear *= share;
-    accumulate_generalised_force(state, part.joint, wrench, out.jacobian_transposed.col(0));
+    add(block, links, points, sums);
+    for (int i = 0; i < block.num; ++i) {
+      gradient.add(block.joints[i],
+                   {share * Eigen::Vector3d(sums.moment[0][i], sums.moment[1][i], sums.moment[2][i]),
+                    share * Eigen::Vector3d(sums.force[0][i], sums.force[1][i], sums.force[2][i])});
+    }
   }
-  out.values[0] += share * value;
-  out.curvatures[0] += share * curvature;
+  gradient.finish();
+  out.values[0] += share * sum(sums.value);
+  out.curvatures[0] += share * sum(sums.curvature);
 }
 
 void CollisionDensity::lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,
                                        const Obstacles& obstacles) const noexcept {
-  for (const Link& part : links_) {
-    const KinematicState::Link& link = state.link(part.joint);
-    double& distance = distances[link.coordinate];
-    for (const Gaussian& gaussian : part.gaussians) {
-      const Eigen::Vector3d mean_W = link.p_WL + link.R_WL * gaussian.mean;
+  for (const kernels::GaussianBlock& block : gaussians_->blocks) {
+    for (int i = 0; i < block.num; ++i) {
+      const KinematicState::Link& link = state.link(block.joints[i]);
+      const Eigen::Vector3d mean(block.mean[0][i], block.mean[1][i], block.mean[2][i]);
+      const Eigen::Vector3d mean_W = link.p_WL + link.R_WL * mean;
+      double& distance = distances[link.coordinate];
       for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
         distance = std::min(distance, (obstacles.points().col(n) - mean_W).norm() - obstacles.radii()[n]);
       }

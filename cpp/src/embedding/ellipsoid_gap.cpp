@@ -1,7 +1,7 @@
 #include "sidestep/embedding/ellipsoid_gap.hpp"
 
 #include "kernels/gap_kernel.hpp"
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {

@@ -49,13 +49,9 @@ Eigen::MatrixXd GraphMetric::matrix() const {
 }
 
 void GraphMetric::solve_factored(Eigen::Ref<Eigen::VectorXd> x) const noexcept {
-  if (x.size() == 1) {
-    x[0] /= factor_(0, 0) * factor_(0, 0);
-  } else {
-    const auto L = factor_.topLeftCorner(x.size(), x.size());
-    L.triangularView<Eigen::Lower>().solveInPlace(x);
-    L.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
-  }
+  const auto L = factor_.topLeftCorner(x.size(), x.size());
+  L.triangularView<Eigen::Lower>().solveInPlace(x);
+  L.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
 }
 
 void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept {
@@ -66,6 +62,12 @@ void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept {
     solve_factored(x);
     return;
   }
+  if (num_used_ == 1) {
+    const auto J_T = jacobian_transposed_.col(0);
+    const double share = J_T.dot(x) / (factor_(0, 0) * factor_(0, 0));
+    x -= share * J_T;
+    return;
+  }
   auto along = along_.head(num_used_);
   along = columns().transpose().lazyProduct(x);
   solve_factored(along);
@@ -73,6 +75,11 @@ void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept {
 }
 
 void GraphMetric::solve_pullback(const Eigen::Ref<const Eigen::VectorXd>& c, Eigen::Ref<Eigen::VectorXd> x) noexcept {
+  if (num_used_ == 1) {
+    const double share = c[used_[0]] / (factor_(0, 0) * factor_(0, 0));
+    x = share * jacobian_transposed_.col(0);
+    return;
+  }
   auto along = along_.head(num_used_);
   for (Eigen::Index a = 0; a < num_used_; ++a) {
     along[a] = c[used_[static_cast<std::size_t>(a)]];

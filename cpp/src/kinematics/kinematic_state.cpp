@@ -1,61 +1,99 @@
 #include "sidestep/kinematics/kinematic_state.hpp"
 
-#include <cmath>
+#include <cstddef>
+#include <type_traits>
+
+#include "kernels/kinematics_kernel.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
+namespace {
+
+using Link = KinematicState::Link;
+
+// The inner loop writes a link as consecutive numbers.
+constexpr std::size_t number_at(int i) { return offsetof(Link, R_WL) + static_cast<std::size_t>(i) * sizeof(double); }
+static_assert(std::is_standard_layout_v<Link> && sizeof(Link) % sizeof(double) == 0);
+static_assert(offsetof(Link, p_WL) == number_at(kernels::position_at));
+static_assert(offsetof(Link, screw) == number_at(kernels::screw_at));
+static_assert(offsetof(Link, velocity) == number_at(kernels::velocity_at));
+static_assert(offsetof(Link, bias) == number_at(kernels::bias_at));
+static_assert(sizeof(Link) >= number_at(kernels::link_numbers));
+
+kernels::UpdateLinks update_links() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  if (instruction_set() >= InstructionSet::avx2) {
+    return kernels::update_links_avx2;
+  }
+#endif
+  return kernels::update_links_baseline;
+}
+
+using Column = Eigen::Map<Eigen::Vector4d>;
+
+void set_columns(double (&columns)[3][4], const Eigen::Matrix3d& matrix) {
+  for (int k = 0; k < 3; ++k) {
+    Column(columns[k]) << matrix.col(k), 0.0;
+  }
+}
+
+/// A revolute joint turns by R_PJ exp(θ [a]×) = R_PJ (a aᵀ + cos θ (I − a aᵀ) + sin θ [a]×) (Rodrigues).
+kernels::JointModel model_of(const Joint& joint) {
+  const Eigen::Matrix3d R_PJ = joint.X_PJ.linear();
+  const Eigen::Vector3d& a = joint.axis;
+  kernels::JointModel model{};
+  Column(model.translation) << joint.X_PJ.translation(), 0.0;
+  Column(model.axis) << R_PJ * a, 0.0;
+  model.multiplier = joint.multiplier;
+  model.parent = joint.parent;
+  model.slides = joint.type == JointType::prismatic;
+  if (model.slides) {
+    set_columns(model.fixed, R_PJ);
+  } else {
+    Eigen::Matrix3d cross;
+    cross << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
+    set_columns(model.fixed, R_PJ * a * a.transpose());
+    set_columns(model.cosine, R_PJ - R_PJ * a * a.transpose());
+    set_columns(model.sine, R_PJ * cross);
+  }
+  return model;
+}
+
+}  // namespace
+
+struct KinematicState::Joints {
+  std::vector<kernels::JointModel> models;
+};
 
 KinematicState::KinematicState(const Robot& robot)
     : q_(robot.num_coordinates()), v_(robot.num_coordinates()), links_(robot.joints().size()) {
+  auto joints = std::make_shared<Joints>();
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const Joint& joint = robot.joints()[i];
     links_[i].parent = joint.parent;
     links_[i].coordinate = joint.coordinate;
-    const Eigen::Vector3d& a = joint.axis;
-    const Eigen::Matrix3d R_PJ = joint.X_PJ.linear();
-    Eigen::Matrix3d cross;
-    cross << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-    rotations_.push_back({R_PJ * a * a.transpose(), R_PJ - R_PJ * a * a.transpose(), R_PJ * cross});
+    joints->models.push_back(model_of(joint));
   }
+  joints_ = std::move(joints);
+  constexpr std::size_t block = kernels::joint_block;
+  positions_.resize((links_.size() + block - 1) / block * block);
+  velocities_.resize(positions_.size());
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.num_coordinates());
   update(robot, zero, zero);
 }
 
 void KinematicState::update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd> q,
                             Eigen::Ref<const Eigen::VectorXd> v) noexcept {
-  static const Link base{-1, -1, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), {}, {}, {}};
   q_ = q;
   v_ = v;
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const Joint& joint = robot.joints()[i];
-    const Link& parent = joint.parent < 0 ? base : links_[static_cast<std::size_t>(joint.parent)];
-    Link& link = links_[i];
-    const double position = joint.multiplier * q[joint.coordinate] + joint.offset;
-    const double velocity = v[joint.coordinate];
-
-    const Eigen::Vector3d p_WJ = parent.p_WL + parent.R_WL * joint.X_PJ.translation();
-    if (joint.type == JointType::revolute) {
-      const Rotation& rotation = rotations_[i];
-      const Eigen::Matrix3d R_PL =
-          rotation.fixed + std::cos(position) * rotation.cosine + std::sin(position) * rotation.sine;
-      link.R_WL = parent.R_WL.lazyProduct(R_PL);
-      link.p_WL = p_WJ;
-      link.screw.angular = joint.multiplier * (link.R_WL * joint.axis);
-      link.screw.linear = p_WJ.cross(link.screw.angular);
-    } else {
-      link.R_WL = parent.R_WL.lazyProduct(joint.X_PJ.linear());
-      link.screw.angular.setZero();
-      link.screw.linear = joint.multiplier * (link.R_WL * joint.axis);
-      link.p_WL = p_WJ + position * (link.R_WL * joint.axis);
-    }
-
-    const Eigen::Vector3d joint_angular = velocity * link.screw.angular;
-    const Eigen::Vector3d joint_linear = velocity * link.screw.linear;
-    link.velocity.angular = parent.velocity.angular + joint_angular;
-    link.velocity.linear = parent.velocity.linear + joint_linear;
-    // V × (S q̇), the motion cross product, at the world origin.
-    link.bias.angular = parent.bias.angular + link.velocity.angular.cross(joint_angular);
-    link.bias.linear = parent.bias.linear + link.velocity.angular.cross(joint_linear) +
-                       link.velocity.linear.cross(joint_angular);
+    positions_[i] = joint.multiplier * q[joint.coordinate] + joint.offset;
+    velocities_[i] = v[joint.coordinate];
+  }
+  if (!links_.empty()) {
+    update_links()(joints_->models.data(), num_links(), positions_.data(), velocities_.data(),
+                   links_.front().R_WL.data(), static_cast<int>(sizeof(Link) / sizeof(double)));
   }
 }
 
@@ -102,6 +140,26 @@ void accumulate_generalised_force(const KinematicState& state, int joint, const 
     const KinematicState::Link& link = state.link(j);
     generalised_force[link.coordinate] +=
         link.screw.angular.dot(wrench.angular) + link.screw.linear.dot(wrench.linear);
+  }
+}
+
+void GeneralisedForce::add(int joint, const SpatialForce& wrench) noexcept {
+  go_down_to(joint);
+  if (joint_ != joint) {  // on another branch, or the first
+    go_down_to(-1);
+    joint_ = joint;
+    wrench_ = wrench;
+  } else {
+    wrench_.angular += wrench.angular;
+    wrench_.linear += wrench.linear;
+  }
+}
+
+void GeneralisedForce::go_down_to(int joint) noexcept {
+  while (joint_ > joint) {
+    const Link& link = state_.link(joint_);
+    force_[link.coordinate] += link.screw.angular.dot(wrench_.angular) + link.screw.linear.dot(wrench_.linear);
+    joint_ = link.parent;
   }
 }
 

@@ -20,7 +20,7 @@ GoalPull pull_of(const Robot& robot, const Goal& goal, const Eigen::VectorXd& q)
   KinematicState state(robot);
   state.update(robot, q, Eigen::VectorXd::Zero(q.size()));
   GoalPull pull(robot.num_coordinates());
-  pull.update(goal, state, Eigen::MatrixXd::Identity(q.size(), q.size()));
+  pull.update(goal, state, Gain(Eigen::MatrixXd::Identity(q.size(), q.size())));
   return pull;
 }
 

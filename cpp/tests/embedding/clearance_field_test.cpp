@@ -7,7 +7,7 @@
 #include <string>
 
 #include "sidestep/embedding/boltzmann_mean.hpp"
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 #include "support/random_scene.hpp"
 #include "support/serial_arm.hpp"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 #include "support/random_scene.hpp"
 
 using namespace sidestep;

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "sidestep/embedding/clearance_barrier.hpp"
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 #include "sidestep/embedding/self_collision_barrier.hpp"
 #include "support/allocations.hpp"
 #include "support/random_scene.hpp"

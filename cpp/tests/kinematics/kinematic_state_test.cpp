@@ -3,6 +3,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include "sidestep/kinematics/instruction_set.hpp"
 #include "support/allocations.hpp"
 #include "support/random_scene.hpp"
 
@@ -85,6 +86,60 @@ BOOST_AUTO_TEST_CASE(generalised_force_is_the_transposed_jacobian) {
     about_frame << wrench.linear, wrench.angular - p.cross(wrench.linear);
     BOOST_TEST((force - frame_jacobian(robot, state, joint).transpose() * about_frame).norm() < 1e-12);  // rounding
   }
+}
+
+BOOST_AUTO_TEST_CASE(generalised_forces_of_many_wrenches_add_up) {
+  Random random(5);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Robot robot = test::random_tree(random, 8);
+    const Eigen::VectorXd q = random.vector(robot.num_coordinates());
+    KinematicState state(robot);
+    state.update(robot, q, q);
+    Eigen::VectorXd together = Eigen::VectorXd::Zero(q.size()), one_by_one = together;
+    GeneralisedForce sum(state, together);
+    for (int joint = 7; joint >= 0; --joint) {
+      for (int k = random.integer(0, 2); k > 0; --k) {
+        const SpatialForce wrench{random.vector(3), random.vector(3)};
+        sum.add(joint, wrench);
+        accumulate_generalised_force(state, joint, wrench, one_by_one);
+      }
+    }
+    sum.finish();
+    BOOST_TEST((together - one_by_one).norm() < 1e-12);  // rounding
+  }
+}
+
+BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_product_of_poses) {
+  const InstructionSet before = instruction_set();
+  for (const InstructionSet set : instruction_sets()) {
+    use(set);
+    Random random(6);
+    for (int trial = 0; trial < 100; ++trial) {
+      const Robot robot = test::random_tree(random, random.integer(1, 9));
+      // Also after many turns: the angle is taken as it is.
+      const Eigen::VectorXd q = random.magnitude(0.1, 1e7) * random.vector(robot.num_coordinates());
+      KinematicState state(robot);
+      state.update(robot, q, q);
+      std::vector<Eigen::Isometry3d> poses;
+      for (const Joint& joint : robot.joints()) {
+        const double position = joint.multiplier * q[joint.coordinate] + joint.offset;
+        Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+        if (joint.type == JointType::revolute) {
+          X.linear() = Eigen::AngleAxisd(position, joint.axis).toRotationMatrix();
+        } else {
+          X.translation() = position * joint.axis;
+        }
+        const Eigen::Isometry3d parent =
+            joint.parent < 0 ? Eigen::Isometry3d::Identity() : poses[static_cast<std::size_t>(joint.parent)];
+        poses.push_back(parent * joint.X_PJ * X);
+        const KinematicState::Link& link = state.link(static_cast<int>(poses.size()) - 1);
+        // rounding, of rotations and of positions
+        BOOST_TEST((link.R_WL - poses.back().linear()).norm() < 1e-13);
+        BOOST_TEST((link.p_WL - poses.back().translation()).norm() < 1e-13 * (1.0 + q.norm()));
+      }
+    }
+  }
+  use(before);
 }
 
 BOOST_AUTO_TEST_CASE(update_allocates_nothing) {

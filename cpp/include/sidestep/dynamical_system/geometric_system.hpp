@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sidestep/dynamical_system/diagnosis.hpp"
+#include "sidestep/dynamical_system/gain.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
 #include "sidestep/dynamical_system/recovery.hpp"
 #include "sidestep/dynamical_system/speed_regulator.hpp"
@@ -131,6 +132,7 @@ class GeometricSystem {
   Robot robot_;
   std::vector<std::shared_ptr<const Embedding>> embeddings_;
   GeometricSystemSettings settings_;
+  Gain stiffness_, damping_;
   int num_embedding_coordinates_ = 0;
   std::vector<CoordinateLabel> labels_;
   Eigen::VectorXd floors_;

@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "sidestep/dynamical_system/gain.hpp"
 #include "sidestep/kinematics/kinematic_state.hpp"
 
 namespace sidestep {
@@ -95,7 +96,7 @@ struct GoalPull {
   explicit GoalPull(int nv);
 
   /// Computes everything but for a goal with a fault that makes it unusable. No allocation.
-  void update(const Goal& goal, const KinematicState& state, const Eigen::MatrixXd& stiffness) noexcept;
+  void update(const Goal& goal, const KinematicState& state, const Gain& stiffness) noexcept;
 
   double potential = 0.0;      ///< U, without the posture pull
   Eigen::VectorXd gradient;    ///< ∂U/∂q − a* (nv), posture pull included
@@ -107,7 +108,7 @@ struct GoalPull {
 
  private:
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  void update(const JointGoal& goal, const KinematicState& state, const Eigen::MatrixXd& stiffness) noexcept;
+  void update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept;
   void update(const PoseGoal& goal, const KinematicState& state) noexcept;
 
   Eigen::VectorXd displacement_;

@@ -23,8 +23,9 @@ namespace sidestep {
 /// which has the same value and gradient on the surface, and one kink only, at the centre.
 ///
 /// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
-/// depend on how densely a surface is sampled. Points that do not matter are left out in groups, by h ≥ |e| − a − r with a
-/// the longest semi-axis. The others are taken side by side, with the widest registers of the machine.
+/// depend on how densely a surface is sampled. Points that do not matter are left out in groups, by h ≥ |e| − a − r
+/// with a the longest semi-axis: first all but what may be nearest, then all but what weighs beside it. The others are
+/// taken side by side, with the widest registers of the machine.
 class ClearanceField {
  public:
   /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, or the

@@ -15,7 +15,7 @@ struct ClearanceStateView {
 
 /// Where an embedding that is a barrier of clearances writes them.
 struct ClearanceView : ClearanceStateView {
-  Eigen::Ref<Eigen::VectorXi> nearest;  ///< (m) index of the nearest obstacle point, -1 where there is none
+  Eigen::Ref<Eigen::VectorXi> nearest;  ///< (m) the nearest point; beyond the reach what approaches; -1: neither
   ClearanceStateView approach;          ///< of what the arm has to mind where it moves, see approach_mean.hpp
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <vector>
+#include <memory>
 
 #include "sidestep/body/body.hpp"
 #include "sidestep/embedding/embedding.hpp"
@@ -19,7 +19,7 @@ namespace sidestep {
 ///     d²ψ/dt² = ẏᵀ (∇²_y N) ẏ + ∇_y N · ÿ.
 ///
 /// Links that no joint moves are left out: they add a value that the arm cannot change.
-/// Cost: O(points × Gaussians + joints).
+/// Gaussians are taken side by side, with the widest registers of the machine. Cost: O(points × Gaussians + joints).
 class CollisionDensity final : public Embedding {
  public:
   /// `average` divides by the number of points (as the thesis's code does, its text does not).
@@ -35,27 +35,10 @@ class CollisionDensity final : public Embedding {
   bool measures_distances() const noexcept override { return true; }
 
  private:
-  /// scale · exp(−½ eᵀ P e), with e the offset from the mean.
-  struct Peak {
-    Eigen::Matrix3d precision;
-    double scale;
-  };
-  struct Gaussian {
-    Eigen::Vector3d mean;       // in the frame of the joint's child
-    double weight;
-    Eigen::Vector3d variances;  // eigenvalues of the covariance
-    Eigen::Matrix3d axes;       // its eigenvectors
-    Peak peak;                  // for points without radius
-
-    Peak widened(double radius) const noexcept;
-  };
-  struct Link {
-    int joint;
-    std::vector<Gaussian> gaussians;
-  };
+  struct Gaussians;  // of links that a joint moves, those of the last joint first
 
   bool average_;
-  std::vector<Link> links_;
+  std::shared_ptr<const Gaussians> gaussians_;
 };
 
 }  // namespace sidestep

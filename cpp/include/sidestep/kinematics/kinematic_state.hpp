@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <memory>
 #include <vector>
 
 #include "sidestep/kinematics/robot.hpp"
@@ -43,6 +44,9 @@ class KinematicState {
     SpatialMotion screw;        ///< column of the Jacobian of this joint's own coordinate (multiplier included)
     SpatialMotion velocity;
     SpatialMotion bias;
+
+    /// The numbers from R_WL (by columns) to bias, one after the other, as inner loops read and write them.
+    const double* numbers() const noexcept { return R_WL.data(); }
   };
   const Eigen::VectorXd& q() const noexcept { return q_; }
   const Eigen::VectorXd& v() const noexcept { return v_; }
@@ -50,16 +54,12 @@ class KinematicState {
   int num_links() const noexcept { return static_cast<int>(links_.size()); }
 
  private:
-  /// The rotation of a joint about its unit axis a, R_PJ exp(θ [a]×) = fixed + cos θ · cosine + sin θ · sine (Rodrigues).
-  struct Rotation {
-    Eigen::Matrix3d fixed;   // R_PJ a aᵀ
-    Eigen::Matrix3d cosine;  // R_PJ (I − a aᵀ)
-    Eigen::Matrix3d sine;    // R_PJ [a]×
-  };
+  struct Joints;  // what of the joints does not change, as the inner loop reads it
 
   Eigen::VectorXd q_, v_;
   std::vector<Link> links_;
-  std::vector<Rotation> rotations_;
+  std::shared_ptr<const Joints> joints_;
+  std::vector<double> positions_, velocities_;  // of the joints, to whole blocks
 };
 
 /// Pose X_WF of a frame.
@@ -73,6 +73,28 @@ Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, 
 Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state, int frame);
 
 /// Projects a wrench on link `joint` to the joint coordinates: generalised_force += J_jointᵀ wrench.
-void accumulate_generalised_force(const KinematicState& state, int joint, const SpatialForce& wrench, Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept;
+void accumulate_generalised_force(const KinematicState& state, int joint, const SpatialForce& wrench,
+                                  Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept;
+
+/// The same for wrenches on many links, from the last joint to the first: those of a chain go down to the base together.
+class GeneralisedForce {
+ public:
+  /// Adds to `generalised_force` (nv), which must outlive this.
+  GeneralisedForce(const KinematicState& state, Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept
+      : state_(state), force_(generalised_force.data()) {}
+
+  /// `joint` is not after those before.
+  void add(int joint, const SpatialForce& wrench) noexcept;
+  /// To be called once, after all.
+  void finish() noexcept { go_down_to(-1); }
+
+ private:
+  void go_down_to(int joint) noexcept;
+
+  const KinematicState& state_;
+  double* force_;
+  SpatialForce wrench_ = {};
+  int joint_ = -1;
+};
 
 }  // namespace sidestep

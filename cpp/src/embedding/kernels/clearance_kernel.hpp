@@ -1,10 +1,12 @@
 #pragma once
 
+#include "most_lanes.hpp"
+
 // The inner loop of ClearanceField, once per instruction set. Plain arrays only: a translation unit compiled for a newer
 // instruction set must not emit code that others share, such as Eigen's inline functions.
 namespace sidestep::kernels {
 
-/// Points as structure of arrays. `velocity[0]` is null where all are at rest.
+/// Points as structure of arrays, padded to whole registers. `velocity[0]` is null where all are at rest.
 struct Points {
   const double* position[3];
   const double* radius;
@@ -20,7 +22,6 @@ struct LinkMotion {
 // Of the Boltzmann mean s0, ṡ0, s̈0, s1, ṡ1, s̈1 and two gradients of force and moment; from `approach` on, of the
 // mean of what approaches: the weight, h, h', h'' and a gradient.
 inline constexpr int approach = 18, sums = 28;
-inline constexpr int most_lanes = 8;  // doubles in the widest register
 
 /// An ellipsoid at a state, with the sums of its means over the points so far, lane by lane.
 struct Query {
@@ -29,9 +30,9 @@ struct Query {
   double semi_axes[3], squared_axes[3];     // a and a²
   double linear[3], angular[3];             // velocity of the centre and of the axes, in principal axes
   double bias_linear[3], bias_angular[3];   // the same for the bias
-  double reference;                         // smallest clearance so far; sums are relative to it
-  double ahead;                             // smallest h + τ h' so far
-  int nearest;                              // its point
+  double reference;                         // smallest clearance; sums are relative to it
+  double ahead;                             // smallest h + τ h'
+  int nearest, minded;                      // their points
   int shortest;                             // the axis of the smallest a
   bool ready;                               // whether all but the centre has been set
 };
@@ -61,11 +62,17 @@ struct Leaf {
   double x, y, z, radius;
 };
 
-/// Adds the points of a leaf to every query of the group that they matter to. Returns whether `near` or `ahead` fell.
-using AddLeaf = bool (*)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+/// What is done with the points of a leaf, for every query of the group that they matter to: what is smallest is found
+/// first, so that only what weighs beside it is looked at when the sums are made.
+struct ClearanceKernel {
+  /// Lowers `reference` and `ahead` of the queries, `near` and `ahead` of the group to them. Returns whether any fell.
+  bool (*find)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+  /// Adds to the sums.
+  void (*add)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+};
 
-bool add_leaf_baseline(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
-bool add_leaf_avx2(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
-bool add_leaf_avx512(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+ClearanceKernel clearance_kernel_baseline() noexcept;
+ClearanceKernel clearance_kernel_avx2() noexcept;
+ClearanceKernel clearance_kernel_avx512() noexcept;
 
 }  // namespace sidestep::kernels

@@ -1,5 +1,5 @@
 // Included by one file per instruction set, after clearance_kernel.hpp and <immintrin.h> where there is one. Defines
-// add_leaf in an anonymous namespace.
+// find_in_leaf and add_leaf in an anonymous namespace.
 
 namespace sidestep::kernels {
 namespace {
@@ -58,23 +58,6 @@ void prepare(QueryGroup& group, int k) noexcept {
 /// Old weights are smaller by the exponential of this.
 Lanes decay(double shift, double inverse_T) noexcept {
   return exponential(all(shift * inverse_T < 690.0 ? -shift * inverse_T : -690.0));
-}
-
-/// Measured from a smaller reference, the old values are larger by `shift` and the old weights smaller.
-void rescale(Query& query, double shift, double inverse_T) noexcept {
-  const Lanes factor = decay(shift, inverse_T);
-  const auto move = [&query, factor, shift](int zeroth, int first) {
-    double* s0 = query.lane_sums[zeroth];
-    double* s1 = query.lane_sums[first];
-    store(s1, factor * (load(s1) + shift * load(s0)));
-    store(s0, factor * load(s0));
-  };
-  for (int i = 0; i < 3; ++i) {
-    move(i, 3 + i);
-  }
-  for (int i = 6; i < 12; ++i) {
-    move(i, 6 + i);
-  }
 }
 
 /// As Horizon::closing_speed: the angle of n to x is within that of the ball, asin(radius/|x|).
@@ -138,7 +121,22 @@ struct Inside {
   }
 };
 
-void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf) noexcept {
+enum class Pass { find, add };
+
+void lower(double& limit, double& least, int& point, Lanes values, int first) noexcept {
+  if (below(values, all(limit)) != 0) {
+    for (int i = 0; i < width; ++i) {
+      if (values[i] < limit) {
+        limit = least = values[i];
+        point = first + i;
+      }
+    }
+  }
+}
+
+/// `closing_of_leaf` [m] bounds what any of the points closes within the horizon.
+template <Pass pass>
+void look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf, double closing_of_leaf) noexcept {
   Query& query = group.queries[k];
   const double* R = query.axes;
   const double* A = query.squared_axes;
@@ -148,6 +146,11 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     const Lanes y = load(points.position[1] + n) - group.centre[1][k];
     const Lanes z = load(points.position[2] + n) - group.centre[2][k];
     const Lanes radius = load(points.radius + n);
+    const double near = group.near[k], near_after = group.ahead[k] + closing_of_leaf;
+    const Lanes limit = (near > near_after ? near : near_after) + group.extent[k] + radius;
+    if (below(x * x + y * y + z * z, limit > 0.0 ? limit * limit : Lanes{}) == 0) {
+      continue;
+    }
     Lanes e[3], s[3], v[3];  // the offset in principal axes, and the velocities of the point, there and in moving axes
     for (int i = 0; i < 3; ++i) {
       e[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
@@ -240,18 +243,12 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     if (matter(h) == 0) {
       continue;
     }
-    if (below(h, all(query.reference)) != 0) {
-      const double before = query.reference;
-      const int last = n + width < leaf.first + leaf.count ? width : leaf.first + leaf.count - n;
-      for (int i = 0; i < last; ++i) {
-        if (h[i] < query.reference) {
-          query.reference = h[i];
-          query.nearest = n + i;
-        }
-      }
-      if (before < __builtin_inf()) {
-        rescale(query, before - query.reference, group.inverse_T);
-      }
+    const Lanes rate = g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
+    const Lanes ahead = h + group.horizon * rate;
+    if constexpr (pass == Pass::find) {
+      lower(group.near[k], query.reference, query.nearest, h, n);
+      lower(group.ahead[k], query.ahead, query.minded, ahead, n);
+      continue;
     }
 
     // The acceleration of the point in the ellipsoid's moving axes.
@@ -267,7 +264,6 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
         a[i] -= W[j] * s[l] - W[l] * s[j];
       }
     }
-    const Lanes rate = g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
     Lanes bend = out.bend(A, v);
     if (__builtin_expect(any_inside != 0, 0)) {
       bend = inside ? Inside(A, e).bend(A, v, rate) : bend;
@@ -275,8 +271,39 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
     const Lanes curvature = g[0] * a[0] + g[1] * a[1] + g[2] * a[2] + bend;
 
     const double inverse_T = group.inverse_T;
-    const Lanes ahead = h + group.horizon * rate;
-    if (below(ahead, all(query.ahead)) != 0) {
+    Lanes moment[3];
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      moment[i] = e[j] * g[l] - e[l] * g[j];
+    }
+    const auto add = [&query](int sum, Lanes term) {
+      double* at = query.lane_sums[sum];
+      store(at, load(at) + term);
+    };
+    // Weights; those beyond the window, and the padding, are zero.
+    if (below(h, all(group.near[k])) != 0) {
+      const Lanes above = h - query.reference;
+      const auto matters = above < group.window;
+      const Lanes weight = matters ? exponential(matters ? -inverse_T * above : Lanes{}) : Lanes{};
+      const Lanes over = matters ? above : Lanes{};
+      const Lanes weight_dot = -inverse_T * weight * rate;
+      const Lanes weight_ddot = inverse_T * weight * (inverse_T * rate * rate - curvature);
+      add(0, weight);
+      add(1, weight_dot);
+      add(2, weight_ddot);
+      add(3, weight * over);
+      add(4, weight_dot * over + weight * rate);
+      add(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * curvature);
+      const Lanes zeroth = -inverse_T * weight;
+      const Lanes first = weight + zeroth * over;
+      for (int i = 0; i < 3; ++i) {
+        add(6 + i, zeroth * g[i]);
+        add(9 + i, zeroth * moment[i]);
+        add(12 + i, first * g[i]);
+        add(15 + i, first * moment[i]);
+      }
+    }
+    if (below(ahead, all(query.ahead)) != 0) {  // where none is below the horizon, and so none has been found
       const double before = query.ahead;
       for (int i = 0; i < width; ++i) {
         query.ahead = ahead[i] < query.ahead ? ahead[i] : query.ahead;
@@ -288,51 +315,26 @@ void add_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf
         }
       }
     }
-    const double near = query.reference + group.window, minded_below = query.ahead + group.window;
-    group.near[k] = near < group.near[k] ? near : group.near[k];
-    group.ahead[k] = minded_below < group.ahead[k] ? minded_below : group.ahead[k];
-
-    // Weights; those beyond the window, and the padding, are zero.
-    const Lanes above = h - query.reference;
-    const auto matters = above < group.window;
-    const Lanes weight = matters ? exponential(matters ? -inverse_T * above : Lanes{}) : Lanes{};
-    const Lanes over = matters ? above : Lanes{};
-    const Lanes weight_dot = -inverse_T * weight * rate;
-    const Lanes weight_ddot = inverse_T * weight * (inverse_T * rate * rate - curvature);
-    const auto add = [&query](int sum, Lanes term) {
-      double* at = query.lane_sums[sum];
-      store(at, load(at) + term);
-    };
-    add(0, weight);
-    add(1, weight_dot);
-    add(2, weight_ddot);
-    add(3, weight * over);
-    add(4, weight_dot * over + weight * rate);
-    add(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * curvature);
     const Lanes above_ahead = ahead - query.ahead;
-    const auto is_minded = above_ahead < group.window;
-    const Lanes minded = is_minded ? exponential(is_minded ? -inverse_T * above_ahead : Lanes{}) : Lanes{};
-    add(approach, minded);
-    add(approach + 1, minded * (is_minded ? h : Lanes{}));
-    add(approach + 2, minded * (is_minded ? rate : Lanes{}));
-    add(approach + 3, minded * (is_minded ? curvature : Lanes{}));
-    const Lanes zeroth = -inverse_T * weight;
-    const Lanes first = weight + zeroth * over;
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, l = (i + 2) % 3;
-      const Lanes moment = e[j] * g[l] - e[l] * g[j];
-      add(6 + i, zeroth * g[i]);
-      add(9 + i, zeroth * moment);
-      add(12 + i, first * g[i]);
-      add(15 + i, first * moment);
-      add(approach + 4 + i, minded * g[i]);
-      add(approach + 7 + i, minded * moment);
+    if (below(above_ahead, all(group.window)) != 0) {
+      const auto is_minded = above_ahead < group.window;
+      const Lanes minded = is_minded ? exponential(is_minded ? -inverse_T * above_ahead : Lanes{}) : Lanes{};
+      add(approach, minded);
+      add(approach + 1, minded * (is_minded ? h : Lanes{}));
+      add(approach + 2, minded * (is_minded ? rate : Lanes{}));
+      add(approach + 3, minded * (is_minded ? curvature : Lanes{}));
+      for (int i = 0; i < 3; ++i) {
+        add(approach + 4 + i, minded * g[i]);
+        add(approach + 7 + i, minded * moment[i]);
+      }
     }
   }
 }
 
-bool add_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
-  bool lower = false;
+/// Returns whether `near` or `ahead` fell.
+template <Pass pass>
+bool look_at_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
+  bool fell = false;
   // The link's point at the centre of the leaf moves by v, at others of the leaf by a little more.
   const LinkMotion& link = *group.link;
   const double v[3] = {link.linear[0] + link.angular[1] * leaf.z - link.angular[2] * leaf.y,
@@ -347,21 +349,29 @@ bool add_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcep
     const Lanes distance = root(x * x + y * y + z * z);
     const Lanes radius = load(group.extent + first) + leaf.radius;
     const Lanes bound = distance - radius;
-    const Lanes closing = closing_speed(x * v[0] + y * v[1] + z * v[2], distance, radius, all(speed)) + more;
-    unsigned near = below(bound, load(group.near + first)) |
-                    below(bound - group.horizon * closing, load(group.ahead + first));
+    const Lanes closing =
+        group.horizon * (closing_speed(x * v[0] + y * v[1] + z * v[2], distance, radius, all(speed)) + more);
+    unsigned near = below(bound, load(group.near + first)) | below(bound - closing, load(group.ahead + first));
     for (int k = first; near != 0; ++k, near >>= 1) {
       if ((near & 1u) != 0 && k < group.size) {
         if (!group.queries[k].ready) {
           prepare(group, k);
         }
         const double near_before = group.near[k], ahead_before = group.ahead[k];
-        add_points(group, k, points, leaf);
-        lower = lower || group.near[k] < near_before || group.ahead[k] < ahead_before;
+        look_at_points<pass>(group, k, points, leaf, closing[k - first]);
+        fell = fell || group.near[k] < near_before || group.ahead[k] < ahead_before;
       }
     }
   }
-  return lower;
+  return fell;
+}
+
+bool find_in_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
+  return look_at_leaf<Pass::find>(group, points, leaf);
+}
+
+void add_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
+  look_at_leaf<Pass::add>(group, points, leaf);
 }
 
 }  // namespace

@@ -8,9 +8,7 @@
 
 namespace sidestep::kernels {
 
-bool add_leaf_avx512(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
-  return add_leaf(group, points, leaf);
-}
+ClearanceKernel clearance_kernel_avx512() noexcept { return {find_in_leaf, add_leaf}; }
 
 }  // namespace sidestep::kernels
 #endif

@@ -9,8 +9,6 @@
 
 namespace sidestep::kernels {
 
-bool add_leaf_baseline(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
-  return add_leaf(group, points, leaf);
-}
+ClearanceKernel clearance_kernel_baseline() noexcept { return {find_in_leaf, add_leaf}; }
 
 }  // namespace sidestep::kernels

@@ -1,6 +1,6 @@
 #include "distance_kernel.hpp"
 
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep::kernels {
 

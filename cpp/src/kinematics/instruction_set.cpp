@@ -1,4 +1,4 @@
-#include "sidestep/embedding/instruction_set.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 
 #include <algorithm>
 #include <atomic>

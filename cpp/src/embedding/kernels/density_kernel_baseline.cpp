@@ -1,0 +1,17 @@
+// For every processor of the architecture.
+#include "density_kernel.hpp"
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#include "density_kernel.inl"
+
+namespace sidestep::kernels {
+
+void add_density_baseline(const GaussianBlock& gaussians, const double* const* links, const DensityPoints& points,
+                          DensitySums& sums) noexcept {
+  add_density(gaussians, links, points, sums);
+}
+
+}  // namespace sidestep::kernels

@@ -1,0 +1,7 @@
+#pragma once
+
+namespace sidestep::kernels {
+
+inline constexpr int most_lanes = 8;  // doubles in the widest register
+
+}  // namespace sidestep::kernels
