@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sidestep import Obstacles
 from sidestep.bench import StepSettings, compare_steps, run_step_bench
 from sidestep.bench import step as step_module
 from sidestep.bench.step_scenes import REACH, table_cloud, uniform_cloud
+from sidestep.body import Body
+from sidestep.presets import barrier_system
+from sidestep.robot import Robot
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +33,25 @@ def test_measures_every_row(document: dict[str, list[dict[str, object]]]) -> Non
     assert [row["joints"] for row in rows[:6:2]] == [2, 3, 7]
     assert {row["points"] for row in rows[6:]} == {5}
     json.dumps(document, allow_nan=False)
+
+
+def test_arms_are_drawn_to_where_they_have_clearance() -> None:
+    robot = Robot.named("planar3")
+    body = Body.cover(robot)
+    system = barrier_system(robot, body)
+    obstacles = Obstacles([[0.9, 0.2, 0.0], [0.5, -0.6, 0.0]], 0.1)
+    row = step_module._Row("row", robot, system, obstacles, len(body.links), None, False)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        q = row._goal(rng)
+        assert row._clearance(q) >= step_module.CLEARANCE
+    crowd = Obstacles(np.random.default_rng(1).uniform(-1.5, 1.5, (2000, 3)) * [1.0, 1.0, 0.05])
+    crowded = step_module._Row("row", robot, system, crowd, len(body.links), None, False)
+    drawn = np.random.default_rng(2)
+    clearances = [crowded._clearance(robot.random_configuration(drawn)) for _ in range(step_module.TRIES)]
+    assert (
+        crowded._clearance(crowded._goal(np.random.default_rng(2))) == max(clearances) < step_module.CLEARANCE
+    )
 
 
 def test_compares_row_by_row(document: dict[str, list[dict[str, object]]]) -> None:
