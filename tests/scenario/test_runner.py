@@ -1,6 +1,7 @@
 """Running a scenario, end to end."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -158,3 +159,18 @@ def test_a_pose_out_of_reach_is_said() -> None:
     assert "mm and" in result.sentence()
     assert "from the goal, which it does not reach" in result.sentence()
     assert (result.stop or "").startswith("out of reach: the nearest posture found is ")
+
+
+@pytest.mark.parametrize("name", ["thesis-6.2.2", "thesis-6.2.3", "thesis-6.2.4"])
+def test_the_thesis_s_scenarios_arrive_by_the_barriers(name: str) -> None:
+    result = run_scenario(replace(Scenario.load(name), method="barrier"))
+    evaluation = result.evaluation
+    assert evaluation.reached
+    assert evaluation.contacts == 0
+    assert not evaluation.moved_objects
+    assert not evaluation.limits.any
+    if name == "thesis-6.2.2":
+        assert evaluation.min_clearance_m is None  # nothing is in the way
+    else:
+        assert evaluation.min_clearance_m is not None
+        assert evaluation.min_clearance_m > 0.01

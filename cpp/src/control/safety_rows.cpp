@@ -30,6 +30,19 @@ double room_needed(double speed, double A, double rate) noexcept {
   return std::copysign(size > A / rate ? 0.5 * (size * size / A + A / (rate * rate)) : size / rate, speed);
 }
 
+/// The largest direction·a with lower <= a <= upper; a joint that does not count may be without limits.
+template <class Direction, class Lower, class Upper>
+double largest_product(const Direction& direction, const Lower& lower, const Upper& upper) noexcept {
+  double sum = 0.0;
+  for (Eigen::Index j = 0; j < direction.size(); ++j) {
+    const double d = direction[j];
+    if (d != 0.0) {
+      sum += d > 0.0 ? d * upper[j] : d * lower[j];
+    }
+  }
+  return sum;
+}
+
 }  // namespace
 
 double demanded_deceleration(double room, double u, const ClosingLimits& limits, double period) noexcept {
@@ -83,29 +96,21 @@ bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   return true;
 }
 
-double SafetyRows::hardest_deceleration(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
-                                        const BrakingTorque* torque) noexcept {
-  double of_limits = 0.0, of_torque = 0.0;
-  for (Eigen::Index j = 0; j < gradient.size(); ++j) {
-    if (gradient[j] != 0.0) {
-      of_limits += std::abs(gradient[j]) * limits.acceleration[j];
-    }
-  }
-  if (torque == nullptr) {
-    return of_limits;
-  }
+double SafetyRows::hardest_by_torque(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
+                                     const BrakingTorque& torque) noexcept {
   response_ = gradient;
-  solve_in_place(torque->mass_cholesky, response_);
+  solve_in_place(torque.mass_cholesky, response_);
+  double hardest = 0.0;
   for (Eigen::Index j = 0; j < gradient.size(); ++j) {
     if (response_[j] != 0.0) {
-      of_torque += std::abs(response_[j]) * limits.effort[j] - response_[j] * torque->bias[j];
+      hardest += std::abs(response_[j]) * limits.effort[j] - response_[j] * torque.bias[j];
     }
   }
-  return std::min(of_limits, of_torque);
+  return hardest;
 }
 
 void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
-                        double period, const BrakingTorque* torque) noexcept {
+                        const AccelerationBounds& bounds, double period, const BrakingTorque* torque) noexcept {
   const double stop_time = v.cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
   const double rate = stop_time * settings_.rate > 1.0 ? 1.0 / stop_time : settings_.rate;
   const ClearanceState& approach = clearances.approach;
@@ -131,7 +136,9 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
   for (int row = 0; row < size_; ++row) {
     const int k = coordinates[static_cast<std::size_t>(row)];
     const auto gradient = approach.gradients.col(k);
-    const double hardest = std::max(hardest_deceleration(gradient, limits, torque), smallest_deceleration);
+    const double by_torque = torque == nullptr ? infinity : hardest_by_torque(gradient, limits, *torque);
+    const double by_limits = largest_product(gradient, -limits.acceleration, limits.acceleration);
+    const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,
                                 rate, settings_.correction};
     const double demand =
@@ -140,7 +147,11 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     normals.row(row) = gradient.transpose() / length;
     // Of the points, but no more than the mean where it says that a surface recedes: see the header.
     const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
-    lower[row] = (demand - c) / length;
+    // What is not to be had now is asked for only where the room does not last with what is.
+    const double u = -approach.rates[k], room = approach.values[k] - settings_.margin;
+    const double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque), net = now + c;
+    const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));
+    lower[row] = (lasts ? std::min(demand - c, now) : demand - c) / length;
     lengths[row] = length;
     nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];
   }
@@ -148,14 +159,7 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
 
 bool SafetyRows::satisfied_within(int k, const Eigen::VectorXd& box_lower,
                                   const Eigen::VectorXd& box_upper) const noexcept {
-  double smallest = 0.0;
-  for (Eigen::Index j = 0; j < box_lower.size(); ++j) {
-    const double n = normals(k, j);
-    if (n != 0.0) {
-      smallest += n > 0.0 ? n * box_lower[j] : n * box_upper[j];
-    }
-  }
-  return smallest >= lower[k];
+  return -largest_product(-normals.row(k).transpose(), box_lower, box_upper) >= lower[k];
 }
 
 }  // namespace sidestep

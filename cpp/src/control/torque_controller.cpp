@@ -191,7 +191,7 @@ TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
-      rows_.update(*clearances, velocity_, limits_, settings_.period, limited ? &braking : nullptr);
+      rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr);
     }
     if (wanted_known && clear) {
       wanted_ = acceleration;

@@ -145,8 +145,9 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   clearances.curvatures[1] = -5.7;
   clearances.approach.curvatures[1] = -0.7;
   SafetyRows rows(2, {});
+  const AccelerationBounds anything(2);
   Eigen::VectorXd v = Eigen::VectorXd::Zero(2);
-  rows.update(clearances, v, limits, 0.001);
+  rows.update(clearances, v, limits, anything, 0.001);
   BOOST_REQUIRE(rows.size() == 1);
   BOOST_TEST(rows.coordinates[0] == 1);
   BOOST_TEST(rows.nearest[0] == 7);
@@ -164,17 +165,17 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   Eigen::VectorXd bias(2);
   bias << 22.0, -2.0;
   const BrakingTorque torque{cholesky, bias};
-  rows.update(clearances, v, limits, 0.001, &torque);
+  rows.update(clearances, v, limits, anything, 0.001, &torque);
   const double weaker = demanded_deceleration(0.1, 0.4, {1.9, 3.8, 20.0, 0.5}, 0.001);
   BOOST_TEST(rows.lower[0] == (weaker + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
 
   // Stopping takes 0.5 s: a line of 2/s instead of 20/s.
   v << 1.0, -2.5;
-  rows.update(clearances, v, limits, 0.001);
+  rows.update(clearances, v, limits, anything, 0.001);
   const double slower = demanded_deceleration(0.1, 0.4, {2.5, 5.0, 2.0, 0.5}, 0.001);
   BOOST_TEST(rows.lower[0] == (slower + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
   v.setZero();
-  rows.update(clearances, v, limits, 0.001, &torque);
+  rows.update(clearances, v, limits, anything, 0.001, &torque);
 
   // Every acceleration within ±b gives at least -(0.6 + 0.8) b.
   const double b = -rows.lower[0] / 1.4;
@@ -208,7 +209,7 @@ BOOST_AUTO_TEST_CASE(the_most_critical_are_kept_in_order) {
     clearances.mind_nearest();
     SafetyRows rows(5, settings);
     BOOST_REQUIRE(rows.usable(clearances));
-    rows.update(clearances, v, limits, 0.001);
+    rows.update(clearances, v, limits, AccelerationBounds(5), 0.001);
     BOOST_REQUIRE_EQUAL(rows.size(), std::min(within_reach, 6));
     const auto urgency = [&](int k) { return clearances.values[k] + clearances.rates[k] / settings.rate; };
     for (int row = 1; row < rows.size(); ++row) {
@@ -271,6 +272,39 @@ BOOST_AUTO_TEST_CASE(settings_of_safety_rows_are_checked) {
   BOOST_TEST(message_of([](S& s) { s.max_rows = -1; }).find("max_rows") != std::string::npos);
 }
 
+BOOST_AUTO_TEST_CASE(more_than_is_to_be_had_is_asked_for_only_where_room_runs_out) {
+  JointLimits limits = JointLimits::unlimited(2);
+  limits.acceleration << 10.0, 10.0;
+  Clearances clearances(2, 1);
+  clearances.nearest << 0;
+  clearances.gradients.col(0) << 0.6, -0.8;
+  SafetyRows rows(2, {});
+  AccelerationBounds bounds(2);
+  bounds.lower << -10.0, -5.0;  // close to its lower limit the second joint cannot give all
+  bounds.upper << 10.0, 10.0;
+  const double now = 0.6 * 10.0 + 0.8 * 5.0;
+  const auto lower = [&](double room, double closing, double curvature) {
+    clearances.values << room + rows.settings().margin;
+    clearances.rates << -closing;
+    clearances.curvatures << curvature;
+    clearances.mind_nearest();
+    rows.update(clearances, Eigen::VectorXd::Zero(2), limits, bounds, 0.001);
+    return rows.lower[0];
+  };
+  const auto asked = [&](double room, double closing, double curvature) {
+    return demanded_deceleration(room, closing, {7.0, 14.0, 20.0, 0.5}, 0.001) - curvature;
+  };
+  const auto close = boost::test_tools::tolerance(1e-12);
+  BOOST_TEST_REQUIRE(asked(0.3, 2.5, -2.0) > now);
+  BOOST_TEST(2.5 * 2.5 / (2.0 * (now - 2.0)) > 0.3);
+  BOOST_TEST(lower(0.3, 2.5, -2.0) == asked(0.3, 2.5, -2.0), close);  // it does not stop in time
+  BOOST_TEST_REQUIRE(asked(0.4, 2.5, -2.0) > now);
+  BOOST_TEST(lower(0.4, 2.5, -2.0) == now, close);  // it does
+  BOOST_TEST_REQUIRE(asked(-0.02, -0.01, -2.0) > now);
+  BOOST_TEST(lower(-0.02, -0.01, -2.0) == now, close);                         // too near, but on its way out
+  BOOST_TEST(lower(-0.02, -0.01, -11.0) == asked(-0.02, -0.01, -11.0), close);  // as long as that lasts
+}
+
 BOOST_AUTO_TEST_CASE(update_allocates_nothing) {
   Random random(4);
   const JointLimits limits = test::arm_limits(7);
@@ -278,11 +312,12 @@ BOOST_AUTO_TEST_CASE(update_allocates_nothing) {
   const Eigen::MatrixXd cholesky = Eigen::MatrixXd::Identity(7, 7);
   const Eigen::VectorXd bias = Eigen::VectorXd::Zero(7), v = bias;
   const BrakingTorque torque{cholesky, bias};
+  const AccelerationBounds bounds(7);
   for (int num : {0, 1, 16, 32, 80}) {
     const Clearances clearances = linear_clearances(random, 7, num);
     BOOST_REQUIRE_EQUAL(test::allocations_of([&] {
                           if (rows.usable(clearances)) {
-                            rows.update(clearances, v, limits, 0.001, &torque);
+                            rows.update(clearances, v, limits, bounds, 0.001, &torque);
                           }
                         }),
                         0u);
@@ -304,7 +339,7 @@ BOOST_AUTO_TEST_CASE(changing_points_never_make_a_surface_recede) {
   const auto lower = [&](double of_nearest, double of_points) {
     clearances.curvatures << of_nearest;
     clearances.approach.curvatures << of_points;
-    rows.update(clearances, Eigen::VectorXd::Zero(1), limits, 0.001);
+    rows.update(clearances, Eigen::VectorXd::Zero(1), limits, AccelerationBounds(1), 0.001);
     return rows.lower[0] - demand;
   };
   const auto close = boost::test_tools::tolerance(1e-9);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "sidestep/control/acceleration_bounds.hpp"
 #include "sidestep/embedding/clearances.hpp"
 #include "sidestep/kinematics/robot.hpp"
 
@@ -51,6 +52,10 @@ struct ClosingLimits {
 // be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
 // the profile itself decelerates with, plus correction·e/T, and never above the hardest deceleration the limits allow.
 // A room that is negative grows back the same way, with a closing speed of p⁻¹(s) < 0.
+//
+// A demand may be for more than is to be had: the curvature c adds to it, and close to position limits joints cannot
+// give all. It then is for b = max ∇h·a within the bounds of now and the torque, if with b the room lasts: the arm comes
+// no nearer, or stops in time, u²/2(b + c) ≤ s. Only where it does not are bounds of comfort given up for it.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.
@@ -92,9 +97,10 @@ class SafetyRows {
   bool usable(const Clearances& clearances) const noexcept;
 
   /// The most critical clearances of usable ones, at velocity v (nv). The hardest deceleration is Σ_j |∂h/∂q_j| (acceleration limit)_j or,
-  /// given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. No allocation.
-  void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, double period,
-              const BrakingTorque* torque = nullptr) noexcept;
+  /// given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. `bounds` are those of now.
+  /// No allocation.
+  void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
+              const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr) noexcept;
 
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
   bool satisfied_within(int k, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) const noexcept;
@@ -111,8 +117,8 @@ class SafetyRows {
   std::vector<int> nearest;         ///< (max) its nearest obstacle point
 
  private:
-  double hardest_deceleration(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
-                              const BrakingTorque* torque) noexcept;
+  double hardest_by_torque(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
+                           const BrakingTorque& torque) noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
