@@ -63,7 +63,8 @@ int main(int argc, char** argv) {
     });
   }
   int failures = 0;
-  for (int k = 0; k < std::atoi(argv[2]); ++k) {
+  const int steps = std::atoi(argv[2]);
+  for (int k = 0; k < steps; ++k) {
     const benchmarks::State& state = states[static_cast<std::size_t>(k) % states.size()];
     failures += is_fallback(system.acceleration(state.q, state.v, goal, scene.obstacles, workspace));
     if (filtered) {

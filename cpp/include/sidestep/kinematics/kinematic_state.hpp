@@ -44,6 +44,7 @@ class KinematicState {
     SpatialMotion screw;        ///< column of the Jacobian of this joint's own coordinate (multiplier included)
     SpatialMotion velocity;
     SpatialMotion bias;
+    double unused = 0.0;        ///< inner loops write here what they have too much of
 
     /// The numbers from R_WL (by columns) to bias, one after the other, as inner loops read and write them.
     const double* numbers() const noexcept { return R_WL.data(); }

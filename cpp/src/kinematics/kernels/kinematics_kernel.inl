@@ -76,12 +76,14 @@ inline Turn turn(Vector x) noexcept {
 }
 
 struct Motion {
-  Vector angular = {}, linear = {};
+  Vector angular, linear;
 };
 
+constexpr double base[link_numbers] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+
 struct Link {
-  Vector rotation[3] = {{1.0, 0.0, 0.0, 0.0}, {0.0, 1.0, 0.0, 0.0}, {0.0, 0.0, 1.0, 0.0}};  // columns
-  Vector position = {};
+  Vector rotation[3];  // columns
+  Vector position;
   Motion velocity, bias;
 
   Vector rotated(Vector v) const noexcept { return rotation[0] * v[0] + rotation[1] * v[1] + rotation[2] * v[2]; }
@@ -98,7 +100,7 @@ Link read(const double* numbers) noexcept {
   return link;
 }
 
-/// In the order of memory: the fourth number of every vector is overwritten by the next.
+/// In the order of memory: the fourth number of every vector is overwritten by the next, that of the last goes nowhere.
 void write(const Link& link, const Motion& screw, double* numbers) noexcept {
   for (int i = 0; i < 3; ++i) {
     store(numbers + 3 * i, link.rotation[i]);
@@ -109,13 +111,13 @@ void write(const Link& link, const Motion& screw, double* numbers) noexcept {
   store(numbers + velocity_at, link.velocity.angular);
   store(numbers + velocity_at + 3, link.velocity.linear);
   store(numbers + bias_at, link.bias.angular);
-  __builtin_memcpy(numbers + bias_at + 3, &link.bias.linear, 3 * sizeof(double));
+  store(numbers + bias_at + 3, link.bias.linear);
 }
 
 void update_links(const JointModel* joints, int num, const double* positions, const double* velocities, double* links,
                   int stride) noexcept {
   Link link;  // of the joint before, then of this one
-  Turn turns = {};
+  Turn turns;
   for (int i = 0; i < num; ++i) {
     const JointModel& joint = joints[i];
     const int at = i % joint_block;
@@ -127,8 +129,8 @@ void update_links(const JointModel* joints, int num, const double* positions, co
       sine = __builtin_sin(positions[i]);
       cosine = __builtin_cos(positions[i]);
     }
-    if (joint.parent != i - 1) {
-      link = joint.parent < 0 ? Link{} : read(links + joint.parent * stride);
+    if (i == 0 || joint.parent != i - 1) {
+      link = read(joint.parent < 0 ? base : links + joint.parent * stride);
     }
     link.position += link.rotated(load(joint.translation));
     const Vector axis = link.rotated(load(joint.axis));
@@ -139,13 +141,10 @@ void update_links(const JointModel* joints, int num, const double* positions, co
     for (int k = 0; k < 3; ++k) {
       link.rotation[k] = rotation[k];
     }
-    Motion screw;
+    Motion screw{joint.multiplier * axis, turned(turned_cross(link.position, joint.multiplier * axis))};
     if (joint.slides) {
       link.position += positions[i] * axis;
-      screw.linear = joint.multiplier * axis;
-    } else {
-      screw.angular = joint.multiplier * axis;
-      screw.linear = turned(turned_cross(link.position, screw.angular));
+      screw = {Vector{}, screw.angular};
     }
     const Motion own{velocities[i] * screw.angular, velocities[i] * screw.linear};
     link.velocity.angular += own.angular;
