@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -188,11 +189,14 @@ def test_refining_a_ball_inside_a_ball_finds_its_surface() -> None:
     mesh = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
     surface = LinkSurface(np.asarray(mesh.triangles))
     start = ball(0.03, (0.004, -0.003, 0.002))
-    refined, multipliers = refine(surface, surface.points(1000), start, OUTLINE)
+    points = surface.points(1000)
+    refined, multipliers = refine(surface, points, start, OUTLINE)
     # within the last steps' length, 0.2 % of 0.1 m, of the sphere and the margin of 0.1 mm
     np.testing.assert_allclose(refined.centres[0], 0.0, atol=3e-4)
     np.testing.assert_allclose(np.linalg.svd(refined.shapes[0], compute_uv=False), 0.0501, atol=3e-4)
-    assert multipliers.min() == 0.0 < multipliers.max()  # some points push, most are inside
+    assert multipliers.min() == 0.0  # what is inside does not push
+    _, multipliers = refine(surface, points, start, replace(OUTLINE, steps=20))
+    assert multipliers.min() > 1.0  # a ball that is still smaller than the sphere: every point pushes
 
 
 @pytest.mark.parametrize(
