@@ -149,7 +149,8 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
     // What is not to be had now is asked for only where the room does not last with what is.
     const double u = -approach.rates[k], room = approach.values[k] - settings_.margin;
-    const double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque), net = now + c;
+    const double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque);
+    const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
     const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));
     lower[row] = (lasts ? std::min(demand - c, now) : demand - c) / length;
     lengths[row] = length;

@@ -170,6 +170,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
         group.axes_T[k] = ellipsoid.axes_T.data();
         group.semi_axes[k] = ellipsoid.semi_axes.data();
         group.queries[k].reference = group.queries[k].ahead = infinity;
+        group.queries[k].nearest = group.queries[k].minded = 0;
         group.queries[k].ready = false;
       }
       placed = true;

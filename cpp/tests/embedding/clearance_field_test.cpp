@@ -172,6 +172,37 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
   use(before);
 }
 
+// Inside, gradients are longer than one: a point may close faster than any bound of a distance says, beside one that is
+// deeper by more than the window.
+BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {
+  Joint slide;
+  slide.name = "slide";
+  slide.type = JointType::prismatic;
+  slide.axis = Eigen::Vector3d::UnitY();
+  const Robot robot("slider", {slide}, {{"link", 0, Eigen::Isometry3d::Identity()}}, {"slide"}, JointLimits::unlimited(1));
+  const Body body({"link"}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1),
+                  {Eigen::Vector3d(0.0225, 0.0025, 0.0025).asDiagonal().toDenseMatrix()}, Eigen::VectorXd::Ones(1));
+  KinematicState state(robot);
+  state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Constant(1, 0.5));
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Constant(3, 9, 5.0);
+  points.col(0) << 0.06, 0.008, 0.0;
+  points.col(8) << 0.005, 1e-9, 0.0;
+  const Obstacles obstacles(points, Eigen::VectorXd::Zero(9), Eigen::Matrix3Xd::Zero(3, 9));
+  const InstructionSet before = instruction_set();
+  for (const InstructionSet set : instruction_sets()) {
+    BOOST_TEST_CONTEXT(name(set)) {
+      use(set);
+      compare(robot, body, state, obstacles, 0.1, 0.25);
+      const ClearanceField field(robot, body, temperature);
+      Clearances found(1, 1);
+      field.evaluate(state, obstacles, 0.1, {0.25, 0.1}, found.view(0, 1));
+      BOOST_TEST(found.approach.rates[0] < -2.0);
+      BOOST_TEST(found.approach.values[0] > found.values[0] + 0.08);
+    }
+  }
+  use(before);
+}
+
 BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
   // There the iteration begins at its end, where S is 1 but for rounding. A foot that stays on an axis a of curvature
   // radius b²/a bends the distance h by v²/(b²/a + h) for a speed v across.

@@ -55,7 +55,7 @@ struct ClosingLimits {
 //
 // A demand may be for more than is to be had: the curvature c adds to it, and close to position limits joints cannot
 // give all. It then is for b = max ∇h·a within the bounds of now and the torque, if with b the room lasts: the arm comes
-// no nearer, or stops in time, u²/2(b + c) ≤ s. Only where it does not are bounds of comfort given up for it.
+// no nearer, or stops in time, u²/2(b + min(c, 0)) ≤ s. Only where it does not are bounds of comfort given up for it.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.

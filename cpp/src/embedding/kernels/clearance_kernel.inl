@@ -246,8 +246,11 @@ void look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
     const Lanes rate = g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
     const Lanes ahead = h + group.horizon * rate;
     if constexpr (pass == Pass::find) {
+      // No lower than what the bounds say: inside an ellipsoid gradients are longer than one, and a point that the second
+      // pass does not look at again must not be what the sums are relative to.
+      const Lanes least = h - closing;
       lower(group.near[k], query.reference, query.nearest, h, n);
-      lower(group.ahead[k], query.ahead, query.minded, ahead, n);
+      lower(group.ahead[k], query.ahead, query.minded, ahead < least ? least : ahead, n);
       continue;
     }
 
@@ -303,7 +306,7 @@ void look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
         add(15 + i, first * moment[i]);
       }
     }
-    if (below(ahead, all(query.ahead)) != 0) {  // where none is below the horizon, and so none has been found
+    if (below(ahead, all(query.ahead)) != 0) {  // none has been found below the horizon, or it is inside
       const double before = query.ahead;
       for (int i = 0; i < width; ++i) {
         query.ahead = ahead[i] < query.ahead ? ahead[i] : query.ahead;

@@ -124,7 +124,7 @@ void add_density(const GaussianBlock& gaussians, const double* const* numbers, c
       const auto counts = exponent > least_exponent;
       const Lanes density = counts ? peak.scale * exponential(counts ? exponent : Lanes{}) : Lanes{};
       const Lanes slope = t.dot(y_dot);
-      // δψ = −f · (δv + δω × x − δx): the wrench (x × f, f) about the world origin.
+      // δψ = f · (δv + δω × x − δx): the wrench (x × f, f) about the world origin.
       const Vectors f = link.to_world({density * t.x, density * t.y, density * t.z});
       value += density;
       curvature += density * (slope * slope - y_dot.dot(peak * y_dot)) + f.dot(drag);
