@@ -78,11 +78,18 @@ class Looker:
 
     def type(self, label: str, text: str) -> None:
         """Types into the field beside a label."""
-        field = self.page.locator(
-            f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]"
-        )
+        field = self._field(label)
         field.fill(text, force=True)
         field.press("Enter")
+
+    def typed(self, label: str) -> str:
+        """What stands in the field beside a label."""
+        return self._field(label).input_value()
+
+    def _field(self, label: str) -> Any:
+        return self.page.locator(
+            f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]"
+        )
 
     def choose(self, label: str, option: str) -> None:
         """Chooses an option of the list beside a label."""

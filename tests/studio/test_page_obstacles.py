@@ -115,6 +115,10 @@ def test_a_motion_is_recorded_and_replayed(studio: Studio, looker: Looker) -> No
     run_to(studio, last(studio).time + 0.5)  # the arm is elsewhere now
     looker.press("Play")
     until(lambda: recorder.replaying and np.array_equal(view.arm.q, rows[-1].q), "the replay's end")
+    # What the replay has set may still be on its way to the page, and would replace what is typed.
+    until(
+        lambda: float(looker.typed("moment [s]") or "nan") == round(recorder.length, 2), "the end on the page"
+    )
     looker.type("moment [s]", "0.5")
     shown = rows[int(np.searchsorted([row.time for row in rows], rows[0].time + 0.5))]
     until(lambda: np.array_equal(view.arm.q, shown.q), "the moment")
