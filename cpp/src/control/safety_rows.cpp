@@ -56,7 +56,12 @@ double demanded_deceleration(double room, double u, const ClosingLimits& limits,
     return at_once;
   }
   const double along_profile = std::clamp(rate * allowed, -A, A);
-  return std::min({at_once, along_profile + limits.correction * (u - allowed) / period, limits.hardest});
+  const double left = room - u * period;
+  const double for_a_stop = u > 0.0 && left > 0.0 ? std::max(rate * u, u * u / (2.0 * left)) : infinity;
+  const double too_fast = std::max(u - std::max(allowed, 0.0), 0.0);  // closing
+  const double too_slow = std::max(std::min(u, 0.0) - allowed, 0.0);  // leaving
+  const double returning = along_profile + limits.correction * too_fast / period + 2.0 * rate * too_slow;
+  return std::min({at_once, returning, std::max(along_profile, for_a_stop), limits.hardest});
 }
 
 void SafetySettings::validate() const {

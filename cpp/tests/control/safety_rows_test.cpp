@@ -101,13 +101,33 @@ BOOST_AUTO_TEST_CASE(demands_by_value) {
   BOOST_TEST(demanded_deceleration(room_needed(u, limits), u + 0.001, limits, T) == 2.5,
              boost::test_tools::tolerance(1e-9));
   BOOST_TEST(demanded_deceleration(0.01, 1.0, limits, T) == 4.0);
-  // Inside by 1 cm and at rest: wants to leave with 0.1 m/s, and 0.5 * 0.1/T is above the hardest.
-  BOOST_TEST(demanded_deceleration(-0.01, 0.0, limits, T) == 4.0);
+  // Too fast by a half on the line, 10 * 0.15 until it stops; by three times, 0.3^2/2s.
+  BOOST_TEST(demanded_deceleration(0.01, 0.15, limits, T) == 1.5, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(demanded_deceleration(0.015, 0.31, limits, T) == 0.31 * 0.31 / 2.0 / (0.015 - 0.31 * T),
+             boost::test_tools::tolerance(1e-12));
+  // Inside by 1 cm and at rest: wants to leave with 0.1 m/s, so 10^2 * 0.01. Closing, the hardest; closing slowly, its end.
+  BOOST_TEST(demanded_deceleration(-0.01, 0.0, limits, T) == 1.0, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(demanded_deceleration(-0.01, 0.1, limits, T) == 4.0);
+  BOOST_TEST(demanded_deceleration(-0.01, 0.002, limits, T) == 1.0 + 0.5 * 0.002 / T, boost::test_tools::tolerance(1e-12));
   // Leaving with that speed already: the speed may fall along the line, w = -(0.01 - uT/2)/(1/10 + T/2).
   BOOST_TEST(std::abs(demanded_deceleration(-0.01, -0.1, limits, T) + 1.0) < 0.02);  // -10 u, up to T of order
   // Limits that are infinite leave the line.
   const ClosingLimits unlimited{infinity, infinity, 10.0, 0.5};
   BOOST_TEST(demanded_deceleration(1.0, 0.0, unlimited, T) == -1.0 / 0.101 / T, boost::test_tools::tolerance(1e-12));
+}
+
+BOOST_AUTO_TEST_CASE(a_stop_along_the_path_meets_all_demands_up_to_twice_the_line) {
+  Random random(6);
+  int above = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const ClosingLimits limits = random_limits(random);
+    const double period = random.magnitude(1e-4, 0.02), closing = random.magnitude(0.001, 2.0);
+    const double room = closing * (random.uniform(0.5, 2.0) / limits.rate + period);
+    const double demand = demanded_deceleration(room, closing, limits, period);
+    BOOST_REQUIRE_LE(demand, limits.rate * closing * (1.0 + 1e-9));
+    above += closing > limits.rate * room ? 1 : 0;
+  }
+  BOOST_TEST(above > 1000);
 }
 
 BOOST_AUTO_TEST_CASE(a_violation_decays_without_spikes) {

@@ -51,7 +51,11 @@ struct ClosingLimits {
 // Outside (s < p(u): an obstacle that appeared, a disturbance, another constraint that won) meeting it at once would
 // be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
 // the profile itself decelerates with, plus correction·e/T, and never above the hardest deceleration the limits allow.
-// A room that is negative grows back the same way, with a closing speed of p⁻¹(s) < 0.
+// While room is left, neither is it above what a stop takes: γ u, or u²/2s if that is more. So as long as u ≤ 2γ s, one and
+// the same acceleration still meets all rows, that of the stop along the path; more could only be had by one row at the
+// expense of another, or of limits. u²/2s is asked for anew in every period: what disturbs makes it grow before s is gone.
+// A room that is negative grows back to p⁻¹(s) < 0: closing ends that way, and the leaving speed e that is missing comes by
+// 2γ e, without hurry; on the line that is critically damped, s'' = −2γ s' − γ² s.
 //
 // A demand may be for more than is to be had: the curvature c adds to it, and close to position limits joints cannot
 // give all. It then is for b = max ∇h·a within the bounds of now and the torque, if with b the room lasts: the arm comes
