@@ -14,7 +14,6 @@
 namespace sidestep {
 namespace {
 
-
 kernels::ClearanceKernel clearance_kernel() noexcept {
 #if defined(SIDESTEP_X86_KERNELS)
   switch (instruction_set()) {
@@ -130,7 +129,8 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
   const kernels::ClearanceKernel kernel = clearance_kernel();
   kernels::QueryGroup group;
   group.inverse_T = 1.0 / temperature_;
-  group.window = BoltzmannMean::window * temperature_;
+  group.window = window * temperature_;
+  group.window_ahead = window_ahead * temperature_;
   group.horizon = horizon.time;
   group.fastest = tree.fastest();
   for (const Cluster& cluster : clusters_) {
@@ -198,7 +198,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
     for (int k = 0; k < cluster.size; ++k) {
       const kernels::Query& query = group.queries[k];
       group.near[k] = query.reference < infinity ? query.reference + group.window : -infinity;
-      group.ahead[k] = is_found(query) ? std::min(query.ahead, horizon.distance) + group.window : -infinity;
+      group.ahead[k] = is_found(query) ? std::min(query.ahead, horizon.distance) + group.window_ahead : -infinity;
     }
     limit();
     visit([&](const kernels::Leaf& leaf) { kernel.add(group, points, leaf); });

@@ -2,12 +2,15 @@
 #include "sidestep/embedding/clearance_field.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "sidestep/embedding/boltzmann_mean.hpp"
 #include "sidestep/kinematics/instruction_set.hpp"
+#include "support/numbers.hpp"
 #include "support/random_scene.hpp"
 #include "support/serial_arm.hpp"
 
@@ -97,14 +100,24 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
       continue;
     }
     const KinematicState::Link& link = state.link(ellipsoid.joint);
+    std::vector<ClearanceSample> samples;
+    const auto after = [horizon](const ClearanceSample& at) { return at.value + horizon * at.rate; };
+    double least = test::infinity, least_after = test::infinity;
+    for (int n = 0; n < obstacles.size(); ++n) {
+      samples.push_back(sample(ellipsoid, link, obstacles.points().col(n), obstacles.velocities().col(n),
+                               obstacles.radii()[n]));
+      least = std::min(least, samples.back().value);
+      least_after = std::min(least_after, after(samples.back()));
+    }
     BoltzmannMean mean(temperature);
     ApproachMean ahead(temperature, horizon);
     int nearest = -1;
     for (int n = 0; n < obstacles.size(); ++n) {
-      const ClearanceSample at = sample(ellipsoid, link, obstacles.points().col(n), obstacles.velocities().col(n),
-                                        obstacles.radii()[n]);
-      ahead.add(at);
-      if (mean.add(at)) {
+      const ClearanceSample& at = samples[static_cast<std::size_t>(n)];
+      if (after(at) < least_after + ClearanceField::window_ahead * temperature) {
+        ahead.add(at);
+      }
+      if (at.value < least + ClearanceField::window * temperature && mean.add(at)) {
         nearest = n;
       }
     }
@@ -125,7 +138,7 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
     }
     // Of samples whose room after a stop is below the reach, all that weigh are looked at.
     const ClearanceSample approach = ahead.result();
-    if (approach.value + horizon * approach.rate + BoltzmannMean::window * temperature < reach) {
+    if (after(approach) + ClearanceField::window_ahead * temperature < reach) {
       Eigen::VectorXd turned = Eigen::VectorXd::Zero(robot.num_coordinates());
       accumulate_generalised_force(state, ellipsoid.joint, approach.gradient.first, turned);
       // Weights feel rates, which are summed with more terms than clearances; curvatures go with their squares.

@@ -23,7 +23,8 @@ namespace sidestep {
 /// which has the same value and gradient on the surface, and one kink only, at the centre.
 ///
 /// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
-/// depend on how densely a surface is sampled. Points that do not matter are left out in groups, by h ≥ |e| − a − r
+/// depend on how densely a surface is sampled, of those within a window above the nearest; and to what approaches (see
+/// approach_mean.hpp). Points that do not matter are left out in groups, by h ≥ |e| − a − r
 /// with a the longest semi-axis: first all but what may be nearest, then all but what weighs beside it. The others are
 /// taken side by side, with the widest registers of the machine.
 class ClearanceField {
@@ -31,6 +32,11 @@ class ClearanceField {
   /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, or the
   /// temperature is not positive and finite.
   ClearanceField(const Robot& robot, const Body& body, double temperature = 0.002);
+
+  /// Points that are farther than the nearest by so many temperatures do not count: they would weigh less than e⁻¹² = 6e-6,
+  /// and above a plane change the mean by less than 1e-4 temperatures. Of what approaches, whose weights are not
+  /// differentiated, from e⁻⁸ = 3e-4 on.
+  static constexpr double window = 12.0, window_ahead = 8.0;
 
   int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
 

@@ -50,7 +50,7 @@ struct QueryGroup {
   const double* semi_axes[most_queries];       // [m]
   const LinkMotion* link;
   double inverse_T;
-  double window;                               // samples so much above the smallest do not matter [m]
+  double window, window_ahead;                 // clearances, and h + τ h', so much above the smallest have no weight [m]
   double horizon;                              // τ [s]
   double fastest;                              // speed of any point [m/s], at most
   Query queries[most_queries];

@@ -319,8 +319,8 @@ void look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
       }
     }
     const Lanes above_ahead = ahead - query.ahead;
-    if (below(above_ahead, all(group.window)) != 0) {
-      const auto is_minded = above_ahead < group.window;
+    if (below(above_ahead, all(group.window_ahead)) != 0) {
+      const auto is_minded = above_ahead < group.window_ahead;
       const Lanes minded = is_minded ? exponential(is_minded ? -inverse_T * above_ahead : Lanes{}) : Lanes{};
       add(approach, minded);
       add(approach + 1, minded * (is_minded ? h : Lanes{}));
