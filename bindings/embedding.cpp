@@ -16,11 +16,11 @@
 #include "sidestep/embedding/clearance_barrier.hpp"
 #include "sidestep/embedding/clearance_table_barrier.hpp"
 #include "sidestep/embedding/collision_density.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
 #include "sidestep/embedding/joint_limit_barrier.hpp"
 #include "sidestep/embedding/joint_limit_potential.hpp"
 #include "sidestep/embedding/self_collision_barrier.hpp"
 #include "sidestep/embedding/sum.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep::python {
 void check_fitted_to(const Robot& robot, const Body& body) {

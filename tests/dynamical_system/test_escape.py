@@ -169,3 +169,41 @@ def test_sub_goals_for_one_goal_lie_farther_off_one_by_one():
         escape.pursue(goal, middle, np.nan, period)
     escape.pursue(goal, middle, np.nan, period)
     assert farthest_of_next_sub_goal(elsewhere) <= spread  # another goal begins anew
+
+
+def test_another_goal_is_followed_at_once_and_one_that_moves_is_not_another(robot):
+    escape = ss.Escape(robot, patience=0.1, leg=10.0, seed=3)
+
+    def followed(goal):
+        return np.array(escape.pursue(goal, AWAY, np.nan, PERIOD).position)
+
+    while not escape.escaping:
+        sub_goal = followed(GOAL)
+    np.testing.assert_array_equal(followed(GOAL + 0.19), followed(GOAL))
+    assert escape.escaping
+    for other in (GOAL + [0.0, 0.21], AWAY + [0.3, 0.0]):
+        np.testing.assert_array_equal(followed(other), other)
+        while not escape.escaping:
+            followed(other)
+    assert escape.count == 3
+    assert np.any(sub_goal != GOAL)
+
+
+def test_another_pose_is_followed_at_once():
+    robot = ss.Robot.named("fr3_arm")
+    q, tip = robot.neutral, robot.frames[-1].name
+    here, turned, shifted = np.eye(4), np.eye(4), np.eye(4)
+    turned[:2, :2] = [[np.cos(0.25), -np.sin(0.25)], [np.sin(0.25), np.cos(0.25)]]
+    shifted[2, 3] = 0.25
+    escape = ss.Escape(robot, patience=0.1, leg=10.0)
+
+    def followed(goal):
+        return escape.pursue(goal, q, 1e-3, PERIOD)
+
+    for other in (here, turned, shifted @ turned):
+        goal = ss.PoseGoal(robot, tip, other)
+        assert isinstance(followed(goal), ss.PoseGoal)
+        while not escape.escaping:
+            followed(goal)
+    assert isinstance(followed(ss.JointGoal(q + 1.0)), ss.JointGoal)
+    assert not escape.escaping

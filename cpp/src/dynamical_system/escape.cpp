@@ -12,7 +12,8 @@ namespace {
 constexpr double half_patience = 0.5;    // a sub-goal need not be reached: half the patience is enough for it
 constexpr double near_sub_goal = 0.2;    // [rad | m] is as good as there
 constexpr double at_goal = 0.01;         // [rad | m] nothing is left to be stuck on the way to
-constexpr double jump = 2.0;             // a squared distance that grows so much in one step is one to another goal
+constexpr double jump = 2.0;             // a squared distance that grows so much in one step is one to another goal,
+constexpr double elsewhere = 0.2;        // [rad | m] and so is one that is so far from that of the step before
 
 const EscapeSettings& validated(const EscapeSettings& settings) {
   settings.validate();
@@ -53,11 +54,16 @@ Escape::Escape(const Robot& robot, EscapeSettings settings)
       random_(settings.seed),
       stuck_(settings.patience, settings.fraction),
       halted_(half_patience * settings.patience, settings.fraction),
-      sub_goal_(JointGoal(Eigen::VectorXd::Zero(robot.num_coordinates()))) {}
+      sub_goal_(JointGoal(Eigen::VectorXd::Zero(robot.num_coordinates()))),
+      configuration_(Eigen::VectorXd::Zero(robot.num_coordinates())) {}
 
 const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential,
                            double period) noexcept {
   time_ += period;
+  if (is_elsewhere(goal)) {
+    turn(false, q);
+    tries_ = 0;
+  }
   if (!escaping_) {
     const double way = way_left(goal, q, turned_ ? std::numeric_limits<double>::quiet_NaN() : potential);
     turned_ = false;
@@ -77,6 +83,22 @@ const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q
     }
   }
   return escaping_ ? sub_goal_ : goal;
+}
+
+bool Escape::is_elsewhere(const Goal& goal) noexcept {
+  const auto* joint = std::get_if<JointGoal>(&goal);
+  bool changed = was_pose_ != (joint == nullptr);
+  was_pose_ = joint == nullptr;
+  if (joint != nullptr) {
+    changed = changed || (joint->position - configuration_).cwiseAbs().maxCoeff() > elsewhere;
+    configuration_ = joint->position;
+  } else {
+    const Eigen::Isometry3d& pose = std::get<PoseGoal>(goal).pose;
+    changed = changed || (pose.translation() - pose_.translation()).norm() > elsewhere ||
+              Eigen::AngleAxisd(pose_.linear().transpose() * pose.linear()).angle() > elsewhere;
+    pose_ = pose;
+  }
+  return changed;
 }
 
 void Escape::turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept {

@@ -29,7 +29,8 @@ struct EscapeSettings {
 /// arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system, so
 /// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits, the first ones
 /// near: most dead ends are shallow, and out of the others only a long way leads. An arm within
-/// 0.01 [rad | m] of its goal has arrived and is not stuck; patience begins anew with a goal that has jumped away.
+/// 0.01 [rad | m] of its goal has arrived and is not stuck. With a goal that is suddenly elsewhere all begins anew: patience,
+/// and the first sub-goal; one that is being followed is given up.
 class Escape {
  public:
   explicit Escape(const Robot& robot, EscapeSettings settings = {});
@@ -47,6 +48,7 @@ class Escape {
   int num_coordinates() const noexcept { return static_cast<int>(lower_.size()); }
 
  private:
+  bool is_elsewhere(const Goal& goal) noexcept;
   void turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept;
 
   EscapeSettings settings_;
@@ -54,6 +56,9 @@ class Escape {
   std::mt19937_64 random_;
   ProgressMonitor stuck_, halted_;  // on the way to the goal, and to a sub-goal
   Goal sub_goal_;
+  Eigen::VectorXd configuration_;  // of the goal in the step before, one of the two
+  Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
+  bool was_pose_ = false;
   double time_ = 0.0, since_ = 0.0;
   double way_ = std::numeric_limits<double>::infinity();  // left to the goal in the step before
   bool escaping_ = false;

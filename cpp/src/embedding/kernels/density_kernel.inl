@@ -47,7 +47,7 @@ inline Vectors gather(const double* const* links, int at) noexcept {
   return v;
 }
 
-/// The links of the lanes, with the numbers of LinkMotion.
+/// The links of the lanes, from their numbers (see link_numbers.hpp).
 struct Links {
   Vectors rotation[3];  // columns
   Vectors position, angular, linear, bias_angular, bias_linear;

@@ -27,7 +27,7 @@ inline Vector turned(Vector v) noexcept {
 #endif
 }
 
-/// The cross product, (y, z, x) of it.
+/// The cross product as (z, x, y): turned, it is the product.
 inline Vector turned_cross(Vector a, Vector b) noexcept { return a * turned(b) - turned(a) * b; }
 
 struct Turn {
