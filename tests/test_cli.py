@@ -215,6 +215,18 @@ def test_help_imports_nothing_heavy() -> None:
     assert time.perf_counter() - begin < 5.0  # [s] takes 0.2 s; ten times that when the machine is busy
 
 
+def test_a_run_without_report_imports_neither_matplotlib_nor_jsonschema() -> None:
+    code = (
+        "import sys; sys.argv = ['sidestep', 'run', 'planar-drop', '--method', 'barrier', '--no-report', '-q']\n"
+        "from sidestep.cli import main\n"
+        "try: main()\n"
+        "except SystemExit as exit: assert exit.code == 0\n"
+        "print('heavy:', sorted({'matplotlib', 'jsonschema', 'sklearn'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("heavy: []\n")
+
+
 def test_a_diverging_run_is_one_line_and_exit_code_1(
     invoke: Invoke, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -181,7 +181,7 @@ def test_another_goal_is_followed_at_once_and_one_that_moves_is_not_another(robo
         sub_goal = followed(GOAL)
     np.testing.assert_array_equal(followed(GOAL + 0.19), followed(GOAL))
     assert escape.escaping
-    for other in (GOAL + [0.0, 0.21], AWAY + [0.3, 0.0]):
+    for other in (np.array([0.5, 0.71]), np.array([-1.7, 2.0])):
         np.testing.assert_array_equal(followed(other), other)
         while not escape.escaping:
             followed(other)

@@ -10,7 +10,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jsonschema
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +18,7 @@ from sidestep.body.cover import CoverSettings, LinkCover, TradeOff
 from sidestep.body.fitting import FitSettings, LinkFit
 from sidestep.body.mixture import Mixture
 from sidestep.body.selection import CriterionCurve
+from sidestep.schema import mismatch
 
 if TYPE_CHECKING:
     from sidestep.robot import Robot
@@ -113,8 +113,7 @@ def read(path: str | Path, robot: Robot) -> BodyContents:
     except ValueError as error:
         raise ValueError(f"body file '{path}' is not valid JSON: {error}") from error
     _check_version(path, document)
-    schema = json.loads((files("sidestep.body") / "body_schema.json").read_text(encoding="utf-8"))
-    problem = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(document))
+    problem = mismatch(document, (files("sidestep.body") / "body_schema.json").read_text(encoding="utf-8"))
     if problem is not None:
         raise ValueError(f"body file '{path}' is malformed at {problem.json_path}: {problem.message}")
     name, fingerprint = document["robot"]["name"], document["robot"]["fingerprint"]

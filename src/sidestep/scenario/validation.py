@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import jsonschema
 import yaml
+
+from sidestep.schema import mismatch
+
+if TYPE_CHECKING:
+    import jsonschema
 
 
 class ScenarioError(ValueError):
@@ -51,9 +54,7 @@ def check_document(document: dict[str, Any], *, file: str) -> None:
     for place, value in _leaves(document, ()):
         if isinstance(value, float) and not math.isfinite(value):
             raise ScenarioError(f"{file}: {_dotted(place)} is {value}; it must be a finite number")
-    schema = json.loads(schema_text())
-    jsonschema.Draft202012Validator.check_schema(schema)
-    error = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(document))
+    error = mismatch(document, schema_text())
     if error is not None:
         raise ScenarioError(f"{file}: {_explain(error)}")
 
