@@ -22,8 +22,8 @@ void bind_rollout(nb::module_& m) {
                      "Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],\n"
                      "it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):\n"
                      "one uniform within `spread` [rad] of every joint's position and within the limits; the n-th time for one goal within\n"
-                     "n times `spread`, for at most n times `leg`. Within 0.01 [rad | m] of its goal it has arrived. A goal that is\n"
-                     "suddenly more than 0.2 [rad | m] elsewhere is another one, and followed at once.\n"
+                     "n times `spread`, for at most n times `leg`. Within 0.01 [rad | m] of its goal it has arrived. A goal that from\n"
+                     "one call to the next is more than 0.2 [rad | m] elsewhere is another one, and followed at once.\n"
                      "fraction: of its potential that counts as nearer; seed: of the random configurations.\n"
                      "Raises ValueError that names the setting at fault.")
       .def(

@@ -832,8 +832,8 @@ class Escape:
     Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],
     it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):
     one uniform within `spread` [rad] of every joint's position and within the limits; the n-th time for one goal within
-    n times `spread`, for at most n times `leg`. Within 0.01 [rad | m] of its goal it has arrived. A goal that is
-    suddenly more than 0.2 [rad | m] elsewhere is another one, and followed at once.
+    n times `spread`, for at most n times `leg`. Within 0.01 [rad | m] of its goal it has arrived. A goal that from
+    one call to the next is more than 0.2 [rad | m] elsewhere is another one, and followed at once.
     fraction: of its potential that counts as nearer; seed: of the random configurations.
     Raises ValueError that names the setting at fault.
     """

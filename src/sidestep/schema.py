@@ -14,8 +14,13 @@ if TYPE_CHECKING:
 def mismatch(document: Any, schema_text: str) -> jsonschema.ValidationError | None:
     """The most telling of the places where a document does not match a schema (Draft 2020-12), None if it matches."""
     schema = json.loads(schema_text)
-    if jsonschema_rs.Draft202012Validator(schema).is_valid(document):
-        return None
+    try:
+        if jsonschema_rs.Draft202012Validator(schema).is_valid(document):
+            return None
+    except (
+        Exception
+    ):  # what JSON does not have (keys that are no text, dates, large integers) is for the other to judge
+        pass
     import jsonschema  # here: beside JupyterLab its import takes seconds, for checks of formats that no schema asks for
 
     return jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(document))

@@ -171,20 +171,27 @@ def test_sub_goals_for_one_goal_lie_farther_off_one_by_one():
     assert farthest_of_next_sub_goal(elsewhere) <= spread  # another goal begins anew
 
 
+def until_escaping(escape, step):
+    """Steps until a sub-goal is followed, and returns it."""
+    for _ in range(50):
+        followed = step()
+        if escape.escaping:
+            return followed
+    raise AssertionError("no sub-goal")
+
+
 def test_another_goal_is_followed_at_once_and_one_that_moves_is_not_another(robot):
     escape = ss.Escape(robot, patience=0.1, leg=10.0, seed=3)
 
     def followed(goal):
         return np.array(escape.pursue(goal, AWAY, np.nan, PERIOD).position)
 
-    while not escape.escaping:
-        sub_goal = followed(GOAL)
+    sub_goal = until_escaping(escape, lambda: followed(GOAL))
     np.testing.assert_array_equal(followed(GOAL + 0.19), followed(GOAL))
     assert escape.escaping
     for other in (np.array([0.5, 0.71]), np.array([-1.7, 2.0])):
         np.testing.assert_array_equal(followed(other), other)
-        while not escape.escaping:
-            followed(other)
+        until_escaping(escape, lambda goal=other: followed(goal))
     assert escape.count == 3
     assert np.any(sub_goal != GOAL)
 
@@ -203,7 +210,6 @@ def test_another_pose_is_followed_at_once():
     for other in (here, turned, shifted @ turned):
         goal = ss.PoseGoal(robot, tip, other)
         assert isinstance(followed(goal), ss.PoseGoal)
-        while not escape.escaping:
-            followed(goal)
+        until_escaping(escape, lambda goal=goal: followed(goal))
     assert isinstance(followed(ss.JointGoal(q + 1.0)), ss.JointGoal)
     assert not escape.escaping

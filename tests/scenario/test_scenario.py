@@ -69,6 +69,8 @@ def test_every_value_of_a_file_arrives() -> None:
             "name: small\ncolour: red",
             "unknown key 'colour' (value 'red'); allowed: format, name",
         ),
+        ("name: small", "name: small\n1: red", "unknown key 1 (value 'red'); allowed: format, name"),
+        ("name: small", "name: 2024-05-01", "name is datetime.date(2024, 5, 1); it must be of type string"),
         ("name: small", "name: a b", "name is 'a b'; it must match"),
         ("{name: planar2}", "{}", "robot is {}; it needs either 'name' or 'urdf'"),
         ("{name: planar2}", "{name: a, urdf: b}", "it needs either 'name' or 'urdf'"),
@@ -114,6 +116,11 @@ def test_one_error_names_file_place_value_and_what_is_allowed(old: str, new: str
     assert str(caught.value).startswith("file.yaml")
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_an_integer_beyond_64_bits_is_read_as_it_is() -> None:
+    seed = 2**64 + 1
+    assert parse(BASE.replace("seed: 7", f"seed: {seed}")).body.seed == seed
 
 
 def test_a_ball_of_points_is_refused_for_a_box() -> None:

@@ -86,19 +86,21 @@ const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q
 }
 
 bool Escape::is_elsewhere(const Goal& goal) noexcept {
+  // Written so that a goal that is not finite, and the next one after it, count as elsewhere.
   const auto* joint = std::get_if<JointGoal>(&goal);
-  bool changed = was_pose_ != (joint == nullptr);
+  bool here = was_pose_ == (joint == nullptr);
   was_pose_ = joint == nullptr;
   if (joint != nullptr) {
-    changed = changed || (joint->position - configuration_).cwiseAbs().maxCoeff() > elsewhere;
+    here = here && ((joint->position - configuration_).array().abs() <= elsewhere).all();
     configuration_ = joint->position;
   } else {
-    const Eigen::Isometry3d& pose = std::get<PoseGoal>(goal).pose;
-    changed = changed || (pose.translation() - pose_.translation()).norm() > elsewhere ||
-              Eigen::AngleAxisd(pose_.linear().transpose() * pose.linear()).angle() > elsewhere;
-    pose_ = pose;
+    const PoseGoal& now = std::get<PoseGoal>(goal);
+    here = here && (now.pose.translation() - pose_.translation()).norm() <= elsewhere &&
+           (now.settings.position_only ||
+            Eigen::AngleAxisd(pose_.linear().transpose() * now.pose.linear()).angle() <= elsewhere);
+    pose_ = now.pose;
   }
-  return changed;
+  return !here;
 }
 
 void Escape::turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept {

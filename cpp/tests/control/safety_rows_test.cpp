@@ -101,14 +101,14 @@ BOOST_AUTO_TEST_CASE(demands_by_value) {
   BOOST_TEST(demanded_deceleration(room_needed(u, limits), u + 0.001, limits, T) == 2.5,
              boost::test_tools::tolerance(1e-9));
   BOOST_TEST(demanded_deceleration(0.01, 1.0, limits, T) == 4.0);
-  // Too fast by a half on the line, 10 * 0.15 until it stops; by three times, 0.3^2/2s.
+  // Too fast by a half on the line, 10 * 0.15; by more than twice, u^2/2(s - uT).
   BOOST_TEST(demanded_deceleration(0.01, 0.15, limits, T) == 1.5, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(demanded_deceleration(0.015, 0.31, limits, T) == 0.31 * 0.31 / 2.0 / (0.015 - 0.31 * T),
              boost::test_tools::tolerance(1e-12));
-  // Inside by 1 cm and at rest: wants to leave with 0.1 m/s, so 10^2 * 0.01. Closing, the hardest; closing slowly, its end.
-  BOOST_TEST(demanded_deceleration(-0.01, 0.0, limits, T) == 1.0, boost::test_tools::tolerance(1e-12));
-  BOOST_TEST(demanded_deceleration(-0.01, 0.1, limits, T) == 4.0);
-  BOOST_TEST(demanded_deceleration(-0.01, 0.002, limits, T) == 1.0 + 0.5 * 0.002 / T, boost::test_tools::tolerance(1e-12));
+  // Inside by 5 mm and at rest, 2 * 10^2 * 0.005. Closing, the hardest; closing slowly, its end too.
+  BOOST_TEST(demanded_deceleration(-0.005, 0.0, limits, T) == 1.0, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(demanded_deceleration(-0.005, 0.1, limits, T) == 4.0);
+  BOOST_TEST(demanded_deceleration(-0.005, 0.002, limits, T) == 1.0 + 0.5 * 0.002 / T, boost::test_tools::tolerance(1e-12));
   // Leaving with that speed already: the speed may fall along the line, w = -(0.01 - uT/2)/(1/10 + T/2).
   BOOST_TEST(std::abs(demanded_deceleration(-0.01, -0.1, limits, T) + 1.0) < 0.02);  // -10 u, up to T of order
   // Limits that are infinite leave the line.
@@ -128,6 +128,25 @@ BOOST_AUTO_TEST_CASE(a_stop_along_the_path_meets_all_demands_up_to_twice_the_lin
     above += closing > limits.rate * room ? 1 : 0;
   }
   BOOST_TEST(above > 1000);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_not_known_of_is_held_off) {
+  // Pushed on, while an obstacle comes by `speed` that is not told, or something accelerates the arm unseen.
+  const ClosingLimits limits{7.0, 14.0, 20.0, 0.5};
+  const double T = 0.001;
+  const auto room_at_the_end = [&](double speed, double acceleration) {
+    double room = 0.1, closing = 0.0;
+    for (int k = 0; k < 4000; ++k) {
+      const double demand = std::max(demanded_deceleration(room, closing, limits, T), -5.0);
+      closing -= (demand - acceleration) * T;
+      room -= (closing + speed) * T;
+    }
+    return room;
+  };
+  const auto close = boost::test_tools::tolerance(0.05);
+  BOOST_TEST(room_at_the_end(0.08, 0.0) == -1.5 * 0.08 / 20.0, close);
+  BOOST_TEST(room_at_the_end(0.2, 0.0) == -1.5 * 0.2 / 20.0, close);
+  BOOST_TEST(room_at_the_end(0.0, 3.0) == -3.0 / (2.0 * 20.0 * 20.0), close);
 }
 
 BOOST_AUTO_TEST_CASE(a_violation_decays_without_spikes) {

@@ -109,11 +109,12 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
       least = std::min(least, samples.back().value);
       least_after = std::min(least_after, after(samples.back()));
     }
-    BoltzmannMean mean(temperature);
+    BoltzmannMean mean(temperature), of_all(temperature);
     ApproachMean ahead(temperature, horizon);
     int nearest = -1;
     for (int n = 0; n < obstacles.size(); ++n) {
       const ClearanceSample& at = samples[static_cast<std::size_t>(n)];
+      of_all.add(at);
       if (after(at) < least_after + ClearanceField::window_ahead * temperature) {
         ahead.add(at);
       }
@@ -122,6 +123,9 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
       }
     }
     const ClearanceSample expected = mean.result();
+    // Every point beyond the window would change the mean by x e^-x temperatures, x = 12 or more.
+    const double all_beyond = static_cast<double>(obstacles.size()) * 12.0 * std::exp(-12.0) * temperature;
+    BOOST_TEST(std::abs(expected.value - of_all.result().value) <= all_beyond);
     // 1e-12 of what is summed: clearances of up to 1 m, whose rates and curvatures are divided by the temperature.
     constexpr double tolerance = 1e-12;
     if (horizon == 0.0 || expected.value < reach) {  // else it may be found, with a link that moves

@@ -81,7 +81,9 @@ def _step_code(snapshot: Snapshot) -> list[str]:
         lines += [f"motion.set_goal({place})", "step = motion.step(q, v, obstacles)"]
     else:
         if method.escapes:
-            lines += ["# where it is stuck: goal = escape.pursue(goal, q, step.goal_potential, period)"]
+            lines += [
+                "# where it is stuck: goal is escape.pursue(goal, q, step.goal_potential, period) for this step"
+            ]
         if method.covering:
             lines += [f"# among what is at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]
         lines += ["step = system.acceleration(q, v, goal, obstacles)"]

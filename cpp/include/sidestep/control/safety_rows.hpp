@@ -51,11 +51,14 @@ struct ClosingLimits {
 // Outside (s < p(u): an obstacle that appeared, a disturbance, another constraint that won) meeting it at once would
 // be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
 // the profile itself decelerates with, plus correction·e/T, and never above the hardest deceleration the limits allow.
-// While room is left, neither is it above what a stop takes: γ u, or u²/2s if that is more. So as long as u ≤ 2γ s, one and
-// the same acceleration still meets all rows, that of the stop along the path; more could only be had by one row at the
-// expense of another, or of limits. u²/2s is asked for anew in every period: what disturbs makes it grow before s is gone.
-// A room that is negative grows back to p⁻¹(s) < 0: closing ends that way, and the leaving speed e that is missing comes by
-// 2γ e, without hurry; on the line that is critically damped, s'' = −2γ s' − γ² s.
+// While room is left, neither is it above what a stop takes, γ u or, if that is more, u²/2(s − uT). So among obstacles at
+// rest, as long as u ≤ 2γ (s − uT) and curvatures aside, one and the same acceleration still meets all rows, that of the stop
+// along the path; more could only be had by one row at the expense of another, or of limits. The stop is asked for anew in
+// every period: what disturbs makes the demand grow before s is gone, with the logarithm of s; what is then not to be had
+// goes into the margin.
+// A room that is negative grows back to p⁻¹(s) < 0: closing ends as above, and the leaving speed e that is missing comes by
+// 3γ e, on the line s'' = −3γ s' − 2γ² s: firmly, but without a demand of order 1/T. What comes nearer by v unseen (an
+// obstacle whose velocity is not given) is held off at s = −1.5 v/γ, an acceleration d that is not known of at −d/2γ².
 //
 // A demand may be for more than is to be had: the curvature c adds to it, and close to position limits joints cannot
 // give all. It then is for b = max ∇h·a within the bounds of now and the torque, if with b the room lasts: the arm comes
@@ -67,7 +70,8 @@ double demanded_deceleration(double room, double closing_speed, const ClosingLim
 
 struct SafetySettings {
   /// Clearance that is kept [m]. Covers what the model does not see: the reduction over points is high by up to its
-  /// temperature (2 mm by default), tracking error, one period of delay.
+  /// temperature (2 mm by default), tracking error, one period of delay, and 1.5/rate times what obstacles move without
+  /// saying so: 5 mm hold off what comes by up to 0.06 m/s.
   double margin = 0.005;
   /// γ [1/s] of a slow arm. Larger lets it come close quicker and reacts more to noise; γT must stay well below 1.
   double rate = 20.0;

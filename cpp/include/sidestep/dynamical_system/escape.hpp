@@ -29,8 +29,8 @@ struct EscapeSettings {
 /// arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system, so
 /// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits, the first ones
 /// near: most dead ends are shallow, and out of the others only a long way leads. An arm within
-/// 0.01 [rad | m] of its goal has arrived and is not stuck. With a goal that is suddenly elsewhere all begins anew: patience,
-/// and the first sub-goal; one that is being followed is given up.
+/// 0.01 [rad | m] of its goal has arrived and is not stuck. With a goal that from one call to the next is more than
+/// 0.2 [rad | m] elsewhere all begins anew: patience, and the first sub-goal; one that is being followed is given up.
 class Escape {
  public:
   explicit Escape(const Robot& robot, EscapeSettings settings = {});
