@@ -17,9 +17,7 @@ def mismatch(document: Any, schema_text: str) -> jsonschema.ValidationError | No
     try:
         if jsonschema_rs.Draft202012Validator(schema).is_valid(document):
             return None
-    except (
-        Exception
-    ):  # what JSON does not have (keys that are no text, dates, large integers) is for the other to judge
+    except Exception:  # what JSON does not have, such as keys that are no text or dates, the other judges
         pass
     import jsonschema  # here: beside JupyterLab its import takes seconds, for checks of formats that no schema asks for
 
