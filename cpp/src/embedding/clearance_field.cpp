@@ -176,8 +176,9 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       placed = true;
     };
     const auto visit = [&](auto&& look) {
-      tree.visit(centre, matters, [&](int first, int count, const PointTree::Ball& ball) {
-        look(kernels::Leaf{first, count, ball.x, ball.y, ball.z, ball.radius});
+      tree.visit(centre, matters, [&](int first, int count, const PointTree::Ball& ball, const Eigen::Vector3d& half,
+                                    double largest) {
+        look(kernels::Leaf{first, count, ball.x, ball.y, ball.z, ball.radius, half.x(), half.y(), half.z(), largest});
       });
     };
     const auto limit = [&] {

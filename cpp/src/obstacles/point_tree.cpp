@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+#include <cstddef>
 #include <numeric>
 
 #include "../settings.hpp"
@@ -10,37 +10,62 @@
 namespace sidestep {
 namespace {
 
+struct Item {
+  Eigen::Vector3d point;
+  int index;
+};
 
-/// Spreads the lowest 21 bits of x three apart.
-std::uint64_t spread_bits(std::uint64_t x) noexcept {
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffff;
-  x = (x | x << 16) & 0x1f0000ff0000ff;
-  x = (x | x << 8) & 0x100f00f00f00f00f;
-  x = (x | x << 4) & 0x10c30c30c30c30c3;
-  x = (x | x << 2) & 0x1249249249249249;
-  return x;
+/// Halves boxes across their longest side until no more than this is left: points of one register lie together.
+constexpr std::ptrdiff_t smallest_group = 4;
+static_assert(PointTree::leaf_size % smallest_group == 0);
+
+/// Where to cut `count` points in two: the first part fills whole leaves, whole nodes, whole nodes of nodes.
+std::ptrdiff_t first_part(std::ptrdiff_t count) noexcept {
+  std::ptrdiff_t part = smallest_group;
+  while (2 * part < count) {
+    part *= 2;
+  }
+  return part;
 }
 
-std::vector<int> morton_order(const Eigen::Matrix3Xd& points) {
+void cut(std::vector<Item>::iterator begin, std::vector<Item>::iterator end) {
+  if (end - begin <= smallest_group) {
+    return;
+  }
+  Eigen::Vector3d low = begin->point, high = low;
+  for (auto item = begin; item != end; ++item) {
+    low = low.cwiseMin(item->point);
+    high = high.cwiseMax(item->point);
+  }
+  Eigen::Index axis;
+  (high - low).maxCoeff(&axis);
+  const auto middle = begin + first_part(end - begin);
+  std::nth_element(begin, middle, end, [axis](const Item& a, const Item& b) {
+    return a.point[axis] < b.point[axis] || (a.point[axis] == b.point[axis] && a.index < b.index);
+  });
+  cut(begin, middle);
+  cut(middle, end);
+}
+
+/// Neighbours stand together, whatever the order of the input; the same on every machine.
+std::vector<int> spatial_order(const Eigen::Matrix3Xd& points) {
   std::vector<int> order(static_cast<std::size_t>(points.cols()));
   std::iota(order.begin(), order.end(), 0);
   if (points.cols() <= PointTree::leaf_size) {
     return order;
   }
-  const Eigen::Vector3d low = points.rowwise().minCoeff();
-  const double extent = (points.rowwise().maxCoeff() - low).maxCoeff();
-  const double scale = extent > 0.0 ? 0x1fffff / extent : 0.0;
-  std::vector<std::uint64_t> keys(order.size());
-  for (Eigen::Index n = 0; n < points.cols(); ++n) {
-    const Eigen::Vector3d cell = scale * (points.col(n) - low);
-    keys[static_cast<std::size_t>(n)] = spread_bits(static_cast<std::uint64_t>(cell.x())) |
-                                        spread_bits(static_cast<std::uint64_t>(cell.y())) << 1 |
-                                        spread_bits(static_cast<std::uint64_t>(cell.z())) << 2;
+  std::vector<Item> items;
+  items.reserve(order.size());
+  for (const int n : order) {
+    items.push_back({points.col(n), n});
   }
-  std::stable_sort(order.begin(), order.end(), [&keys](int a, int b) {
-    return keys[static_cast<std::size_t>(a)] < keys[static_cast<std::size_t>(b)];
-  });
+  cut(items.begin(), items.end());
+  std::transform(items.begin(), items.end(), order.begin(), [](const Item& item) { return item.index; });
+  const auto group = static_cast<std::size_t>(smallest_group);
+  for (std::size_t n = 0; n < order.size(); n += group) {
+    std::sort(order.begin() + static_cast<std::ptrdiff_t>(n),
+              order.begin() + static_cast<std::ptrdiff_t>(std::min(n + group, order.size())));
+  }
   return order;
 }
 
@@ -49,7 +74,7 @@ std::size_t groups(std::size_t count, int of) { return (count + static_cast<std:
 }  // namespace
 
 PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities)
-    : order_(morton_order(points)), fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
+    : order_(spatial_order(points)), fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
   if (order_.empty()) {
     return;
   }

@@ -33,11 +33,10 @@ class ClearanceField {
   /// temperature is not positive and finite.
   ClearanceField(const Robot& robot, const Body& body, double temperature = 0.002);
 
-  /// Points that are farther than the nearest by so many temperatures do not count: each would weigh less than e⁻¹² = 6e-6.
-  /// Above a plane all of them would change the mean by about 1e-4 temperatures; one that enters the window changes the
-  /// curvature by up to 12 e⁻¹²/T, 0.04 m/s² per (m/s)² at 2 mm. Of what approaches, whose weights are not differentiated,
-  /// points count up to e⁻⁸ = 3e-4.
-  static constexpr double window = 12.0, window_ahead = 8.0;
+  /// Points that are farther than the nearest by so many temperatures do not count: each would weigh less than e⁻²⁴ = 4e-11
+  /// and change the mean by 24 e⁻²⁴ T at most, 2e-12 m at 2 mm, so that its derivatives are those of what is computed. Of
+  /// what approaches, whose weights are not differentiated, points count up to e⁻⁸ = 3e-4.
+  static constexpr double window = 24.0, window_ahead = 8.0;
 
   int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
 

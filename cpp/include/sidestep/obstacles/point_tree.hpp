@@ -13,8 +13,8 @@ namespace sidestep {
 
 /// Points under a hierarchy of bounding balls and boxes, so that a query looks at those near it only.
 ///
-/// The points are sorted along a Morton curve and kept as structure of arrays, padded to whole leaves: point n of the
-/// tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive points, a node `fan_out` consecutive nodes
+/// The points are sorted by halving boxes across their longest side and kept as structure of arrays, padded to whole
+/// leaves: point n of the tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive points, a node `fan_out` consecutive nodes
 /// below it; there are no pointers. Building sorts and allocates and belongs outside the control loop; moving the points
 /// refits the balls in place.
 class PointTree {
@@ -72,8 +72,9 @@ class PointTree {
   /// Stops every point.
   void freeze() noexcept;
 
-  /// Calls leaf(first, count, ball) for every leaf whose ball, and the balls above it, are `near`, the near ones of a
-  /// node in the order of their distance to x. near(ball) may become stricter on the way. No allocation.
+  /// Calls leaf(first, count, ball, half, largest) for every leaf whose ball, and the balls above it, are `near`, the near
+  /// ones of a node in the order of their distance to x. half: of the box around the points, which has the same centre;
+  /// largest: of their radii [m]. near(ball) may become stricter on the way. No allocation.
   template <class Near, class Leaf>
   void visit(const Eigen::Vector3d& x, Near&& near, Leaf&& leaf) const noexcept {
     if (!levels_.empty()) {
@@ -111,7 +112,10 @@ class PointTree {
     }
     const int first = node * (level == 0 ? leaf_size : fan_out);
     if (level == 0) {
-      leaf(first, std::min(leaf_size, size() - first), ball);
+      const Level& leaves = levels_.front();
+      const auto n = static_cast<std::size_t>(node);
+      const Eigen::Vector3d half(leaves.half[0][n], leaves.half[1][n], leaves.half[2][n]);
+      leaf(first, std::min(leaf_size, size() - first), ball, half, leaves.largest[n]);
       return;
     }
     const Level& below = levels_[static_cast<std::size_t>(level) - 1];

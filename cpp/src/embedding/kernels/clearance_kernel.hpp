@@ -56,10 +56,12 @@ struct QueryGroup {
   Query queries[most_queries];
 };
 
-/// The balls of a leaf's points lie within `radius` of (x, y, z).
+/// The balls of a leaf's points lie within `radius` of (x, y, z); the points lie in a box with that centre, and have radii
+/// of up to `largest`.
 struct Leaf {
   int first, count;
   double x, y, z, radius;
+  double half_x, half_y, half_z, largest;
 };
 
 /// What is done with the points of a leaf, for every query of the group that they matter to: what is smallest is found

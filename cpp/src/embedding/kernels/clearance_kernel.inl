@@ -334,6 +334,12 @@ void look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
   }
 }
 
+/// Squared distance along one axis from a box.
+inline Lanes beyond(Lanes x, double half) noexcept {
+  const Lanes over = magnitude(x) - half;
+  return over > 0.0 ? over * over : Lanes{};
+}
+
 /// Returns whether `near` or `ahead` fell.
 template <Pass pass>
 bool look_at_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
@@ -349,9 +355,11 @@ bool look_at_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noe
     const Lanes x = leaf.x - load(group.centre[0] + first);
     const Lanes y = leaf.y - load(group.centre[1] + first);
     const Lanes z = leaf.z - load(group.centre[2] + first);
-    const Lanes distance = root(x * x + y * y + z * z);
-    const Lanes radius = load(group.extent + first) + leaf.radius;
-    const Lanes bound = distance - radius;
+    const Lanes distance = root(x * x + y * y + z * z), extent = load(group.extent + first);
+    const Lanes radius = extent + leaf.radius;
+    const Lanes from_box = root(beyond(x, leaf.half_x) + beyond(y, leaf.half_y) + beyond(z, leaf.half_z));
+    const Lanes of_ball = distance - radius, of_box = from_box - extent - leaf.largest;
+    const Lanes bound = of_ball > of_box ? of_ball : of_box;
     const Lanes closing =
         group.horizon * (closing_speed(x * v[0] + y * v[1] + z * v[2], distance, radius, all(speed)) + more);
     unsigned near = below(bound, load(group.near + first)) | below(bound - closing, load(group.ahead + first));
