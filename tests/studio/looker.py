@@ -78,22 +78,20 @@ class Looker:
 
     def type(self, label: str, text: str) -> None:
         """Types into the field beside a label."""
-        field = self._field(label)
+        field = self.page.locator(self._field(label))
         field.fill(text, force=True)
         field.press("Enter")
 
     def typed(self, label: str) -> str:
         """What stands in the field beside a label."""
-        return self._field(label).input_value()
+        return str(self.page.locator(self._field(label)).input_value())
 
-    def _field(self, label: str) -> Any:
-        return self.page.locator(
-            f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]"
-        )
+    def _field(self, label: str) -> str:
+        return f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]"
 
     def choose(self, label: str, option: str) -> None:
         """Chooses an option of the list beside a label."""
-        self.click(f"xpath=//label[normalize-space()='{label}']/following::input[not(@type='hidden')][1]")
+        self.click(self._field(label))
         self.click(f"[role=option][value='{option}']:visible")
 
     def press(self, name: str) -> None:
