@@ -228,6 +228,8 @@ void bind_torque_controller(nb::module_& m) {
   nb::class_<SafetyRow>(m, "SafetyRow", "What one control step did about one clearance.")
       .def_ro("coordinate", &SafetyRow::coordinate, "Which clearance.")
       .def_ro("nearest", &SafetyRow::nearest, "Its nearest obstacle point.")
+      .def_ro("along_path", &SafetyRow::along_path,
+              "Whether a stop along the path is asked for: -|grad h| v/|v| stands for grad h.")
       .def_ro("required", &SafetyRow::required, "Smallest grad h . x [m/s^2] that was asked for.")
       .def_ro("slack", &SafetyRow::slack, "By how much the solution falls short of it [m/s^2].")
       .def_ro("multiplier", &SafetyRow::multiplier, "What the row costs the task, >= 0; the largest one dominates.");

@@ -1135,6 +1135,12 @@ class SafetyRow:
         """Its nearest obstacle point."""
 
     @property
+    def along_path(self) -> bool:
+        """
+        Whether a stop along the path is asked for: -|grad h| v/|v| stands for grad h.
+        """
+
+    @property
     def required(self) -> float:
         """Smallest grad h . x [m/s^2] that was asked for."""
 

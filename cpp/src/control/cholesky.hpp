@@ -26,6 +26,17 @@ inline bool cholesky(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStri
   return true;
 }
 
+/// x := A x with the factor L of A. Allocates nothing.
+inline void multiply_in_place(const Eigen::MatrixXd& L, Eigen::VectorXd& x) noexcept {
+  const Eigen::Index n = L.rows();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    x[i] = L.col(i).tail(n - i).dot(x.tail(n - i));
+  }
+  for (Eigen::Index i = n - 1; i >= 0; --i) {
+    x[i] = L.row(i).head(i + 1).dot(x.head(i + 1));
+  }
+}
+
 /// x := A⁻¹ x with the factor L of A, by its two triangular solves. Allocates nothing.
 inline void solve_in_place(const Eigen::MatrixXd& L, Eigen::VectorXd& x) noexcept {
   const Eigen::Index n = L.rows();

@@ -13,6 +13,11 @@ namespace {
 constexpr double shortest_gradient = 1e-9;
 // A leaving speed that is missing comes by this many times the rate: see the header.
 constexpr double firmness = 3.0;
+// A stop along the path takes at most this many times as long by the torque as by the acceleration limits: beyond, lines
+// would be so flat that the arm stood still.
+constexpr double longest_stop = 10.0;
+// What closes in faster than by the arm's own motion, beyond rounding [m/s].
+constexpr double rounding = 1e-9;
 // Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
 constexpr double smallest_deceleration = 1e-6;
 
@@ -30,6 +35,12 @@ double profile_speed(double room, double delay, double A, double rate) noexcept 
 double room_needed(double speed, double A, double rate) noexcept {
   const double size = std::abs(speed);
   return std::copysign(size > A / rate ? 0.5 * (size * size / A + A / (rate * rate)) : size / rate, speed);
+}
+
+/// κ, see the header: how many times harder than −v/τ an arm has to stop to keep a room > 0.
+double hardness_of_stop(double room, double u, double c, double stop_time) noexcept {
+  const double linear = 0.5 * u * stop_time, bent = 0.125 * std::max(-c, 0.0) * stop_time * stop_time;
+  return (linear + std::sqrt(linear * linear + 4.0 * bent * room)) / (2.0 * room);
 }
 
 /// The largest direction·a with lower <= a <= upper; a joint that does not count may be without limits.
@@ -116,13 +127,32 @@ double SafetyRows::hardest_by_torque(const Eigen::Ref<const Eigen::VectorXd>& gr
   return hardest;
 }
 
+double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept {
+  const double by_limits = v.cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
+  if (torque == nullptr || by_limits == 0.0) {
+    return by_limits;
+  }
+  // |bias − M v/τ| <= effort
+  double by_torque = 0.0;
+  response_ = v;
+  multiply_in_place(torque->mass_cholesky, response_);
+  for (Eigen::Index j = 0; j < v.size(); ++j) {
+    const double momentum = response_[j];
+    const double left = limits.effort[j] + (momentum > 0.0 ? torque->bias[j] : -torque->bias[j]);
+    if (momentum != 0.0) {
+      by_torque = std::max(by_torque, left > 0.0 ? std::abs(momentum) / left : infinity);
+    }
+  }
+  return std::clamp(by_torque, by_limits, longest_stop * by_limits);
+}
+
 void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
                         const AccelerationBounds& bounds, double period, const BrakingTorque* torque) noexcept {
-  const double stop_time = v.cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
-  const double rate = stop_time * settings_.rate > 1.0 ? 1.0 / stop_time : settings_.rate;
+  const double tau = stop_time(v, limits, torque);
+  const double rate = tau * settings_.rate > 1.0 ? 1.0 / tau : settings_.rate;
   const ClearanceState& approach = clearances.approach;
   // Insert into the list of the most critical, which is kept sorted; it is short.
-  size_ = 0;
+  clear();
   for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
     if (clearances.nearest[k] < 0 || max_size() == 0 ||
         !(approach.gradients.col(k).norm() > shortest_gradient)) {
@@ -140,6 +170,8 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     urgency_[at] = urgency;
     coordinates[static_cast<std::size_t>(at)] = static_cast<int>(k);
   }
+  double hardest_stop = 1.0;
+  int hardest_row = -1;  // that a stop along the path is for
   for (int row = 0; row < size_; ++row) {
     const int k = coordinates[static_cast<std::size_t>(row)];
     const auto gradient = approach.gradients.col(k);
@@ -148,20 +180,43 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,
                                 rate, settings_.correction};
-    const double demand =
-        demanded_deceleration(approach.values[k] - settings_.margin, -approach.rates[k], closing, period);
-    const double length = gradient.norm();
-    normals.row(row) = gradient.transpose() / length;
+    const double room = approach.values[k] - settings_.margin, u = -approach.rates[k];
     // Of the points, but no more than the mean where it says that a surface recedes: see the header.
     const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
-    // What is not to be had now is asked for only where the room does not last with what is.
-    const double u = -approach.rates[k], room = approach.values[k] - settings_.margin;
+    double required = demanded_deceleration(room, u, closing, period) - c;
     const double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque);
-    const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
-    const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));
-    lower[row] = (lasts ? std::min(demand - c, now) : demand - c) / length;
+    const double of_arm = -gradient.dot(v);
+    if (room > 0.0 && tau > 0.0 && u <= of_arm + rounding * (1.0 + std::abs(u))) {
+      const double within_period = settings_.correction * tau / period;
+      const double hardness = std::min(hardness_of_stop(room, of_arm, c, tau), within_period), share = of_arm / tau;
+      if (hardness <= 1.0) {
+        required = std::min(required, share);
+      } else if (required > now) {
+        required = std::min(required, hardness * share);
+        if (hardness > hardest_stop) {
+          hardest_stop = hardness;
+          hardest_row = row;
+        }
+      }
+    } else if (required > now) {
+      const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
+      const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));
+      required = lasts ? now : required;
+    }
+    const double length = gradient.norm();
+    normals.row(row) = gradient.transpose() / length;
+    lower[row] = required / length;
     lengths[row] = length;
     nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];
+  }
+  if (hardest_row >= 0) {
+    const int row = along_path = size_ < max_size() ? size_++ : size_ - 1;
+    const double speed = v.norm();
+    normals.row(row) = -v.transpose() / speed;
+    lower[row] = hardest_stop * speed / tau;
+    lengths[row] = lengths[hardest_row];
+    coordinates[static_cast<std::size_t>(row)] = coordinates[static_cast<std::size_t>(hardest_row)];
+    nearest[static_cast<std::size_t>(row)] = nearest[static_cast<std::size_t>(hardest_row)];
   }
 }
 

@@ -398,8 +398,9 @@ void TorqueController::report_safety(TorqueSolution& solution) noexcept {
     const auto at = static_cast<std::size_t>(k);
     const double short_by = rows_.lower[k] - rows_.normals.row(k).dot(solution.acceleration.transpose());
     const bool rounding = short_by <= slack_tolerance * (1.0 + std::abs(rows_.lower[k]) + wanted_.norm());
-    solution.safety[at] = {rows_.coordinates[at], rows_.nearest[at], rows_.lengths[k] * rows_.lower[k],
-                           rounding ? 0.0 : rows_.lengths[k] * short_by, row_multipliers_[k]};
+    solution.safety[at] = {rows_.coordinates[at], rows_.nearest[at], k == rows_.along_path,
+                           rows_.lengths[k] * rows_.lower[k], rounding ? 0.0 : rows_.lengths[k] * short_by,
+                           row_multipliers_[k]};
     if (row_multipliers_[k] > largest) {
       largest = row_multipliers_[k];
       solution.dominant = k;

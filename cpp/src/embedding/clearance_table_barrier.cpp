@@ -6,6 +6,18 @@
 #include <utility>
 
 namespace sidestep {
+namespace {
+
+/// The way to a stop is looked at as often as it passes cells of the table, but no more often than this.
+constexpr double most_steps_ahead = 16.0;
+
+/// Of h along the path, as it is seen from here.
+struct Tangent {
+  double value, rate, curvature;
+  Eigen::Vector2d gradient;
+};
+
+}  // namespace
 
 ClearanceTableBarrier::ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables,
                                              BarrierFunction barrier, double reach)
@@ -21,6 +33,7 @@ ClearanceTableBarrier::ClearanceTableBarrier(const Robot& robot, std::vector<Cle
   for (const ClearanceTable& table : tables_) {
     robot.frame_index(table.first), robot.frame_index(table.second);
     table.validate(robot.num_coordinates());
+    steepest_.push_back(table.steepest());
   }
   set_num_coordinates(static_cast<int>(tables_.size()));
 }
@@ -29,23 +42,43 @@ void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& stat
                                    const Obstacles& /*obstacles*/) const noexcept {
   const Horizon ahead = horizon(state);
   for (std::size_t i = 0; i < tables_.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    const int x = tables_[i].axes[0].coordinate, y = tables_[i].axes[1].coordinate;
-    const ClearanceTable::Sample h = tables_[i].at(state.q()[x], state.q()[y]);
+    const ClearanceTable& table = tables_[i];
+    const int x = table.axes[0].coordinate, y = table.axes[1].coordinate;
     const Eigen::Vector2d v(state.v()[x], state.v()[y]);
-    const double rate = h.gradient.dot(v);
-    if (!(h.value < reach_) && !(h.value + ahead.time * rate < ahead.distance)) {
+    // The tangent at `time` along the straight path, seen from where the arm is.
+    const auto tangent = [&](double time) {
+      const ClearanceTable::Sample h = table.at(state.q()[x] + time * v.x(), state.q()[y] + time * v.y());
+      const double rate = h.gradient.dot(v);
+      return Tangent{h.value - time * rate, rate, v.dot(h.hessian * v), h.gradient};
+    };
+    const Tangent here = tangent(0.0);
+    Tangent minded = here;
+    if (here.value - ahead.time * steepest_[i].dot(v.cwiseAbs()) < ahead.distance) {
+      const double cells = ahead.time * std::max(std::abs(v.x()) / table.axes[0].spacing,
+                                                 std::abs(v.y()) / table.axes[1].spacing);
+      const double steps = std::ceil(std::min(cells, most_steps_ahead));
+      for (double step = 1.0; step <= steps; ++step) {
+        const Tangent there = tangent(ahead.time * step / steps);
+        if (there.value + ahead.time * there.rate < minded.value + ahead.time * minded.rate) {
+          minded = there;
+        }
+      }
+    }
+    if (!(here.value < reach_) && !(minded.value + ahead.time * minded.rate < ahead.distance)) {
       continue;
     }
-    for (ClearanceStateView* view : {static_cast<ClearanceStateView*>(&out.clearances), &out.clearances.approach}) {
-      view->values[k] = h.value;
-      view->rates[k] = rate;
-      view->curvatures[k] = v.dot(h.hessian * v);
-      view->gradients.col(k).setZero();
-      view->gradients(x, k) = h.gradient.x();
-      view->gradients(y, k) = h.gradient.y();
-    }
-    out.clearances.nearest[k] = 0;
+    const auto write = [k = static_cast<Eigen::Index>(i), x, y](const Tangent& of, ClearanceStateView& to) {
+      to.values[k] = of.value;
+      to.rates[k] = of.rate;
+      to.curvatures[k] = of.curvature;
+      to.gradients.col(k).setZero();
+      to.gradients(x, k) = of.gradient.x();
+      to.gradients(y, k) = of.gradient.y();
+    };
+    write(here, out.clearances);
+    minded.curvature = std::max(minded.curvature, 0.0);  // see the header
+    write(minded, out.clearances.approach);
+    out.clearances.nearest[static_cast<Eigen::Index>(i)] = 0;
   }
   add_barriers(out);
 }

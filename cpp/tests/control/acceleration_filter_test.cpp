@@ -106,8 +106,7 @@ BOOST_AUTO_TEST_CASE(joint_limits_stand_above_clearances) {
   clearances.curvatures[1] = -1.0;
   clearances.gradients(2, 1) = 0.5;
   clearances.mind_nearest();
-  Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;
-  v[2] = -2.0;
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;  // something comes
   BOOST_TEST((filter.apply(q, v, a, &clearances, solution) == TorqueStatus::relaxed_safety));
   BOOST_TEST(solution.acceleration[2] == 10.0);
   BOOST_TEST(contains(solution.active[2], Limit::acceleration_upper));

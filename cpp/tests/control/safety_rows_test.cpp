@@ -344,6 +344,127 @@ BOOST_AUTO_TEST_CASE(more_than_is_to_be_had_is_asked_for_only_where_room_runs_ou
   BOOST_TEST(lower(-0.02, -0.01, -11.0) == asked(-0.02, -0.01, -11.0), close);  // as long as that lasts
 }
 
+BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
+  JointLimits limits = JointLimits::unlimited(2);
+  limits.acceleration << 10.0, 10.0;
+  limits.effort << 30.0, 30.0;
+  Clearances clearances(2, 1);
+  clearances.nearest << 4;
+  clearances.gradients.col(0) << 0.6, 0.8;
+  Eigen::VectorXd v(2);
+  v << -2.0, 1.0;  // closing in with 0.4 m/s; stops in 0.2 s
+  SafetyRows rows(2, {});
+  AccelerationBounds bounds(2);
+  bounds.lower << -10.0, -10.0;
+  bounds.upper << 10.0, 10.0;
+  const auto update = [&](double room, double closing, double curvature, const BrakingTorque* torque = nullptr) {
+    clearances.values << room + rows.settings().margin;
+    clearances.rates << -closing;
+    clearances.curvatures << curvature;
+    clearances.mind_nearest();
+    rows.update(clearances, v, limits, bounds, 0.001, torque);
+  };
+  const auto asked = [](double room, double closing, double curvature) {
+    return demanded_deceleration(room, closing, {7.0, 14.0, 5.0, 0.5}, 0.001) - curvature;
+  };
+  const auto close = boost::test_tools::tolerance(1e-12);
+
+  // 0.4 · 0.2/2 + 7 · 0.2²/8 = 0.075 of the 0.08 m: its share of −v/τ is 0.4/0.2.
+  update(0.08, 0.4, -7.0);
+  BOOST_TEST_REQUIRE(asked(0.08, 0.4, -7.0) > 2.0);
+  BOOST_TEST_REQUIRE(rows.size() == 1);
+  BOOST_TEST(rows.lower[0] == 2.0, close);
+  // Less, where less is demanded.
+  update(0.081, 0.4, -0.5);
+  BOOST_TEST_REQUIRE(asked(0.081, 0.4, -0.5) < 2.0);
+  BOOST_TEST(rows.lower[0] == asked(0.081, 0.4, -0.5), close);
+
+  // 0.04 + 0.05 m are too much, but of the 14 m/s² that the bounds give 12 are enough for the next period.
+  update(0.08, 0.4, -10.0);
+  BOOST_TEST_REQUIRE(asked(0.08, 0.4, -10.0) < 14.0);
+  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_TEST(rows.lower[0] == asked(0.08, 0.4, -10.0), close);
+
+  // Here they are not: the arm has to stop κ times as hard.
+  update(0.08, 0.4, -20.0);
+  BOOST_TEST_REQUIRE(asked(0.08, 0.4, -20.0) > 14.0);
+  BOOST_REQUIRE(rows.size() == 2);
+  const double hardness = rows.lower[0] / 2.0;
+  BOOST_TEST(hardness > 1.0);
+  BOOST_TEST(0.04 / hardness + 0.1 / (hardness * hardness) == 0.08, close);
+  BOOST_TEST((rows.normals.row(1) + v.transpose() / v.norm()).norm() == 0.0, boost::test_tools::tolerance(1e-15));
+  BOOST_TEST(rows.lower[1] == hardness * v.norm() / 0.2, close);
+  BOOST_TEST(rows.lengths[1] == 1.0, close);
+  BOOST_TEST(rows.along_path == 1);
+  BOOST_TEST(rows.coordinates[1] == 0);
+  BOOST_TEST(rows.nearest[1] == 4);
+  // −κ v/τ meets both.
+  for (int row : {0, 1}) {
+    BOOST_TEST(rows.normals.row(row).dot(-hardness / 0.2 * v.transpose()) == rows.lower[row], close);
+  }
+  // A room that is all but gone is no reason to turn round: half of the velocity goes in a period.
+  update(1e-9, 0.4, -1.0);
+  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.lower[1] == 0.5 * v.norm() / 0.001, close);
+
+  // What comes by itself does not stop with the arm.
+  update(0.08, 0.5, -20.0);
+  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_TEST(rows.along_path == -1);
+  BOOST_TEST(rows.lower[0] == asked(0.08, 0.5, -20.0), close);
+
+  // M = diag(4, 1): joint 1 needs 8 Nm s over the 44 Nm that a bias of −14 Nm leaves to stop in, or over 16 Nm.
+  Eigen::MatrixXd cholesky(2, 2);
+  cholesky << 2.0, 0.0, 0.0, 1.0;
+  Eigen::VectorXd bias(2);
+  bias << -14.0, 0.0;
+  const BrakingTorque torque{cholesky, bias};
+  update(0.08, 0.4, -7.0, &torque);
+  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_TEST(rows.lower[0] == 0.4 / 0.2, close);
+  bias[0] = 14.0;
+  update(0.2, 0.4, -2.0, &torque);
+  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_TEST(rows.lower[0] == 0.4 / 0.5, close);
+}
+
+BOOST_AUTO_TEST_CASE(past_the_crest_of_a_clearance_an_arm_stops_along_its_path) {
+  // h = 0.055 − q²: with 2 rad/s past the crest, where no acceleration along ∇h does anything, and driven on.
+  JointLimits limits = JointLimits::unlimited(1);
+  limits.acceleration << 10.0;
+  Clearances clearances(1, 1);
+  clearances.nearest << 0;
+  SafetyRows rows(1, {});
+  AccelerationBounds bounds(1);
+  bounds.lower << -10.0;
+  bounds.upper << 10.0;
+  double q = -0.3, hardest = 0.0, least = 1.0;
+  Eigen::VectorXd v(1);
+  v << 2.0;
+  for (int step = 0; step < 1000; ++step) {
+    clearances.values << 0.055 - q * q;
+    clearances.rates << -2.0 * q * v[0];
+    clearances.curvatures << -2.0 * v[0] * v[0];
+    clearances.gradients << -2.0 * q;
+    clearances.mind_nearest();
+    rows.update(clearances, v, limits, bounds, 0.001);
+    double a = v[0] < 2.0 ? 10.0 : 0.0;
+    for (int row = 0; row < rows.size(); ++row) {
+      if (rows.normals(row, 0) < 0.0) {
+        a = std::min(a, -rows.lower[row]);
+      }
+    }
+    hardest = std::max(hardest, -a);
+    q += 0.001 * v[0] + 0.5e-6 * a;
+    v[0] += 0.001 * a;
+    least = std::min(least, q > 0.0 ? 0.05 - q * q : 1.0);
+  }
+  BOOST_TEST(hardest < 15.0);  // against the curvature alone it would take 8/|∇h|, 70 and more
+  BOOST_TEST(least > -1e-4);
+  BOOST_TEST(least < 0.005);  // it comes close
+  BOOST_TEST(std::abs(v[0]) < 0.01);
+}
+
 BOOST_AUTO_TEST_CASE(update_allocates_nothing) {
   Random random(4);
   const JointLimits limits = test::arm_limits(7);

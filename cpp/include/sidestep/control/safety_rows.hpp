@@ -44,9 +44,10 @@ struct ClosingLimits {
 // margin is kept for ever and no more than A is ever demanded, whatever T is.
 //
 // Several clearances at once. Each may count on all joints for itself, and they may want opposite things of the same
-// joint. What they all can rely on is that the arm stops along its path: with τ = max_j |v_j| / (acceleration limit)_j
-// the acceleration −v/τ is within the limits, and every closing speed decelerates by u/τ. A line of slope γ demands γ u.
-// So with γ <= 1/τ one and the same acceleration meets all rows on their lines: γ is the smaller of `rate` and 1/τ.
+// joint. What they all can rely on is that the arm stops along its path: the acceleration −v/τ, by which every closing
+// speed decelerates by u/τ, is within the limits with τ = max_j |v_j| / (acceleration limit)_j, and within the torque if τ
+// is as long as |bias − M v/τ| <= effort takes. A line of slope γ demands γ u. So with γ <= 1/τ one and the same
+// acceleration meets all rows on their lines: γ is the smaller of `rate` and 1/τ.
 //
 // Outside (s < p(u): an obstacle that appeared, a disturbance, another constraint that won) meeting it at once would
 // be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
@@ -60,9 +61,18 @@ struct ClosingLimits {
 // 3γ e, on the line s'' = −3γ s' − 2γ² s: firmly, but without a demand of order 1/T. What comes nearer by v unseen (an
 // obstacle whose velocity is not given) is held off at s = −1.5 v/γ, an acceleration d that is not known of at −d/2γ².
 //
-// A demand may be for more than is to be had: the curvature c adds to it, and close to position limits joints cannot
-// give all. It then is for b = max ∇h·a within the bounds of now and the torque, if with b the room lasts: the arm comes
-// no nearer, or stops in time, u²/2(b + min(c, 0)) ≤ s. Only where it does not are bounds of comfort given up for it.
+// What a row may ask for. The curvature c adds to the demand, other rows want something else, and close to position
+// limits joints cannot give all. Where nothing but the arm itself closes in, its stop along the path settles what is
+// needed: κ times as hard as −v/τ it takes the time τ/κ and the way v τ/2κ, on which the clearance falls by
+//     u τ/2κ + max(−c, 0) τ²/8κ²,
+// which is s for a κ in closed form. If κ <= 1 a row asks for no more than its share u/τ of that stop, so that −v/τ meets
+// all such rows at once. Otherwise, if what it demands is more than the bounds of now and the torque can give, it asks for
+// κ u/τ, and one more row for the whole stop, −v·q̈ >= κ |v|²/τ, for the row of the largest κ: where ∇h is short, as past
+// the crest of a clearance, no acceleration along it would do. Bounds of comfort are exceeded κ times by that; no more
+// than `correction` of the velocity goes in one period.
+// Where something else closes in, or the room is used up, a row asks for no more than b = max ∇h·a within the bounds of
+// now and the torque, if with b the room lasts: the arm comes no nearer, or stops in time, u²/2(b + min(c, 0)) <= s. Only
+// where it does not are bounds of comfort given up for it.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.
@@ -93,13 +103,17 @@ struct BrakingTorque {
   const Eigen::VectorXd& bias;
 };
 
-/// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|.
+/// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most one
+/// for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked.
 class SafetyRows {
  public:
   /// Throws std::invalid_argument if the settings are not valid.
   SafetyRows(int num_coordinates, SafetySettings settings);
 
-  void clear() noexcept { size_ = 0; }
+  void clear() noexcept {
+    size_ = 0;
+    along_path = -1;
+  }
 
   /// Whether the sizes match and every entry within reach is finite.
   bool usable(const Clearances& clearances) const noexcept;
@@ -123,15 +137,18 @@ class SafetyRows {
   Eigen::VectorXd lengths;          ///< (max) |∇h| [m/rad]
   std::vector<int> coordinates;     ///< (max) which clearance a row belongs to, most critical first
   std::vector<int> nearest;         ///< (max) its nearest obstacle point
+  int along_path = -1;              ///< the row that asks for a stop along the path, the last; -1: none
 
  private:
+  /// τ [s], see above.
+  double stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept;
   double hardest_by_torque(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
                            const BrakingTorque& torque) noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
   Eigen::VectorXd urgency_;  // (max) predicted room of the rows chosen, ascending
-  Eigen::VectorXd response_; // (nv) M⁻¹ ∇h
+  Eigen::VectorXd response_; // (nv) M⁻¹ ∇h or M v
 };
 
 }  // namespace sidestep

@@ -32,6 +32,7 @@ const char* name(TorqueFault fault) noexcept;
 struct SafetyRow {
   int coordinate;     ///< which clearance
   int nearest;        ///< its nearest obstacle point
+  bool along_path;    ///< asks for a stop along the path: −|∇h| v/|v| stands for ∇h below (see safety_rows.hpp)
   double required;    ///< smallest ∇h·q̈ [m/s²] that was asked for
   double slack;       ///< by how much the solution falls short of it [m/s²]; 0 unless relaxed_safety
   double multiplier;  ///< what the row costs the task, >= 0; the largest one dominates
