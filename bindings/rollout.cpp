@@ -1,7 +1,9 @@
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
+#include "arguments.hpp"
 #include "dynamical_system.hpp"
 #include "module.hpp"
 #include "sidestep/dynamical_system/progress_monitor.hpp"
@@ -49,6 +51,55 @@ void bind_rollout(nb::module_& m) {
       .def_prop_ro("escaping", &Escape::escaping, "Whether the last step followed a sub-goal.")
       .def_prop_ro("count", &Escape::count, "How many sub-goals there have been.");
 
+  nb::class_<Evasion>(m, "Evasion",
+                      "Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until\n"
+                      "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
+                      "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
+                      "for a random configuration (`tries` at most) on whose way it does not, to be followed until the way to the goal\n"
+                      "is free. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed\n"
+                      "what it found; seed: of the configurations. Raises ValueError that names the setting at fault.")
+      .def(
+          "__init__",
+          [](Evasion* self, std::shared_ptr<GeometricSystem> system, double horizon, double period, double delay,
+             double clearance, int tries, std::uint64_t seed) {
+            new (self) Evasion(std::move(system), {horizon, period, delay, clearance, tries, seed});
+          },
+          nb::arg("system"), nb::kw_only(), nb::arg("horizon") = EvasionSettings().horizon,
+          nb::arg("period") = EvasionSettings().period, nb::arg("delay") = EvasionSettings().delay,
+          nb::arg("clearance") = EvasionSettings().clearance, nb::arg("tries") = EvasionSettings().tries,
+          nb::arg("seed") = EvasionSettings().seed)
+      .def(
+          "look",
+          [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles) {
+            const int nv = self.num_coordinates();
+            const Goal target = as_goal(goal, nv);
+            const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
+            const nb::gil_scoped_release release;
+            self.look(target, position, velocity, obstacles);
+            return self.following(target);
+          },
+          nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"),
+          nb::sig("def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
+                  "v: numpy.typing.ArrayLike, obstacles: Obstacles) -> JointGoal | PoseGoal"),
+          "What to follow from `delay` on: the goal given, or a sub-goal. q, v (nv,) and obstacles are of now. Takes as long\n"
+          "as some hundred steps for each motion looked at, so not for the thread of a loop; other threads run meanwhile.")
+      .def(
+          "pursue",
+          [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
+             double period) {
+            const int nv = self.num_coordinates();
+            const Goal target = as_goal(goal, nv);
+            return self.pursue(target, as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles, period);
+          },
+          nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("period"),
+          nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
+                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> JointGoal | PoseGoal"),
+          "The goal to follow in a step of `period` [s] of a simulation: looks every `delay`, and follows what the look\n"
+          "before found, as if another thread had looked meanwhile.")
+      .def_prop_ro("evading", &Evasion::evading, "Whether the last look found a sub-goal.")
+      .def_prop_ro("pursuing", &Evasion::pursuing, "Whether the last step of `pursue` followed a sub-goal.")
+      .def_prop_ro("count", &Evasion::count, "How many sub-goals were found.");
+
   nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
       .value("semi_implicit_euler", Integrator::semi_implicit_euler, "v += a dt; q += v dt.")
       .value("second_order", Integrator::second_order, "q += v dt + a dt^2/2; v += a dt (thesis 6.2.1).")
@@ -71,7 +122,8 @@ void bind_rollout(nb::module_& m) {
   m.def(
       "rollout",
       [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal, const Obstacles& obstacles,
-         double period, int steps, nb::handle integrator, bool time_steps, const AccelerationFilter* filter, Escape* escape) {
+         double period, int steps, nb::handle integrator, bool time_steps, const AccelerationFilter* filter, Escape* escape,
+         Evasion* evasion) {
         const int nv = system.robot().num_coordinates();
         const Eigen::VectorXd start = as_vector(q, "q", nv);
         const Eigen::VectorXd velocity = as_vector(v, "v", nv);
@@ -81,22 +133,25 @@ void bind_rollout(nb::module_& m) {
           settings.filter = *filter;
         }
         settings.escape = escape;
+        settings.evasion = evasion;
         nb::gil_scoped_release release;
         return rollout(system, start, velocity, target, obstacles, settings);
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
       nb::arg("time_steps") = false, nb::arg("filter") = nb::none(),
-      nb::arg("escape") = nb::none(),
+      nb::arg("escape") = nb::none(), nb::arg("evasion") = nb::none(),
       nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
               "goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, "
               "steps: int, "
               "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, "
-              "filter: AccelerationFilter | None = None, escape: Escape | None = None) -> Rollout"),
+              "filter: AccelerationFilter | None = None, escape: Escape | None = None, "
+              "evasion: Evasion | None = None) -> Rollout"),
       "Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.\n"
       "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
       "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;\n"
-      "escape: sub-goals where the motion is stuck; it keeps its state from one call to the next.");
+      "escape: sub-goals where the motion is stuck; evasion: sub-goals out of the way of what moves. Both keep their state\n"
+      "from one call to the next.");
 }
 
 }  // namespace sidestep::python

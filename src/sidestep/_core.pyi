@@ -854,6 +854,42 @@ class Escape:
     def count(self) -> int:
         """How many sub-goals there have been."""
 
+class Evasion:
+    """
+    Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until
+    the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
+    on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
+    for a random configuration (`tries` at most) on whose way it does not, to be followed until the way to the goal
+    is free. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed
+    what it found; seed: of the configurations. Raises ValueError that names the setting at fault.
+    """
+
+    def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 20, seed: int = 0) -> None: ...
+
+    def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles) -> JointGoal | PoseGoal:
+        """
+        What to follow from `delay` on: the goal given, or a sub-goal. q, v (nv,) and obstacles are of now. Takes as long
+        as some hundred steps for each motion looked at, so not for the thread of a loop; other threads run meanwhile.
+        """
+
+    def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> JointGoal | PoseGoal:
+        """
+        The goal to follow in a step of `period` [s] of a simulation: looks every `delay`, and follows what the look
+        before found, as if another thread had looked meanwhile.
+        """
+
+    @property
+    def evading(self) -> bool:
+        """Whether the last look found a sub-goal."""
+
+    @property
+    def pursuing(self) -> bool:
+        """Whether the last step of `pursue` followed a sub-goal."""
+
+    @property
+    def count(self) -> int:
+        """How many sub-goals were found."""
+
 class Integrator(enum.Enum):
     """How a step of length dt is taken."""
 
@@ -913,12 +949,13 @@ class Rollout:
     def switch(self) -> numpy.typing.NDArray[numpy.float64]:
         """Weights of the harmonic part (steps + 1, nv)"""
 
-def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None, escape: Escape | None = None) -> Rollout:
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None, escape: Escape | None = None, evasion: Evasion | None = None) -> Rollout:
     """
     Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.
     period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
     filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;
-    escape: sub-goals where the motion is stuck; it keeps its state from one call to the next.
+    escape: sub-goals where the motion is stuck; evasion: sub-goals out of the way of what moves. Both keep their state
+    from one call to the next.
     """
 
 class QuadraticProgramStatus(enum.Enum):

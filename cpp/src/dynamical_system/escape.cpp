@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "../settings.hpp"
+#include "random_configuration.hpp"
 
 namespace sidestep {
 namespace {
@@ -34,9 +35,6 @@ bool arrived(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double poten
   const PoseGoalSettings& s = std::get<PoseGoal>(goal).settings;
   return potential <= 0.5 * (s.position_stiffness + (s.position_only ? 0.0 : s.orientation_stiffness)) * at_goal * at_goal;
 }
-
-/// Uniform in [0, 1), the same on every machine (the standard's distributions are not).
-double uniform(std::mt19937_64& random) noexcept { return static_cast<double>(random() >> 11) * 0x1p-53; }
 
 }  // namespace
 
@@ -113,13 +111,8 @@ void Escape::turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept {
   if (escape) {
     ++count_;
     ++tries_;
-    const double spread = tries_ * settings_.spread;
-    Eigen::VectorXd& position = std::get<JointGoal>(sub_goal_).position;
-    for (Eigen::Index j = 0; j < position.size(); ++j) {
-      const double low = std::max(lower_[j], q[j] - spread);
-      const double high = std::min(upper_[j], q[j] + spread);
-      position[j] = std::clamp(low + uniform(random_) * (high - low), lower_[j], upper_[j]);
-    }
+    random_configuration(random_, lower_, upper_, q, tries_ * settings_.spread,
+                         std::get<JointGoal>(sub_goal_).position);
   }
 }
 

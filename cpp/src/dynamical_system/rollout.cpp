@@ -33,13 +33,14 @@ void check_filter(const AccelerationFilter& filter, int nv, const RolloutSetting
   }
 }
 
-void check_escape(const Escape& escape, int nv, const RolloutSettings& settings) {
-  if (escape.num_coordinates() != nv) {
-    throw std::invalid_argument("the escape is for " + std::to_string(escape.num_coordinates()) +
+/// Of what gives sub-goals.
+void check_leader(const std::string& name, int num_coordinates, int nv, const RolloutSettings& settings) {
+  if (num_coordinates != nv) {
+    throw std::invalid_argument("the " + name + " is for " + std::to_string(num_coordinates) +
                                 " coordinates, the system has " + std::to_string(nv));
   }
   if (settings.integrator == Integrator::runge_kutta_4) {
-    throw std::invalid_argument("an escape holds its goal for a period: use semi_implicit_euler or second_order");
+    throw std::invalid_argument("an " + name + " holds its goal for a period: use semi_implicit_euler or second_order");
   }
 }
 
@@ -89,7 +90,10 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
     check_filter(*filter, nv, settings);
   }
   if (settings.escape != nullptr) {
-    check_escape(*settings.escape, nv, settings);
+    check_leader("escape", settings.escape->num_coordinates(), nv, settings);
+  }
+  if (settings.evasion != nullptr) {
+    check_leader("evasion", settings.evasion->num_coordinates(), nv, settings);
   }
   const Eigen::Index rows = settings.steps + 1;
   const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, nv);
@@ -110,9 +114,11 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
   for (Eigen::Index k = 0; k < rows; ++k) {
+    const Goal& clear = settings.evasion == nullptr ? goal : settings.evasion->pursue(goal, q, v, obstacles, dt);
+    const bool escapes = settings.escape != nullptr && !(settings.evasion != nullptr && settings.evasion->pursuing());
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
     const Goal& followed =
-        settings.escape == nullptr ? goal : settings.escape->pursue(goal, q, k == 0 ? no_potential : w.pull.potential, dt);
+        escapes ? settings.escape->pursue(clear, q, k == 0 ? no_potential : w.pull.potential, dt) : clear;
     const StepStatus status = system.acceleration(q, v, followed, obstacles, w);
     Eigen::VectorXd a = w.acceleration;
     if (filter) {

@@ -20,3 +20,8 @@ class Method(StrEnum):
     def escapes(self) -> bool:
         """Whether it takes sub-goals where it is stuck."""
         return self is Method.barrier
+
+    @property
+    def evades(self) -> bool:
+        """Whether it takes sub-goals out of the way of what moves."""
+        return self is Method.barrier

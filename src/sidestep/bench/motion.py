@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sidestep._core import (
     AccelerationFilter,
     Escape,
+    Evasion,
     GeometricSystem,
     JointGoal,
     Obstacles,
@@ -43,6 +44,7 @@ class MotionSettings:
             torque controller); for systems of barriers, as others have no clearances.
         escape: sub-goals where the arm is stuck (`Escape`), and barriers that leave a goal free among obstacles at rest
             (`GeometricSystem.relaxed_at`).
+        evade: sub-goals out of the way of what moves (`Evasion`).
 
     Raises:
         ValueError: a number that is not positive.
@@ -54,6 +56,7 @@ class MotionSettings:
     torque: bool = False
     safe: bool = False
     escape: bool = False
+    evade: bool = False
 
     def __post_init__(self) -> None:
         for name in ("period", "duration", "tolerance"):
@@ -135,7 +138,7 @@ def _integrated(
     look = CHUNK if guided is None else guided.period
     total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, look))
     q, v = problem.start, np.zeros_like(problem.start)
-    relaxed, escape = _prepared(robot, system, problem, settings)
+    relaxed, escape, evasion = _prepared(robot, system, problem, settings)
     guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
     rows: list[tuple[Array, Array, Array]] = []
     times: list[Array] = []
@@ -157,6 +160,7 @@ def _integrated(
             time_steps=True,
             filter=guard,
             escape=escape,
+            evasion=evasion,
         )
         near = np.abs(part.q - problem.goal).max(axis=1) < settings.tolerance
         keep = steps
@@ -181,7 +185,7 @@ def _under_torque(
     guided: _Led | None,
 ) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period, visuals=False)
-    relaxed, escape = _prepared(robot, system, problem, settings)
+    relaxed, escape, evasion = _prepared(robot, system, problem, settings)
     timer = _Timer()
     run = simulation.run(
         _TimedSystem(relaxed, timer, settings.period, guided),
@@ -193,6 +197,7 @@ def _under_torque(
         arrival=Arrival(position=settings.tolerance, speed=float("inf"), hold=0.0),
         safe=settings.safe,
         escape=escape,
+        evasion=evasion,
     )
     return Motion(
         run.q,
@@ -211,9 +216,10 @@ def _prepared(
     system: GeometricSystem,
     problem: Problem,
     settings: MotionSettings,
-) -> tuple[_Relaxed, Escape | None]:
+) -> tuple[_Relaxed, Escape | None, Evasion | None]:
     relaxed = _Relaxed(system, problem, relax=settings.escape)
-    return relaxed, Escape(robot, seed=problem.index) if settings.escape else None
+    escape = Escape(robot, seed=problem.index) if settings.escape else None
+    return relaxed, escape, Evasion(system, seed=problem.index) if settings.evade else None
 
 
 class _Relaxed:

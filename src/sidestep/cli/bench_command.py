@@ -73,7 +73,12 @@ def reach(
         count=problems,
         method=method,
         motion=MotionSettings(
-            period=period, duration=duration, torque=torque, safe=method.safe, escape=method.escapes
+            period=period,
+            duration=duration,
+            torque=torque,
+            safe=method.safe,
+            escape=method.escapes,
+            evade=method.evades,
         ),
         jobs=jobs or default_jobs(),
     )

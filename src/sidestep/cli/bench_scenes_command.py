@@ -173,6 +173,7 @@ def _motion_settings(
         torque=torque,
         safe=method.safe,
         escape=method.escapes,
+        evade=method.evades,
     )
 
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Escape, Obstacles, PoseGoal
+from sidestep._core import Escape, Evasion, Obstacles, PoseGoal
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
 from sidestep.simulation.pose_aim import PoseAim
@@ -103,6 +103,7 @@ class Simulation:
         on_step: Callable[[float, Array], None] | None = None,
         safe: bool = False,
         escape: Escape | None = None,
+        evasion: Evasion | None = None,
     ) -> SimulationRun:
         """Runs the loop: state, wanted acceleration, torque, physics, record.
 
@@ -116,7 +117,7 @@ class Simulation:
             arrival: when to stop early; None: run the whole duration.
             on_step: called with time [s] and q after every step.
             safe: the controller keeps the clearances of the system's barriers as well.
-            escape: sub-goals where the arm is stuck.
+            escape: sub-goals where the arm is stuck. evasion: sub-goals out of the way of what moves.
 
         Raises:
             ValueError: start or goal outside the limits, or a duration that is not positive.
@@ -147,9 +148,13 @@ class Simulation:
             mujoco.mj_step1(built.model, data)
             q, v = built.state(data)
             followed = goal.at(q) if isinstance(goal, PoseAim) else goal
-            if escape is not None and not isinstance(followed, PoseGoal):
+            seen = see(time)
+            if evasion is not None:
+                followed = evasion.pursue(followed, q, v, seen, self.timestep)
+            evading = evasion is not None and evasion.pursuing
+            if escape is not None and not evading and not isinstance(followed, PoseGoal):
                 followed = escape.pursue(followed, q, potential, self.timestep)
-            step = system.acceleration(q, v, followed, see(time))
+            step = system.acceleration(q, v, followed, seen)
             potential = getattr(step, "goal_potential", potential)
             kept = {"clearances": step} if safe else {}
             solution = controller.solve(

@@ -7,6 +7,7 @@
 
 #include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/dynamical_system/escape.hpp"
+#include "sidestep/dynamical_system/evasion.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
 
 namespace sidestep {
@@ -28,6 +29,8 @@ struct RolloutSettings {
   std::optional<AccelerationFilter> filter = {};
   /// Sub-goals where the motion is stuck; none if null. It keeps its state, so that a rollout can go on in a next one.
   Escape* escape = nullptr;
+  /// Sub-goals out of the way of what moves; none if null. While one is followed the escape is not asked.
+  Evasion* evasion = nullptr;
 };
 
 /// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.

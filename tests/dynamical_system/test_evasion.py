@@ -1,0 +1,134 @@
+"""Evasion: sub-goals out of the way of what moves."""
+
+import numpy as np
+import pytest
+
+import sidestep as ss
+from sidestep.bench.problem import poses_over
+from sidestep.bench.problems import balls
+from sidestep.presets import barrier_system
+from sidestep.simulation import ExactClearance
+
+PERIOD = 0.002
+GOAL = np.array([-2.9, 0.0])  # 0.24 rad before the limit of joint 1
+CENTRE, SPEED = (
+    np.array([[-0.5, -1.2, 0.0]]),
+    np.array([[0.0, 0.5, 0.0]]),
+)  # comes and presses it against that
+RADIUS = np.array([0.1])
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return ss.Robot.named("planar2")
+
+
+@pytest.fixture(scope="module")
+def system(robot):
+    return barrier_system(robot, ss.Body.cover(robot))
+
+
+def ball(centre=CENTRE, speed=SPEED):
+    return ss.Obstacles(centre, RADIUS, speed)
+
+
+def run(system, robot, evasion, obstacles, steps):
+    guard = ss.AccelerationFilter(robot, period=PERIOD)
+    at_rest = np.zeros_like(GOAL)
+    return ss.rollout(
+        system, GOAL, at_rest, GOAL, obstacles, period=PERIOD, steps=steps, filter=guard, evasion=evasion
+    )
+
+
+def exact_clearance(robot, motion):
+    objects = balls(CENTRE, RADIUS, SPEED)
+    exact = ExactClearance(robot, objects)
+    return exact.decided_minimum(motion.q, poses_over(objects, motion.time), tolerance=1e-3).lower_bound
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_arm_steps_aside_in_time(system, robot, seed):
+    assert exact_clearance(robot, run(system, robot, None, ball(), 2500)) < 0.0
+    evasion = ss.Evasion(system, seed=seed)
+    motion = run(system, robot, evasion, ball(), 2500)
+    assert exact_clearance(robot, motion) > 0.0
+    assert evasion.count > 0
+    assert not evasion.pursuing  # its goal again, once the ball has passed
+    assert np.abs(motion.q[-1] - GOAL).max() < np.abs(motion.q - GOAL).max() / 2.0
+    limits = robot.limits
+    assert np.all(np.abs(motion.v) <= limits.velocity + 1e-9)  # rounding
+    assert np.all(np.abs(motion.acceleration) <= limits.acceleration + 1e-9)
+    again = run(system, robot, ss.Evasion(system, seed=seed), ball(), 2500)
+    np.testing.assert_array_equal(motion.q, again.q)
+
+
+def test_what_rests_or_passes_by_changes_nothing(system, robot):
+    for obstacles in (
+        ball(speed=np.zeros((1, 3))),
+        ball(centre=np.array([[0.0, 3.0, 0.0]])),
+        ss.Obstacles.none(),
+    ):
+        evasion = ss.Evasion(system)
+        with_it, without = (run(system, robot, leader, obstacles, 300) for leader in (evasion, None))
+        np.testing.assert_array_equal(with_it.q, without.q)
+        assert (evasion.count, evasion.evading) == (0, False)
+
+
+def test_what_a_look_finds_is_followed_one_look_later(system):
+    evasion, at_rest = ss.Evasion(system, delay=0.1, seed=1), np.zeros(2)
+    followed = []
+    for k in range(100):
+        goal = evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD)
+        followed.append(goal.position)
+        assert evasion.evading
+    np.testing.assert_array_equal(followed[:50], np.tile(GOAL, (50, 1)))
+    assert np.abs(followed[50] - GOAL).max() > 0.1
+    np.testing.assert_array_equal(followed[50:], np.tile(followed[50], (50, 1)))
+
+
+def test_a_look_says_what_to_follow(system, robot):
+    evasion, at_rest = ss.Evasion(system, seed=1), np.zeros(2)
+    found = evasion.look(GOAL, GOAL, at_rest, ball()).position
+    assert evasion.evading
+    assert np.all((found >= robot.limits.lower) & (found <= robot.limits.upper))
+    np.testing.assert_array_equal(evasion.look(GOAL, GOAL, at_rest, ball()).position, found)  # still good
+    assert evasion.count == 1
+    gone = ball(centre=CENTRE + 4.0 * SPEED)
+    np.testing.assert_array_equal(evasion.look(GOAL, GOAL, at_rest, gone).position, GOAL)
+    assert not evasion.evading
+    np.testing.assert_array_equal(evasion.look(GOAL, GOAL * np.nan, at_rest, ball()).position, GOAL)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"horizon": 0.0}, "evasion: horizon is 0.0*, must be positive and finite"),
+        ({"period": np.inf}, "evasion: period is inf, must be positive"),
+        ({"delay": -1.0}, "evasion: delay is -1.0*, must be positive"),
+        ({"clearance": np.nan}, "evasion: clearance is nan, must be finite"),
+        ({"tries": 0}, "evasion: tries is 0.*, must be >= 1"),
+    ],
+)
+def test_settings_are_checked(system, change, message):
+    with pytest.raises(ValueError, match=message):
+        ss.Evasion(system, **change)
+
+
+def test_what_does_not_go_together_is_named(system):
+    evasion, other = ss.Evasion(system), ss.Robot.named("planar3")
+    flat, q = ss.GeometricSystem([], robot=other), np.zeros(3)
+    with pytest.raises(ValueError, match="the evasion is for 2 coordinates, the system has 3"):
+        ss.rollout(flat, q, q, q, ss.Obstacles.none(), steps=1, evasion=evasion)
+    with pytest.raises(ValueError, match="an evasion holds its goal for a period"):
+        ss.rollout(
+            system,
+            GOAL,
+            0.0 * GOAL,
+            GOAL,
+            ss.Obstacles.none(),
+            steps=1,
+            integrator="runge_kutta_4",
+            evasion=evasion,
+        )
+    with pytest.raises(ValueError, match=r"q has shape \(3,\), expected \(2,\)"):
+        evasion.look(GOAL, q, GOAL, ss.Obstacles.none())
