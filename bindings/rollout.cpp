@@ -3,6 +3,9 @@
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
+#include <stdexcept>
+
 #include "arguments.hpp"
 #include "dynamical_system.hpp"
 #include "module.hpp"
@@ -56,8 +59,9 @@ void bind_rollout(nb::module_& m) {
                       "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
                       "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
                       "for a random configuration (`tries` at most) on whose way it does not, to be followed until the way to the goal\n"
-                      "is free. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed\n"
-                      "what it found; seed: of the configurations. Raises ValueError that names the setting at fault.")
+                      "is free. One thread at a time. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed\n"
+                      "what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has\n"
+                      "no clearances to obstacles.")
       .def(
           "__init__",
           [](Evasion* self, std::shared_ptr<GeometricSystem> system, double horizon, double period, double delay,
@@ -74,8 +78,9 @@ void bind_rollout(nb::module_& m) {
             const int nv = self.num_coordinates();
             const Goal target = as_goal(goal, nv);
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
+            const Obstacles seen = obstacles;
             const nb::gil_scoped_release release;
-            self.look(target, position, velocity, obstacles);
+            self.look(target, position, velocity, seen);
             return self.following(target);
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"),
@@ -89,6 +94,9 @@ void bind_rollout(nb::module_& m) {
              double period) {
             const int nv = self.num_coordinates();
             const Goal target = as_goal(goal, nv);
+            if (!(period > 0.0 && std::isfinite(period))) {
+              throw std::invalid_argument("period is " + std::to_string(period) + " s, must be positive and finite");
+            }
             return self.pursue(target, as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles, period);
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("period"),
@@ -96,7 +104,7 @@ void bind_rollout(nb::module_& m) {
                   "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> JointGoal | PoseGoal"),
           "The goal to follow in a step of `period` [s] of a simulation: looks every `delay`, and follows what the look\n"
           "before found, as if another thread had looked meanwhile.")
-      .def_prop_ro("evading", &Evasion::evading, "Whether the last look found a sub-goal.")
+      .def_prop_ro("evading", &Evasion::evading, "Whether the last look found a sub-goal, or kept one.")
       .def_prop_ro("pursuing", &Evasion::pursuing, "Whether the last step of `pursue` followed a sub-goal.")
       .def_prop_ro("count", &Evasion::count, "How many sub-goals were found.");
 

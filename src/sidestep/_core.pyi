@@ -860,8 +860,9 @@ class Evasion:
     the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
     on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
     for a random configuration (`tries` at most) on whose way it does not, to be followed until the way to the goal
-    is free. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed
-    what it found; seed: of the configurations. Raises ValueError that names the setting at fault.
+    is free. One thread at a time. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed
+    what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has
+    no clearances to obstacles.
     """
 
     def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 20, seed: int = 0) -> None: ...
@@ -880,7 +881,7 @@ class Evasion:
 
     @property
     def evading(self) -> bool:
-        """Whether the last look found a sub-goal."""
+        """Whether the last look found a sub-goal, or kept one."""
 
     @property
     def pursuing(self) -> bool:

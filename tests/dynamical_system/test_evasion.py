@@ -11,10 +11,8 @@ from sidestep.simulation import ExactClearance
 
 PERIOD = 0.002
 GOAL = np.array([-2.9, 0.0])  # 0.24 rad before the limit of joint 1
-CENTRE, SPEED = (
-    np.array([[-0.5, -1.2, 0.0]]),
-    np.array([[0.0, 0.5, 0.0]]),
-)  # comes and presses it against that
+CENTRE = np.array([[-0.5, -1.1, 0.0]])
+SPEED = np.array([[0.0, 0.5, 0.0]])  # comes and presses the arm against that limit
 RADIUS = np.array([0.1])
 
 
@@ -99,6 +97,30 @@ def test_a_look_says_what_to_follow(system, robot):
     np.testing.assert_array_equal(evasion.look(GOAL, GOAL * np.nan, at_rest, ball()).position, GOAL)
 
 
+def test_an_arm_that_can_only_brake_is_taken_to_stay(system):
+    at_rest = np.zeros(2)
+    beyond = ss.JointGoal(np.array([-4.0, 0.0]))  # outside the limits
+    leaving = ss.JointGoal(GOAL, np.array([-1.0, 0.0]))  # a goal that moves out of them
+    for goal in (beyond, leaving):
+        evasion = ss.Evasion(system, seed=1)
+        evasion.look(goal, GOAL, at_rest, ball())
+        assert evasion.evading
+        evasion.look(goal, GOAL, at_rest, ball(centre=np.array([[0.0, 3.0, 0.0]])))
+        assert not evasion.evading
+
+
+def test_sub_goals_of_joints_without_limits_are_finite():
+    text = ss.planar_arm(2).replace('name="joint2" type="revolute"', 'name="joint2" type="continuous"')
+    robot = ss.Robot.from_urdf(text)
+    assert np.isinf(robot.limits.upper[1])
+    system = barrier_system(robot, ss.Body.cover(robot))
+    evasion = ss.Evasion(system, seed=1)
+    for k in range(5):
+        found = evasion.look(GOAL, GOAL, np.zeros(2), ball(CENTRE + 0.1 * k * SPEED)).position
+        assert np.isfinite(found).all()
+    assert evasion.count > 0
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -107,6 +129,9 @@ def test_a_look_says_what_to_follow(system, robot):
         ({"delay": -1.0}, "evasion: delay is -1.0*, must be positive"),
         ({"clearance": np.nan}, "evasion: clearance is nan, must be finite"),
         ({"tries": 0}, "evasion: tries is 0.*, must be >= 1"),
+        ({"delay": 3.0}, "evasion: delay is 3.0*, must be no longer than the horizon"),
+        ({"period": 0.2}, "evasion: period is 0.20*, must be no longer than the delay"),
+        ({"period": 1e-9}, "evasion: horizon is 2.0*, must be at most 100,000 periods"),
     ],
 )
 def test_settings_are_checked(system, change, message):
@@ -130,5 +155,10 @@ def test_what_does_not_go_together_is_named(system):
             integrator="runge_kutta_4",
             evasion=evasion,
         )
+    with pytest.raises(ValueError, match="the system has no clearances to obstacles"):
+        ss.Evasion(flat)
+    for period in (0.0, np.nan):
+        with pytest.raises(ValueError, match=f"period is {period}.*, must be positive and finite"):
+            evasion.pursue(GOAL, GOAL, GOAL, ss.Obstacles.none(), period)
     with pytest.raises(ValueError, match=r"q has shape \(3,\), expected \(2,\)"):
         evasion.look(GOAL, q, GOAL, ss.Obstacles.none())

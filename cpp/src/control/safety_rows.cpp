@@ -16,8 +16,8 @@ constexpr double firmness = 3.0;
 // A stop along the path takes at most this many times as long by the torque as by the acceleration limits: beyond, lines
 // would be so flat that the arm stood still.
 constexpr double longest_stop = 10.0;
-// What closes in faster than by the arm's own motion, beyond rounding [m/s].
-constexpr double rounding = 1e-9;
+// What closes in no more than this [m/s] faster than by the arm's own motion is held off by the margin.
+constexpr double slow = 0.01;
 // Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
 constexpr double smallest_deceleration = 1e-6;
 
@@ -129,7 +129,7 @@ double SafetyRows::hardest_by_torque(const Eigen::Ref<const Eigen::VectorXd>& gr
 
 double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept {
   const double by_limits = v.cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
-  if (torque == nullptr || by_limits == 0.0) {
+  if (torque == nullptr) {
     return by_limits;
   }
   // |bias − M v/τ| <= effort
@@ -142,6 +142,9 @@ double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits
     if (momentum != 0.0) {
       by_torque = std::max(by_torque, left > 0.0 ? std::abs(momentum) / left : infinity);
     }
+  }
+  if (by_limits == 0.0) {  // none, or at rest
+    return std::isfinite(by_torque) ? by_torque : 0.0;
   }
   return std::clamp(by_torque, by_limits, longest_stop * by_limits);
 }
@@ -170,7 +173,7 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     urgency_[at] = urgency;
     coordinates[static_cast<std::size_t>(at)] = static_cast<int>(k);
   }
-  double hardest_stop = 1.0;
+  double hardest_stop = 0.0;
   int hardest_row = -1;  // that a stop along the path is for
   for (int row = 0; row < size_; ++row) {
     const int k = coordinates[static_cast<std::size_t>(row)];
@@ -186,22 +189,28 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     double required = demanded_deceleration(room, u, closing, period) - c;
     const double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque);
     const double of_arm = -gradient.dot(v);
-    if (room > 0.0 && tau > 0.0 && u <= of_arm + rounding * (1.0 + std::abs(u))) {
-      const double within_period = settings_.correction * tau / period;
-      const double hardness = std::min(hardness_of_stop(room, of_arm, c, tau), within_period), share = of_arm / tau;
+    const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
+    const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));
+    if (room > 0.0 && tau > 0.0 && u <= of_arm + slow) {
+      const double share = of_arm / tau;
+      const double of_velocity = settings_.correction * tau / period;  // that goes in this period
+      double hardness = std::min(hardness_of_stop(room, std::max(u, of_arm), c, tau), of_velocity);
       if (hardness <= 1.0) {
         required = std::min(required, share);
       } else if (required > now) {
+        hardness = share > 0.0 ? std::min(hardness, 2.0 * required / share) : hardness;
         required = std::min(required, hardness * share);
+        if (lasts) {
+          required = std::min(required, now);
+          hardness = 1.0;
+        }
         if (hardness > hardest_stop) {
           hardest_stop = hardness;
           hardest_row = row;
         }
       }
-    } else if (required > now) {
-      const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
-      const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));
-      required = lasts ? now : required;
+    } else if (required > now && lasts) {
+      required = now;
     }
     const double length = gradient.norm();
     normals.row(row) = gradient.transpose() / length;

@@ -14,7 +14,7 @@ namespace sidestep {
 namespace {
 
 // How far each joint of a sub-goal may be from the arm's [rad | m], in turn; every fourth from that of the best so far.
-constexpr std::array<double, 3> spreads{0.8, 1.7, std::numeric_limits<double>::infinity()};
+constexpr std::array<double, 3> spreads{0.8, 1.7, 3.1};
 constexpr double spread_of_best = 0.5;
 
 const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& system) {
@@ -27,6 +27,12 @@ const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& sys
 const EvasionSettings& validated(const EvasionSettings& settings) {
   settings.validate();
   return settings;
+}
+
+constexpr double most_periods = 1e5;
+
+int whole_periods(double duration, double period) noexcept {
+  return std::max(1, static_cast<int>(std::lround(duration / period)));
 }
 
 AccelerationFilterSettings filter_settings(double period) {
@@ -44,6 +50,9 @@ void EvasionSettings::validate() const {
   finite(horizon, "evasion: horizon");
   finite(period, "evasion: period");
   finite(delay, "evasion: delay");
+  require(delay <= horizon, "evasion: delay", delay, "no longer than the horizon");
+  require(period <= delay, "evasion: period", period, "no longer than the delay");
+  require(horizon <= most_periods * period, "evasion: horizon", horizon, "at most 100,000 periods");
   require(std::isfinite(clearance), "evasion: clearance", clearance, "finite");
   require(tries >= 1, "evasion: tries", tries, ">= 1");
 }
@@ -62,6 +71,9 @@ Evasion::Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings 
       of_obstacles_.push_back(static_cast<Eigen::Index>(k));
     }
   }
+  if (of_obstacles_.empty()) {
+    throw std::invalid_argument("evasion: the system has no clearances to obstacles (ClearanceBarrier)");
+  }
 }
 
 void Evasion::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) {
@@ -72,7 +84,7 @@ void Evasion::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::Vect
   }
   // Until then what was found before is followed.
   State start{q, v, following(goal), obstacles};
-  for (double time = 0.0; time < settings_.delay; time += settings_.period) {
+  for (int k = 0; k < whole_periods(settings_.delay, settings_.period); ++k) {
     advance(start);
   }
   const auto is_free = [this](double clearance) { return clearance >= settings_.clearance; };
@@ -101,8 +113,10 @@ void Evasion::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::Vect
 
 const Goal& Evasion::pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                             const Obstacles& obstacles, double period) {
-  if (until_look_ <= 0.0) {
-    until_look_ += settings_.delay;
+  // Less than half a period too early, so that sums of periods may be rounded. Written so that a period that is not a
+  // number makes it look.
+  if (!(until_look_ > 0.5 * period)) {
+    until_look_ = settings_.delay;
     pursuing_ = evading_;
     pursued_ = sub_goal_;
     look(goal, q, v, obstacles);
@@ -112,9 +126,15 @@ const Goal& Evasion::pursue(const Goal& goal, const Eigen::VectorXd& q, const Ei
 }
 
 double Evasion::advance(State& state) {
-  const StepStatus status = system_->acceleration(state.q, state.v, state.goal, state.obstacles, workspace_);
-  double least = std::numeric_limits<double>::infinity();
+  StepStatus status = system_->acceleration(state.q, state.v, state.goal, state.obstacles, workspace_);
+  if (is_fallback(status)) {  // it brakes, and stays
+    const JointLimits& limits = system_->robot().limits();
+    state.goal = JointGoal(state.q.cwiseMax(limits.lower).cwiseMin(limits.upper));
+    status = system_->acceleration(state.q, state.v, state.goal, state.obstacles, workspace_);
+  }
+  double least = -std::numeric_limits<double>::infinity();
   if (!is_fallback(status)) {
+    least = -least;
     for (const Eigen::Index k : of_obstacles_) {
       least = std::min(least, workspace_.clearances.values[k]);
     }
@@ -131,7 +151,7 @@ double Evasion::advance(State& state) {
 double Evasion::least_clearance(const State& start, const Goal& goal, double enough) {
   State state{start.q, start.v, goal, start.obstacles};
   double least = std::numeric_limits<double>::infinity();
-  for (double time = 0.0; time < settings_.horizon && least > enough; time += settings_.period) {
+  for (int k = 0; k < whole_periods(settings_.horizon, settings_.period) && least > enough; ++k) {
     least = std::min(least, advance(state));
   }
   return least;

@@ -113,12 +113,17 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   GeometricSystem::Workspace w(system);
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
+  bool evaded = false;
   for (Eigen::Index k = 0; k < rows; ++k) {
     const Goal& clear = settings.evasion == nullptr ? goal : settings.evasion->pursue(goal, q, v, obstacles, dt);
-    const bool escapes = settings.escape != nullptr && !(settings.evasion != nullptr && settings.evasion->pursuing());
+    const bool evades = settings.evasion != nullptr && settings.evasion->pursuing();
+    const bool known = k > 0 && !evaded;  // how far the goal itself was
+    evaded = evades;
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
     const Goal& followed =
-        escapes ? settings.escape->pursue(clear, q, k == 0 ? no_potential : w.pull.potential, dt) : clear;
+        settings.escape == nullptr || evades
+            ? clear
+            : settings.escape->pursue(clear, q, known ? w.pull.potential : no_potential, dt);
     const StepStatus status = system.acceleration(q, v, followed, obstacles, w);
     Eigen::VectorXd a = w.acceleration;
     if (filter) {

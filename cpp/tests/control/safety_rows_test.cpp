@@ -402,10 +402,37 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   for (int row : {0, 1}) {
     BOOST_TEST(rows.normals.row(row).dot(-hardness / 0.2 * v.transpose()) == rows.lower[row], close);
   }
-  // A room that is all but gone is no reason to turn round: half of the velocity goes in a period.
+  // Where the room is all but gone the stop is no harder than twice what meets the demand,
   update(1e-9, 0.4, -1.0);
   BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.lower[0] == asked(1e-9, 0.4, -1.0), close);
+  BOOST_TEST(rows.lower[1] == 2.0 * asked(1e-9, 0.4, -1.0) / 2.0 * v.norm() / 0.2, close);
+  // and where no stop meets it, at a crest, half of the velocity goes in a period.
+  clearances.gradients.col(0) << 0.4, 0.8;
+  update(1e-9, 0.0, -20.0);
+  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.lower[0] * rows.lengths[0] == 0.0, boost::test_tools::tolerance(1e-9));
   BOOST_TEST(rows.lower[1] == 0.5 * v.norm() / 0.001, close);
+  clearances.gradients.col(0) << 0.6, 0.8;
+
+  // Where the gradient alone would stop it in time, limits are kept: at most 14 there, and the stop as it is.
+  update(0.08, 0.4, -12.5);
+  BOOST_TEST_REQUIRE(asked(0.08, 0.4, -12.5) > 14.0);
+  BOOST_TEST_REQUIRE(0.4 * 0.4 / (2.0 * (14.0 - 12.5)) < 0.08);
+  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.lower[0] <= 14.0);
+  BOOST_TEST(rows.lower[1] == v.norm() / 0.2, close);
+
+  // Without room for one more row the least critical one gives way.
+  SafetySettings single;
+  single.max_rows = 1;
+  SafetyRows one(2, single);
+  clearances.values << 0.085;
+  clearances.curvatures << -20.0;
+  clearances.mind_nearest();
+  one.update(clearances, v, limits, bounds, 0.001);
+  BOOST_REQUIRE(one.size() == 1);
+  BOOST_TEST(one.along_path == 0);
 
   // What comes by itself does not stop with the arm.
   update(0.08, 0.5, -20.0);

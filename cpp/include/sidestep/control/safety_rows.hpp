@@ -46,8 +46,8 @@ struct ClosingLimits {
 // Several clearances at once. Each may count on all joints for itself, and they may want opposite things of the same
 // joint. What they all can rely on is that the arm stops along its path: the acceleration −v/τ, by which every closing
 // speed decelerates by u/τ, is within the limits with τ = max_j |v_j| / (acceleration limit)_j, and within the torque if τ
-// is as long as |bias − M v/τ| <= effort takes. A line of slope γ demands γ u. So with γ <= 1/τ one and the same
-// acceleration meets all rows on their lines: γ is the smaller of `rate` and 1/τ.
+// is as long as |bias − M v/τ| <= effort takes (up to ten times as long). A line of slope γ demands γ u. So with γ <= 1/τ
+// one and the same acceleration meets all rows on their lines: γ is the smaller of `rate` and 1/τ.
 //
 // Outside (s < p(u): an obstacle that appeared, a disturbance, another constraint that won) meeting it at once would
 // be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
@@ -62,16 +62,18 @@ struct ClosingLimits {
 // obstacle whose velocity is not given) is held off at s = −1.5 v/γ, an acceleration d that is not known of at −d/2γ².
 //
 // What a row may ask for. The curvature c adds to the demand, other rows want something else, and close to position
-// limits joints cannot give all. Where nothing but the arm itself closes in, its stop along the path settles what is
-// needed: κ times as hard as −v/τ it takes the time τ/κ and the way v τ/2κ, on which the clearance falls by
+// limits joints cannot give all: no more than b = max ∇h·a within the bounds of now and the torque. With b the room lasts
+// if the arm comes no nearer, or stops in time, u²/2(b + min(c, 0)) <= s.
+// Where nothing but the arm itself closes in (by more than 0.01 m/s, which the margin holds off), its stop along the path
+// settles what is needed: κ times as hard as −v/τ it takes the time τ/κ and the way v τ/2κ, on which the clearance falls by
 //     u τ/2κ + max(−c, 0) τ²/8κ²,
-// which is s for a κ in closed form. If κ <= 1 a row asks for no more than its share u/τ of that stop, so that −v/τ meets
-// all such rows at once. Otherwise, if what it demands is more than the bounds of now and the torque can give, it asks for
-// κ u/τ, and one more row for the whole stop, −v·q̈ >= κ |v|²/τ, for the row of the largest κ: where ∇h is short, as past
-// the crest of a clearance, no acceleration along it would do. Bounds of comfort are exceeded κ times by that; no more
-// than `correction` of the velocity goes in one period.
-// Where something else closes in, or the room is used up, a row asks for no more than b = max ∇h·a within the bounds of
-// now and the torque, if with b the room lasts: the arm comes no nearer, or stops in time, u²/2(b + min(c, 0)) <= s. Only
+// which is s for a κ in closed form. If κ <= 1 a row asks for no more than its share −∇h·v/τ of that stop, so that −v/τ
+// meets all such rows at once. Otherwise, if it demands more than b, the arm is to stop along its path as well, by one more
+// row, −v·q̈ >= κ |v|²/τ, for the row of the largest κ: where ∇h is short, as past the crest of a clearance, no acceleration
+// along it would do. The row itself then asks for no more than κ times its share. κ is no larger than twice what meets
+// its demand so, nor than takes `correction` of the velocity in this period. Bounds of comfort are exceeded κ times by that;
+// if with b the room lasts they are not: the row asks for no more than b, and the path for κ = 1.
+// Where something else closes in, or the room is used up, a row asks for no more than b if with b the room lasts. Only
 // where it does not are bounds of comfort given up for it.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
@@ -104,7 +106,8 @@ struct BrakingTorque {
 };
 
 /// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most one
-/// for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked.
+/// for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked (if there is no room for one
+/// more it takes that of the least critical).
 class SafetyRows {
  public:
   /// Throws std::invalid_argument if the settings are not valid.

@@ -36,20 +36,23 @@ struct EvasionSettings {
 /// way is free. Every leg is a motion of the same system, so nothing about safety changes. Where nothing moves, nothing
 /// is looked at.
 ///
+/// Towards a goal that the system falls back from, such as one outside the limits, the arm is taken to stay where it is.
+///
 /// A look takes as long as some hundred steps for each motion: `look` is for another thread than the loop's. `pursue`
-/// does the same in simulated time.
+/// does the same in simulated time. One thread at a time.
 class Evasion {
  public:
-  /// Throws std::invalid_argument if there is no system, or a setting is at fault, which it names.
+  /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
+  /// which it names.
   explicit Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings settings = {});
 
   /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles. Allocates. After it `following` is
   /// what is to be followed from `delay` on: `goal`, if nothing moves or the state is unusable.
   void look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles);
 
-  /// What the last look found: `goal` itself, or a sub-goal.
+  /// What the last look found: `goal` itself, or a sub-goal, until the next look.
   const Goal& following(const Goal& goal) const noexcept { return evading_ ? sub_goal_ : goal; }
-  /// Whether that is a sub-goal.
+  /// Whether that is a sub-goal, found or kept.
   bool evading() const noexcept { return evading_; }
 
   /// The goal to follow in a step of `period` [s] of a simulation: looks every `delay`, and follows what the look before
