@@ -429,8 +429,10 @@ void TorqueController::stop(bool mass_known, TorqueSolution& solution) noexcept 
   solution.torque = bias_;
   if (mass_known) {
     for (int j = 0; j < nv_; ++j) {
-      const double braking = std::clamp(-velocity_[j] / settings_.stop_time, -limits_.acceleration[j],
-                                        limits_.acceleration[j]);
+      const double wanted = std::clamp(-velocity_[j] / settings_.stop_time, -limits_.acceleration[j],
+                                       limits_.acceleration[j]);
+      const bool bounded = solution.lower[j] <= solution.upper[j];  // not without a position
+      const double braking = bounded ? std::clamp(wanted, solution.lower[j], solution.upper[j]) : wanted;
       solution.torque += braking * mass_.col(j);
     }
   } else {

@@ -218,6 +218,10 @@ BOOST_AUTO_TEST_CASE(unusable_input_gives_a_damped_stop) {
   check([](Input& in) { in.q.resize(3); }, TorqueFault::position, -7.0, 12.0);
   check([](Input& in) { in.v[2] = infinity; }, TorqueFault::velocity, 3.0, 3.0);  // hold against the bias
   check([](Input& in) { in.h[2] = not_a_number; }, TorqueFault::bias, -7.0, 12.0);         // the last bias, 3 Nm, is kept
+  // Close to a position limit it takes more than -3 /s² to stop before it.
+  check([](Input& in) { in.h[2] = not_a_number, in.q[0] = 2.5 - 0.00455, in.v[0] = 0.3; }, TorqueFault::bias,
+        3.0 + acceleration_interval(2.5 - 0.00455, 0.3, {-2.5, 2.5, 2.5, 10.0}, 0.001).upper, 12.0);
+  BOOST_TEST(solution.torque[0] < 3.0 - 7.0);
   // Without M: h - D v, with D = a quarter of effort limit / velocity limit.
   const double D0 = 0.25 * 87.0 / 2.5, D6 = 0.25 * 12.0 / 2.5;
   check([](Input& in) { in.M(2, 3) = not_a_number; }, TorqueFault::mass_matrix, 3.0 - D0, 3.0 + 2.0 * D6);

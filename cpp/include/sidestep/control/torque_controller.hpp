@@ -98,8 +98,9 @@ struct TorqueControllerSettings {
 ///
 /// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
 /// clearances are unusable, the same without them.
-/// Otherwise torque = M (-v/stop_time) + h clipped to the effort limits; if M is unusable, h - D v clipped; an unusable
-/// h is replaced by the last usable one (zero before the first), an unusable v by zero. Every fallback is counted.
+/// Otherwise torque = M a + h with a = -v/stop_time within the bounds, clipped to the effort limits; if M is unusable,
+/// h - D v clipped; an unusable h is replaced by the last usable one (zero before the first), an unusable v by zero.
+/// Every fallback is counted.
 ///
 /// `solve` allocates nothing and never throws. One object per thread.
 class TorqueController {
