@@ -199,12 +199,8 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
         required = std::min(required, share);
       } else if (required > now) {
         hardness = share > 0.0 ? std::min(hardness, 2.0 * required / share) : hardness;
-        required = std::min(required, hardness * share);
-        if (lasts) {
-          required = std::min(required, now);
-          hardness = 1.0;
-        }
-        if (hardness > hardest_stop) {
+        required = std::min({required, hardness * share, lasts ? now : infinity});
+        if (net <= 0.0 && hardness > hardest_stop) {
           hardest_stop = hardness;
           hardest_row = row;
         }

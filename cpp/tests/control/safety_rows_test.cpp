@@ -403,11 +403,16 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
     BOOST_TEST(rows.normals.row(row).dot(-hardness / 0.2 * v.transpose()) == rows.lower[row], close);
   }
   // Where the room is all but gone the stop is no harder than twice what meets the demand,
-  update(1e-9, 0.4, -1.0);
+  update(1e-9, 0.4, -20.0);
   BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.lower[0] == asked(1e-9, 0.4, -20.0), close);
+  BOOST_TEST(rows.lower[1] == 2.0 * asked(1e-9, 0.4, -20.0) / 2.0 * v.norm() / 0.2, close);
+  // not asked for where the gradient does something about the curvature,
+  update(1e-9, 0.4, -1.0);
+  BOOST_TEST_REQUIRE(asked(1e-9, 0.4, -1.0) > 14.0);
+  BOOST_REQUIRE(rows.size() == 1);
   BOOST_TEST(rows.lower[0] == asked(1e-9, 0.4, -1.0), close);
-  BOOST_TEST(rows.lower[1] == 2.0 * asked(1e-9, 0.4, -1.0) / 2.0 * v.norm() / 0.2, close);
-  // and where no stop meets it, at a crest, half of the velocity goes in a period.
+  // and where no stop meets the demand, at a crest, takes half of the velocity in a period.
   clearances.gradients.col(0) << 0.4, 0.8;
   update(1e-9, 0.0, -20.0);
   BOOST_REQUIRE(rows.size() == 2);
@@ -415,13 +420,12 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   BOOST_TEST(rows.lower[1] == 0.5 * v.norm() / 0.001, close);
   clearances.gradients.col(0) << 0.6, 0.8;
 
-  // Where the gradient alone would stop it in time, limits are kept: at most 14 there, and the stop as it is.
+  // Where the gradient alone would stop it in time, limits are kept.
   update(0.08, 0.4, -12.5);
   BOOST_TEST_REQUIRE(asked(0.08, 0.4, -12.5) > 14.0);
   BOOST_TEST_REQUIRE(0.4 * 0.4 / (2.0 * (14.0 - 12.5)) < 0.08);
-  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_REQUIRE(rows.size() == 1);
   BOOST_TEST(rows.lower[0] <= 14.0);
-  BOOST_TEST(rows.lower[1] == v.norm() / 0.2, close);
 
   // Without room for one more row the least critical one gives way.
   SafetySettings single;
@@ -487,7 +491,7 @@ BOOST_AUTO_TEST_CASE(past_the_crest_of_a_clearance_an_arm_stops_along_its_path) 
     least = std::min(least, q > 0.0 ? 0.05 - q * q : 1.0);
   }
   BOOST_TEST(hardest < 15.0);  // against the curvature alone it would take 8/|∇h|, 70 and more
-  BOOST_TEST(least > -1e-4);
+  BOOST_TEST(least > -5e-4);  // of the margin's 5 mm: what is demanded at last is what a stop takes now, without its bend
   BOOST_TEST(least < 0.005);  // it comes close
   BOOST_TEST(std::abs(v[0]) < 0.01);
 }

@@ -68,11 +68,11 @@ struct ClosingLimits {
 // settles what is needed: κ times as hard as −v/τ it takes the time τ/κ and the way v τ/2κ, on which the clearance falls by
 //     u τ/2κ + max(−c, 0) τ²/8κ²,
 // which is s for a κ in closed form. If κ <= 1 a row asks for no more than its share −∇h·v/τ of that stop, so that −v/τ
-// meets all such rows at once. Otherwise, if it demands more than b, the arm is to stop along its path as well, by one more
-// row, −v·q̈ >= κ |v|²/τ, for the row of the largest κ: where ∇h is short, as past the crest of a clearance, no acceleration
-// along it would do. The row itself then asks for no more than κ times its share. κ is no larger than twice what meets
-// its demand so, nor than takes `correction` of the velocity in this period. Bounds of comfort are exceeded κ times by that;
-// if with b the room lasts they are not: the row asks for no more than b, and the path for κ = 1.
+// meets all such rows at once. Otherwise, if it demands more than b, it asks for no more than κ times its share, nor than
+// b if with b the room lasts. Where b + c <= 0, as past the crest of a clearance where ∇h is short, no acceleration along ∇h
+// would do, and the arm is to stop along its path as well, by one more row, −v·q̈ >= κ |v|²/τ, for the row of the largest κ.
+// κ is no larger than twice what meets the demand, nor than takes `correction` of the velocity in this period; bounds of
+// comfort are exceeded κ times by it.
 // Where something else closes in, or the room is used up, a row asks for no more than b if with b the room lasts. Only
 // where it does not are bounds of comfort given up for it.
 
