@@ -22,6 +22,7 @@ from sidestep._core import (
     TorqueController,
     rollout,
 )
+from sidestep.bench.method import Method
 from sidestep.bench.problem import Problem, poses_over
 from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
@@ -57,6 +58,11 @@ class MotionSettings:
     safe: bool = False
     escape: bool = False
     evade: bool = False
+
+    @classmethod
+    def of(cls, method: Method, **numbers: Any) -> MotionSettings:
+        """With all that belongs to a method; `numbers` are period, duration, tolerance and torque."""
+        return cls(safe=method.safe, escape=method.escapes, evade=method.evades, **numbers)
 
     def __post_init__(self) -> None:
         for name in ("period", "duration", "tolerance"):

@@ -72,14 +72,7 @@ def reach(
         ),
         count=problems,
         method=method,
-        motion=MotionSettings(
-            period=period,
-            duration=duration,
-            torque=torque,
-            safe=method.safe,
-            escape=method.escapes,
-            evade=method.evades,
-        ),
+        motion=MotionSettings.of(method, period=period, duration=duration, torque=torque),
         jobs=jobs or default_jobs(),
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")

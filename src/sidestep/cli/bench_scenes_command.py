@@ -166,15 +166,7 @@ def _motion_settings(
 ) -> MotionSettings:
     from sidestep.bench import MotionSettings
 
-    return MotionSettings(
-        period=period,
-        duration=duration,
-        tolerance=tolerance,
-        torque=torque,
-        safe=method.safe,
-        escape=method.escapes,
-        evade=method.evades,
-    )
+    return MotionSettings.of(method, period=period, duration=duration, tolerance=tolerance, torque=torque)
 
 
 def run_and_report(

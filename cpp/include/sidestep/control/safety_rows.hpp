@@ -106,8 +106,8 @@ struct BrakingTorque {
 };
 
 /// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most one
-/// for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked (if there is no room for one
-/// more it takes that of the least critical).
+/// for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked (where rows are
+/// full it takes the place of the least critical).
 class SafetyRows {
  public:
   /// Throws std::invalid_argument if the settings are not valid.
