@@ -20,7 +20,7 @@ TIMES = (0.0, 0.5, 1.0, 1.5)  # [s] at which an arm that has not moved from its 
 
 
 def looks(name: str) -> tuple[list[float], list[float]]:
-    """Milliseconds of looks that find the way free, and of those that lead to a sub-goal."""
+    """Milliseconds of looks that find the way free, and of those that lead to a flight."""
     robot = Robot.named(name)
     system = build_system(Method.barrier, robot)
     settings = ProblemSettings(robot=name, obstacles=10, moving=0.5)
@@ -32,15 +32,17 @@ def looks(name: str) -> tuple[list[float], list[float]]:
         evasion = Evasion(system, seed=index)
         for at in TIMES:
             begin = time.process_time()
-            evasion.look(problem.goal, problem.start, np.zeros_like(problem.start), problem.obstacles_at(at))
-            (evading if evasion.evading else free).append(1e3 * (time.process_time() - begin))
+            found = evasion.look(
+                problem.goal, problem.start, np.zeros_like(problem.start), problem.obstacles_at(at)
+            )
+            (free if found is None else evading).append(1e3 * (time.process_time() - begin))
     return free, evading
 
 
 def main() -> None:
     print("| robot | looks | number | median [ms] | p95 [ms] | most [ms] |\n|---|---|---|---|---|---|")
     for name in sys.argv[1:] or ("fr3", "panda", "ur10", "xarm7", "iiwa"):
-        for label, times in zip(("way free", "sub-goal"), looks(name), strict=True):
+        for label, times in zip(("way free", "flight"), looks(name), strict=True):
             median, p95, most = np.quantile(times, (0.5, 0.95, 1.0))
             print(f"| {name} | {label} | {len(times)} | {median:.1f} | {p95:.1f} | {most:.1f} |")
 

@@ -1,10 +1,13 @@
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
+#include <optional>
 #include <stdexcept>
+#include <string>
 
 #include "arguments.hpp"
 #include "dynamical_system.hpp"
@@ -13,6 +16,16 @@
 #include "sidestep/dynamical_system/rollout.hpp"
 
 namespace sidestep::python {
+namespace {
+
+double as_period(double period) {
+  if (!(period > 0.0 && std::isfinite(period))) {
+    throw std::invalid_argument("period is " + std::to_string(period) + " s, must be positive and finite");
+  }
+  return period;
+}
+
+}  // namespace
 
 void bind_rollout(nb::module_& m) {
   nb::class_<ProgressMonitor>(m, "ProgressMonitor",
@@ -54,11 +67,42 @@ void bind_rollout(nb::module_& m) {
       .def_prop_ro("escaping", &Escape::escaping, "Whether the last step followed a sub-goal.")
       .def_prop_ro("count", &Escape::count, "How many sub-goals there have been.");
 
+  nb::class_<Flight>(m, "Flight",
+                     "A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits\n"
+                     "allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter\n"
+                     "or a TorqueController with clearances. period [s]: of the first step. Raises ValueError on wrong shapes,\n"
+                     "what is not finite, and a period that is not positive.")
+      .def(
+          "__init__",
+          [](Flight* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& refuge,
+             double period) {
+            const int nv = robot.num_coordinates();
+            new (self) Flight(robot.limits(), as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv),
+                              as_finite_vector(refuge, "refuge", nv), as_period(period));
+          },
+          nb::arg("robot"), nb::arg("q"), nb::arg("v"), nb::arg("refuge"), nb::kw_only(), nb::arg("period") = 0.001)
+      .def(
+          "acceleration",
+          [](const Flight& self, const ArrayLike& q, const ArrayLike& v) {
+            const int nv = static_cast<int>(self.refuge().size());
+            return to_numpy(self.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv)));
+          },
+          nb::arg("q"), nb::arg("v"), "a* + w^2 (q* - q) + 2 w (v* - v) (nv,) [/s^2], w = 10 /s, for this step.")
+      .def(
+          "advance", [](Flight& self, double period) { self.advance(as_period(period)); }, nb::arg("period"),
+          "Moves the reference on by the step that was said last; the next one is of `period` [s].")
+      .def_prop_ro(
+          "refuge", [](const Flight& self) { return to_numpy(self.refuge()); }, "Where it comes to rest (nv,) [rad | m].")
+      .def_prop_ro(
+          "position", [](const Flight& self) { return to_numpy(self.position()); }, "The reference q* (nv,) [rad | m].")
+      .def_prop_ro(
+          "velocity", [](const Flight& self) { return to_numpy(self.velocity()); }, "The reference's velocity v* (nv,) [/s].");
+
   nb::class_<Evasion>(m, "Evasion",
                       "Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until\n"
                       "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
                       "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
-                      "for a random configuration (`tries` at most) on whose way it does not, to be followed until the way to the goal\n"
+                      "for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal\n"
                       "is free. One thread at a time. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed\n"
                       "what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has\n"
                       "no clearances to obstacles.")
@@ -80,33 +124,29 @@ void bind_rollout(nb::module_& m) {
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
             const Obstacles seen = obstacles;
             const nb::gil_scoped_release release;
-            self.look(target, position, velocity, seen);
-            return self.following(target);
+            return self.look(target, position, velocity, seen);
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"),
           nb::sig("def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
-                  "v: numpy.typing.ArrayLike, obstacles: Obstacles) -> JointGoal | PoseGoal"),
-          "What to follow from `delay` on: the goal given, or a sub-goal. q, v (nv,) and obstacles are of now. Takes as long\n"
-          "as some hundred steps for each motion looked at, so not for the thread of a loop; other threads run meanwhile.")
+                  "v: numpy.typing.ArrayLike, obstacles: Obstacles) -> Flight | None"),
+          "What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,) and obstacles are of now;\n"
+          "looks follow each other by `delay`. Takes as long as some thousand steps, so not for the thread of a loop; other\n"
+          "threads run meanwhile. The flight is advanced by who follows it.")
       .def(
           "pursue",
           [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
              double period) {
             const int nv = self.num_coordinates();
-            const Goal target = as_goal(goal, nv);
-            if (!(period > 0.0 && std::isfinite(period))) {
-              throw std::invalid_argument("period is " + std::to_string(period) + " s, must be positive and finite");
-            }
-            return self.pursue(target, as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles, period);
+            const Flight* flight = self.pursue(as_goal(goal, nv), as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles,
+                                               as_period(period));
+            return flight == nullptr ? std::nullopt : std::optional<Flight>(*flight);
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("period"),
           nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
-                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> JointGoal | PoseGoal"),
-          "The goal to follow in a step of `period` [s] of a simulation: looks every `delay`, and follows what the look\n"
-          "before found, as if another thread had looked meanwhile.")
-      .def_prop_ro("evading", &Evasion::evading, "Whether the last look found a sub-goal, or kept one.")
-      .def_prop_ro("pursuing", &Evasion::pursuing, "Whether the last step of `pursue` followed a sub-goal.")
-      .def_prop_ro("count", &Evasion::count, "How many sub-goals were found.");
+                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> Flight | None"),
+          "The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every\n"
+          "`delay`, and follows what the look before found, as if another thread had looked meanwhile.")
+      .def_prop_ro("count", &Evasion::count, "How many flights were found.");
 
   nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
       .value("semi_implicit_euler", Integrator::semi_implicit_euler, "v += a dt; q += v dt.")
@@ -158,7 +198,7 @@ void bind_rollout(nb::module_& m) {
       "Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.\n"
       "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
       "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;\n"
-      "escape: sub-goals where the motion is stuck; evasion: sub-goals out of the way of what moves. Both keep their state\n"
+      "escape: sub-goals where the motion is stuck; evasion: flights out of the way of what moves, with a filter. Both keep their state\n"
       "from one call to the next.");
 }
 

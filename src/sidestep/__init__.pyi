@@ -12,6 +12,7 @@ from ._core import Embedding as Embedding
 from ._core import EmbeddingEvaluation as EmbeddingEvaluation
 from ._core import Escape as Escape
 from ._core import Evasion as Evasion
+from ._core import Flight as Flight
 from ._core import GeodesicOnly as GeodesicOnly
 from ._core import GeometricSystem as GeometricSystem
 from ._core import Guidance as Guidance

@@ -854,42 +854,67 @@ class Escape:
     def count(self) -> int:
         """How many sub-goals there have been."""
 
+class Flight:
+    """
+    A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits
+    allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter
+    or a TorqueController with clearances. period [s]: of the first step. Raises ValueError on wrong shapes,
+    what is not finite, and a period that is not positive.
+    """
+
+    def __init__(self, robot: Robot, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, refuge: numpy.typing.ArrayLike, *, period: float = 0.001) -> None: ...
+
+    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        a* + w^2 (q* - q) + 2 w (v* - v) (nv,) [/s^2], w = 10 /s, for this step.
+        """
+
+    def advance(self, period: float) -> None:
+        """
+        Moves the reference on by the step that was said last; the next one is of `period` [s].
+        """
+
+    @property
+    def refuge(self) -> numpy.typing.NDArray[numpy.float64]:
+        """Where it comes to rest (nv,) [rad | m]."""
+
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """The reference q* (nv,) [rad | m]."""
+
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """The reference's velocity v* (nv,) [/s]."""
+
 class Evasion:
     """
     Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until
     the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
     on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
-    for a random configuration (`tries` at most) on whose way it does not, to be followed until the way to the goal
+    for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal
     is free. One thread at a time. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed
     what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has
     no clearances to obstacles.
     """
 
-    def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 20, seed: int = 0) -> None: ...
+    def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 100, seed: int = 0) -> None: ...
 
-    def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles) -> JointGoal | PoseGoal:
+    def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles) -> Flight | None:
         """
-        What to follow from `delay` on: the goal given, or a sub-goal. q, v (nv,) and obstacles are of now. Takes as long
-        as some hundred steps for each motion looked at, so not for the thread of a loop; other threads run meanwhile.
-        """
-
-    def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> JointGoal | PoseGoal:
-        """
-        The goal to follow in a step of `period` [s] of a simulation: looks every `delay`, and follows what the look
-        before found, as if another thread had looked meanwhile.
+        What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,) and obstacles are of now;
+        looks follow each other by `delay`. Takes as long as some thousand steps, so not for the thread of a loop; other
+        threads run meanwhile. The flight is advanced by who follows it.
         """
 
-    @property
-    def evading(self) -> bool:
-        """Whether the last look found a sub-goal, or kept one."""
-
-    @property
-    def pursuing(self) -> bool:
-        """Whether the last step of `pursue` followed a sub-goal."""
+    def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> Flight | None:
+        """
+        The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every
+        `delay`, and follows what the look before found, as if another thread had looked meanwhile.
+        """
 
     @property
     def count(self) -> int:
-        """How many sub-goals were found."""
+        """How many flights were found."""
 
 class Integrator(enum.Enum):
     """How a step of length dt is taken."""
@@ -955,7 +980,7 @@ def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.
     Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.
     period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
     filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;
-    escape: sub-goals where the motion is stuck; evasion: sub-goals out of the way of what moves. Both keep their state
+    escape: sub-goals where the motion is stuck; evasion: flights out of the way of what moves, with a filter. Both keep their state
     from one call to the next.
     """
 

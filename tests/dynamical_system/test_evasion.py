@@ -1,4 +1,4 @@
-"""Evasion: sub-goals out of the way of what moves."""
+"""Evasion: flights out of the way of what moves."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,6 @@ def test_an_arm_steps_aside_in_time(system, robot, seed):
     motion = run(system, robot, evasion, ball(), 2500)
     assert exact_clearance(robot, motion) > 0.0
     assert evasion.count > 0
-    assert not evasion.pursuing  # its goal again, once the ball has passed
     assert np.abs(motion.q[-1] - GOAL).max() < np.abs(motion.q - GOAL).max() / 2.0
     limits = robot.limits
     assert np.all(np.abs(motion.v) <= limits.velocity + 1e-9)  # rounding
@@ -69,32 +68,40 @@ def test_what_rests_or_passes_by_changes_nothing(system, robot):
         evasion = ss.Evasion(system)
         with_it, without = (run(system, robot, leader, obstacles, 300) for leader in (evasion, None))
         np.testing.assert_array_equal(with_it.q, without.q)
-        assert (evasion.count, evasion.evading) == (0, False)
+        assert evasion.count == 0
 
 
-def test_what_a_look_finds_is_followed_one_look_later(system):
+def test_what_a_look_finds_is_followed_one_look_later(system, robot):
     evasion, at_rest = ss.Evasion(system, delay=0.1, seed=1), np.zeros(2)
-    followed = []
-    for k in range(100):
-        goal = evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD)
-        followed.append(goal.position)
-        assert evasion.evading
-    np.testing.assert_array_equal(followed[:50], np.tile(GOAL, (50, 1)))
-    assert np.abs(followed[50] - GOAL).max() > 0.1
-    np.testing.assert_array_equal(followed[50:], np.tile(followed[50], (50, 1)))
+    flights = [
+        evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD) for k in range(100)
+    ]
+    assert flights[:50] == [None] * 50
+    first = flights[50]
+    assert np.all((first.refuge >= robot.limits.lower) & (first.refuge <= robot.limits.upper))
+    np.testing.assert_allclose(first.position, GOAL, atol=2e-3)  # nothing draws the arm away before
+    expected = ss.Flight(robot, first.position, first.velocity, first.refuge, period=0.01)
+    for flight in flights[51:]:
+        expected.advance(PERIOD)
+        np.testing.assert_array_equal(flight.position, expected.position)
+        np.testing.assert_array_equal(flight.refuge, first.refuge)
 
 
-def test_a_look_says_what_to_follow(system, robot):
+def test_a_look_says_what_to_follow(system):
     evasion, at_rest = ss.Evasion(system, seed=1), np.zeros(2)
-    found = evasion.look(GOAL, GOAL, at_rest, ball()).position
-    assert evasion.evading
-    assert np.all((found >= robot.limits.lower) & (found <= robot.limits.upper))
-    np.testing.assert_array_equal(evasion.look(GOAL, GOAL, at_rest, ball()).position, found)  # still good
+    found = evasion.look(GOAL, GOAL, at_rest, ball())
+    assert evasion.count == 1
+    ahead = ball(CENTRE + 0.1 * SPEED)
+    kept = evasion.look(GOAL, GOAL, at_rest, ahead)  # still good
+    np.testing.assert_array_equal(kept.refuge, found.refuge)
+    for _ in range(10):
+        found.advance(0.01)
+    np.testing.assert_array_equal(kept.position, found.position)
     assert evasion.count == 1
     gone = ball(centre=CENTRE + 4.0 * SPEED)
-    np.testing.assert_array_equal(evasion.look(GOAL, GOAL, at_rest, gone).position, GOAL)
-    assert not evasion.evading
-    np.testing.assert_array_equal(evasion.look(GOAL, GOAL * np.nan, at_rest, ball()).position, GOAL)
+    assert evasion.look(GOAL, GOAL, at_rest, gone) is None
+    assert evasion.look(GOAL, GOAL, at_rest, ball()) is not None
+    assert evasion.look(GOAL, GOAL * np.nan, at_rest, ball()) is None
 
 
 def test_an_arm_that_can_only_brake_is_taken_to_stay(system):
@@ -103,21 +110,20 @@ def test_an_arm_that_can_only_brake_is_taken_to_stay(system):
     leaving = ss.JointGoal(GOAL, np.array([-1.0, 0.0]))  # a goal that moves out of them
     for goal in (beyond, leaving):
         evasion = ss.Evasion(system, seed=1)
-        evasion.look(goal, GOAL, at_rest, ball())
-        assert evasion.evading
-        evasion.look(goal, GOAL, at_rest, ball(centre=np.array([[0.0, 3.0, 0.0]])))
-        assert not evasion.evading
+        assert evasion.look(goal, GOAL, at_rest, ball()) is not None
+        assert evasion.look(goal, GOAL, at_rest, ball(centre=np.array([[0.0, 3.0, 0.0]]))) is None
 
 
-def test_sub_goals_of_joints_without_limits_are_finite():
+def test_flights_of_joints_without_limits_are_finite():
     text = ss.planar_arm(2).replace('name="joint2" type="revolute"', 'name="joint2" type="continuous"')
     robot = ss.Robot.from_urdf(text)
     assert np.isinf(robot.limits.upper[1])
     system = barrier_system(robot, ss.Body.cover(robot))
     evasion = ss.Evasion(system, seed=1)
     for k in range(5):
-        found = evasion.look(GOAL, GOAL, np.zeros(2), ball(CENTRE + 0.1 * k * SPEED)).position
-        assert np.isfinite(found).all()
+        found = evasion.look(GOAL, GOAL, np.zeros(2), ball(CENTRE + 0.1 * k * SPEED))
+        assert np.isfinite(found.refuge).all()
+        assert np.isfinite(found.acceleration(GOAL, np.zeros(2))).all()
     assert evasion.count > 0
 
 
@@ -144,6 +150,10 @@ def test_what_does_not_go_together_is_named(system):
     flat, q = ss.GeometricSystem([], robot=other), np.zeros(3)
     with pytest.raises(ValueError, match="the evasion is for 2 coordinates, the system has 3"):
         ss.rollout(flat, q, q, q, ss.Obstacles.none(), steps=1, evasion=evasion)
+    with pytest.raises(ValueError, match="an evasion needs a filter, which keeps its flights off obstacles"):
+        ss.rollout(
+            system, GOAL, 0.0 * GOAL, GOAL, ss.Obstacles.none(), period=PERIOD, steps=1, evasion=evasion
+        )
     with pytest.raises(ValueError, match="an evasion holds its goal for a period"):
         ss.rollout(
             system,

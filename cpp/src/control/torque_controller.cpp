@@ -312,6 +312,7 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
     steepest = std::max(steepest, tracking_weight_[i] * (1.0 + std::abs(wanted_[i] - nearest)));
   }
   const double price = settings_.slack_weight * steepest;
+  const double row_price = settings_.hard_bounds ? price : settings_.safety_weight * price;  // where no bound competes
   data.H.topLeftCorner(nv_, nv_) = hard_data_.H;
   data.H.diagonal().segment(nv_, nv_) = tracking_weight_;
   data.H.diagonal().tail(relaxed.num_rows).setConstant(tracking_weight_.maxCoeff());
@@ -332,7 +333,7 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
   data.A.block(3 * nv_, 0, relaxed.num_rows, nv_).setZero();
   for (int n = 0; n < num_relaxed_rows_; ++n) {
     const int row = relaxed_rows_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
-    data.g[2 * nv_ + n] = settings_.safety_weight * price;
+    data.g[2 * nv_ + n] = row_price;
     if (row >= 0) {
       data.A.row(at).head(nv_) = rows_.normals.row(row);
       data.row_lower[at] = rows_.lower[row];

@@ -33,7 +33,7 @@ void check_filter(const AccelerationFilter& filter, int nv, const RolloutSetting
   }
 }
 
-/// Of what gives sub-goals.
+/// Of what takes the lead now and then.
 void check_leader(const std::string& name, int num_coordinates, int nv, const RolloutSettings& settings) {
   if (num_coordinates != nv) {
     throw std::invalid_argument("the " + name + " is for " + std::to_string(num_coordinates) +
@@ -94,6 +94,9 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   }
   if (settings.evasion != nullptr) {
     check_leader("evasion", settings.evasion->num_coordinates(), nv, settings);
+    if (!filter) {
+      throw std::invalid_argument("an evasion needs a filter, which keeps its flights off obstacles");
+    }
   }
   const Eigen::Index rows = settings.steps + 1;
   const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, nv);
@@ -115,17 +118,17 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   Eigen::VectorXd v = start_velocity;
   bool evaded = false;
   for (Eigen::Index k = 0; k < rows; ++k) {
-    const Goal& clear = settings.evasion == nullptr ? goal : settings.evasion->pursue(goal, q, v, obstacles, dt);
-    const bool evades = settings.evasion != nullptr && settings.evasion->pursuing();
-    const bool known = k > 0 && !evaded;  // how far the goal itself was
-    evaded = evades;
+    const Flight* flight =
+        settings.evasion == nullptr ? nullptr : settings.evasion->pursue(goal, q, v, obstacles, dt);
+    const bool known = k > 0 && !evaded;  // how far the goal itself was, as seen from a way to it
+    evaded = flight != nullptr;
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
     const Goal& followed =
-        settings.escape == nullptr || evades
-            ? clear
-            : settings.escape->pursue(clear, q, known ? w.pull.potential : no_potential, dt);
+        settings.escape == nullptr || evaded
+            ? goal
+            : settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt);
     const StepStatus status = system.acceleration(q, v, followed, obstacles, w);
-    Eigen::VectorXd a = w.acceleration;
+    Eigen::VectorXd a = flight == nullptr ? w.acceleration : flight->acceleration(q, v);
     if (filter) {
       // After a fallback the workspace holds no clearances of this state.
       const Clearances* clearances = is_fallback(status) ? nullptr : &w.clearances;

@@ -45,7 +45,7 @@ class MotionSettings:
             torque controller); for systems of barriers, as others have no clearances.
         escape: sub-goals where the arm is stuck (`Escape`), and barriers that leave a goal free among obstacles at rest
             (`GeometricSystem.relaxed_at`).
-        evade: sub-goals out of the way of what moves (`Evasion`).
+        evade: flights out of the way of what moves (`Evasion`); with `safe`.
 
     Raises:
         ValueError: a number that is not positive.

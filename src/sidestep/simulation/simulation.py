@@ -117,14 +117,16 @@ class Simulation:
             arrival: when to stop early; None: run the whole duration.
             on_step: called with time [s] and q after every step.
             safe: the controller keeps the clearances of the system's barriers as well.
-            escape: sub-goals where the arm is stuck. evasion: sub-goals out of the way of what moves.
+            escape: sub-goals where the arm is stuck. evasion: flights out of the way of what moves; with `safe`.
 
         Raises:
-            ValueError: start or goal outside the limits, or a duration that is not positive.
+            ValueError: start or goal outside the limits, a duration that is not positive, an evasion without `safe`.
             RuntimeError: the physics diverged (MuJoCo's own check).
         """
         if not (np.isfinite(duration) and duration > 0.0):
             raise ValueError(f"duration must be positive, got {duration}")
+        if evasion is not None and not safe:
+            raise ValueError("an evasion needs safe=True, which keeps its flights off obstacles")
         start = self.robot.check_configuration(start, "start")
         if not isinstance(goal, PoseAim):
             goal = self.robot.check_configuration(goal, "goal")
@@ -149,17 +151,14 @@ class Simulation:
             q, v = built.state(data)
             followed = goal.at(q) if isinstance(goal, PoseAim) else goal
             seen = see(time)
-            if evasion is not None:
-                followed = evasion.pursue(followed, q, v, seen, self.timestep)
-            evading = evasion is not None and evasion.pursuing
-            if escape is not None and not evading and not isinstance(followed, PoseGoal):
+            flight = None if evasion is None else evasion.pursue(followed, q, v, seen, self.timestep)
+            if escape is not None and flight is None and not isinstance(followed, PoseGoal):
                 followed = escape.pursue(followed, q, potential, self.timestep)
             step = system.acceleration(q, v, followed, seen)
             potential = getattr(step, "goal_potential", potential)
+            wanted = step.acceleration if flight is None else flight.acceleration(q, v)
             kept = {"clearances": step} if safe else {}
-            solution = controller.solve(
-                q, v, step.acceleration, built.mass_matrix(data), built.bias(data), **kept
-            )
+            solution = controller.solve(q, v, wanted, built.mass_matrix(data), built.bias(data), **kept)
             torque = np.asarray(solution.torque)
             poses = poses if at_rest else built.object_poses(data)
             data.ctrl[built.actuators] = torque
@@ -178,7 +177,7 @@ class Simulation:
                 time,
                 q,
                 v,
-                step.acceleration,
+                wanted,
                 (v_next - v) / self.timestep,
                 np.atleast_1d(getattr(step, "switch", ())),
                 np.atleast_1d(getattr(step, "values", ())),

@@ -66,7 +66,8 @@ struct TorqueControllerSettings {
   Eigen::VectorXd torque_weight = Eigen::VectorXd::Constant(1, 1e-6);
   /// Price of leaving the acceleration bounds when they cannot be kept: that many times the steepest tracking cost [-].
   double slack_weight = 1e3;
-  /// Price of leaving a clearance or a position limit: that many times the price of the other bounds [-].
+  /// Price of leaving a clearance or a position limit: that many times the price of the other bounds [-]. With
+  /// hard_bounds there is no other price to be above, and it is not used.
   double safety_weight = 1e3;
   /// What is kept of the clearances, where they are given.
   SafetySettings safety = {};

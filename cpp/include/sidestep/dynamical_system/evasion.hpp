@@ -3,10 +3,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <random>
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
+#include "sidestep/dynamical_system/flight.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
@@ -18,7 +20,7 @@ struct EvasionSettings {
   double period = 0.01;      ///< [s] of the steps of the motions looked at
   double delay = 0.1;        ///< [s] from one look to the next, from when on is followed what it found
   double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
-  int tries = 20;            ///< sub-goals that are tried in one look, at most
+  int tries = 100;           ///< configurations that are tried in one look, at most
   std::uint64_t seed = 0;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
@@ -29,55 +31,67 @@ struct EvasionSettings {
 /// limit or at its fastest, where a step aside would have let it pass.
 ///
 /// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from where
-/// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal, or to the
-/// sub-goal that is followed already, that comes nearer to an obstacle than `clearance`, the same is done for random
-/// configurations, near ones, far ones and such as are near the best, until one is found on whose way it does not. If
-/// none is, that is followed on whose way the least clearance is largest. The goal is followed again as soon as its own
-/// way is free. Every leg is a motion of the same system, so nothing about safety changes. Where nothing moves, nothing
-/// is looked at.
+/// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal that comes
+/// nearer to an obstacle than `clearance`, and so does the flight that is followed already, flights to random
+/// configurations are tried: near ones, far ones and such as are near the best. First where their references lead, a
+/// configuration every 0.05 s; of those that keep farthest away the motions are integrated, until one is found that keeps
+/// `clearance`. If none does, that is followed whose least clearance is largest. The goal is followed again as soon as its
+/// own way is free.
+///
+/// A flight is no motion of the system: its barriers would push it off its way, straight away from what comes. It goes
+/// where it was seen to go, kept off obstacles and itself, and within limits, by the filter or the torque controller, which
+/// have to be there. A limit of the closing speed (SpeedRegulator) does not hold in it. Where nothing moves, nothing is
+/// looked at.
 ///
 /// Towards a goal that the system falls back from, such as one outside the limits, the arm is taken to stay where it is.
 ///
-/// A look takes as long as some hundred steps for each motion: `look` is for another thread than the loop's. `pursue`
-/// does the same in simulated time. One thread at a time.
+/// `look` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
+/// simulated time. One thread at a time.
 class Evasion {
  public:
   /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
   /// which it names.
   explicit Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings settings = {});
 
-  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles. Allocates. After it `following` is
-  /// what is to be followed from `delay` on: `goal`, if nothing moves or the state is unusable.
-  void look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles);
+  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles; looks follow each other by `delay`.
+  /// What is to be followed from `delay` on: a flight, or the system to the goal where it is empty, as it is if nothing
+  /// moves or the state is unusable. Allocates.
+  const std::optional<Flight>& look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                    const Obstacles& obstacles);
 
-  /// What the last look found: `goal` itself, or a sub-goal, until the next look.
-  const Goal& following(const Goal& goal) const noexcept { return evading_ ? sub_goal_ : goal; }
-  /// Whether that is a sub-goal, found or kept.
-  bool evading() const noexcept { return evading_; }
+  /// The flight to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every `delay`,
+  /// and follows what the look before found.
+  const Flight* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
+                       double period);
 
-  /// The goal to follow in a step of `period` [s] of a simulation: looks every `delay`, and follows what the look before
-  /// found.
-  const Goal& pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
-                     double period);
-  /// Whether the last step of `pursue` followed a sub-goal.
-  bool pursuing() const noexcept { return pursuing_; }
-
-  /// How many sub-goals were found.
+  /// How many flights were found.
   int count() const noexcept { return count_; }
   const EvasionSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return system_->robot().num_coordinates(); }
 
  private:
-  struct State {
+  /// An arm that follows a flight or, where it is empty, the system to a goal.
+  struct Motion {
     Eigen::VectorXd q, v;
-    Goal goal;
     Obstacles obstacles;
+    Goal goal;
+    std::optional<Flight> flight;
   };
+  struct Tried {
+    double clearance;
+    Flight flight;
+  };
+
   /// Moves on by one period; the least clearance from obstacles at its beginning [m].
-  double advance(State& state);
-  /// The least clearance [m] on the way to a goal, or any of the way that is no more than `enough`.
-  double least_clearance(const State& start, const Goal& goal, double enough);
-  Goal draw(const Eigen::VectorXd& q, int number);
+  double advance(Motion& motion);
+  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`.
+  double least_clearance(Motion motion, double enough);
+  /// The same of the configurations that a flight's reference goes through.
+  double reference_clearance(Flight flight, Obstacles obstacles, double enough);
+  double obstacle_clearance() const noexcept;
+  /// The flights from a state whose references keep farthest away, best first.
+  std::vector<Tried> promising(const Motion& now);
+  Eigen::VectorXd draw(const Eigen::VectorXd& q, int number);
 
   std::shared_ptr<const GeometricSystem> system_;
   EvasionSettings settings_;
@@ -86,8 +100,7 @@ class Evasion {
   TorqueSolution filtered_;
   std::vector<Eigen::Index> of_obstacles_;  // coordinates
   std::mt19937_64 random_;
-  Goal sub_goal_, pursued_;
-  bool evading_ = false, pursuing_ = false;
+  std::optional<Flight> found_, pursued_;
   double until_look_ = 0.0;
   int count_ = 0;
 };

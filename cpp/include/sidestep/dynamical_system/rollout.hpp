@@ -29,7 +29,7 @@ struct RolloutSettings {
   std::optional<AccelerationFilter> filter = {};
   /// Sub-goals where the motion is stuck; none if null. It keeps its state, so that a rollout can go on in a next one.
   Escape* escape = nullptr;
-  /// Sub-goals out of the way of what moves; none if null. While one is followed the escape is not asked.
+  /// Flights out of the way of what moves; none if null. While one is followed the escape is not asked. With a filter.
   Evasion* evasion = nullptr;
 };
 
