@@ -71,6 +71,18 @@ def test_what_rests_or_passes_by_changes_nothing(system, robot):
         assert evasion.count == 0
 
 
+def test_a_motion_in_parts_is_the_same(system, robot):
+    whole = run(system, robot, ss.Evasion(system, seed=1), ball(), 1500)
+    evasion, guard = ss.Evasion(system, seed=1), ss.AccelerationFilter(robot, period=PERIOD)
+    q, v = GOAL, np.zeros(2)
+    for k in range(0, 1500, 25):
+        seen = ball(CENTRE + k * PERIOD * SPEED)
+        part = ss.rollout(system, q, v, GOAL, seen, period=PERIOD, steps=25, filter=guard, evasion=evasion)
+        np.testing.assert_allclose(part.q, whole.q[k : k + 26], atol=1e-9)  # rounding of where the ball is
+        q, v = part.q[-1], part.v[-1]
+    assert evasion.count > 0
+
+
 def test_what_a_look_finds_is_followed_one_look_later(system, robot):
     evasion, at_rest = ss.Evasion(system, delay=0.1, seed=1), np.zeros(2)
     flights = [

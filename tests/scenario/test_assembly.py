@@ -145,6 +145,12 @@ def test_impossible_wishes_name_the_place(old: str, new: str, message: str) -> N
     assert message in str(caught.value).replace("['link2']", "link2")
 
 
+def test_numbers_of_the_look_ahead_that_do_not_go_together_are_named() -> None:
+    text = POSE.format(method="barrier", frame="tip", activation=0.12) + "evasion: {delay: 3.0}\n"
+    with pytest.raises(ScenarioError, match=r"evasion: delay is 3\.0*, must be no longer than the horizon"):
+        assemble(Scenario.from_text(text))
+
+
 def test_the_barrier_method_sees_real_sizes_covers_the_links_and_leaves_the_goal_free() -> None:
     scenario = Scenario.from_text(
         """
@@ -194,10 +200,9 @@ def test_a_pose_is_reached_from_a_posture_that_has_it() -> None:
     assert parts.pose.at(parts.goal) is parts.pose.goal
     assert isinstance(parts.pose.at(parts.start), JointGoal)
     assert parts.escape is not None
-    assert (
-        assemble(Scenario.from_text(POSE.format(method="reactive", frame="tip", activation=0.12))).escape
-        is None
-    )
+    assert parts.evasion is not None
+    alone = assemble(Scenario.from_text(POSE.format(method="reactive", frame="tip", activation=0.12)))
+    assert (alone.escape, alone.evasion) == (None, None)
 
 
 def test_a_barrier_sees_a_box_without_gaps() -> None:

@@ -174,3 +174,27 @@ def test_the_thesis_s_scenarios_arrive_by_the_barriers(name: str) -> None:
     else:
         assert evaluation.min_clearance_m is not None
         assert evaluation.min_clearance_m > 0.01
+
+
+@pytest.mark.parametrize("mode", ["kinematic", "torque"])
+@pytest.mark.parametrize(
+    "how", ["velocity: [0, 0.5, 0]", "motion: {to: [-0.5, 1.4, 0], begin: 0.0, end: 5.0}"]
+)
+def test_an_arm_steps_out_of_the_way_of_what_moves(mode: str, how: str) -> None:
+    """A ball presses the arm against a joint's limit, unless it looks ahead."""
+    text = f"""\
+format: 1
+name: aside
+method: barrier
+robot: {{name: planar2}}
+start: {{unit: rad, position: [-2.89, 0.0]}}
+goal: {{unit: rad, position: [-2.9, 0.0]}}
+obstacles:
+  - {{shape: {{type: sphere, radius: 0.1}}, position: [-0.5, -1.1, 0.0], {how}}}
+simulation: {{mode: {mode}, period: 0.002, duration: 4.0, tolerance: 1.0e-7}}
+"""  # it has not arrived before the ball comes
+    scenario = Scenario.from_text(text)
+    aside = run_scenario(scenario).evaluation
+    assert aside.collision_free
+    pressed = run_scenario(replace(scenario, method="reactive")).evaluation
+    assert not pressed.collision_free

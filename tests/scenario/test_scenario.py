@@ -8,7 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from sidestep import Escape, PlannerSettings, RouteSettings, SafetySettings, TorqueController
+from sidestep import Escape, Evasion, PlannerSettings, RouteSettings, SafetySettings, TorqueController
 from sidestep.scenario import Scenario, ScenarioError, schema_text, settings, shipped_scenarios
 from sidestep.scenario import scenario as module
 
@@ -218,6 +218,7 @@ def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
                 assert stated == getattr(value, field.name), f"{key}.{field.name}"
     nested = {
         ("escape",): settings.EscapeChoice,
+        ("evasion",): settings.EvasionChoice,
         ("guide", "planner"): settings.PlannerChoice,
         ("guide", "route"): settings.RouteChoice,
         ("torque",): settings.TorqueChoice,
@@ -247,6 +248,7 @@ def core_defaults(kind: type) -> dict[str, object]:
     ("choice", "kind"),
     [
         (settings.EscapeChoice, Escape),
+        (settings.EvasionChoice, Evasion),
         (settings.PlannerChoice, PlannerSettings),
         (settings.RouteChoice, RouteSettings),
         (settings.TorqueChoice, TorqueController),
@@ -265,12 +267,14 @@ def test_the_numbers_beside_the_system_arrive_and_survive_saving(tmp_path: Path)
         BASE
         + """
 escape: {patience: 1.5}
+evasion: {tries: 30, delay: 0.2}
 guide: {planner: {margin: 0.08, max_nodes: 500}, route: {speed: 1.25}}
 torque: {slack_weight: 50.5, safety: {margin: 0.012345678901234, max_rows: 8}}
 """
     )
     mine = Scenario.from_text(text, folder=tmp_path)
     assert mine.escape == settings.EscapeChoice(patience=1.5)
+    assert mine.evasion == settings.EvasionChoice(tries=30, delay=0.2)
     assert mine.guide.planner == settings.PlannerChoice(margin=0.08, max_nodes=500)
     assert mine.guide.route == settings.RouteChoice(speed=1.25)
     assert mine.torque.safety == settings.SafetyChoice(margin=0.012345678901234, max_rows=8)

@@ -116,18 +116,20 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   GeometricSystem::Workspace w(system);
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
-  bool evaded = false;
+  const Flight* flight = nullptr;
+  const Goal* followed = &goal;
   for (Eigen::Index k = 0; k < rows; ++k) {
-    const Flight* flight =
-        settings.evasion == nullptr ? nullptr : settings.evasion->pursue(goal, q, v, obstacles, dt);
-    const bool known = k > 0 && !evaded;  // how far the goal itself was, as seen from a way to it
-    evaded = flight != nullptr;
+    const bool known = k > 0 && flight == nullptr;  // how far the goal itself was, as seen from a way to it
+    const bool leads = k < settings.steps;          // the last row is the first of the rollout that goes on from here
+    if (leads && settings.evasion != nullptr) {
+      flight = settings.evasion->pursue(goal, q, v, obstacles, dt);
+    }
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
-    const Goal& followed =
-        settings.escape == nullptr || evaded
-            ? goal
-            : settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt);
-    const StepStatus status = system.acceleration(q, v, followed, obstacles, w);
+    if (leads && settings.escape != nullptr) {
+      followed = flight == nullptr ? &settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt)
+                                   : &goal;
+    }
+    const StepStatus status = system.acceleration(q, v, *followed, obstacles, w);
     Eigen::VectorXd a = flight == nullptr ? w.acceleration : flight->acceleration(q, v);
     if (filter) {
       // After a fallback the workspace holds no clearances of this state.

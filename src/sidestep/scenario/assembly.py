@@ -19,6 +19,7 @@ from sidestep import (
     DistanceSwitch,
     Embedding,
     Escape,
+    Evasion,
     GeodesicOnly,
     GeometricSystem,
     HarmonicOnly,
@@ -35,7 +36,7 @@ from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.presets import barrier_system
-from sidestep.scenario.parts import escape_of, guide_of, torque_program_of
+from sidestep.scenario.parts import escape_of, evasion_of, guide_of, torque_program_of
 from sidestep.scenario.scenario import (
     BasePose,
     EmbeddingChoice,
@@ -71,7 +72,8 @@ class Assembly:
         robot, body, system: as the scenario asks.
         objects: the solid obstacles, for physics and exact clearance.
         safe: clearances bound the motion as well, as a part of the method.
-        escape: sub-goals where the arm is stuck, or None. guide: what leads the arm along a path, or None.
+        escape: sub-goals where the arm is stuck, or None. evasion: flights out of the way of what moves, or None.
+        guide: what leads the arm along a path, or None.
         start, start_velocity, goal: (nv,) [rad | m]; for a pose a configuration that has it, or is near it.
         pose: in place of the goal.
         seen: what the controller sees; a function of time [s] where an obstacle starts or stops.
@@ -89,6 +91,7 @@ class Assembly:
     torque_program: TorqueController
     safe: bool = False
     escape: Escape | None = None
+    evasion: Evasion | None = None
     guide: GuidedMotion | None = None
     pose: PoseAim | None = None
 
@@ -119,6 +122,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
     scripted = any(item.motion is not None for item in scenario.obstacles)
     seen = partial(seen_at, tuple(views)) if scripted else seen_at(tuple(views), 0.0)
     barrier, guided = scenario.method != "written", scenario.method == "guided"
+    leads = scenario.method == "barrier"
     if guided and scenario.simulation.mode != "torque":
         raise ScenarioError(
             f"{scenario.name}: method is 'guided', which goes with simulation.mode torque alone"
@@ -137,9 +141,8 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         goal=posture.q,
         seen=seen,
         safe=barrier,
-        escape=_at("escape", scenario, partial(escape_of, scenario.escape, robot))
-        if scenario.method == "barrier"
-        else None,
+        escape=_at("escape", scenario, partial(escape_of, scenario.escape, robot)) if leads else None,
+        evasion=_at("evasion", scenario, partial(evasion_of, scenario.evasion, system)) if leads else None,
         guide=_at("guide", scenario, partial(guide_of, scenario.guide, robot, body, system, synchronous=True))
         if guided
         else None,

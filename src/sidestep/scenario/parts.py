@@ -1,4 +1,4 @@
-"""The parts of a run beside body and system, by the numbers of a scenario: sub-goals, guide, torque program."""
+"""The parts of a run beside body and system, by the numbers of a scenario: sub-goals, flights, guide, torque."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import dataclasses
 
 from sidestep._core import (
     Escape,
+    Evasion,
     GeometricSystem,
     PlannerSettings,
     RouteSettings,
@@ -15,12 +16,17 @@ from sidestep._core import (
 from sidestep.body import Body
 from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
-from sidestep.scenario.settings import EscapeChoice, GuideChoice, TorqueChoice
+from sidestep.scenario.settings import EscapeChoice, EvasionChoice, GuideChoice, TorqueChoice
 
 
 def escape_of(choice: EscapeChoice, robot: Robot) -> Escape:
     """Sub-goals where the arm is stuck; raises ValueError that names the number at fault."""
     return Escape(robot, **dataclasses.asdict(choice))
+
+
+def evasion_of(choice: EvasionChoice, system: GeometricSystem) -> Evasion:
+    """Flights out of the way of what moves; raises ValueError that names the number at fault."""
+    return Evasion(system, **dataclasses.asdict(choice))
 
 
 def guide_of(

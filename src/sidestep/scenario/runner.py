@@ -95,6 +95,7 @@ def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> 
         on_step=on_step,
         safe=parts.safe,
         escape=parts.escape,
+        evasion=parts.evasion,
     )
 
 
@@ -128,4 +129,5 @@ def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) 
         on_step=on_step,
         safe=parts.safe,
         escape=parts.escape,
+        evasion=parts.evasion,
     )

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import yaml
 
 from sidestep.barriers import Barriers
-from sidestep.scenario.settings import EscapeChoice, GuideChoice, TorqueChoice
+from sidestep.scenario.settings import EscapeChoice, EvasionChoice, GuideChoice, TorqueChoice
 from sidestep.scenario.validation import ScenarioError, check_document, parse_yaml
 
 Vector3 = tuple[float, float, float]
@@ -178,10 +178,10 @@ class Scenario:
     Args:
         name: letters, digits, dot, dash, underscore.
         method: "written": body, embedding and system as this file says; in place of them the recommended system with
-            the real size of the obstacles: "barrier" (with sub-goals where it is stuck), "reactive" (without), "guided"
-            (led along a path).
-        robot, start, goal, body, obstacles, embedding, system, barriers, escape, guide, torque, simulation: the parts,
-            see their classes.
+            the real size of the obstacles: "barrier" (with sub-goals where it is stuck, and flights out of the way of
+            what moves), "reactive" (without), "guided" (led along a path).
+        robot, start, goal, body, obstacles, embedding, system, barriers, escape, evasion, guide, torque, simulation:
+            the parts, see their classes.
         description, source: what happens, and where it comes from.
         folder: what relative file names refer to; not part of the file.
     """
@@ -199,6 +199,7 @@ class Scenario:
     system: SystemChoice = field(default_factory=SystemChoice)
     barriers: BarrierChoice = field(default_factory=BarrierChoice)
     escape: EscapeChoice = field(default_factory=EscapeChoice)
+    evasion: EvasionChoice = field(default_factory=EvasionChoice)
     guide: GuideChoice = field(default_factory=GuideChoice)
     torque: TorqueChoice = field(default_factory=TorqueChoice)
     simulation: SimulationChoice = field(default_factory=SimulationChoice)

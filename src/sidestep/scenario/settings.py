@@ -1,6 +1,6 @@
-"""What a scenario file says of the parts beside the system: sub-goals, guide, torque program.
+"""What a scenario file says of the parts beside the system: sub-goals, flights, guide, torque program.
 
-Their defaults are those of the core (`Escape`, `PlannerSettings`, `RouteSettings`, `TorqueController`,
+Their defaults are those of the core (`Escape`, `Evasion`, `PlannerSettings`, `RouteSettings`, `TorqueController`,
 `SafetySettings`), which say what each is.
 """
 
@@ -17,6 +17,17 @@ class EscapeChoice:
     fraction: float = 0.05
     leg: float = 2.0
     spread: float = 1.7
+
+
+@dataclass(frozen=True)
+class EvasionChoice:
+    """Numbers of the look ahead of the method "barrier", where something moves, see `Evasion`."""
+
+    horizon: float = 2.0
+    period: float = 0.01
+    delay: float = 0.1
+    clearance: float = 0.004
+    tries: int = 100
 
 
 @dataclass(frozen=True)

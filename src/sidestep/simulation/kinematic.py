@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import AccelerationFilter, Escape, GeometricSystem, rollout
+from sidestep._core import AccelerationFilter, Escape, Evasion, GeometricSystem, rollout
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.pose_aim import PoseAim
@@ -43,6 +43,7 @@ def run_kinematically(
     on_step: Callable[[float, Array], None] | None = None,
     safe: bool = False,
     escape: Escape | None = None,
+    evasion: Evasion | None = None,
 ) -> KinematicRun:
     """Integrates the wanted acceleration itself, by the core's `rollout`: no masses, torques or contacts.
 
@@ -85,6 +86,7 @@ def run_kinematically(
             integrator=integrator,
             filter=guard,
             escape=escape,
+            evasion=evasion,
         )
         if not (np.all(np.isfinite(part.q)) and np.all(np.isfinite(part.v))):
             raise RuntimeError(f"the integration diverged near {done * timestep:.3f} s; shorten the timestep")

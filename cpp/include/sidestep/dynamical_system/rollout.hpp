@@ -27,7 +27,8 @@ struct RolloutSettings {
   /// What the acceleration passes before it is applied; none if empty. Of the same period, and not with runge_kutta_4,
   /// whose stages are not held.
   std::optional<AccelerationFilter> filter = {};
-  /// Sub-goals where the motion is stuck; none if null. It keeps its state, so that a rollout can go on in a next one.
+  /// Sub-goals where the motion is stuck; none if null. It keeps its state, so that a rollout can go on in a next one: the
+  /// last row, which is the first of that one, follows what the row before it did.
   Escape* escape = nullptr;
   /// Flights out of the way of what moves; none if null. While one is followed the escape is not asked. With a filter.
   Evasion* evasion = nullptr;
