@@ -144,6 +144,7 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
 CLASSES = {  # of the snippet, by places in a scenario file
     "barriers": "Barriers",
     "escape": "Escape",
+    "evasion": "Evasion",
     "guide.planner": "PlannerSettings",
     "guide.route": "RouteSettings",
     "torque": "TorqueController",

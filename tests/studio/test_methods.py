@@ -15,7 +15,14 @@ from sidestep.scenario.scenario import (
     JointLimitChoice,
     SystemChoice,
 )
-from sidestep.scenario.settings import EscapeChoice, PlannerChoice, RouteChoice, SafetyChoice, TorqueChoice
+from sidestep.scenario.settings import (
+    EscapeChoice,
+    EvasionChoice,
+    PlannerChoice,
+    RouteChoice,
+    SafetyChoice,
+    TorqueChoice,
+)
 from sidestep.studio.methods import METHODS, check_numbers
 from sidestep.studio.page.tuning import add_control, show_value, value_of
 from sidestep.studio.parameters import Parameter
@@ -26,6 +33,7 @@ def test_every_method_of_the_benchmark_is_there() -> None:
     for method in BenchMethod:
         assert METHODS[method.value].safe == method.safe
         assert METHODS[method.value].escapes == method.escapes
+        assert METHODS[method.value].evades == method.evades
         assert METHODS[method.value].guided == (method is BenchMethod.guided)
 
 
@@ -46,6 +54,7 @@ def every_parameter() -> dict[str, Parameter]:
     [
         (BarrierChoice, "barriers"),
         (EscapeChoice, "escape"),
+        (EvasionChoice, "evasion"),
         (PlannerChoice, "guide.planner"),
         (RouteChoice, "guide.route"),
         (SafetyChoice, "torque.safety"),

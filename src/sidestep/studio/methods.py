@@ -11,6 +11,7 @@ from sidestep.studio.parameters import (
     BARRIERS,
     DENSITY,
     ESCAPE,
+    EVASION,
     GUIDE,
     SAFETY,
     TORQUE,
@@ -31,6 +32,7 @@ class Method:
         name: on the command line. label: on the page. sentence: what it is.
         parameters: its numbers. covering: needs a covering body, otherwise a fitted one.
         safe: the torque program keeps clearances as well. escapes: takes sub-goals where it is stuck.
+        evades: looks ahead where something moves, and steps out of its way.
         guided: a guide searches a path in the background and leads the goal along it.
     """
 
@@ -41,6 +43,7 @@ class Method:
     covering: bool
     safe: bool
     escapes: bool = False
+    evades: bool = False
     guided: bool = False
 
     @property
@@ -65,16 +68,18 @@ METHODS: dict[str, Method] = {
             "barrier",
             "barriers (recommended)",
             "A barrier for each part of the body, each joint limit and each pair of links; clearances are also "
-            "kept by the torque program. Where it is stuck it follows random sub-goals for a while.",
-            (*BARRIERS, *ESCAPE, *SAFETY, *TORQUE),
+            "kept by the torque program. Where it is stuck it follows random sub-goals for a while; what comes at it "
+            "it sees ahead, and steps out of the way.",
+            (*BARRIERS, *ESCAPE, *EVASION, *SAFETY, *TORQUE),
             covering=True,
             safe=True,
             escapes=True,
+            evades=True,
         ),
         Method(
             "reactive",
             "barriers without sub-goals",
-            "The same, but where it is stuck it stays.",
+            "The same, but where it is stuck it stays, and it yields straight away from what comes.",
             _BARRIERS,
             covering=True,
             safe=True,

@@ -19,7 +19,14 @@ from sidestep.scenario.scenario import (
     Scenario,
     SystemChoice,
 )
-from sidestep.scenario.settings import EscapeChoice, PlannerChoice, RouteChoice, SafetyChoice, TorqueChoice
+from sidestep.scenario.settings import (
+    EscapeChoice,
+    EvasionChoice,
+    PlannerChoice,
+    RouteChoice,
+    SafetyChoice,
+    TorqueChoice,
+)
 
 Value: TypeAlias = float | int | str | None
 Numbers: TypeAlias = dict[str, Any]  # values by the names of parameters; as a file has them
@@ -31,6 +38,7 @@ FOLDERS = {  # on the page, by places in a scenario file
     "embedding": "Curved space",
     "embedding.joint_limits": "Curved space",
     "escape": "Sub-goals",
+    "evasion": "Flights",
     "guide.planner": "Search of paths",
     "guide.route": "Following a path",
     "torque": "Torque program",
@@ -174,6 +182,15 @@ ESCAPE: tuple[Parameter, ...] = (
         6.3,
         "Higher takes sub-goals farther off: out of deeper dead ends, on longer ways.",
     ),
+)
+
+_v = _number(EvasionChoice, "evasion", "evasion_")
+EVASION: tuple[Parameter, ...] = (
+    _v("horizon", "s", 0.5, 5.0, "Higher looks farther ahead, and takes longer."),
+    _v("period", "s", 0.005, 0.05, "Of the steps looked at: higher is quicker, and coarser."),
+    _v("delay", "s", 0.05, 0.5, "From look to look: a look should take no longer; lower steps aside sooner."),
+    _v("clearance", "m", 0.0, 0.05, "Higher steps aside from what would pass farther off."),
+    _v("tries", "", 1, 1000, "More find ways that are harder to find, and take longer.", powers=True),
 )
 
 _p = _number(PlannerChoice, "guide.planner", "planner_")

@@ -18,8 +18,9 @@ from sidestep._core import (
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.parts import escape_of, guide_of
+from sidestep.scenario.parts import escape_of, evasion_of, guide_of
 from sidestep.simulation.pose_aim import PoseAim, Posture
+from sidestep.studio.lookout import Lookout
 from sidestep.studio.methods import Method
 
 Array = npt.NDArray[np.float64]
@@ -33,7 +34,7 @@ class Pursuit:
 
     Args:
         robot, tip: the arm, and the frame whose pose is a goal. body, system: of the method.
-        written: the method and its numbers as a file has them: sub-goals, guide, period of control.
+        written: the method and its numbers as a file has them: sub-goals, flights, guide, period of control.
 
     Raises:
         ValueError: that names the number at fault.
@@ -44,7 +45,7 @@ class Pursuit:
     ) -> None:
         self.system = system
         self._robot, self._tip, self._method = robot, tip, method
-        self._period, self._choice = written.simulation.period, written.escape
+        self._period, self._written = written.simulation.period, written
         self._guide = (
             guide_of(written.guide, robot, body, system, synchronous=False) if method.guided else None
         )
@@ -61,6 +62,7 @@ class Pursuit:
         if self._guide is not None:
             self._guide.set_goal(posture.q)
         self._escape = self._new_escape() if self._method.escapes else None
+        self._lookout = self._new_lookout() if self._method.evades else None
         self._arrived = False
         self.obstacles_changed()
 
@@ -68,12 +70,17 @@ class Pursuit:
         """Obstacles came, went, or are suddenly elsewhere."""
         self._relaxed: GeometricSystem | None = None
 
-    def step(self, q: Array, v: Array, obstacles: Obstacles) -> Step:
-        """The wanted acceleration at q, v (nv,) for one period: to the goal, a sub-goal, or along the guide's path."""
-        goal = self._attractor(q, obstacles)
+    def step(self, q: Array, v: Array, obstacles: Obstacles) -> tuple[Step, Array]:
+        """One period from q, v (nv,): the step of the system, and the wanted acceleration.
+
+        That is the step's, to the goal, a sub-goal, or along the guide's path; or that of a flight out of the way.
+        """
+        aim = self._goal(q)
+        flight = None if self._lookout is None else self._lookout.follow(aim, q, v, obstacles)
+        goal = self._attractor(aim, q, obstacles) if flight is None else aim
         step = self._moving_by(obstacles).acceleration(q, v, goal, obstacles)
-        self._potential = step.goal_potential
-        return step
+        self._potential = step.goal_potential if flight is None else float("nan")
+        return step, np.asarray(step.acceleration if flight is None else flight.acceleration(q, v))
 
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> Step:
         """The same to the goal alone, without time passing."""
@@ -102,21 +109,26 @@ class Pursuit:
             words = f"guide: {self._says}; {words}"
         if self._escape is not None and self._escape.escaping:
             words = f"leaves a dead end, sub-goal {self._escape.count}: {words}"
+        if self._lookout is not None and self._lookout.flight is not None:
+            words = f"steps out of the way: {words}"
         return self._posture.in_words(words)
 
     def _new_escape(self) -> Escape:
-        return escape_of(self._choice, self._robot)
+        return escape_of(self._written.escape, self._robot)
+
+    def _new_lookout(self) -> Lookout:
+        evasion = evasion_of(self._written.evasion, self.system)
+        return Lookout(evasion, delay=self._written.evasion.delay, period=self._period)
 
     def _goal(self, q: Array) -> JointGoal | PoseGoal:
         return self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
 
-    def _attractor(self, q: Array, obstacles: Obstacles) -> JointGoal | PoseGoal:
+    def _attractor(self, aim: JointGoal | PoseGoal, q: Array, obstacles: Obstacles) -> JointGoal | PoseGoal:
         self._time += self._period
         if self._guide is not None:
             guidance = self._guide.lead(q, obstacles, self._time)
             self._says = guidance.status.name.replace("_", " ")
             return guidance.goal
-        aim = self._goal(q)
         if self._escape is None or not isinstance(aim, JointGoal):
             return aim
         if np.abs(q - aim.position).max() < ARRIVED:

@@ -164,10 +164,10 @@ class Session:
         if np.abs(v).max() > SLOW:
             self._moved = self.time
         obstacles = self._obstacles()
-        step = self._pursuit.step(q, v, obstacles)
+        step, wanted = self._pursuit.step(q, v, obstacles)
         mass, bias = stage.dynamics()
         solution = self._controller.solve(
-            q, v, step.acceleration, mass, bias, clearances=step if self._method.safe else None
+            q, v, wanted, mass, bias, clearances=step if self._method.safe else None
         )
         finite = stage.end(solution.torque)
         self._times.append(clock.perf_counter() - begin)

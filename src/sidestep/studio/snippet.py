@@ -20,7 +20,8 @@ WIDTH = 80  # [characters] that a window on the page shows
 def python_snippet(snapshot: Snapshot) -> str:
     """Python that makes the system that moves the arm, as `system`, and its `goal`, and takes a step without obstacles.
 
-    Beside it are `escape` or `motion`, where the method has sub-goals or a guide, and `controller`, the torque program.
+    Beside it are `escape` and `evasion`, or `motion`, where the method has sub-goals and flights, or a guide, and
+    `controller`, the torque program.
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
@@ -36,6 +37,8 @@ def python_snippet(snapshot: Snapshot) -> str:
         lines += _written_code(written)
     if method.escapes:
         lines += _call("escape = ss.Escape", dataclasses.asdict(written.escape), "robot")
+    if method.evades:
+        lines += _call("evasion = ss.Evasion", dataclasses.asdict(written.evasion), "system")
     if method.guided:
         lines += [
             *_call("planner = ss.PlannerSettings", dataclasses.asdict(written.guide.planner)),
@@ -83,6 +86,12 @@ def _step_code(snapshot: Snapshot) -> list[str]:
         if method.escapes:
             lines += [
                 "# where it is stuck: goal is escape.pursue(goal, q, step.goal_potential, period) for this step"
+            ]
+        if method.evades:
+            lines += [
+                "# where something moves, every delay, in another thread:",
+                "# flight = evasion.look(goal, q, v, obstacles); it is followed from then on, if it is not None:",
+                "# flight.acceleration(q, v) in place of the step's, then flight.advance(period)",
             ]
         if method.covering:
             lines += [f"# among what is at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]

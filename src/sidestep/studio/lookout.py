@@ -1,0 +1,42 @@
+"""Looks ahead beside a loop, and says what to fly."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import Evasion, Flight, JointGoal, Obstacles, PoseGoal
+
+Array = npt.NDArray[np.float64]
+
+
+class Lookout:
+    """Looks of an `Evasion` in a thread of their own, one after the other, while a loop goes on.
+
+    Args:
+        evasion: that nothing else uses. delay: of it, and period: of the loop [s].
+    """
+
+    def __init__(self, evasion: Evasion, *, delay: float, period: float) -> None:
+        self._evasion, self._period = evasion, period
+        self._periods = max(1, round(delay / period))
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="sidestep-lookout")
+        self._look: Future[Flight | None] | None = None
+        self._since = 0  # periods since the look began
+        self.flight: Flight | None = None
+
+    def follow(self, goal: JointGoal | PoseGoal, q: Array, v: Array, obstacles: Obstacles) -> Flight | None:
+        """What to fly in this period, None where the way to the goal is free: never waits for a look."""
+        self._since += 1
+        due = self._look is None or (self._since >= self._periods and self._look.done())
+        if not due:
+            if self.flight is not None:
+                self.flight.advance(self._period)
+            return self.flight
+        if self._look is not None:
+            self.flight = self._look.result()
+        self._look = self._thread.submit(self._evasion.look, goal, q.copy(), v.copy(), obstacles)
+        self._since = 0
+        return self.flight
