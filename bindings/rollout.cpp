@@ -70,27 +70,27 @@ void bind_rollout(nb::module_& m) {
   nb::class_<Flight>(m, "Flight",
                      "A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits\n"
                      "allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter\n"
-                     "or a TorqueController with clearances. period [s]: of the first step. Raises ValueError on wrong shapes,\n"
-                     "what is not finite, and a period that is not positive.")
+                     "or a TorqueController with clearances. Raises ValueError on wrong shapes and what is not finite.")
       .def(
           "__init__",
-          [](Flight* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& refuge,
-             double period) {
+          [](Flight* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& refuge) {
             const int nv = robot.num_coordinates();
             new (self) Flight(robot.limits(), as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv),
-                              as_finite_vector(refuge, "refuge", nv), as_period(period));
+                              as_finite_vector(refuge, "refuge", nv));
           },
-          nb::arg("robot"), nb::arg("q"), nb::arg("v"), nb::arg("refuge"), nb::kw_only(), nb::arg("period") = 0.001)
+          nb::arg("robot"), nb::arg("q"), nb::arg("v"), nb::arg("refuge"))
+      .def("__copy__", [](const Flight& self) { return Flight(self); })
       .def(
           "acceleration",
-          [](const Flight& self, const ArrayLike& q, const ArrayLike& v) {
+          [](const Flight& self, const ArrayLike& q, const ArrayLike& v, double period) {
             const int nv = static_cast<int>(self.refuge().size());
-            return to_numpy(self.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv)));
+            return to_numpy(self.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv), as_period(period)));
           },
-          nb::arg("q"), nb::arg("v"), "a* + w^2 (q* - q) + 2 w (v* - v) (nv,) [/s^2], w = 10 /s, for this step.")
+          nb::arg("q"), nb::arg("v"), nb::arg("period"),
+          "a* + w^2 (q* - q) + 2 w (v* - v) (nv,) [/s^2], w = 10 /s, for a step of `period` [s].")
       .def(
           "advance", [](Flight& self, double period) { self.advance(as_period(period)); }, nb::arg("period"),
-          "Moves the reference on by the step that was said last; the next one is of `period` [s].")
+          "Moves the reference on by `period` [s].")
       .def_prop_ro(
           "refuge", [](const Flight& self) { return to_numpy(self.refuge()); }, "Where it comes to rest (nv,) [rad | m].")
       .def_prop_ro(
@@ -103,7 +103,7 @@ void bind_rollout(nb::module_& m) {
                       "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
                       "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
                       "for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal\n"
-                      "is free. One thread at a time. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed\n"
+                      "is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole times; delay [s]: from one look to the next, from when on is followed\n"
                       "what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has\n"
                       "no clearances to obstacles.")
       .def(
@@ -118,20 +118,26 @@ void bind_rollout(nb::module_& m) {
           nb::arg("seed") = EvasionSettings().seed)
       .def(
           "look",
-          [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles) {
+          [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
+             const std::optional<Flight>& followed) {
             const int nv = self.num_coordinates();
             const Goal target = as_goal(goal, nv);
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
+            if (followed && followed->refuge().size() != nv) {
+              throw std::invalid_argument("the flight is for " + std::to_string(followed->refuge().size()) +
+                                          " coordinates, the system has " + std::to_string(nv));
+            }
             const Obstacles seen = obstacles;
+            const std::optional<Flight> flown = followed;
             const nb::gil_scoped_release release;
-            return self.look(target, position, velocity, seen);
+            return self.look(target, position, velocity, seen, flown);
           },
-          nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"),
+          nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("followed") = nb::none(),
           nb::sig("def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
-                  "v: numpy.typing.ArrayLike, obstacles: Obstacles) -> Flight | None"),
-          "What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,) and obstacles are of now;\n"
-          "looks follow each other by `delay`. Takes as long as some thousand steps, so not for the thread of a loop; other\n"
-          "threads run meanwhile. The flight is advanced by who follows it.")
+                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: Flight | None = None) -> Flight | None"),
+          "What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,), obstacles and the flight\n"
+          "that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the thread of a\n"
+          "loop; other threads run meanwhile. The flight is advanced by who follows it.")
       .def(
           "pursue",
           [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
@@ -146,6 +152,7 @@ void bind_rollout(nb::module_& m) {
                   "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> Flight | None"),
           "The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every\n"
           "`delay`, and follows what the look before found, as if another thread had looked meanwhile.")
+      .def("reset", &Evasion::reset, "Before another motion is pursued: what was found is forgotten.")
       .def_prop_ro("count", &Evasion::count, "How many flights were found.");
 
   nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")

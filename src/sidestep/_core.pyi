@@ -858,21 +858,20 @@ class Flight:
     """
     A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits
     allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter
-    or a TorqueController with clearances. period [s]: of the first step. Raises ValueError on wrong shapes,
-    what is not finite, and a period that is not positive.
+    or a TorqueController with clearances. Raises ValueError on wrong shapes and what is not finite.
     """
 
-    def __init__(self, robot: Robot, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, refuge: numpy.typing.ArrayLike, *, period: float = 0.001) -> None: ...
+    def __init__(self, robot: Robot, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, refuge: numpy.typing.ArrayLike) -> None: ...
 
-    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    def __copy__(self) -> Flight: ...
+
+    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, period: float) -> numpy.typing.NDArray[numpy.float64]:
         """
-        a* + w^2 (q* - q) + 2 w (v* - v) (nv,) [/s^2], w = 10 /s, for this step.
+        a* + w^2 (q* - q) + 2 w (v* - v) (nv,) [/s^2], w = 10 /s, for a step of `period` [s].
         """
 
     def advance(self, period: float) -> None:
-        """
-        Moves the reference on by the step that was said last; the next one is of `period` [s].
-        """
+        """Moves the reference on by `period` [s]."""
 
     @property
     def refuge(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -892,18 +891,18 @@ class Evasion:
     the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
     on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
     for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal
-    is free. One thread at a time. period [s]: of the steps looked at; delay [s]: from one look to the next, from when on is followed
+    is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole times; delay [s]: from one look to the next, from when on is followed
     what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has
     no clearances to obstacles.
     """
 
     def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 100, seed: int = 0) -> None: ...
 
-    def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles) -> Flight | None:
+    def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: Flight | None = None) -> Flight | None:
         """
-        What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,) and obstacles are of now;
-        looks follow each other by `delay`. Takes as long as some thousand steps, so not for the thread of a loop; other
-        threads run meanwhile. The flight is advanced by who follows it.
+        What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,), obstacles and the flight
+        that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the thread of a
+        loop; other threads run meanwhile. The flight is advanced by who follows it.
         """
 
     def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> Flight | None:
@@ -911,6 +910,9 @@ class Evasion:
         The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every
         `delay`, and follows what the look before found, as if another thread had looked meanwhile.
         """
+
+    def reset(self) -> None:
+        """Before another motion is pursued: what was found is forgotten."""
 
     @property
     def count(self) -> int:

@@ -83,20 +83,33 @@ def test_a_motion_in_parts_is_the_same(system, robot):
     assert evasion.count > 0
 
 
-def test_what_a_look_finds_is_followed_one_look_later(system, robot):
+def test_what_a_look_finds_is_followed_one_look_later_and_without_jumps(system, robot):
     evasion, at_rest = ss.Evasion(system, delay=0.1, seed=1), np.zeros(2)
     flights = [
-        evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD) for k in range(100)
+        evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD) for k in range(200)
     ]
     assert flights[:50] == [None] * 50
     first = flights[50]
     assert np.all((first.refuge >= robot.limits.lower) & (first.refuge <= robot.limits.upper))
     np.testing.assert_allclose(first.position, GOAL, atol=2e-3)  # nothing draws the arm away before
-    expected = ss.Flight(robot, first.position, first.velocity, first.refuge, period=0.01)
-    for flight in flights[51:]:
-        expected.advance(PERIOD)
-        np.testing.assert_array_equal(flight.position, expected.position)
+    expected = ss.Flight(robot, first.position, first.velocity, first.refuge)
+    for k, flight in enumerate(flights[51:], start=51):
         np.testing.assert_array_equal(flight.refuge, first.refuge)
+        expected.advance(PERIOD)
+        # A kept flight goes on as the look foresaw it, in steps of 0.01 s: off by less than one of these.
+        tolerance = 0.0 if k < 100 else 0.9 * robot.limits.acceleration.max() * 0.01
+        np.testing.assert_allclose(flight.velocity, expected.velocity, rtol=0.0, atol=tolerance)
+        np.testing.assert_allclose(flight.position, expected.position, rtol=0.0, atol=tolerance * 0.1)
+
+
+def test_what_was_found_is_forgotten_for_another_motion(system):
+    evasion, at_rest = ss.Evasion(system, seed=1), np.zeros(2)
+    for k in range(60):
+        found = evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD)
+    assert found is not None
+    evasion.reset()
+    for _ in range(60):
+        assert evasion.pursue(-GOAL, -GOAL, at_rest, ball(), PERIOD) is None
 
 
 def test_a_look_says_what_to_follow(system):
@@ -104,19 +117,49 @@ def test_a_look_says_what_to_follow(system):
     found = evasion.look(GOAL, GOAL, at_rest, ball())
     assert evasion.count == 1
     ahead = ball(CENTRE + 0.1 * SPEED)
-    kept = evasion.look(GOAL, GOAL, at_rest, ahead)  # still good
+    kept = evasion.look(GOAL, GOAL, at_rest, ahead, found)  # still good
     np.testing.assert_array_equal(kept.refuge, found.refuge)
     for _ in range(10):
         found.advance(0.01)
     np.testing.assert_array_equal(kept.position, found.position)
     assert evasion.count == 1
     gone = ball(centre=CENTRE + 4.0 * SPEED)
-    assert evasion.look(GOAL, GOAL, at_rest, gone) is None
-    assert evasion.look(GOAL, GOAL, at_rest, ball()) is not None
+    assert evasion.look(GOAL, GOAL, at_rest, gone, kept) is None
     assert evasion.look(GOAL, GOAL * np.nan, at_rest, ball()) is None
 
 
-def test_an_arm_that_can_only_brake_is_taken_to_stay(system):
+def test_steps_are_made_to_go_into_the_delay(system):
+    evasion, at_rest = ss.Evasion(system, delay=0.1, period=0.04, seed=1), np.zeros(2)
+    found = evasion.look(GOAL, GOAL, at_rest, ball())
+    kept = evasion.look(GOAL, GOAL, at_rest, ball(CENTRE + 0.1 * SPEED), found)
+    for _ in range(3):
+        found.advance(0.1 / 3.0)
+    np.testing.assert_allclose(kept.position, found.position, rtol=1e-12)
+
+
+def test_a_flight_minds_obstacles_also_where_the_goal_is_none(system, robot):
+    """Outside the limits: the system falls back, and the arm is hit where it brakes, unless it flies."""
+    guard, beyond = ss.AccelerationFilter(robot, period=PERIOD), np.array([-4.0, 0.0])
+    clearances = {}
+    for name, evasion in (("hit", None), ("flown", ss.Evasion(system, seed=1))):
+        motion = ss.rollout(
+            system,
+            GOAL,
+            np.zeros(2),
+            beyond,
+            ball(),
+            period=PERIOD,
+            steps=2000,
+            filter=guard,
+            evasion=evasion,
+        )
+        clearances[name] = exact_clearance(robot, motion)
+        flown = np.array([status == ss.StepStatus.ok for status in motion.statuses])
+        assert flown.any() == (name == "flown")
+    assert clearances["hit"] < 0.0 < clearances["flown"]
+
+
+def test_an_arm_that_can_only_brake_is_taken_to_do_so(system):
     at_rest = np.zeros(2)
     beyond = ss.JointGoal(np.array([-4.0, 0.0]))  # outside the limits
     leaving = ss.JointGoal(GOAL, np.array([-1.0, 0.0]))  # a goal that moves out of them
@@ -135,7 +178,7 @@ def test_flights_of_joints_without_limits_are_finite():
     for k in range(5):
         found = evasion.look(GOAL, GOAL, np.zeros(2), ball(CENTRE + 0.1 * k * SPEED))
         assert np.isfinite(found.refuge).all()
-        assert np.isfinite(found.acceleration(GOAL, np.zeros(2))).all()
+        assert np.isfinite(found.acceleration(GOAL, np.zeros(2), PERIOD)).all()
     assert evasion.count > 0
 
 
@@ -150,6 +193,7 @@ def test_flights_of_joints_without_limits_are_finite():
         ({"delay": 3.0}, "evasion: delay is 3.0*, must be no longer than the horizon"),
         ({"period": 0.2}, "evasion: period is 0.20*, must be no longer than the delay"),
         ({"period": 1e-9}, "evasion: horizon is 2.0*, must be at most 100,000 periods"),
+        ({"horizon": 6e3, "period": 0.1}, "evasion: horizon is 6000.0*, must be at most .* 5,000 s"),
     ],
 )
 def test_settings_are_checked(system, change, message):
@@ -182,5 +226,8 @@ def test_what_does_not_go_together_is_named(system):
     for period in (0.0, np.nan):
         with pytest.raises(ValueError, match=f"period is {period}.*, must be positive and finite"):
             evasion.pursue(GOAL, GOAL, GOAL, ss.Obstacles.none(), period)
+    foreign = ss.Flight(other, q, q, q)
+    with pytest.raises(ValueError, match="the flight is for 3 coordinates, the system has 2"):
+        evasion.look(GOAL, GOAL, GOAL, ss.Obstacles.none(), foreign)
     with pytest.raises(ValueError, match=r"q has shape \(3,\), expected \(2,\)"):
         evasion.look(GOAL, q, GOAL, ss.Obstacles.none())

@@ -1,5 +1,7 @@
 """Flight: to rest at a configuration, each joint as fast as its limits allow."""
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -28,7 +30,7 @@ def references(flight, period, duration):
 
 @pytest.mark.parametrize("period", [0.001, 0.01, 0.05])
 def test_it_is_as_quick_as_nine_tenths_of_the_limits_allow(robot, period):
-    rows = references(ss.Flight(robot, START, AT_REST, START + WAY, period=period), period, 4.0)
+    rows = references(ss.Flight(robot, START, AT_REST, START + WAY), period, 4.0)
     fastest, hardest = 0.9 * robot.limits.velocity, 0.9 * robot.limits.acceleration
     q, v = rows[:, 0], rows[:, 1]
     assert np.all(np.abs(v) <= fastest + 1e-9)
@@ -54,15 +56,38 @@ def test_a_joint_that_is_too_fast_to_stop_in_time_comes_back(robot):
 def test_an_arm_follows_it_and_comes_back_to_it(robot):
     flight = ss.Flight(robot, START, AT_REST, START + 1.0)
     q, v = START.copy(), AT_REST.copy()
-    np.testing.assert_allclose(flight.acceleration(q, v), 0.9 * robot.limits.acceleration)
-    pull = flight.acceleration(q + 0.01 * np.eye(7)[0], v + 0.1 * np.eye(7)[1]) - flight.acceleration(q, v)
+    np.testing.assert_allclose(flight.acceleration(q, v, 0.001), 0.9 * robot.limits.acceleration)
+    pull = flight.acceleration(q + 0.01 * np.eye(7)[0], v + 0.1 * np.eye(7)[1], 0.001) - flight.acceleration(
+        q, v, 0.001
+    )
     np.testing.assert_allclose(pull, [-1.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-12)
     q += 0.05  # put aside
     for _ in range(4000):
-        v = v + 0.001 * flight.acceleration(q, v)
+        v = v + 0.001 * flight.acceleration(q, v, 0.001)
         q = q + 0.001 * v
         flight.advance(0.001)
     np.testing.assert_allclose(q, START + 1.0, atol=1e-4)
+
+
+def test_steps_may_be_of_any_length(robot):
+    one, many = (ss.Flight(robot, START, 0.1 * WAY, START + WAY) for _ in range(2))
+    one.advance(0.01)
+    for _ in range(10):
+        many.advance(0.001)
+    hardest = 0.9 * robot.limits.acceleration
+    assert np.all(np.abs(one.velocity - 0.1 * WAY) <= 0.01 * hardest + 1e-12)
+    assert np.all(np.abs(many.velocity - one.velocity) <= 0.01 * hardest)
+    assert np.all(np.abs(many.position - one.position) <= 0.01**2 * hardest)
+    copied = copy.copy(one)
+    copied.advance(0.01)
+    assert np.any(copied.position != one.position)
+
+
+def test_what_has_no_limits_is_flown_at_a_finite_acceleration():
+    free = ss.Robot.from_urdf(ss.planar_arm(1), acceleration_limits=np.inf)
+    assert np.isinf(free.limits.acceleration).all()
+    flight = ss.Flight(free, np.zeros(1), np.zeros(1), np.ones(1))
+    np.testing.assert_allclose(flight.acceleration(np.zeros(1), np.zeros(1), 0.001), 90.0)
 
 
 def test_bad_input_is_named(robot):
@@ -72,6 +97,6 @@ def test_bad_input_is_named(robot):
         ss.Flight(robot, START * np.nan, START, START)
     for period in (0.0, np.nan):
         with pytest.raises(ValueError, match=r"period is .* s, must be positive and finite"):
-            ss.Flight(robot, START, START, START, period=period)
+            ss.Flight(robot, START, START, START).acceleration(START, START, period)
         with pytest.raises(ValueError, match=r"period is .* s, must be positive and finite"):
             ss.Flight(robot, START, START, START).advance(period)

@@ -51,6 +51,7 @@ def test_it_says_what_the_looks_find_and_never_waits() -> None:
         if k > 0:
             flight.advance(0.002)
         np.testing.assert_array_equal(followed.refuge, flight.refuge)
+    assert found[-1] is not None
     np.testing.assert_array_equal(found[-1].position, flight.position)
     ball = ss.Obstacles.none()
     gone = [follow() for _ in range(100)]

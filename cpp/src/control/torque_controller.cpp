@@ -311,8 +311,15 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
     farthest = std::max(farthest, std::abs(wanted_[i] - nearest));
     steepest = std::max(steepest, tracking_weight_[i] * (1.0 + std::abs(wanted_[i] - nearest)));
   }
-  const double price = settings_.slack_weight * steepest;
-  const double row_price = settings_.hard_bounds ? price : settings_.safety_weight * price;  // where no bound competes
+  double row_weight = settings_.safety_weight;
+  if (settings_.hard_bounds) {  // no other price to be above, but bounds that may be far from what is wanted
+    row_weight = 1.0;
+    for (int k = 0; k < rows_.size(); ++k) {
+      const double shortfall = rows_.lower[k] - rows_.normals.row(k).dot(wanted_.transpose());
+      steepest = std::max(steepest, tracking_weight_.maxCoeff() * (1.0 + shortfall));
+    }
+  }
+  const double price = settings_.slack_weight * steepest, row_price = row_weight * price;
   data.H.topLeftCorner(nv_, nv_) = hard_data_.H;
   data.H.diagonal().segment(nv_, nv_) = tracking_weight_;
   data.H.diagonal().tail(relaxed.num_rows).setConstant(tracking_weight_.maxCoeff());

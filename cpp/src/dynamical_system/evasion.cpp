@@ -12,9 +12,10 @@
 namespace sidestep {
 namespace {
 
-// How far each joint of a refuge may be from the arm's [rad | m], in turn; every other one from that of the flight found.
-constexpr std::array<double, 3> spreads{0.8, 1.7, 3.1};
-constexpr double spread_of_found = 0.5;
+// How far each joint of a refuge may be from the arm's [rad | m], in turn; while a flight is followed, of every other one
+// from its refuge.
+constexpr std::array<double, 3> spreads{0.8, 2.2, 6.3};
+constexpr double spread_of_followed = 0.5;
 constexpr double reference_period = 0.05;  // [s] between the configurations of a reference that are looked at
 constexpr std::size_t num_motions = 8;     // flights that are integrated in one look, at most
 
@@ -31,6 +32,7 @@ const EvasionSettings& validated(const EvasionSettings& settings) {
 }
 
 constexpr double most_periods = 1e5;
+constexpr double rounding = 1e-6;
 
 int whole_periods(double duration, double period) noexcept {
   return std::max(1, static_cast<int>(std::lround(duration / period)));
@@ -53,7 +55,8 @@ void EvasionSettings::validate() const {
   finite(delay, "evasion: delay");
   require(delay <= horizon, "evasion: delay", delay, "no longer than the horizon");
   require(period <= delay, "evasion: period", period, "no longer than the delay");
-  require(horizon <= most_periods * period, "evasion: horizon", horizon, "at most 100,000 periods");
+  require(horizon <= most_periods * std::min(period, reference_period), "evasion: horizon", horizon,
+          "at most 100,000 periods and 5,000 s");
   require(std::isfinite(clearance), "evasion: clearance", clearance, "finite");
   require(tries >= 1, "evasion: tries", tries, ">= 1");
 }
@@ -62,7 +65,9 @@ Evasion::Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings 
     : system_(std::move(system)),
       settings_(validated(settings)),
       workspace_(checked(system_)),
-      filter_(system_->robot(), filter_settings(settings.period)),
+      periods_(static_cast<int>(std::ceil(settings.delay / settings.period - rounding))),
+      period_(settings.delay / periods_),
+      filter_(system_->robot(), filter_settings(period_)),
       filtered_(num_coordinates()),
       random_(settings.seed) {
   for (std::size_t k = 0; k < system_->labels().size(); ++k) {
@@ -75,42 +80,41 @@ Evasion::Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings 
   }
 }
 
-const std::optional<Flight>& Evasion::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                                           const Obstacles& obstacles) {
+std::optional<Flight> Evasion::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                    const Obstacles& obstacles, const std::optional<Flight>& followed) {
   const auto usable = [this](const Eigen::VectorXd& x) { return x.size() == num_coordinates() && x.allFinite(); };
   if (!obstacles.tree().moves() || !usable(q) || !usable(v)) {
-    found_.reset();
-    return found_;
+    return std::nullopt;
   }
-  // Until then what was found before is followed.
-  Motion now{q, v, obstacles, goal, found_};
-  for (int k = 0; k < whole_periods(settings_.delay, settings_.period); ++k) {
+  Motion now{q, v, obstacles, goal, followed};
+  for (int k = 0; k < periods_; ++k) {
     advance(now);
   }
+  std::optional<Flight> best_flight = std::exchange(now.flight, std::nullopt);
   const auto is_free = [this](double clearance) { return clearance >= settings_.clearance; };
-  found_ = std::exchange(now.flight, std::nullopt);
-  double best = least_clearance(now, -infinity);
+  const auto clearance_of = [&](const std::optional<Flight>& flight, double enough) {
+    return least_clearance({now.q, now.v, now.obstacles, now.goal, flight}, enough);
+  };
+  double best = clearance_of(std::nullopt, -infinity);
   if (is_free(best)) {
-    found_.reset();
-    return found_;
+    return std::nullopt;
   }
-  if (found_) {
-    const double kept = least_clearance({now.q, now.v, now.obstacles, now.goal, found_}, best);
-    if (kept > best) {
-      best = kept;
-    } else {
-      found_.reset();
+  if (best_flight) {
+    const double kept = clearance_of(best_flight, best);
+    if (!(kept > best)) {
+      best_flight.reset();
     }
+    best = std::max(best, kept);
   }
   if (is_free(best)) {
-    return found_;
+    return best_flight;
   }
   bool found = false;
-  for (const Tried& tried : promising(now)) {
-    const double clearance = least_clearance({now.q, now.v, now.obstacles, now.goal, tried.flight}, best);
+  for (const Tried& tried : promising(now, best_flight)) {
+    const double clearance = clearance_of(tried.flight, best);
     if (clearance > best) {
       best = clearance;
-      found_ = tried.flight;
+      best_flight = tried.flight;
       found = true;
     }
     if (is_free(best)) {
@@ -118,7 +122,7 @@ const std::optional<Flight>& Evasion::look(const Goal& goal, const Eigen::Vector
     }
   }
   count_ += found;
-  return found_;
+  return best_flight;
 }
 
 const Flight* Evasion::pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
@@ -126,14 +130,20 @@ const Flight* Evasion::pursue(const Goal& goal, const Eigen::VectorXd& q, const 
   // Less than half a period too early, so that sums of periods may be rounded. Written so that a period that is not a
   // number makes it look.
   if (!(until_look_ > 0.5 * period)) {
-    until_look_ = settings_.delay;
+    until_look_ = std::max(until_look_ + settings_.delay, 0.0);
     pursued_ = found_;
-    look(goal, q, v, obstacles);
+    found_ = look(goal, q, v, obstacles, pursued_);
   } else if (pursued_) {
     pursued_->advance(period);
   }
   until_look_ -= period;
   return pursued_ ? &*pursued_ : nullptr;
+}
+
+void Evasion::reset() noexcept {
+  found_.reset();
+  pursued_.reset();
+  until_look_ = 0.0;
 }
 
 double Evasion::obstacle_clearance() const noexcept {
@@ -145,40 +155,43 @@ double Evasion::obstacle_clearance() const noexcept {
 }
 
 double Evasion::advance(Motion& motion) {
-  StepStatus status = system_->acceleration(motion.q, motion.v, motion.goal, motion.obstacles, workspace_);
-  if (is_fallback(status)) {  // it brakes, and stays
+  const auto step = [&](const Goal& goal) {
+    return system_->acceleration(motion.q, motion.v, goal, motion.obstacles, workspace_);
+  };
+  StepStatus status = motion.flight ? step(JointGoal(motion.flight->refuge())) : step(motion.goal);
+  Eigen::VectorXd wanted = workspace_.acceleration;
+  const bool brakes = is_fallback(status);  // without clearances, as a loop then does
+  if (brakes) {
     const JointLimits& limits = system_->robot().limits();
-    motion.goal = JointGoal(motion.q.cwiseMax(limits.lower).cwiseMin(limits.upper));
-    status = system_->acceleration(motion.q, motion.v, motion.goal, motion.obstacles, workspace_);
+    status = step(JointGoal(motion.q.cwiseMax(limits.lower).cwiseMin(limits.upper)));
+  } else if (motion.flight) {
+    wanted = motion.flight->acceleration(motion.q, motion.v, period_);
+    motion.flight->advance(period_);
   }
-  const bool known = !is_fallback(status);
-  const double clearance = known ? obstacle_clearance() : -infinity;
-  if (motion.flight) {
-    workspace_.acceleration = motion.flight->acceleration(motion.q, motion.v);
-    motion.flight->advance(settings_.period);
-  }
-  const Clearances* clearances = known ? &workspace_.clearances : nullptr;
-  static_cast<void>(filter_.apply(motion.q, motion.v, workspace_.acceleration, clearances, filtered_));
-  motion.v += settings_.period * filtered_.acceleration;
-  motion.q += settings_.period * motion.v;
-  motion.obstacles.advance(settings_.period);
-  sidestep::advance(motion.goal, settings_.period);
+  const double clearance = is_fallback(status) ? -infinity : obstacle_clearance();
+  const Clearances* clearances = brakes ? nullptr : &workspace_.clearances;
+  static_cast<void>(filter_.apply(motion.q, motion.v, wanted, clearances, filtered_));
+  motion.v += period_ * filtered_.acceleration;
+  motion.q += period_ * motion.v;
+  motion.obstacles.advance(period_);
+  sidestep::advance(motion.goal, period_);
   return clearance;
 }
 
 double Evasion::least_clearance(Motion motion, double enough) {
   double least = infinity;
-  for (int k = 0; k < whole_periods(settings_.horizon, settings_.period) && least > enough; ++k) {
+  for (int k = 0; k < whole_periods(settings_.horizon, period_) && least > enough; ++k) {
     least = std::min(least, advance(motion));
   }
   return least;
 }
 
 double Evasion::reference_clearance(Flight flight, Obstacles obstacles, double enough) {
+  const JointLimits& limits = system_->robot().limits();
   const Eigen::VectorXd at_rest = Eigen::VectorXd::Zero(num_coordinates());
   double least = infinity;
   for (int k = 0; k < whole_periods(settings_.horizon, reference_period) && least > enough; ++k) {
-    const JointGoal here(flight.position());
+    const JointGoal here(flight.position().cwiseMax(limits.lower).cwiseMin(limits.upper));
     const StepStatus status = system_->acceleration(here.position, at_rest, here, obstacles, workspace_);
     least = is_fallback(status) ? -infinity : std::min(least, obstacle_clearance());
     flight.advance(reference_period);
@@ -187,11 +200,13 @@ double Evasion::reference_clearance(Flight flight, Obstacles obstacles, double e
   return least;
 }
 
-std::vector<Evasion::Tried> Evasion::promising(const Motion& now) {
-  const JointLimits& limits = system_->robot().limits();
+std::vector<Evasion::Tried> Evasion::promising(const Motion& now, const std::optional<Flight>& followed) {
   std::vector<Tried> best;
   for (int number = 0; number < settings_.tries; ++number) {
-    const Flight flight(limits, now.q, now.v, draw(now.q, number), settings_.period);
+    const double spread = spreads[static_cast<std::size_t>(number / 2) % spreads.size()];
+    Eigen::VectorXd refuge =
+        number % 2 == 1 && followed ? draw(followed->refuge(), spread_of_followed) : draw(now.q, spread);
+    const Flight flight(system_->robot().limits(), now.q, now.v, std::move(refuge));
     const bool full = best.size() == num_motions;
     const double clearance = reference_clearance(flight, now.obstacles, full ? best.back().clearance : -infinity);
     if (full && !(clearance > best.back().clearance)) {
@@ -207,15 +222,10 @@ std::vector<Evasion::Tried> Evasion::promising(const Motion& now) {
   return best;
 }
 
-Eigen::VectorXd Evasion::draw(const Eigen::VectorXd& q, int number) {
+Eigen::VectorXd Evasion::draw(const Eigen::VectorXd& q, double spread) {
   const JointLimits& limits = system_->robot().limits();
   Eigen::VectorXd refuge(num_coordinates());
-  if (number % 2 == 1 && found_) {
-    random_configuration(random_, limits.lower, limits.upper, found_->refuge(), spread_of_found, refuge);
-  } else {
-    const double spread = spreads[static_cast<std::size_t>(number / 2) % spreads.size()];
-    random_configuration(random_, limits.lower, limits.upper, q, spread, refuge);
-  }
+  random_configuration(random_, limits.lower, limits.upper, q, spread, refuge);
   return refuge;
 }
 

@@ -117,20 +117,25 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
   const Flight* flight = nullptr;
+  Goal refuge = goal;  // of the flight
   const Goal* followed = &goal;
   for (Eigen::Index k = 0; k < rows; ++k) {
     const bool known = k > 0 && flight == nullptr;  // how far the goal itself was, as seen from a way to it
     const bool leads = k < settings.steps;          // the last row is the first of the rollout that goes on from here
     if (leads && settings.evasion != nullptr) {
       flight = settings.evasion->pursue(goal, q, v, obstacles, dt);
+      followed = &goal;
+      if (flight != nullptr) {
+        refuge = JointGoal(flight->refuge());
+        followed = &refuge;
+      }
     }
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
-    if (leads && settings.escape != nullptr) {
-      followed = flight == nullptr ? &settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt)
-                                   : &goal;
+    if (leads && settings.escape != nullptr && flight == nullptr) {
+      followed = &settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt);
     }
     const StepStatus status = system.acceleration(q, v, *followed, obstacles, w);
-    Eigen::VectorXd a = flight == nullptr ? w.acceleration : flight->acceleration(q, v);
+    Eigen::VectorXd a = flight == nullptr ? w.acceleration : flight->acceleration(q, v, dt);
     if (filter) {
       // After a fallback the workspace holds no clearances of this state.
       const Clearances* clearances = is_fallback(status) ? nullptr : &w.clearances;

@@ -98,6 +98,38 @@ BOOST_AUTO_TEST_CASE(comfort_gives_way_before_clearances) {
   BOOST_TEST(solution.safety[0].slack == 0.5 * (asked - 10.0), boost::test_tools::tolerance(1e-9));
 }
 
+BOOST_AUTO_TEST_CASE(a_clearance_that_can_be_kept_is_kept_beside_one_that_cannot) {
+  // Joint 2 cannot give what its clearance asks for; joint 0 can, whatever the task wants: it may change by 2000 /s².
+  JointLimits limits = test::arm_limits(nv);
+  limits.acceleration[0] = limits.effort[0] = std::numeric_limits<double>::infinity();
+  limits.velocity[0] = 2.0;
+  TorqueControllerSettings settings;
+  settings.hard_bounds = true;
+  TorqueController controller(test::serial_arm(limits), settings);
+  TorqueSolution solution(nv);
+  Approach in;
+  in.v.setZero();
+  in.clearances.curvatures[1] = -9.0;
+  in.clearances.nearest[0] = 3;
+  in.clearances.values[0] = 0.010;
+  in.clearances.rates[0] = -0.1;
+  in.clearances.gradients(0, 0) = -0.5;
+  in.a[0] = 1900.0;
+  BOOST_TEST((in.solve(controller, solution) == TorqueStatus::relaxed_safety));
+  BOOST_TEST(solution.num_safety_rows == 2);
+  BOOST_TEST(solution.acceleration[2] == 10.0, boost::test_tools::tolerance(1e-9));
+  for (int k = 0; k < 2; ++k) {
+    const SafetyRow& row = solution.safety[static_cast<std::size_t>(k)];
+    if (row.coordinate == 0) {
+      BOOST_TEST(row.required > 0.0);
+      BOOST_TEST(row.slack == 0.0);
+      BOOST_TEST(solution.acceleration[0] == -2.0 * row.required, boost::test_tools::tolerance(1e-6));
+    } else {
+      BOOST_TEST(row.slack > 1.0);
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(torque_limits_stand_above_clearances) {
   TorqueController controller(test::serial_arm(test::arm_limits(nv)));
   TorqueSolution solution(nv);

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Escape, Evasion, Obstacles, PoseGoal
+from sidestep._core import Escape, Evasion, JointGoal, Obstacles, PoseGoal
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
 from sidestep.simulation.pose_aim import PoseAim
@@ -152,11 +152,13 @@ class Simulation:
             followed = goal.at(q) if isinstance(goal, PoseAim) else goal
             seen = see(time)
             flight = None if evasion is None else evasion.pursue(followed, q, v, seen, self.timestep)
-            if escape is not None and flight is None and not isinstance(followed, PoseGoal):
+            if flight is not None:
+                followed = JointGoal(flight.refuge)
+            elif escape is not None and not isinstance(followed, PoseGoal):
                 followed = escape.pursue(followed, q, potential, self.timestep)
             step = system.acceleration(q, v, followed, seen)
             potential = getattr(step, "goal_potential", potential)
-            wanted = step.acceleration if flight is None else flight.acceleration(q, v)
+            wanted = step.acceleration if flight is None else flight.acceleration(q, v, self.timestep)
             kept = {"clearances": step} if safe else {}
             solution = controller.solve(q, v, wanted, built.mass_matrix(data), built.bias(data), **kept)
             torque = np.asarray(solution.torque)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
@@ -37,6 +38,7 @@ class Lookout:
             return self.flight
         if self._look is not None:
             self.flight = self._look.result()
-        self._look = self._thread.submit(self._evasion.look, goal, q.copy(), v.copy(), obstacles)
+        now = goal, q.copy(), v.copy(), obstacles, copy.copy(self.flight)
+        self._look = self._thread.submit(self._evasion.look, *now)
         self._since = 0
         return self.flight

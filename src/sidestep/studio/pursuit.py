@@ -77,10 +77,12 @@ class Pursuit:
         """
         aim = self._goal(q)
         flight = None if self._lookout is None else self._lookout.follow(aim, q, v, obstacles)
-        goal = self._attractor(aim, q, obstacles) if flight is None else aim
+        goal = self._attractor(aim, q, obstacles) if flight is None else JointGoal(flight.refuge)
         step = self._moving_by(obstacles).acceleration(q, v, goal, obstacles)
         self._potential = step.goal_potential if flight is None else float("nan")
-        return step, np.asarray(step.acceleration if flight is None else flight.acceleration(q, v))
+        return step, np.asarray(
+            step.acceleration if flight is None else flight.acceleration(q, v, self._period)
+        )
 
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> Step:
         """The same to the goal alone, without time passing."""

@@ -90,8 +90,8 @@ def _step_code(snapshot: Snapshot) -> list[str]:
         if method.evades:
             lines += [
                 "# where something moves, every delay, in another thread:",
-                "# flight = evasion.look(goal, q, v, obstacles); it is followed from then on, if it is not None:",
-                "# flight.acceleration(q, v) in place of the step's, then flight.advance(period)",
+                "# flight = evasion.look(goal, q, v, obstacles, flight); from then on, if it is not None:",
+                "# flight.acceleration(q, v, period) in place of the step's, then flight.advance(period)",
             ]
         if method.covering:
             lines += [f"# among what is at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]

@@ -17,7 +17,7 @@ namespace sidestep {
 
 struct EvasionSettings {
   double horizon = 2.0;      ///< [s] how far is looked ahead
-  double period = 0.01;      ///< [s] of the steps of the motions looked at
+  double period = 0.01;      ///< [s] of the steps of the motions looked at; made shorter to go into `delay` whole times
   double delay = 0.1;        ///< [s] from one look to the next, from when on is followed what it found
   double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
   int tries = 100;           ///< configurations that are tried in one look, at most
@@ -33,7 +33,7 @@ struct EvasionSettings {
 /// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from where
 /// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal that comes
 /// nearer to an obstacle than `clearance`, and so does the flight that is followed already, flights to random
-/// configurations are tried: near ones, far ones and such as are near the best. First where their references lead, a
+/// configurations are tried: near ones, far ones and such as are near that of the flight followed. First where their references lead, a
 /// configuration every 0.05 s; of those that keep farthest away the motions are integrated, until one is found that keeps
 /// `clearance`. If none does, that is followed whose least clearance is largest. The goal is followed again as soon as its
 /// own way is free.
@@ -43,7 +43,7 @@ struct EvasionSettings {
 /// have to be there. A limit of the closing speed (SpeedRegulator) does not hold in it. Where nothing moves, nothing is
 /// looked at.
 ///
-/// Towards a goal that the system falls back from, such as one outside the limits, the arm is taken to stay where it is.
+/// Towards a goal that the system falls back from, such as one outside the limits, the arm is taken to brake, as it does.
 ///
 /// `look` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
 /// simulated time. One thread at a time.
@@ -53,16 +53,18 @@ class Evasion {
   /// which it names.
   explicit Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings settings = {});
 
-  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles; looks follow each other by `delay`.
-  /// What is to be followed from `delay` on: a flight, or the system to the goal where it is empty, as it is if nothing
-  /// moves or the state is unusable. Allocates.
-  const std::optional<Flight>& look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                                    const Obstacles& obstacles);
+  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the flight that is followed, if
+  /// there is one. What is to be followed from `delay` on: a flight, or the system to the goal where it is empty, as it is
+  /// if nothing moves or the state is unusable. Allocates.
+  std::optional<Flight> look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                             const Obstacles& obstacles, const std::optional<Flight>& followed = std::nullopt);
 
   /// The flight to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every `delay`,
   /// and follows what the look before found.
   const Flight* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
                        double period);
+  /// Before another motion is pursued: what was found is forgotten.
+  void reset() noexcept;
 
   /// How many flights were found.
   int count() const noexcept { return count_; }
@@ -90,12 +92,14 @@ class Evasion {
   double reference_clearance(Flight flight, Obstacles obstacles, double enough);
   double obstacle_clearance() const noexcept;
   /// The flights from a state whose references keep farthest away, best first.
-  std::vector<Tried> promising(const Motion& now);
-  Eigen::VectorXd draw(const Eigen::VectorXd& q, int number);
+  std::vector<Tried> promising(const Motion& now, const std::optional<Flight>& followed);
+  Eigen::VectorXd draw(const Eigen::VectorXd& q, double spread);
 
   std::shared_ptr<const GeometricSystem> system_;
   EvasionSettings settings_;
   GeometricSystem::Workspace workspace_;
+  int periods_;    // of a delay
+  double period_;  // delay / periods_ [s]
   AccelerationFilter filter_;
   TorqueSolution filtered_;
   std::vector<Eigen::Index> of_obstacles_;  // coordinates

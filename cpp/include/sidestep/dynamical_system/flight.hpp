@@ -12,33 +12,31 @@ namespace sidestep {
 /// which it still stops there with the deceleration A,
 ///     w²/2A + T w/2 + T (v + w)/2 <= distance left,    |w − v| <= A T,    w <= V
 /// (the first two terms are what a stop in whole periods takes at most: it ends at the refuge, not beyond), with A and V nine
-/// tenths of the joint's acceleration and velocity limit: what is left serves to follow it. It is followed with
-/// a* + ω² (q* − q) + 2ω (v* − v), q*, v*, a* the reference, ω = 10 /s.
+/// tenths of the joint's acceleration limit (90 /s² where there is none) and velocity limit: what is left serves to follow
+/// it. It is followed with a* + ω² (q* − q) + 2ω (v* − v), q*, v*, a* the reference, ω = 10 /s.
 ///
 /// Nothing here minds obstacles: the acceleration is for an AccelerationFilter or a TorqueController with clearances.
 class Flight {
  public:
-  /// From q at velocity v (nv) to `refuge` (nv); the first step is of `period` [s] > 0.
-  Flight(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd refuge,
-         double period);
+  /// From q at velocity v (nv) to `refuge` (nv).
+  Flight(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd refuge);
 
-  /// Moves the reference on by the step that was said last; the next one is of `period` [s].
+  /// The acceleration (nv) [/s²] that follows the reference from q, v for a period [s] > 0.
+  Eigen::VectorXd acceleration(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double period) const;
+
+  /// Moves the reference on by a period [s] > 0.
   void advance(double period) noexcept;
 
-  /// The acceleration (nv) [/s²] that follows the reference from q, v.
-  Eigen::VectorXd acceleration(const Eigen::VectorXd& q, const Eigen::VectorXd& v) const;
-
   const Eigen::VectorXd& refuge() const noexcept { return refuge_; }
-  /// The reference [rad | m, /s], at the beginning of the step.
+  /// The reference [rad | m, /s].
   const Eigen::VectorXd& position() const noexcept { return position_; }
   const Eigen::VectorXd& velocity() const noexcept { return velocity_; }
 
  private:
-  void plan(double period) noexcept;
+  double reference_acceleration(Eigen::Index joint, double period) const noexcept;
 
   Eigen::VectorXd fastest_, hardest_;  // V, A
-  Eigen::VectorXd refuge_, position_, velocity_, acceleration_;
-  double period_;
+  Eigen::VectorXd refuge_, position_, velocity_;
 };
 
 }  // namespace sidestep

@@ -30,7 +30,8 @@ struct RolloutSettings {
   /// Sub-goals where the motion is stuck; none if null. It keeps its state, so that a rollout can go on in a next one: the
   /// last row, which is the first of that one, follows what the row before it did.
   Escape* escape = nullptr;
-  /// Flights out of the way of what moves; none if null. While one is followed the escape is not asked. With a filter.
+  /// Flights out of the way of what moves on the way to the goal (not to a sub-goal); none if null. With a filter. While one
+  /// is followed, the escape is not asked, and the system's step is that towards its refuge.
   Evasion* evasion = nullptr;
 };
 
