@@ -311,15 +311,7 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
     farthest = std::max(farthest, std::abs(wanted_[i] - nearest));
     steepest = std::max(steepest, tracking_weight_[i] * (1.0 + std::abs(wanted_[i] - nearest)));
   }
-  double row_weight = settings_.safety_weight;
-  if (settings_.hard_bounds) {  // no other price to be above, but bounds that may be far from what is wanted
-    row_weight = 1.0;
-    for (int k = 0; k < rows_.size(); ++k) {
-      const double shortfall = rows_.lower[k] - rows_.normals.row(k).dot(wanted_.transpose());
-      steepest = std::max(steepest, tracking_weight_.maxCoeff() * (1.0 + shortfall));
-    }
-  }
-  const double price = settings_.slack_weight * steepest, row_price = row_weight * price;
+  const double price = settings_.slack_weight * steepest;
   data.H.topLeftCorner(nv_, nv_) = hard_data_.H;
   data.H.diagonal().segment(nv_, nv_) = tracking_weight_;
   data.H.diagonal().tail(relaxed.num_rows).setConstant(tracking_weight_.maxCoeff());
@@ -340,7 +332,7 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
   data.A.block(3 * nv_, 0, relaxed.num_rows, nv_).setZero();
   for (int n = 0; n < num_relaxed_rows_; ++n) {
     const int row = relaxed_rows_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
-    data.g[2 * nv_ + n] = row_price;
+    data.g[2 * nv_ + n] = settings_.safety_weight * price;
     if (row >= 0) {
       data.A.row(at).head(nv_) = rows_.normals.row(row);
       data.row_lower[at] = rows_.lower[row];

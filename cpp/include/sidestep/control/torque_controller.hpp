@@ -66,8 +66,7 @@ struct TorqueControllerSettings {
   Eigen::VectorXd torque_weight = Eigen::VectorXd::Constant(1, 1e-6);
   /// Price of leaving the acceleration bounds when they cannot be kept: that many times the steepest tracking cost [-].
   double slack_weight = 1e3;
-  /// Price of leaving a clearance or a position limit: that many times the price of the other bounds [-]. With
-  /// hard_bounds nothing else has a price, and that of a clearance is slack_weight times the steepest tracking cost.
+  /// Price of leaving a clearance or a position limit: that many times the price of the other bounds [-].
   double safety_weight = 1e3;
   /// What is kept of the clearances, where they are given.
   SafetySettings safety = {};
