@@ -32,13 +32,20 @@ class Passing:
         raise AssertionError("nobody looks")
 
 
-def judged(robot: Robot, through: list[float], *, safe: bool = True, motion: str = "moving") -> Outcome:
-    """The arm lies along x; the ball comes along y and is at `through` [m] after one second."""
+def judged(
+    robot: Robot, through: list[float], *, safe: bool = True, motion: str = "moving", there: float = 0.0
+) -> Outcome:
+    """The arm lies along x; the ball comes along y and is at `through` [m] after one second; present from `there` on."""
     velocity = np.array([0.0, 0.5, 0.0])
     resting = motion == "fixed"
     place = np.array(through) - (0.0 if resting else 1.0) * velocity
     ball = SceneObject.ball(
-        "ball", place, radius=0.05, motion=motion, velocity=np.zeros(3) if resting else velocity
+        "ball",
+        place,
+        radius=0.05,
+        motion=motion,
+        velocity=np.zeros(3) if resting else velocity,
+        present=(there, np.inf),
     )
     steps = round(2.0 / PERIOD)
     q = np.zeros((steps, robot.num_coordinates))
@@ -71,3 +78,10 @@ def test_only_collisions_of_safe_methods_with_what_moves_are_looked_into() -> No
     assert judged(robot, [0.9, 0.0, 0.0], motion="fixed").collision
     assert judged(robot, [0.9, 0.0, 0.0], motion="fixed").way_out is None
     assert judged(robot, [0.9, 0.0, 0.0], safe=False).way_out is None
+
+
+def test_nobody_gets_out_of_the_way_of_what_is_not_there_yet() -> None:
+    outcome = judged(Robot.named("planar3"), [0.9, 0.0, 0.0], there=0.95)  # then it is in the arm already
+    assert outcome.collision
+    assert outcome.way_out is not None
+    assert outcome.way_out.sentence == "none of 100 motions from up to 0.0 s before gets out of the way"

@@ -23,5 +23,5 @@ class Method(StrEnum):
 
     @property
     def evades(self) -> bool:
-        """Whether it takes sub-goals out of the way of what moves."""
+        """Whether it flies out of the way of what moves."""
         return self is Method.barrier

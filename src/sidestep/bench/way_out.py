@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ Array = npt.NDArray[np.float64]
 POSTURES = 2000  # random, of which one would have to be free
 AROUND = 1.0  # [s] before and after the deepest contact at which postures are looked at
 LOOK = 0.05  # [s] between the moments looked at
-DEPARTURES = (0.3, 1.0, 2.0)  # [s] before the first contact
+DEPARTURES = (0.3, 1.0, 2.0)  # [s] before the first contact, but not before what was touched is there
 TARGETS = 100  # random postures to go for from each
 AFTER = 1.0  # [s] after the deepest contact until which a motion has to stay free
 TOLERANCE = 1e-3  # [m] of the clearance of a motion
@@ -49,9 +50,9 @@ def find_way_out(
     """Looks for a way out of a collision, in two ways; both are searches by samples.
 
     First for a moment, within 1 s of the deepest contact, at which all of 2,000 random postures touch what was
-    touched: then there is none. Else for a motion from where the arm was 0.3, 1 or 2 s before it was touched to one of
-    100 random postures, each joint as fast as its velocity and acceleration limits allow, that touches nothing and
-    not itself until 1 s after the deepest contact.
+    touched: then there is none. Else for a motion from where the arm was 0.3, 1 or 2 s before it was touched, but not
+    before what was touched is there, to one of 100 random postures, each joint as fast as its velocity and acceleration
+    limits allow, that touches nothing and not itself until 1 s after the deepest contact.
 
     Args:
         problem, motion: that go together. touched: what was. deepest: when it was so deepest [s].
@@ -66,9 +67,10 @@ def find_way_out(
         pose = poses_over([touched], np.array([time]))[0]
         if all(alone.distance(q, pose).distance <= 0.0 for q in postures):
             return WayOut(False, f"no way out: all of {POSTURES} postures touch {name} at {time:.2f} s")
-    first = _first_contact(whole, motion, round(deepest / period), round(LOOK / period))
-    for before in DEPARTURES:
-        begin = max(0, first - round(before / period))
+    there = math.ceil(touched.present[0] / period)
+    first = max(there, _first_contact(whole, motion, round(deepest / period), round(LOOK / period)))
+    begins = sorted({max(there, first - round(before / period)) for before in DEPARTURES}, reverse=True)
+    for begin in begins:
         steps = round((deepest + AFTER) / period) - begin
         times: Array = period * np.arange(begin, begin + steps, dtype=np.float64)
         poses = poses_over(problem.objects, times)
@@ -76,10 +78,8 @@ def find_way_out(
             way = _fastest(robot, motion.q[begin], motion.v[begin], target, period, steps)
             if way is not None and _is_free(whole, self_collision, way, poses, round(LOOK / period)):
                 return WayOut(True, f"there was a way out {period * (first - begin):.1f} s before")
-    tried = len(DEPARTURES) * TARGETS
-    return WayOut(
-        False, f"none of {tried} motions from up to {DEPARTURES[-1]:.0f} s before gets out of the way"
-    )
+    tried, earliest = len(begins) * TARGETS, period * (first - begins[-1])
+    return WayOut(False, f"none of {tried} motions from up to {earliest:.1f} s before gets out of the way")
 
 
 def _first_contact(clearance: ExactClearance, motion: Motion, deepest: int, stride: int) -> int:
