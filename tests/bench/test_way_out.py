@@ -35,7 +35,7 @@ class Passing:
 def judged(
     robot: Robot, through: list[float], *, safe: bool = True, motion: str = "moving", there: float = 0.0
 ) -> Outcome:
-    """The arm lies along x; the ball comes along y and is at `through` [m] after one second; present from `there` on."""
+    """The arm lies along x; the ball comes along y, seen from `there` on, and is at `through` [m] after one second."""
     velocity = np.array([0.0, 0.5, 0.0])
     resting = motion == "fixed"
     place = np.array(through) - (0.0 if resting else 1.0) * velocity

@@ -166,6 +166,8 @@ double Evasion::advance(Motion& motion) {
     status = step(JointGoal(motion.q.cwiseMax(limits.lower).cwiseMin(limits.upper)));
   } else if (motion.flight) {
     wanted = motion.flight->acceleration(motion.q, motion.v, period_);
+  }
+  if (motion.flight) {
     motion.flight->advance(period_);
   }
   const double clearance = is_fallback(status) ? -infinity : obstacle_clearance();

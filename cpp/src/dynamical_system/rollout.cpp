@@ -135,7 +135,10 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
       followed = &settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt);
     }
     const StepStatus status = system.acceleration(q, v, *followed, obstacles, w);
-    Eigen::VectorXd a = flight == nullptr ? w.acceleration : flight->acceleration(q, v, dt);
+    Eigen::VectorXd a = w.acceleration;
+    if (flight != nullptr && !is_fallback(status)) {
+      a = flight->acceleration(q, v, dt);
+    }
     if (filter) {
       // After a fallback the workspace holds no clearances of this state.
       const Clearances* clearances = is_fallback(status) ? nullptr : &w.clearances;

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import AccelerationFilter, Escape, Evasion, GeometricSystem, rollout
+from sidestep._core import AccelerationFilter, Escape, Evasion, GeometricSystem, PoseGoal, rollout
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.pose_aim import PoseAim
@@ -72,20 +72,23 @@ def run_kinematically(
     }
     statuses: list[str] = []
     guard = AccelerationFilter(robot, period=timestep) if safe else None
+    if evasion is not None:
+        evasion.reset()
     done, arrived = 0, False
     while done < steps and not arrived:
         count = min(chunk, steps - done)
+        aim = goal.at(q) if isinstance(goal, PoseAim) else goal
         part = rollout(
             system,
             q,
             v,
-            goal.at(q) if isinstance(goal, PoseAim) else goal,
+            aim,
             see(done * timestep),
             period=timestep,
             steps=count,
             integrator=integrator,
             filter=guard,
-            escape=escape,
+            escape=None if isinstance(aim, PoseGoal) else escape,  # as under torque
             evasion=evasion,
         )
         if not (np.all(np.isfinite(part.q)) and np.all(np.isfinite(part.v))):

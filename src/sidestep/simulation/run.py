@@ -62,7 +62,7 @@ class Run:
         start, goal: (nv,). pose: that was to be reached, where `goal` is the configuration at the end.
         timestep: control period [s]; time: (T,) [s].
         q, v: (T, nv) state at the beginning of each step.
-        wanted: (T, nv) acceleration that the dynamical system asked for.
+        wanted: (T, nv) acceleration that the dynamical system asked for, or a flight (`Evasion`).
         achieved: (T, nv) change of v over the step divided by the period.
         switch: (T, num_switches); values: (T, m) embedding values psi.
         system_status: T names.

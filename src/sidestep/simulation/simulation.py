@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Escape, Evasion, JointGoal, Obstacles, PoseGoal
+from sidestep._core import Escape, Evasion, JointGoal, Obstacles, PoseGoal, is_fallback
 from sidestep.robot import Robot
 from sidestep.simulation.model import build_model
 from sidestep.simulation.pose_aim import PoseAim
@@ -127,6 +127,8 @@ class Simulation:
             raise ValueError(f"duration must be positive, got {duration}")
         if evasion is not None and not safe:
             raise ValueError("an evasion needs safe=True, which keeps its flights off obstacles")
+        if evasion is not None:
+            evasion.reset()
         start = self.robot.check_configuration(start, "start")
         if not isinstance(goal, PoseAim):
             goal = self.robot.check_configuration(goal, "goal")
@@ -158,7 +160,9 @@ class Simulation:
                 followed = escape.pursue(followed, q, potential, self.timestep)
             step = system.acceleration(q, v, followed, seen)
             potential = getattr(step, "goal_potential", potential)
-            wanted = step.acceleration if flight is None else flight.acceleration(q, v, self.timestep)
+            wanted = step.acceleration
+            if flight is not None and not is_fallback(step.status):
+                wanted = flight.acceleration(q, v, self.timestep)
             kept = {"clearances": step} if safe else {}
             solution = controller.solve(q, v, wanted, built.mass_matrix(data), built.bias(data), **kept)
             torque = np.asarray(solution.torque)

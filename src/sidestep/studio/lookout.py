@@ -29,16 +29,21 @@ class Lookout:
         self.flight: Flight | None = None
 
     def follow(self, goal: JointGoal | PoseGoal, q: Array, v: Array, obstacles: Obstacles) -> Flight | None:
-        """What to fly in this period, None where the way to the goal is free: never waits for a look."""
+        """What to fly in this period, None where the way to the goal is free: never waits for a look.
+
+        Raises what a look raised, once.
+        """
         self._since += 1
-        due = self._look is None or (self._since >= self._periods and self._look.done())
-        if not due:
+        if self.flight is not None:
+            self.flight.advance(self._period)
+        if self._look is not None and self._since >= self._periods and self._look.done():
+            look, self._look = self._look, None
+            self.flight = look.result()
             if self.flight is not None:
-                self.flight.advance(self._period)
-            return self.flight
-        if self._look is not None:
-            self.flight = self._look.result()
-        now = goal, q.copy(), v.copy(), obstacles, copy.copy(self.flight)
-        self._look = self._thread.submit(self._evasion.look, *now)
-        self._since = 0
+                for _ in range(self._since - self._periods):  # it came late
+                    self.flight.advance(self._period)
+        if self._look is None:
+            now = goal, q.copy(), v.copy(), obstacles, copy.copy(self.flight)
+            self._look = self._thread.submit(self._evasion.look, *now)
+            self._since = 0
         return self.flight

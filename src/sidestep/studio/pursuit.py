@@ -14,6 +14,7 @@ from sidestep._core import (
     Obstacles,
     PoseGoal,
     Step,
+    is_fallback,
 )
 from sidestep.body import Body
 from sidestep.robot import Robot
@@ -50,6 +51,15 @@ class Pursuit:
             guide_of(written.guide, robot, body, system, synchronous=False) if method.guided else None
         )
         self._time, self._says = 0.0, ""
+        self.forget()
+
+    def forget(self) -> None:
+        """The arm is suddenly elsewhere: what was found on its way is of no use."""
+        self._lookout: Lookout | None = None
+        if self._method.evades:
+            choice = self._written.evasion
+            evasion = evasion_of(choice, self.system)
+            self._lookout = Lookout(evasion, delay=choice.delay, period=self._period)
 
     def begin(self, pose: Array | None, posture: Posture) -> None:
         """Goes to a posture, or a pose (4, 4) by it; what was stuck before is so no longer."""
@@ -62,7 +72,6 @@ class Pursuit:
         if self._guide is not None:
             self._guide.set_goal(posture.q)
         self._escape = self._new_escape() if self._method.escapes else None
-        self._lookout = self._new_lookout() if self._method.evades else None
         self._arrived = False
         self.obstacles_changed()
 
@@ -75,14 +84,16 @@ class Pursuit:
 
         That is the step's, to the goal, a sub-goal, or along the guide's path; or that of a flight out of the way.
         """
-        aim = self._goal(q)
-        flight = None if self._lookout is None else self._lookout.follow(aim, q, v, obstacles)
+        aim, flight = self._goal(q), None
+        if self._lookout is not None:
+            moving = Obstacles.none() if self._relaxes(obstacles) else obstacles
+            flight = self._lookout.follow(aim, q, v, moving)
         goal = self._attractor(aim, q, obstacles) if flight is None else JointGoal(flight.refuge)
         step = self._moving_by(obstacles).acceleration(q, v, goal, obstacles)
         self._potential = step.goal_potential if flight is None else float("nan")
-        return step, np.asarray(
-            step.acceleration if flight is None else flight.acceleration(q, v, self._period)
-        )
+        if flight is None or is_fallback(step.status):
+            return step, np.asarray(step.acceleration)
+        return step, np.asarray(flight.acceleration(q, v, self._period))
 
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> Step:
         """The same to the goal alone, without time passing."""
@@ -117,10 +128,6 @@ class Pursuit:
 
     def _new_escape(self) -> Escape:
         return escape_of(self._written.escape, self._robot)
-
-    def _new_lookout(self) -> Lookout:
-        evasion = evasion_of(self._written.evasion, self.system)
-        return Lookout(evasion, delay=self._written.evasion.delay, period=self._period)
 
     def _goal(self, q: Array) -> JointGoal | PoseGoal:
         return self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim

@@ -297,6 +297,7 @@ class Session:
         self._recording = False  # time goes back: a recording is of one motion
         self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(*self._start)
+        self._pursuit.forget()
         self._pursuit.begin(self._pose, self._posture)
 
     def _set_goal(self, pose: Array | None, posture: Posture, *, written: bool = False) -> None:

@@ -89,14 +89,16 @@ def _step_code(snapshot: Snapshot) -> list[str]:
             ]
         if method.evades:
             lines += [
-                "# where something moves, every delay, in another thread:",
-                "# flight = evasion.look(goal, q, v, obstacles, flight); from then on, if it is not None:",
-                "# flight.acceleration(q, v, period) in place of the step's, then flight.advance(period)",
+                "# where something moves, every delay, in another thread, with a copy.copy of the flight:",
+                "# flight = evasion.look(goal, q, v, obstacles, flight); from then on, if it is not None,",
+                "# goal is flight.refuge, its flight.acceleration(q, v, period) takes the place of the step's,",
+                "# and flight.advance(period) follows",
             ]
         if method.covering:
             lines += [f"# among what is at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]
         lines += ["step = system.acceleration(q, v, goal, obstacles)"]
-    return [*lines, "# controller.solve(q, v, step.acceleration, mass_matrix, bias).torque"]
+    kept = ", clearances=step" if method.safe else ""
+    return [*lines, f"# controller.solve(q, v, step.acceleration, mass_matrix, bias{kept}).torque"]
 
 
 def _robot_code(robot: RobotChoice, scenario: Scenario) -> str:

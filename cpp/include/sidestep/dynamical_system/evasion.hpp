@@ -33,10 +33,10 @@ struct EvasionSettings {
 /// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from where
 /// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal that comes
 /// nearer to an obstacle than `clearance`, and so does the flight that is followed already, flights to random
-/// configurations are tried: near ones, far ones and such as are near that of the flight followed. First where their references lead, a
-/// configuration every 0.05 s; of those that keep farthest away the motions are integrated, until one is found that keeps
-/// `clearance`. If none does, that is followed whose least clearance is largest. The goal is followed again as soon as its
-/// own way is free.
+/// configurations are tried: near ones, far ones and such as are near that of the flight followed. First where their
+/// references lead, a configuration every 0.05 s; of those that keep farthest away the motions are integrated, until one
+/// is found that keeps `clearance`. If none does, that is followed whose least clearance is largest. The goal is followed
+/// again as soon as its own way is free.
 ///
 /// A flight is no motion of the system: its barriers would push it off its way, straight away from what comes. It goes
 /// where it was seen to go, kept off obstacles and itself, and within limits, by the filter or the torque controller, which
