@@ -6,6 +6,7 @@
 
 #include "dynamical_system.hpp"
 #include "module.hpp"
+#include "sidestep/control/real_time.hpp"
 #include "sidestep/dynamical_system/batch.hpp"
 
 namespace sidestep::python {
@@ -68,6 +69,53 @@ void bind_loop(nb::module_& m) {
           nb::arg("q"), nb::arg("v"), nb::arg("mass_matrix"), nb::arg("bias"),
           "One period at q (nv,) [rad | m] and v (nv,) [/s], with mass matrix (nv, nv) and bias (nv,) [Nm | N] there.\n"
           "Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.");
+
+  nb::class_<RealTimeRun>(
+      m, "RealTimeRun",
+      "Runs a Loop at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1 periods\n"
+      "after the start, and what is late is not left out. The arm is integrated with the acceleration that was commanded;\n"
+      "mass_matrix (nv, nv) and bias (nv,) stay as they are given. Until it has ended the loop is its alone, but for\n"
+      "`Loop.set_goal` and `Loop.set_obstacles`. period [s]; priority: ask for real-time scheduling. Raises ValueError on wrong\n"
+      "shapes, what is not finite, and settings at fault.")
+      .def(
+          "__init__",
+          [](RealTimeRun* self, Loop& loop, const ArrayLike& q, const ArrayLike& v, const ArrayLike& mass_matrix,
+             const ArrayLike& bias, double period, int steps, bool priority) {
+            const int nv = loop.system().robot().num_coordinates();
+            new (self) RealTimeRun(loop, {as_vector(q, "q", nv), as_vector(v, "v", nv)},
+                                   as_matrix(mass_matrix, "mass_matrix", nv, nv), as_vector(bias, "bias", nv),
+                                   {period, steps, priority});
+          },
+          nb::arg("loop"), nb::arg("q"), nb::arg("v"), nb::arg("mass_matrix"), nb::arg("bias"), nb::kw_only(),
+          nb::arg("period") = RealTimeSettings().period, nb::arg("steps") = RealTimeSettings().steps,
+          nb::arg("priority") = RealTimeSettings().priority, nb::keep_alive<1, 2>())
+      .def_prop_ro("running", &RealTimeRun::running, "Whether steps are left.")
+      .def(
+          "state",
+          [](RealTimeRun& self) {
+            const ArmState& now = self.state();
+            return nb::make_tuple(to_numpy(now.q), to_numpy(now.v));
+          },
+          nb::sig("def state(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"),
+          "q, v (nv,) before the next step; for one thread.")
+      .def(
+          "finish",
+          [](RealTimeRun& self) {
+            const RealTimeRecord* record = nullptr;
+            {
+              const nb::gil_scoped_release release;
+              record = &self.finish();
+            }
+            return *record;
+          },
+          "Waits for the end; the RealTimeRecord.");
+  nb::class_<RealTimeRecord>(m, "RealTimeRecord", "When the steps of a real-time run began and ended.")
+      .def_prop_ro("late", [](const RealTimeRecord& r) { return to_numpy(r.late); },
+                   "(T,) [s] from when a step was due to when it began.")
+      .def_prop_ro("taken", [](const RealTimeRecord& r) { return to_numpy(r.taken); },
+                   "(T,) [s] from when it began to when its torque was there.")
+      .def_ro("missed", &RealTimeRecord::missed, "Steps that ended after the next one was due.")
+      .def_ro("prioritised", &RealTimeRecord::prioritised, "Whether real-time scheduling was granted.");
 
   nb::class_<BatchEvaluation> batch(m, "BatchEvaluation", "One step at each of N states.");
   matrix_property(batch, "accelerations", &BatchEvaluation::accelerations, "(N, nv) [rad/s^2]");

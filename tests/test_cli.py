@@ -217,7 +217,8 @@ def test_help_imports_nothing_heavy() -> None:
 
 def test_a_run_without_report_imports_neither_matplotlib_nor_jsonschema() -> None:
     code = (
-        "import sys; sys.argv = ['sidestep', 'run', 'planar-one-obstacle', '--method', 'barrier', '--no-report', '-q']\n"
+        "import sys\n"
+        "sys.argv = ['sidestep', 'run', 'planar-one-obstacle', '--method', 'barrier', '--no-report', '-q']\n"
         "from sidestep.cli import main\n"
         "try: main()\n"
         "except SystemExit as exit: assert exit.code == 0\n"

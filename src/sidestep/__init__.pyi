@@ -33,6 +33,8 @@ from ._core import PlanStatus as PlanStatus
 from ._core import PoseGoal as PoseGoal
 from ._core import ProgressMonitor as ProgressMonitor
 from ._core import PullForm as PullForm
+from ._core import RealTimeRecord as RealTimeRecord
+from ._core import RealTimeRun as RealTimeRun
 from ._core import Recovery as Recovery
 from ._core import Rollout as Rollout
 from ._core import RouteSettings as RouteSettings

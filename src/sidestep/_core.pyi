@@ -1355,6 +1355,46 @@ class Loop:
         Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
         """
 
+class RealTimeRun:
+    """
+    Runs a Loop at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1 periods
+    after the start, and what is late is not left out. The arm is integrated with the acceleration that was commanded;
+    mass_matrix (nv, nv) and bias (nv,) stay as they are given. Until it has ended the loop is its alone, but for
+    `Loop.set_goal` and `Loop.set_obstacles`. period [s]; priority: ask for real-time scheduling. Raises ValueError on wrong
+    shapes, what is not finite, and settings at fault.
+    """
+
+    def __init__(self, loop: Loop, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, period: float = 0.001, steps: int = 10000, priority: bool = True) -> None: ...
+
+    @property
+    def running(self) -> bool:
+        """Whether steps are left."""
+
+    def state(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """q, v (nv,) before the next step; for one thread."""
+
+    def finish(self) -> RealTimeRecord:
+        """Waits for the end; the RealTimeRecord."""
+
+class RealTimeRecord:
+    """When the steps of a real-time run began and ended."""
+
+    @property
+    def late(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(T,) [s] from when a step was due to when it began."""
+
+    @property
+    def taken(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(T,) [s] from when it began to when its torque was there."""
+
+    @property
+    def missed(self) -> int:
+        """Steps that ended after the next one was due."""
+
+    @property
+    def prioritised(self) -> bool:
+        """Whether real-time scheduling was granted."""
+
 class BatchEvaluation:
     """One step at each of N states."""
 

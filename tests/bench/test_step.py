@@ -40,18 +40,18 @@ def test_arms_are_drawn_to_where_they_have_clearance() -> None:
     body = Body.cover(robot)
     system = barrier_system(robot, body)
     obstacles = Obstacles([[0.9, 0.2, 0.0], [0.5, -0.6, 0.0]], 0.1)
-    row = step_module._Row("row", robot, system, obstacles, len(body.links), None, False)
     rng = np.random.default_rng(0)
     for _ in range(20):
-        q = row._goal(rng)
-        assert row._clearance(q) >= step_module.CLEARANCE
+        q = step_module.clear_place(robot, system, obstacles, rng)
+        assert step_module.clearance_at(q, system, obstacles) >= step_module.CLEARANCE
     crowd = Obstacles(np.random.default_rng(1).uniform(-1.5, 1.5, (2000, 3)) * [1.0, 1.0, 0.05])
-    crowded = step_module._Row("row", robot, system, crowd, len(body.links), None, False)
     drawn = np.random.default_rng(2)
-    clearances = [crowded._clearance(robot.random_configuration(drawn)) for _ in range(step_module.TRIES)]
-    assert (
-        crowded._clearance(crowded._goal(np.random.default_rng(2))) == max(clearances) < step_module.CLEARANCE
-    )
+    clearances = [
+        step_module.clearance_at(robot.random_configuration(drawn), system, crowd)
+        for _ in range(step_module.TRIES)
+    ]
+    best = step_module.clear_place(robot, system, crowd, np.random.default_rng(2))
+    assert step_module.clearance_at(best, system, crowd) == max(clearances) < step_module.CLEARANCE
 
 
 def test_compares_row_by_row(document: dict[str, list[dict[str, object]]]) -> None:

@@ -22,6 +22,8 @@ from .problems import Workspace as Workspace
 from .reach import BenchResult as BenchResult
 from .reach import BenchSettings as BenchSettings
 from .reach import run_bench as run_bench
+from .real_time import RealTimeBenchSettings as RealTimeBenchSettings
+from .real_time import run_real_time_bench as run_real_time_bench
 from .scenes import SceneOutcome as SceneOutcome
 from .scenes import SceneResult as SceneResult
 from .scenes import SceneSettings as SceneSettings

@@ -166,21 +166,7 @@ class _Row:
         }
 
     def _goal(self, rng: np.random.Generator) -> Array:
-        """A random configuration with clearance, or the one of `TRIES` with the largest."""
-        best, most = self.robot.neutral, -np.inf
-        for _ in range(TRIES):
-            q = self.robot.random_configuration(rng)
-            clearance = self._clearance(q)
-            if clearance >= CLEARANCE:
-                return q
-            if clearance > most:
-                best, most = q, clearance
-        return best
-
-    def _clearance(self, q: Array) -> float:
-        """The smallest [m] of those with barriers, to the links themselves and joint limits too; inf without any."""
-        step = self.system.acceleration(q, np.zeros_like(q), q, self.obstacles)
-        return float(step.clearances.values.min(initial=np.inf))
+        return clear_place(self.robot, self.system, self.obstacles, rng)
 
     def _from_cpp(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
         moved = rollout(
@@ -206,6 +192,27 @@ class _Row:
             _ = step.acceleration
             seconds[k] = 1e-9 * (time.perf_counter_ns() - start)
         return _inside(self.robot, moved.q[-1]), seconds
+
+
+def clearance_at(q: Array, system: GeometricSystem, obstacles: Obstacles) -> float:
+    """The smallest [m] of those with barriers, to the links themselves and joint limits too; inf without any."""
+    step = system.acceleration(q, np.zeros_like(q), q, obstacles)
+    return float(step.clearances.values.min(initial=np.inf))
+
+
+def clear_place(
+    robot: Robot, system: GeometricSystem, obstacles: Obstacles, rng: np.random.Generator
+) -> Array:
+    """A random configuration with 3 cm of clearance, or the one of 30 with the largest."""
+    best, most = robot.neutral, -np.inf
+    for _ in range(TRIES):
+        q = robot.random_configuration(rng)
+        clearance = clearance_at(q, system, obstacles)
+        if clearance >= CLEARANCE:
+            return q
+        if clearance > most:
+            best, most = q, clearance
+    return best
 
 
 def _inside(robot: Robot, q: Array) -> Array:

@@ -1,4 +1,4 @@
-"""`sidestep bench step` and `sidestep bench compare`."""
+"""`sidestep bench step`, `sidestep bench compare` and `sidestep bench realtime`."""
 
 from __future__ import annotations
 
@@ -85,3 +85,55 @@ def compare(
             f"{row['ratio']:.2f}",
         )
     console(quiet=quiet).print(table)
+
+
+def realtime(
+    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    points: Annotated[int, typer.Option(min=1, help="Of the cloud of a table with objects.")] = 10_000,
+    seconds: Annotated[float, typer.Option(min=0.001, help="Of each row [s].")] = 60.0,
+    refresh: Annotated[float, typer.Option(min=0.001, help="Clouds per second.")] = 60.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of goals, points and guide.")] = 0,
+    json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """The whole loop, state in and torque out, at 1 kHz by the machine's clock: how late it is, and what it misses.
+
+    Alone, beside new clouds of points, and beside clouds and a guide that leads the goal. A step is late by the time
+    from when it is due to when it begins; it misses its deadline if it ends after the next one is due. Real-time
+    scheduling is used where the machine allows it. Exit code 0: misses are figures, not errors.
+    """
+    from rich import box
+    from rich.table import Table
+
+    from sidestep.bench import RealTimeBenchSettings, run_real_time_bench
+
+    settings = RealTimeBenchSettings(robot=robot, points=points, seconds=seconds, refresh=refresh, seed=seed)
+    terminal = console(quiet=quiet, to_stderr=json == "-")
+    with terminal.status("") as status:
+        document = run_real_time_bench(
+            settings, progress=lambda done, in_all, name: status.update(f"{done + 1} of {in_all}: {name}")
+        )
+    rows = document["results"]
+    scheduled = "real-time scheduling" if rows[0]["real_time_scheduling"] else "no real-time scheduling"
+    table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {scheduled}")
+    table.add_column("beside", no_wrap=True)
+    for name in ("steps", "missed", "us", "median", "p99", "p99.9", "max"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        for what, times in (("late", row["late_us"]), ("step", row["step_us"])):
+            first = (row["beside"], f"{row['steps']:,}", str(row["missed"])) if what == "late" else ("",) * 3
+            table.add_row(*first, what, *(f"{times[name]:.1f}" for name in ("median", "p99", "p99.9", "max")))
+    terminal.print(table)
+    histogram = Table(box=box.SIMPLE, pad_edge=False, title="steps by how late they began")
+    histogram.add_column("up to, us", justify="right")
+    for row in rows:
+        histogram.add_column(row["beside"], justify="right")
+    edges = [*(str(edge) for edge in rows[0]["late_histogram"]["edges_us"]), "more"]
+    for edge, *counts in zip(edges, *(row["late_histogram"]["counts"] for row in rows), strict=True):
+        histogram.add_row(edge, *(f"{count:,}" for count in counts))
+    terminal.print(histogram)
+    if json is not None:
+        write_json(document, json)

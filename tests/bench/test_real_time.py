@@ -1,0 +1,59 @@
+"""`sidestep bench realtime`."""
+
+import json
+
+import pytest
+
+from sidestep.bench import RealTimeBenchSettings, run_real_time_bench
+from sidestep.bench.real_time import BESIDE
+from sidestep.cli import main
+
+
+def test_every_row_is_of_what_was_asked_for():
+    told = []
+    document = run_real_time_bench(
+        RealTimeBenchSettings(robot="planar2", points=50, seconds=0.4, refresh=50.0),
+        progress=lambda *news: told.append(news),
+    )
+    assert [row["beside"] for row in document["results"]] == list(BESIDE)
+    assert [news[:2] for news in told] == [(0, 3), (1, 3), (2, 3)]
+    for row in document["results"]:
+        assert row["steps"] == sum(row["late_histogram"]["counts"]) == 400
+        assert 0 <= row["missed"] <= 400
+        assert 0.0 < row["step_us"]["median"] <= row["step_us"]["p99.9"] <= row["step_us"]["max"]
+        assert 0.0 < row["late_us"]["median"] <= row["late_us"]["max"]
+    clouds = [row["clouds"] for row in document["results"]]
+    assert clouds[0] == 0
+    assert all(2 <= count <= 25 for count in clouds[1:])  # 20, fewer on a busy machine
+
+
+def test_the_command_writes_the_same(capsys, monkeypatch):
+    monkeypatch.setattr(
+        "sys.argv",
+        [
+            "sidestep",
+            "bench",
+            "realtime",
+            "--robot",
+            "planar2",
+            "--points",
+            "20",
+            "--seconds",
+            "0.1",
+            "--json",
+            "-",
+        ],
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code in (0, None)
+    document = json.loads(capsys.readouterr().out)
+    assert document["benchmark"] == "realtime"
+    assert document["points"] == 20
+    assert [row["steps"] for row in document["results"]] == [100] * 3
+
+
+@pytest.mark.parametrize("name", ["points", "seconds", "refresh"])
+def test_what_is_not_positive_is_named(name):
+    with pytest.raises(ValueError, match=f"{name} is 0, must be positive and finite"):
+        RealTimeBenchSettings(**{name: 0})
