@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from PIL import Image
 
 from sidestep.report import write_report
+from sidestep.report.figures import psi_figure
 from sidestep.scenario import Scenario, ScenarioResult, run_scenario
 
 TEXT = """\
@@ -100,3 +102,24 @@ def test_the_page_needs_nothing_else(folder: Path, result: ScenarioResult) -> No
     assert "An &lt;arm&gt; &amp; a ball." in page
     assert result.sentence() in page
     assert "http" not in page.replace("http-equiv", "")
+
+
+def test_of_many_coordinates_the_largest_are_drawn(result: ScenarioResult) -> None:
+    rows, many = len(result.run.time), 40
+    values = np.zeros((rows, many))
+    values[:, 5::4] = np.linspace(0.0, 1.0, rows)[:, None] * np.arange(1.0, 10.0)  # nine of them
+    values[0, 7] = np.nan
+    barriers = replace(
+        result, run=replace(result.run, values=values), scenario=replace(result.scenario, method="barrier")
+    )
+    figure = psi_figure(barriers)
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        f"ψ{k + 1}" for k in range(9, 40, 4)
+    ]
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), values[:, 9])
+    assert axes.get_title() == "Embedding, the largest 8 of 40 coordinates"
+    assert "barriers" in axes.get_ylabel()
+    (plain,) = psi_figure(result).axes
+    assert (plain.get_title(), len(plain.lines)) == ("Embedding", result.run.values.shape[1])
+    assert "1/m³" in plain.get_ylabel()

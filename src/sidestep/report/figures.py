@@ -23,6 +23,7 @@ Array = npt.NDArray[np.float64]
 
 JOINT_STYLES = ("-", "--", "-.", ":")
 DPI = 120
+MOST_COORDINATES = 8  # of an embedding that are drawn: more names than that have no room
 LIMIT_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": (0, (1, 1)), "linewidth": 1.2}
 
 
@@ -123,11 +124,22 @@ def switch_figure(result: ScenarioResult) -> Figure | None:
 
 
 def psi_figure(result: ScenarioResult) -> Figure:
-    """Embedding coordinates over time."""
+    """Embedding coordinates over time; of many those that become largest."""
     values = result.run.values
-    names = ["ψ"] if values.shape[1] == 1 else [f"ψ{i + 1}" for i in range(values.shape[1])]
-    figure, axes = _single("Embedding", "ψ   (collision density in 1/m³)")
-    _lines(axes, result.run.time, values, names)
+    count = values.shape[1]
+    chosen = np.arange(count)
+    if count > MOST_COORDINATES:
+        largest = np.nan_to_num(np.abs(values)).max(axis=0, initial=0.0)
+        chosen = np.sort(np.argsort(largest, kind="stable")[-MOST_COORDINATES:])
+    title = (
+        "Embedding"
+        if len(chosen) == count
+        else f"Embedding, the largest {len(chosen)} of {count} coordinates"
+    )
+    written = result.scenario.method == "written"
+    figure, axes = _single(title, f"ψ   ({'collision density in 1/m³' if written else 'of barriers'})")
+    names = ["ψ"] if count == 1 else [f"ψ{i + 1}" for i in chosen]
+    _lines(axes, result.run.time, values[:, chosen], names)
     return figure
 
 
