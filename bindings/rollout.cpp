@@ -103,8 +103,9 @@ void bind_rollout(nb::module_& m) {
                       "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
                       "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
                       "for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal\n"
-                      "is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole times; delay [s]: from one look to the next, from when on is followed\n"
-                      "what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has\n"
+                      "is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole\n"
+                      "times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.\n"
+                      "Raises ValueError that names the setting at fault, or if the system has\n"
                       "no clearances to obstacles.")
       .def(
           "__init__",
@@ -128,9 +129,8 @@ void bind_rollout(nb::module_& m) {
                                           " coordinates, the system has " + std::to_string(nv));
             }
             const Obstacles seen = obstacles;
-            const std::optional<Flight> flown = followed;
             const nb::gil_scoped_release release;
-            return self.look(target, position, velocity, seen, flown);
+            return self.look(target, position, velocity, seen, followed);
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("followed") = nb::none(),
           nb::sig("def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "

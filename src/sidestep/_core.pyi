@@ -891,8 +891,9 @@ class Evasion:
     the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
     on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
     for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal
-    is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole times; delay [s]: from one look to the next, from when on is followed
-    what it found; seed: of the configurations. Raises ValueError that names the setting at fault, or if the system has
+    is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole
+    times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.
+    Raises ValueError that names the setting at fault, or if the system has
     no clearances to obstacles.
     """
 

@@ -1,7 +1,6 @@
 #include "sidestep/control/real_time.hpp"
 
 #include <chrono>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -10,7 +10,7 @@ import typer
 from sidestep.bench.method import Method
 from sidestep.cli.bench_scenes_command import dynamic, motion_bench_maker
 from sidestep.cli.bench_step_command import compare, realtime, step
-from sidestep.cli.output import console, write_json
+from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 app = typer.Typer(help="Benchmarks on random and on published problems.", no_args_is_help=True)
 app.command("motionbenchmaker")(motion_bench_maker)
@@ -43,11 +43,8 @@ def reach(
     failures: Annotated[
         bool, typer.Option("--failures", help="List the problems that went wrong, and why.")
     ] = False,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
 ) -> None:
     """Random reach problems: balls of 5-10 cm radius in the reachable shell, a random start, a random goal.
 

@@ -10,7 +10,7 @@ import typer
 
 from sidestep.bench.method import Method
 from sidestep.bench.points import POINT_RADIUS, SPACING
-from sidestep.cli.output import console, write_json
+from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 if TYPE_CHECKING:
     from sidestep.bench import MotionSettings, SceneResult, SceneSettings
@@ -52,10 +52,8 @@ def motion_bench_maker(
     failures: Annotated[
         bool, typer.Option("--failures", help="List the problems that were not solved, and why.")
     ] = False,
-    json: Annotated[
-        str | None, typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout.")
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
 ) -> None:
     """The published problems of MotionBenchMaker, in closed loop: shelves, boxes, cages, tables.
 
@@ -122,10 +120,8 @@ def dynamic(
     failures: Annotated[
         bool, typer.Option("--failures", help="List the problems that went wrong, and why.")
     ] = False,
-    json: Annotated[
-        str | None, typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout.")
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
 ) -> None:
     """A ball that comes or goes while the arm moves: suddenly there, drifting through, in the goal, leaving it.
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from sidestep.cli.output import console, write_json
+from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 
 def step(
@@ -20,11 +20,8 @@ def step(
         str, typer.Option(metavar="N,N,...", help="Numbers of points around the whole arm.")
     ] = "1,100,1000,10000,100000",
     seed: Annotated[int, typer.Option(min=0, help="Seed of states, goals and points.")] = 0,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
 ) -> None:
     """Times one control step: Table 6.1 of the thesis, and the whole arm among clouds of points.
 
@@ -61,7 +58,7 @@ def step(
 def compare(
     before: Annotated[Path, typer.Argument(exists=True, dir_okay=False, help="Result of `bench step`.")],
     after: Annotated[Path, typer.Argument(exists=True, dir_okay=False, help="Result of `bench step`.")],
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Compares the medians of two results of `sidestep bench step`, row by row."""
     from json import loads
@@ -93,11 +90,8 @@ def realtime(
     seconds: Annotated[float, typer.Option(min=0.001, help="Of each row [s].")] = 60.0,
     refresh: Annotated[float, typer.Option(min=0.001, help="Clouds per second.")] = 60.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of goals, points and guide.")] = 0,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
 ) -> None:
     """The whole loop, state in and torque out, at 1 kHz by the machine's clock: how late it is, and what it misses.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from sidestep.cli.output import console, write_json
+from sidestep.cli.output import QuietOption, console, write_json
 
 if TYPE_CHECKING:
     from sidestep import Body, Robot
@@ -41,7 +41,7 @@ def fit(
     json: Annotated[
         str | None, typer.Option("--json", metavar="FILE|-", help="Write the table as JSON; '-' for stdout.")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Fit a Gaussian mixture to the surface of every link of a robot."""
     if (robot is None) == (urdf is None):

@@ -5,10 +5,18 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+
+JsonOption: TypeAlias = Annotated[
+    str | None, typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout.")
+]
+QuietOption: TypeAlias = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
 def console(*, quiet: bool = False, to_stderr: bool = False) -> Console:

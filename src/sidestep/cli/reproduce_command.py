@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from sidestep.cli.output import console, write_json
+from sidestep.cli.output import QuietOption, console, write_json
 
 
 def reproduce(
@@ -26,7 +26,7 @@ def reproduce(
         str | None,
         typer.Option("--json", metavar="FILE|-", help="Write files and times as JSON; '-' for stdout."),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Run the experiments of the thesis with the correct equations, and write them as a web page.
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from sidestep.cli.output import console, write_json
+from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 if TYPE_CHECKING:
     from sidestep.scenario import Scenario
@@ -103,12 +103,9 @@ def run(
         float | None,
         typer.Option(min=1e-3, max=600.0, help="Longest simulated time [s], instead of the scenario's."),
     ] = None,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
-    ] = None,
+    json: JsonOption = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Write the report folder.")] = True,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Run a scenario, judge it, and write a report folder.
 
@@ -142,11 +139,8 @@ def demo(
         ),
     ] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Report folder.")] = Path("sidestep-report-demo"),
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout."),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
 ) -> None:
     """Show what Sidestep does: a Franka Research 3 under torque control passes a cluster of balls.
 

@@ -125,9 +125,9 @@ class Simulation:
         """
         if not (np.isfinite(duration) and duration > 0.0):
             raise ValueError(f"duration must be positive, got {duration}")
-        if evasion is not None and not safe:
-            raise ValueError("an evasion needs safe=True, which keeps its flights off obstacles")
         if evasion is not None:
+            if not safe:
+                raise ValueError("an evasion needs safe=True, which keeps its flights off obstacles")
             evasion.reset()
         start = self.robot.check_configuration(start, "start")
         if not isinstance(goal, PoseAim):
