@@ -1,4 +1,4 @@
-"""Makes what comes with Sidestep in src/sidestep/body/covers: bodies, pairs of links, clearance tables; a minute each.
+"""Makes what comes with Sidestep in src/sidestep/body/covers: bodies, pairs of links, clearance tables; minutes each.
 
     python benchmarks/ship_covers.py
 

@@ -13,10 +13,13 @@ from scipy.special import logsumexp
 from sidestep.body.cover_certificate import complete, grow
 from sidestep.body.cover_overshoot import Overshoot, interior_coverage, overshoot, union_volume
 from sidestep.body.cover_refine import (
+    HOP,
     OUTLINE,
     POLISH,
     Ellipsoids,
+    RefineSettings,
     initial,
+    rearranged,
     refine,
 )
 from sidestep.body.cover_surface import Array, LinkSurface
@@ -27,22 +30,26 @@ from sidestep.body.sampling import check_components, link_seed, links_with_geome
 if TYPE_CHECKING:
     from sidestep.robot import Robot
 
-ALGORITHM_VERSION = 2  # part of the cache's key: a cover of another algorithm is made again
+ALGORITHM_VERSION = 3  # part of the cache's key: a cover of another algorithm is made again
 MAX_COMPONENTS = 80
-MEAN_AIM, MAX_AIM = 4e-3, 15e-3  # mean and largest overshoot aimed at on a link of AIM_SIZE [m]
+MEAN_AIM, MAX_AIM = 4e-3, 15e-3  # mean and largest overshoot aimed at on a link of AIM_SIZE or more [m]
 AIM_SIZE = 0.15  # a link of an arm [m]
-AIM_POWER = 0.8  # of the size, with which the aims go: 1 mm and 3.6 mm on a finger of 25 mm
-FIXED_ALLOWANCE = (
-    2.0  # links that no joint moves may overshoot by this factor more: only self-collision sees them
+AIM_POWER = (
+    0.6  # of the size, with which the aims of smaller links go: 1.4 mm and 5.1 mm on a finger of 25 mm
 )
+FIXED_ALLOWANCE = (
+    2.0  # the mean of links that no joint moves may be this much larger: only self-collision sees them
+)
+BEYOND_MAX = 5.0  # what the largest overshoot costs more, as a share of its aim, where it is larger
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
 GROWTH = 1.3  # numbers of ellipsoids tried on a link grow by this factor
 CERTIFICATE_TOLERANCE = 1 / 400  # of a link's size: longest edge of a triangle that is not cut further
 TRIAL_STARTS = 2  # outlines tried while numbers of ellipsoids are compared
+TRIAL_HOPS = 10  # rearrangements tried of the best of them
 FINAL_STARTS = 10  # more of them with the final number: the best of them overshoots 5 to 15 % less
+FINAL_HOPS = 100  # more rearrangements with the final number: 5 to 15 % less again
 NUM_COARSE = 1_000  # surface points that an outline must hold, besides the triangles' corners
 NUM_FINE = 30_000  # surface points that the final refinement must hold; the proof itself needs no points
-TRIAL_DIRECTIONS = 400  # boundary points per ellipsoid while covers are compared
 NUM_SAMPLES = 4000  # surface points by which the density of the cover is assessed
 SOLID_LEVEL = 5.0  # (y - mu)^T Sigma^-1 (y - mu) on the boundary of a solid ellipsoid of covariance Sigma
 LEVEL_ROUNDING = 1e-9  # levels are larger by this share: rounding of the covariances cannot bare a corner
@@ -133,18 +140,27 @@ class LinkCover:
 
 
 @dataclass(frozen=True, eq=False)
+class _Outline:
+    """Ellipsoids that hold coarse points, how strongly each point pushes, and the overshoot."""
+
+    ellipsoids: Ellipsoids
+    multipliers: Array
+    measured: Overshoot
+
+
+@dataclass(frozen=True, eq=False)
 class _Solution:
     ellipsoids: Ellipsoids
-    mean: float
-    maximum: float
+    measured: Overshoot
 
 
 class _LinkProblem:
     """One link with the best cover known for every number of ellipsoids tried."""
 
-    def __init__(self, triangles: Array, *, seed: int) -> None:
+    def __init__(self, triangles: Array, *, seed: int, mean_allowance: float) -> None:
         self.surface = LinkSurface(triangles)
         self.seed = seed
+        self.mean_allowance = mean_allowance
         self.coarse = self.surface.points(NUM_COARSE)
         self.fine = self.surface.points(NUM_FINE)
         self._nearest_fine = cKDTree(self.fine).query(self.coarse)[1]
@@ -154,51 +170,71 @@ class _LinkProblem:
     def solve(self, number: int) -> _Solution:
         """A proven cover, good enough to compare numbers of ellipsoids by."""
         if number not in self.solutions:
-            self.solutions[number] = self._search(number, range(TRIAL_STARTS))
+            self.solutions[number] = self._hop(self._search(number, range(TRIAL_STARTS)), TRIAL_HOPS)
         return self.solutions[number]
 
     def finish(self, number: int) -> _Solution:
-        """The best cover found with more starts."""
+        """The best cover found with a longer search."""
         if number not in self._finished:  # equal links share their covers
             starts = range(TRIAL_STARTS, TRIAL_STARTS + FINAL_STARTS)
-            found = [self.solve(number), self._search(number, starts)]
-            self.solutions[number] = min(found, key=self._excess)
+            best = min(self.solve(number), self._search(number, starts), key=self._excess)
+            self.solutions[number] = self._hop(best, FINAL_HOPS)
             self._finished.add(number)
         return self.solutions[number]
 
     def _search(self, number: int, starts: range) -> _Solution:
         """The best of several outlines, refined with finer points and completed."""
-        surface = self.surface
         outlines = []
         for start in starts:
-            first = initial(surface, self.coarse, number, self.seed + start)
-            outline, multipliers = refine(surface, self.coarse, first, OUTLINE)
-            grown = grow(outline, self.coarse[:, None])
-            measured = overshoot(surface, grown, directions=OUTLINE.directions)
-            outlines.append((self._excess(measured), start, outline, multipliers))
-        _, _, outline, multipliers = min(outlines, key=lambda entry: entry[:2])
-        pushing = np.flatnonzero(multipliers)
+            outline = self._outline(initial(self.surface, self.coarse, number, self.seed + start), OUTLINE)
+            outlines.append((self._excess(outline), start, outline))
+        return self._polish(min(outlines, key=lambda entry: entry[:2])[2])
+
+    def _hop(self, best: _Solution, hops: int) -> _Solution:
+        """Basin hopping: rearranges the best cover and descends from there; keeps what is better."""
+        rng = np.random.default_rng(self.seed)
+        for _ in range(hops):
+            measured = best.measured
+            weights = measured.distances * measured.areas
+            moved = rearranged(self.surface, best.ellipsoids, measured.points, weights, rng)
+            outline = self._outline(moved, HOP)
+            if self._excess(outline) < self._excess(best):  # coarse points flatter
+                best = min(best, self._polish(outline), key=self._excess)
+        return best
+
+    def _outline(self, start: Ellipsoids, settings: RefineSettings) -> _Outline:
+        ellipsoids, multipliers = refine(self.surface, self.coarse, start, settings)
+        grown = grow(ellipsoids, self.coarse[:, None])
+        return _Outline(
+            ellipsoids, multipliers, overshoot(self.surface, grown, directions=settings.directions)
+        )
+
+    def _polish(self, outline: _Outline) -> _Solution:
+        """Refined with finer points and completed."""
+        pushing = np.flatnonzero(outline.multipliers)
         fine = np.zeros(len(self.fine))
-        fine[self._nearest_fine[pushing]] = multipliers[pushing]
-        return self._proven(refine(surface, self.fine, outline, POLISH, fine)[0])
+        fine[self._nearest_fine[pushing]] = outline.multipliers[pushing]
+        return self._proven(refine(self.surface, self.fine, outline.ellipsoids, POLISH, fine)[0])
 
     def _proven(self, ellipsoids: Ellipsoids) -> _Solution:
         surface = self.surface
         tolerance = CERTIFICATE_TOLERANCE * surface.size
         covering, _ = complete(surface.triangles, ellipsoids, tolerance=tolerance, points=self.fine)
-        measured = overshoot(surface, covering, directions=TRIAL_DIRECTIONS)
-        return _Solution(covering, measured.mean, measured.maximum)
+        return _Solution(covering, overshoot(surface, covering))
 
     def excess(self, number: int) -> float:
-        """Overshoot over what is aimed at: the mean of its two measures."""
+        """Overshoot over what is aimed at: the mean of its two measures, and more beyond the aim of the largest."""
         return self._excess(self.solve(number))
 
-    def _excess(self, solution: _Solution | Overshoot) -> float:
-        scale = (self.surface.size / AIM_SIZE) ** AIM_POWER
-        return float(0.5 * (solution.mean / MEAN_AIM + solution.maximum / MAX_AIM) / scale)
+    def _excess(self, found: _Outline | _Solution) -> float:
+        scale = min(1.0, self.surface.size / AIM_SIZE) ** AIM_POWER
+        mean = found.measured.mean / (MEAN_AIM * scale * self.mean_allowance)
+        maximum = found.measured.maximum / (MAX_AIM * scale)
+        return float(0.5 * (mean + maximum) + BEYOND_MAX / self.mean_allowance**2 * max(0.0, maximum - 1.0))
 
     def trade_off(self) -> tuple[TradeOff, ...]:
-        return tuple(TradeOff(k, s.mean, s.maximum) for k, s in sorted(self.solutions.items()))
+        found = sorted(self.solutions.items())
+        return tuple(TradeOff(k, s.measured.mean, s.measured.maximum) for k, s in found)
 
 
 def cover_links(
@@ -210,17 +246,18 @@ def cover_links(
         ValueError: if the settings do not suit the robot.
     """
     settings.validate(robot)
-    twins: dict[bytes, _LinkProblem] = {}
+    twins: dict[tuple[bytes, float], _LinkProblem] = {}
     problems: dict[str, _LinkProblem] = {}
+    moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
     for link in links_with_geometry(robot):
         triangles = _triangles(robot, link)
-        key = np.unique(triangles.reshape(-1, 3).round(9), axis=0).tobytes()  # fingers are often equal
-        if key not in twins:
-            twins[key] = _LinkProblem(triangles, seed=link_seed(link, seed=settings.seed))
+        allowance = 1.0 if moves[link] else FIXED_ALLOWANCE
+        key = (np.unique(triangles.reshape(-1, 3).round(9), axis=0).tobytes(), allowance)
+        if key not in twins:  # fingers are often equal
+            seed = link_seed(link, seed=settings.seed)
+            twins[key] = _LinkProblem(triangles, seed=seed, mean_allowance=allowance)
         problems[link] = twins[key]
-    moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
-    allowances = {link: 1.0 if moves[link] else FIXED_ALLOWANCE for link in problems}
-    numbers = _numbers(problems, allowances, settings, progress)
+    numbers = _numbers(problems, settings, progress)
     total = sum(numbers.values())
     covers: list[tuple[LinkCover, Ellipsoids]] = []
     for link, problem in problems.items():
@@ -240,7 +277,6 @@ def _triangles(robot: Robot, link: str) -> Array:
 
 def _numbers(
     problems: Mapping[str, _LinkProblem],
-    allowances: Mapping[str, float],
     settings: CoverSettings,
     progress: CoverProgress | None,
 ) -> dict[str, int]:
@@ -254,7 +290,7 @@ def _numbers(
         gains: list[tuple[float, str, int]] = []
         for link in shared:
             problem = problems[link]
-            now = problem.excess(best[link]) / allowances[link]
+            now = problem.excess(best[link])
             if now <= 1.0:
                 continue
             following = best[link]
@@ -264,7 +300,7 @@ def _numbers(
                     break
                 if progress is not None:
                     progress(link, sum(best.values()), 2 * settings.max_components)
-                gain = now**2 - (problem.excess(following) / allowances[link]) ** 2
+                gain = now**2 - problem.excess(following) ** 2
                 if gain > 0.0:
                     gains.append((gain / (following - best[link]), link, following))
         if not gains:

@@ -73,6 +73,7 @@ class RefineSettings:
 
 
 OUTLINE = RefineSettings()
+HOP = RefineSettings(steps=400, first_rate=0.006, directions=160)
 POLISH = RefineSettings(
     steps=150, first_rate=0.002, last_rate=1e-4, stiffness=100.0, multiplier_steps=5, directions=160
 )
@@ -134,3 +135,35 @@ def initial(surface: LinkSurface, samples: Array, number: int, seed: int) -> Ell
         centres.append(own.mean(axis=0))
         shapes.append(e @ np.diag(np.sqrt(4.0 * w)) @ e.T)
     return Ellipsoids(np.array(centres), np.array(shapes))
+
+
+SHIFT = 0.06  # of a link's size: how far all centres are moved at random
+HALF = 0.6  # of a semi-axis that is left to each half of an ellipsoid
+
+
+def rearranged(
+    surface: LinkSurface, ellipsoids: Ellipsoids, points: Array, weights: Array, rng: np.random.Generator
+) -> Ellipsoids:
+    """One move of a search: shifts all ellipsoids, or splits one that overshoots and leaves another out.
+
+    Args:
+        points: on the boundary of the union (N, 3) [m]. weights: by which one of them is drawn, whose ellipsoid
+            is split along one of its axes (N,).
+    """
+    count = len(ellipsoids)
+    if count == 1 or not len(points) or rng.random() < 1.0 / 3.0:
+        return Ellipsoids(
+            ellipsoids.centres + SHIFT * surface.size * rng.standard_normal((count, 3)), ellipsoids.shapes
+        )
+    drawn = points[rng.choice(len(points), p=weights / weights.sum())]
+    split = int(ellipsoids.radii(drawn[None])[0].argmin())
+    left_out = int((split + rng.integers(1, count)) % count)
+    directions, axes, _ = np.linalg.svd(ellipsoids.shapes[split])
+    along = 0 if rng.random() < 0.5 else int(rng.integers(3))  # the longest as often as any
+    offset = 0.5 * axes[along] * directions[:, along]
+    axes[along] *= HALF
+    centres, shapes = ellipsoids.centres.copy(), ellipsoids.shapes.copy()
+    centres[left_out] = centres[split] + offset
+    centres[split] -= offset
+    shapes[[split, left_out]] = directions @ np.diag(axes) @ directions.T
+    return Ellipsoids(centres, shapes)
