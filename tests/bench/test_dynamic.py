@@ -22,7 +22,7 @@ from sidestep.bench import (
     run_dynamic,
 )
 from sidestep.bench.arm import Arm
-from sidestep.bench.dynamic import FROM_GOAL, FROM_START, with_ball
+from sidestep.bench.dynamic import BLOCKED_WITHIN, FROM_GOAL, FROM_START, with_ball
 from sidestep.bench.methods import build_body
 from sidestep.bench.problem import poses_over
 
@@ -50,8 +50,11 @@ def test_a_ball_is_where_its_kind_says(kind: Kind) -> None:
     exact = ExactClearance(arm().robot, [problem.ball])
     assert exact.distance(problem.start).distance >= FROM_START
     at_goal = exact.distance(problem.goal).distance
-    if kind in (Kind.blocked, Kind.cleared):
+    if kind.in_goal:
         assert at_goal < 0.0
+        rng = np.random.default_rng(0)
+        within = problem.goal + rng.uniform(-BLOCKED_WITHIN, BLOCKED_WITHIN, (50, len(problem.goal)))
+        assert max(exact.distance(q).distance for q in within) < 0.0
     if kind is Kind.sudden:
         assert at_goal >= FROM_GOAL
         assert len(problem.obstacles_at(0.0)) == 1
@@ -107,6 +110,22 @@ def test_every_kind_is_reported_as_a_set() -> None:
     assert document["all"]["problems"] == 4
     with pytest.raises(ValueError, match="count is 0"):
         run_dynamic(settings, count=0)
+
+
+def test_an_arm_beside_a_ball_in_its_goal_has_not_arrived() -> None:
+    settings = SceneSettings(
+        robot="planar3", method=Method.barrier, motion=MotionSettings(duration=6.0, tolerance=0.5), jobs=1
+    )
+    result = run_dynamic(settings, count=2, seed=3, obstacles=0)
+    ended = {(x.set, x.index): x for x in result.outcomes}
+    for index in range(2):
+        blocked = ended["random blocked", index]
+        assert blocked.outcome is not None
+        assert not blocked.outcome.collision
+        assert not blocked.outcome.arrived
+        assert blocked.outcome.error_rad > BLOCKED_WITHIN
+        assert blocked.tolerance == BLOCKED_WITHIN
+        assert ended["random drift", index].tolerance == 0.5
 
 
 def test_only_a_moving_object_comes_and_goes() -> None:

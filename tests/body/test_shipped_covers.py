@@ -11,6 +11,10 @@ import pytest
 from sidestep import Body, Robot, clearance_tables
 from sidestep.body import cache
 from sidestep.body.cover import CoverSettings
+from sidestep.body.cover_certificate import certify
+from sidestep.body.cover_overshoot import overshoot
+from sidestep.body.cover_refine import Ellipsoids
+from sidestep.body.cover_surface import LinkSurface
 from sidestep.link_pairs import stored_at
 
 FILES = sorted(path for path in cache.SHIPPED.glob("*.json") if not path.name.startswith("pairs-"))
@@ -39,6 +43,26 @@ def test_it_is_taken_and_holds_every_link(path: Path, monkeypatch: pytest.Monkey
         shapes = np.asarray(body.levels)[ks, None, None] * body.covariances[ks]
         depth = np.einsum("kni,kij,knj->kn", offsets, np.linalg.inv(shapes), offsets).min(axis=0)
         assert depth.max() <= 1.0 + 1e-9
+
+
+def test_that_of_the_fr3_overshoots_by_as_little_as_is_said() -> None:
+    robot = Robot.named("fr3")
+    body = Body.cover(robot)
+    assert body.num_components <= 80
+    for cover in body.link_covers:
+        mesh = robot.collision_mesh(cover.link)
+        assert mesh is not None
+        surface = LinkSurface(np.asarray(mesh.triangles))
+        ks = [k for k, name in enumerate(body.links) if name == cover.link]
+        shapes = np.linalg.cholesky(np.asarray(body.levels)[ks, None, None] * body.covariances[ks])
+        ellipsoids = Ellipsoids(body.means[ks], shapes)
+        assert certify(surface.triangles, ellipsoids, tolerance=surface.size / 800).complete
+        measured = overshoot(surface, ellipsoids)
+        # The base, which no joint moves, by 15.6 mm.
+        assert measured.maximum <= (16e-3 if cover.link == "fr3_link0" else 15e-3)
+        assert measured.mean == pytest.approx(cover.mean_overshoot, rel=0.02)
+        if cover.link.endswith("finger"):
+            assert measured.mean <= 2e-3
 
 
 def test_planar3_is_there() -> None:

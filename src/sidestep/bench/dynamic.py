@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +35,7 @@ SPEEDS = (0.1, 0.4)  # [m/s] of its drift
 CLEARS = (3.0, 6.0)  # [s] when it leaves the goal
 FROM_START = 0.15  # [m] at least, exact, from the arm at its start when the ball comes
 FROM_GOAL = 0.03  # [m] at least from the arm at its goal, where the goal is to stay free
+BLOCKED_WITHIN = 0.01  # [rad | m] of a goal with a ball in it, in every joint: the arm is to arrive within less
 FROM_SHOULDER = 0.35  # [m] at least between its way and the shoulder: nearer, the arm cannot yield
 TRIES = 2000  # balls drawn for one problem
 
@@ -45,6 +47,11 @@ class Kind(StrEnum):
     drift = "drift"  #: it drifts through the arm's way, and on
     blocked = "blocked"  #: it is in the goal, and stays
     cleared = "cleared"  #: it is in the goal, and then leaves
+
+    @property
+    def in_goal(self) -> bool:
+        """The ball is in the goal at first, and in all that is within BLOCKED_WITHIN of it."""
+        return self in (Kind.blocked, Kind.cleared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +121,7 @@ def with_ball(base: Problem, kind: Kind, arm: Arm, workspace: Workspace, *, seed
     rng = np.random.default_rng((seed, base.index, list(Kind).index(kind)))
     for _ in range(TRIES):
         radius = float(rng.uniform(*RADII))
-        share = 1.0 if kind in (Kind.blocked, Kind.cleared) else float(rng.uniform(*ALONG))
+        share = 1.0 if kind.in_goal else float(rng.uniform(*ALONG))
         through = _tip(arm.robot, base.start + share * (base.goal - base.start))
         through = through + workspace.directions.T @ rng.normal(scale=OFFSET, size=len(workspace.directions))
         direction, speed = workspace.direction(rng), float(rng.uniform(*SPEEDS))
@@ -149,8 +156,9 @@ def _fits(ball: SceneObject, kind: Kind, base: Problem, arm: Arm, workspace: Wor
     if alone.distance(base.start).distance < FROM_START:
         return False
     at_goal = alone.distance(base.goal).distance
-    if kind in (Kind.blocked, Kind.cleared):
-        return at_goal < 0.0
+    if kind.in_goal:
+        corners = product((-BLOCKED_WITHIN, BLOCKED_WITHIN), repeat=len(base.goal))
+        return at_goal < 0.0 and all(alone.distance(base.goal + np.array(x)).distance < 0.0 for x in corners)
     if kind is Kind.sudden and at_goal < FROM_GOAL:
         return False
     away = workspace.shoulder - ball.pose[:3, 3]
@@ -203,6 +211,9 @@ class _Worker:
     def run(self, task: tuple[Kind, int | MotionBenchMakerProblem]) -> tuple[SceneOutcome, StepTimes]:
         kind, source = task
         settings = self.settings
+        if kind.in_goal:  # beside the ball, within a wider tolerance, it would have arrived
+            tolerance = min(settings.motion.tolerance, BLOCKED_WITHIN)
+            settings = replace(settings, motion=replace(settings.motion, tolerance=tolerance))
         base: Problem
         if isinstance(source, int):
             arm, name, base = self._arm, "random", self._generator.problem(source)

@@ -9,7 +9,7 @@ import numpy as np
 from sidestep.body.cover_refine import Ellipsoids, sphere_directions
 from sidestep.body.cover_surface import Array, LinkSurface
 
-NUM_DIRECTIONS = 1000  # per ellipsoid: a point every 2 to 4 mm on the ellipsoids of an arm
+NUM_DIRECTIONS = 16_000  # per ellipsoid, 0.5 to 1 mm apart on an arm; four times as many find 0.3 mm more
 NUM_VOLUME_SAMPLES = 200_000  # the volume's standard error is below 0.5 %
 
 
