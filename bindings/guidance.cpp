@@ -87,9 +87,9 @@ void bind_settings(nb::module_& m) {
       "How a PathPlanner searches. floor [m]: clearance that the first path keeps; margin [m]: that a wider one would.\n"
       "allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance\n"
       "[m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.\n"
-      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes,\n"
-      "max_iterations, max_seconds: the budget. shortcuts: attempts to shorten. Raises ValueError that names the\n"
-      "setting at fault.")
+      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees, of joints\n"
+      "that count by their reach over the mean of all. max_nodes, max_iterations, max_seconds: the budget. shortcuts:\n"
+      "attempts to shorten. Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
           [](PlannerSettings* self, double margin, double floor, double allowance, double pair_allowance, double slack,

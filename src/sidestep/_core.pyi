@@ -1511,9 +1511,9 @@ class PlannerSettings:
     How a PathPlanner searches. floor [m]: clearance that the first path keeps; margin [m]: that a wider one would.
     allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance
     [m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.
-    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees. max_nodes,
-    max_iterations, max_seconds: the budget. shortcuts: attempts to shorten. Raises ValueError that names the
-    setting at fault.
+    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees, of joints
+    that count by their reach over the mean of all. max_nodes, max_iterations, max_seconds: the budget. shortcuts:
+    attempts to shorten. Raises ValueError that names the setting at fault.
     """
 
     def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.5, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 100) -> None: ...

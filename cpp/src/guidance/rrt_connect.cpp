@@ -18,7 +18,9 @@ namespace {
 constexpr double pi = 3.14159265358979323846;
 constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
 constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
-constexpr double short_step = 0.25;      // of the range
+constexpr double local = 0.3;            // of the samples are around a node: narrow places are near others
+constexpr double around_node = 1.2;      // half-width of two uniform numbers, their sum the offset of such a sample [rad | m]
+constexpr double octaves = 3.0;          // of the lengths of steps from a node that was trapped, below the range
 constexpr double domain = 2.0;           // of the range: how far samples may be from a node that was trapped
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
 constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
@@ -65,8 +67,8 @@ RrtConnect::RrtConnect(const BodyClearance& body, const PlannerSettings& setting
     : body_(&body),
       settings_(settings),
       workspace_(body),
-      from_start_(body.robot().num_coordinates(), settings.max_nodes),
-      from_goal_(body.robot().num_coordinates(), settings.max_nodes),
+      from_start_(body.reach() / body.reach().mean(), settings.max_nodes),
+      from_goal_(body.reach() / body.reach().mean(), settings.max_nodes),
       sample_(body.robot().num_coordinates()),
       next_(body.robot().num_coordinates()),
       near_(body.robot().num_coordinates()),
@@ -221,22 +223,12 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
       plan.status = PlanStatus::timeout;
       return;
     }
-    // Samples far from nodes that were trapped only find the same walls again.
-    int nearest = 0;
-    for (int draw = 0; draw < draws; ++draw) {
-      for (Eigen::Index k = 0; k < sample_.size(); ++k) {
-        sample_[k] = random.uniform(low[k], high[k]);
-      }
-      nearest = one->nearest(sample_);
-      if ((sample_ - one->node(nearest)).norm() <= one->domain(nearest)) {
-        break;
-      }
-    }
-    if (grow(*one, nearest, sample_, obstacles, margins) != Growth::trapped) {
+    const int nearest = draw_sample(low, high, *one, random);
+    if (grow(*one, nearest, sample_, obstacles, margins, random) != Growth::trapped) {
       const Eigen::VectorXd target = one->node(one->size() - 1);
       Growth growth = Growth::advanced;
       while (growth == Growth::advanced && !other->full()) {
-        growth = grow(*other, other->nearest(target), target, obstacles, margins);
+        growth = grow(*other, other->nearest(target), target, obstacles, margins, random);
       }
       if (growth == Growth::reached) {
         std::vector<Eigen::VectorXd> way = to_root(from_start_, from_start_.size() - 1);
@@ -259,22 +251,50 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
   }
 }
 
+int RrtConnect::draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& high, SearchTree& tree, RandomStream& random) {
+  if (random.unit() < local) {
+    const auto node = tree.node(static_cast<int>(random.unit() * tree.size()));
+    for (Eigen::Index k = 0; k < sample_.size(); ++k) {
+      const double offset = random.uniform(-around_node, around_node) + random.uniform(-around_node, around_node);
+      sample_[k] = std::clamp(node[k] + offset, low[k], high[k]);
+    }
+    return tree.nearest(sample_);
+  }
+  // Samples far from nodes that were trapped only find the same walls again.
+  int nearest = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    for (Eigen::Index k = 0; k < sample_.size(); ++k) {
+      sample_[k] = random.uniform(low[k], high[k]);
+    }
+    nearest = tree.nearest(sample_);
+    if (tree.distance(nearest, sample_) <= tree.domain(nearest)) {
+      break;
+    }
+  }
+  return nearest;
+}
+
 RrtConnect::Growth RrtConnect::grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles,
-                                    const Margins& margins) {
+                                    const Margins& margins, RandomStream& random) {
   near_ = tree.node(from);
-  const double distance = (target - near_).norm();
-  // A long step, or where that is not free a short one.
-  for (const double range : {settings_.range, short_step * settings_.range}) {
+  const double distance = tree.distance(from, target);
+  const auto step = [&](double range) {
     const bool whole = distance <= range;
     next_ = whole ? target : near_ + range / distance * (target - near_);
-    if (body_->free(next_, obstacles, margins, workspace_) &&
-        body_->edge_free(near_, next_, obstacles, margins, workspace_)) {
-      tree.add(next_, from);
-      return whole ? Growth::reached : Growth::advanced;
+    if (!body_->free(next_, obstacles, margins, workspace_) ||
+        !body_->edge_free(near_, next_, obstacles, margins, workspace_)) {
+      return Growth::trapped;
     }
+    tree.add(next_, from);
+    return whole ? Growth::reached : Growth::advanced;
+  };
+  // A long step, unless one was not free before; else a shorter one.
+  Growth growth = tree.bounded(from) ? Growth::trapped : step(settings_.range);
+  if (growth == Growth::trapped) {
     tree.bound(from, domain * settings_.range);
+    growth = step(settings_.range * std::exp2(-octaves * random.unit()));
   }
-  return Growth::trapped;
+  return growth;
 }
 
 }  // namespace sidestep

@@ -1,15 +1,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 namespace sidestep {
 
 /// A tree of configurations with the nearest of them found by a scan, which at some thousands of nodes is as fast as an
-/// index. Room is taken once.
+/// index. Joints count by their weights w: |Δq| = √Σ (w_i Δq_i)². Room is taken once.
 class SearchTree {
  public:
-  SearchTree(int num_coordinates, int capacity);
+  /// weights: (nv), positive.
+  SearchTree(const Eigen::VectorXd& weights, int capacity);
 
   void clear() noexcept { size_ = 0; }
   int size() const noexcept { return size_; }
@@ -21,8 +23,12 @@ class SearchTree {
   /// The node with the least |q − node|. The tree must not be empty.
   int nearest(const Eigen::VectorXd& q) noexcept;
 
+  /// |q − node|, weighted.
+  double distance(int k, const Eigen::VectorXd& q) const noexcept { return (q - nodes_.col(k)).cwiseProduct(weights_).norm(); }
+
   /// How far from a node samples may be that it is the nearest to: infinitely until `bound` [rad | m].
   double domain(int k) const noexcept { return domains_[static_cast<std::size_t>(k)]; }
+  bool bounded(int k) const noexcept { return std::isfinite(domain(k)); }
   void bound(int k, double distance) noexcept { domains_[static_cast<std::size_t>(k)] = distance; }
 
   auto node(int k) const noexcept { return nodes_.col(k); }
@@ -30,8 +36,9 @@ class SearchTree {
 
  private:
   int size_ = 0, capacity_;
+  Eigen::VectorXd weights_;
   Eigen::MatrixXd nodes_;                                              // (nv × capacity)
-  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> coordinates_;    // (capacity × nv): a run per coordinate, for the scan
+  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> coordinates_;    // (capacity × nv), weighted: a run per coordinate, for the scan
   Eigen::ArrayXf distances_;
   std::vector<int> parents_;
   std::vector<double> domains_;
