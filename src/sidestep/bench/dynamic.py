@@ -35,7 +35,9 @@ SPEEDS = (0.1, 0.4)  # [m/s] of its drift
 CLEARS = (3.0, 6.0)  # [s] when it leaves the goal
 FROM_START = 0.15  # [m] at least, exact, from the arm at its start when the ball comes
 FROM_GOAL = 0.03  # [m] at least from the arm at its goal, where the goal is to stay free
-BLOCKED_WITHIN = 0.01  # [rad | m] of a goal with a ball in it, in every joint: the arm is to arrive within less
+BLOCKED_WITHIN = (
+    0.01  # [rad | m] of a goal with a ball in it, in every joint: the arm is to arrive within less
+)
 FROM_SHOULDER = 0.35  # [m] at least between its way and the shoulder: nearer, the arm cannot yield
 TRIES = 2000  # balls drawn for one problem
 
