@@ -16,8 +16,8 @@ namespace {
 // from its refuge.
 constexpr std::array<double, 3> spreads{0.8, 2.2, 6.3};
 constexpr double spread_of_followed = 0.5;
-constexpr double reference_period = 0.05;  // [s] between the configurations of a reference that are looked at
-constexpr std::size_t num_motions = 8;     // flights that are integrated in one look, at most
+constexpr double coarse_period = 0.05;  // [s] of the steps by which flights are compared at first
+constexpr std::size_t num_motions = 4;  // flights that are integrated finely in one look, at most
 
 const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& system) {
   if (system == nullptr) {
@@ -55,19 +55,21 @@ void EvasionSettings::validate() const {
   finite(delay, "evasion: delay");
   require(delay <= horizon, "evasion: delay", delay, "no longer than the horizon");
   require(period <= delay, "evasion: period", period, "no longer than the delay");
-  require(horizon <= most_periods * std::min(period, reference_period), "evasion: horizon", horizon,
+  require(horizon <= most_periods * std::min(period, coarse_period), "evasion: horizon", horizon,
           "at most 100,000 periods and 5,000 s");
   require(std::isfinite(clearance), "evasion: clearance", clearance, "finite");
   require(tries >= 1, "evasion: tries", tries, ">= 1");
 }
+
+Evasion::Stepper::Stepper(const Robot& robot, double period) : period(period), filter(robot, filter_settings(period)) {}
 
 Evasion::Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings settings)
     : system_(std::move(system)),
       settings_(validated(settings)),
       workspace_(checked(system_)),
       periods_(static_cast<int>(std::ceil(settings.delay / settings.period - rounding))),
-      period_(settings.delay / periods_),
-      filter_(system_->robot(), filter_settings(period_)),
+      fine_(system_->robot(), settings.delay / periods_),
+      coarse_(system_->robot(), std::max(fine_.period, coarse_period)),
       filtered_(num_coordinates()),
       random_(settings.seed) {
   for (std::size_t k = 0; k < system_->labels().size(); ++k) {
@@ -88,12 +90,12 @@ std::optional<Flight> Evasion::look(const Goal& goal, const Eigen::VectorXd& q, 
   }
   Motion now{q, v, obstacles, goal, followed};
   for (int k = 0; k < periods_; ++k) {
-    advance(now);
+    advance(now, fine_);
   }
   std::optional<Flight> best_flight = std::exchange(now.flight, std::nullopt);
   const auto is_free = [this](double clearance) { return clearance >= settings_.clearance; };
   const auto clearance_of = [&](const std::optional<Flight>& flight, double enough) {
-    return least_clearance({now.q, now.v, now.obstacles, now.goal, flight}, enough);
+    return least_clearance({now.q, now.v, now.obstacles, now.goal, flight}, fine_, enough);
   };
   double best = clearance_of(std::nullopt, -infinity);
   if (is_free(best)) {
@@ -154,7 +156,8 @@ double Evasion::obstacle_clearance() const noexcept {
   return least;
 }
 
-double Evasion::advance(Motion& motion) {
+double Evasion::advance(Motion& motion, Stepper& stepper) {
+  const double period = stepper.period;
   const auto step = [&](const Goal& goal) {
     return system_->acceleration(motion.q, motion.v, goal, motion.obstacles, workspace_);
   };
@@ -165,39 +168,25 @@ double Evasion::advance(Motion& motion) {
     const JointLimits& limits = system_->robot().limits();
     status = step(JointGoal(motion.q.cwiseMax(limits.lower).cwiseMin(limits.upper)));
   } else if (motion.flight) {
-    wanted = motion.flight->acceleration(motion.q, motion.v, period_);
+    wanted = motion.flight->acceleration(motion.q, motion.v, period);
   }
   if (motion.flight) {
-    motion.flight->advance(period_);
+    motion.flight->advance(period);
   }
   const double clearance = is_fallback(status) ? -infinity : obstacle_clearance();
   const Clearances* clearances = brakes ? nullptr : &workspace_.clearances;
-  static_cast<void>(filter_.apply(motion.q, motion.v, wanted, clearances, filtered_));
-  motion.v += period_ * filtered_.acceleration;
-  motion.q += period_ * motion.v;
-  motion.obstacles.advance(period_);
-  sidestep::advance(motion.goal, period_);
+  static_cast<void>(stepper.filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
+  motion.v += period * filtered_.acceleration;
+  motion.q += period * motion.v;
+  motion.obstacles.advance(period);
+  sidestep::advance(motion.goal, period);
   return clearance;
 }
 
-double Evasion::least_clearance(Motion motion, double enough) {
+double Evasion::least_clearance(Motion motion, Stepper& stepper, double enough) {
   double least = infinity;
-  for (int k = 0; k < whole_periods(settings_.horizon, period_) && least > enough; ++k) {
-    least = std::min(least, advance(motion));
-  }
-  return least;
-}
-
-double Evasion::reference_clearance(Flight flight, Obstacles obstacles, double enough) {
-  const JointLimits& limits = system_->robot().limits();
-  const Eigen::VectorXd at_rest = Eigen::VectorXd::Zero(num_coordinates());
-  double least = infinity;
-  for (int k = 0; k < whole_periods(settings_.horizon, reference_period) && least > enough; ++k) {
-    const JointGoal here(flight.position().cwiseMax(limits.lower).cwiseMin(limits.upper));
-    const StepStatus status = system_->acceleration(here.position, at_rest, here, obstacles, workspace_);
-    least = is_fallback(status) ? -infinity : std::min(least, obstacle_clearance());
-    flight.advance(reference_period);
-    obstacles.advance(reference_period);
+  for (int k = 0; k < whole_periods(settings_.horizon, stepper.period) && least > enough; ++k) {
+    least = std::min(least, advance(motion, stepper));
   }
   return least;
 }
@@ -210,7 +199,8 @@ std::vector<Evasion::Tried> Evasion::promising(const Motion& now, const std::opt
         number % 2 == 1 && followed ? draw(followed->refuge(), spread_of_followed) : draw(now.q, spread);
     const Flight flight(system_->robot().limits(), now.q, now.v, std::move(refuge));
     const bool full = best.size() == num_motions;
-    const double clearance = reference_clearance(flight, now.obstacles, full ? best.back().clearance : -infinity);
+    const double enough = full ? best.back().clearance : -infinity;
+    const double clearance = least_clearance({now.q, now.v, now.obstacles, now.goal, flight}, coarse_, enough);
     if (full && !(clearance > best.back().clearance)) {
       continue;
     }

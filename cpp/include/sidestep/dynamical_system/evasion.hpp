@@ -33,10 +33,9 @@ struct EvasionSettings {
 /// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from where
 /// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal that comes
 /// nearer to an obstacle than `clearance`, and so does the flight that is followed already, flights to random
-/// configurations are tried: near ones, far ones and such as are near that of the flight followed. First where their
-/// references lead, a configuration every 0.05 s; of those that keep farthest away the motions are integrated, until one
-/// is found that keeps `clearance`. If none does, that is followed whose least clearance is largest. The goal is followed
-/// again as soon as its own way is free.
+/// configurations are tried: near ones, far ones and such as are near that of the flight followed. First by steps of
+/// 0.05 s; those that keep farthest away are integrated by steps of `period`, until one is found that keeps `clearance`. If
+/// none does, that is followed whose least clearance is largest. The goal is followed again as soon as its own way is free.
 ///
 /// A flight is no motion of the system: its barriers would push it off its way, straight away from what comes. It goes
 /// where it was seen to go, kept off obstacles and itself, and within limits, by the filter or the torque controller, which
@@ -83,24 +82,28 @@ class Evasion {
     double clearance;
     Flight flight;
   };
+  /// What integrates motions by a period [s].
+  struct Stepper {
+    double period;
+    AccelerationFilter filter;
+
+    Stepper(const Robot& robot, double period);
+  };
 
   /// Moves on by one period; the least clearance from obstacles at its beginning [m].
-  double advance(Motion& motion);
+  double advance(Motion& motion, Stepper& stepper);
   /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`.
-  double least_clearance(Motion motion, double enough);
-  /// The same of the configurations that a flight's reference goes through.
-  double reference_clearance(Flight flight, Obstacles obstacles, double enough);
+  double least_clearance(Motion motion, Stepper& stepper, double enough);
   double obstacle_clearance() const noexcept;
-  /// The flights from a state whose references keep farthest away, best first.
+  /// The flights from a state that keep farthest away in coarse steps, best first.
   std::vector<Tried> promising(const Motion& now, const std::optional<Flight>& followed);
   Eigen::VectorXd draw(const Eigen::VectorXd& q, double spread);
 
   std::shared_ptr<const GeometricSystem> system_;
   EvasionSettings settings_;
   GeometricSystem::Workspace workspace_;
-  int periods_;    // of a delay
-  double period_;  // delay / periods_ [s]
-  AccelerationFilter filter_;
+  int periods_;  // of a delay
+  Stepper fine_, coarse_;
   TorqueSolution filtered_;
   std::vector<Eigen::Index> of_obstacles_;  // coordinates
   std::mt19937_64 random_;
