@@ -197,10 +197,13 @@ def test_a_rearrangement_splits_one_ellipsoid_and_leaves_another_out_or_shifts_a
     cube = LinkSurface(np.asarray(trimesh.creation.box((0.1, 0.1, 0.1)).triangles))
     far = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     three = Ellipsoids(far, np.tile(np.diag([0.2, 0.1, 0.1]), (3, 1, 1)))
-    on_second, weights = np.array([[1.2, 0.0, 0.0], [1.0, 0.1, 0.0]]), np.array([1.0, 0.0])
+    points, weights = (
+        np.array([[1.2, 0.0, 0.0], [2.2, 0.0, 0.0]]),
+        np.array([1.0, 0.0]),
+    )  # on the second and the third
     kinds = set()
     for seed in range(30):
-        moved = rearranged(cube, three, on_second, weights, np.random.default_rng(seed))
+        moved = rearranged(cube, three, points, weights, np.random.default_rng(seed))
         assert len(moved) == 3
         changed = [k for k in range(3) if not np.array_equal(moved.centres[k], three.centres[k])]
         if len(changed) == 3:
@@ -218,7 +221,7 @@ def test_a_rearrangement_splits_one_ellipsoid_and_leaves_another_out_or_shifts_a
             0.0, abs=1e-15
         )  # to both sides of it, along one of its axes
         axis = int(np.abs(halves[0]).argmax())
-        kinds.add("xyz"[axis] if axis == 0 else "yz")
+        kinds.add("x" if axis == 0 else "yz")
         semi_axes = np.array([0.2, 0.1, 0.1])
         assert np.abs(halves[0]) == pytest.approx(
             np.where(np.arange(3) == axis, 0.5 * semi_axes, 0.0), abs=1e-15
@@ -226,6 +229,12 @@ def test_a_rearrangement_splits_one_ellipsoid_and_leaves_another_out_or_shifts_a
         expected = np.diag(np.where(np.arange(3) == axis, 0.6 * semi_axes, semi_axes))
         assert moved.shapes[changed] == pytest.approx(np.tile(expected, (2, 1, 1)), abs=1e-15)
     assert kinds == {"shifted", "x", "yz"}
+    # One ellipsoid cannot be split for another, and without overshoot there is none to split.
+    for few, seen in ((Ellipsoids(far[:1], three.shapes[:1]), points[:1]), (three, points[:0])):
+        for seed in range(5):
+            moved = rearranged(cube, few, seen, np.ones(len(seen)), np.random.default_rng(seed))
+            assert np.array_equal(moved.shapes, few.shapes)
+            assert not np.any(np.all(moved.centres == few.centres, axis=1))
 
 
 def test_a_named_link_gets_its_number_and_the_others_share_the_rest(planar: Robot) -> None:

@@ -17,6 +17,7 @@ namespace {
 constexpr std::array<double, 3> spreads{0.8, 2.2, 6.3};
 constexpr double spread_of_followed = 0.5;
 constexpr double coarse_period = 0.05;  // [s] of the steps by which flights are compared at first
+constexpr double least_steps = 10.0;    // of a coarse motion, where the fine ones have as many
 constexpr std::size_t num_motions = 4;  // flights that are integrated finely in one look, at most
 
 const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& system) {
@@ -55,8 +56,7 @@ void EvasionSettings::validate() const {
   finite(delay, "evasion: delay");
   require(delay <= horizon, "evasion: delay", delay, "no longer than the horizon");
   require(period <= delay, "evasion: period", period, "no longer than the delay");
-  require(horizon <= most_periods * std::min(period, coarse_period), "evasion: horizon", horizon,
-          "at most 100,000 periods and 5,000 s");
+  require(horizon <= most_periods * period, "evasion: horizon", horizon, "at most 100,000 periods");
   require(std::isfinite(clearance), "evasion: clearance", clearance, "finite");
   require(tries >= 1, "evasion: tries", tries, ">= 1");
 }
@@ -69,7 +69,7 @@ Evasion::Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings 
       workspace_(checked(system_)),
       periods_(static_cast<int>(std::ceil(settings.delay / settings.period - rounding))),
       fine_(system_->robot(), settings.delay / periods_),
-      coarse_(system_->robot(), std::max(fine_.period, coarse_period)),
+      coarse_(system_->robot(), std::max(fine_.period, std::min(coarse_period, settings.horizon / least_steps))),
       filtered_(num_coordinates()),
       random_(settings.seed) {
   for (std::size_t k = 0; k < system_->labels().size(); ++k) {

@@ -19,7 +19,7 @@ constexpr double pi = 3.14159265358979323846;
 constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
 constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
 constexpr double local = 0.3;            // of the samples are around a node: narrow places are near others
-constexpr double around_node = 1.2;      // half-width of two uniform numbers, their sum the offset of such a sample [rad | m]
+constexpr double around_node = 2.4;      // how far each joint of such a sample may be from the node's [rad | m]
 constexpr double octaves = 3.0;          // of the lengths of steps from a node that was trapped, below the range
 constexpr double domain = 2.0;           // of the range: how far samples may be from a node that was trapped
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
@@ -255,8 +255,7 @@ int RrtConnect::draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& h
   if (random.unit() < local) {
     const auto node = tree.node(static_cast<int>(random.unit() * tree.size()));
     for (Eigen::Index k = 0; k < sample_.size(); ++k) {
-      const double offset = random.uniform(-around_node, around_node) + random.uniform(-around_node, around_node);
-      sample_[k] = std::clamp(node[k] + offset, low[k], high[k]);
+      sample_[k] = random.uniform(std::max(low[k], node[k] - around_node), std::min(high[k], node[k] + around_node));
     }
     return tree.nearest(sample_);
   }
@@ -289,12 +288,16 @@ RrtConnect::Growth RrtConnect::grow(SearchTree& tree, int from, const Eigen::Vec
     return whole ? Growth::reached : Growth::advanced;
   };
   // A long step, unless one was not free before; else a shorter one.
-  Growth growth = tree.bounded(from) ? Growth::trapped : step(settings_.range);
-  if (growth == Growth::trapped) {
+  double longest = settings_.range;
+  if (!tree.bounded(from)) {
+    const Growth growth = step(longest);
+    if (growth != Growth::trapped) {
+      return growth;
+    }
+    longest = std::min(longest, distance);
     tree.bound(from, domain * settings_.range);
-    growth = step(settings_.range * std::exp2(-octaves * random.unit()));
   }
-  return growth;
+  return step(longest * std::exp2(-octaves * random.unit()));
 }
 
 }  // namespace sidestep

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 import numpy.typing as npt
@@ -35,9 +35,8 @@ SPEEDS = (0.1, 0.4)  # [m/s] of its drift
 CLEARS = (3.0, 6.0)  # [s] when it leaves the goal
 FROM_START = 0.15  # [m] at least, exact, from the arm at its start when the ball comes
 FROM_GOAL = 0.03  # [m] at least from the arm at its goal, where the goal is to stay free
-BLOCKED_WITHIN = (
-    0.01  # [rad | m] of a goal with a ball in it, in every joint: the arm is to arrive within less
-)
+BLOCKED_WITHIN = 0.01  # [rad | m] of a goal with a ball in it, in every joint: within it an arm has arrived
+MOST_CORNERS = 1024  # of the box around the goal that are looked at: all of ten joints
 FROM_SHOULDER = 0.35  # [m] at least between its way and the shoulder: nearer, the arm cannot yield
 TRIES = 2000  # balls drawn for one problem
 
@@ -52,7 +51,7 @@ class Kind(StrEnum):
 
     @property
     def in_goal(self) -> bool:
-        """The ball is in the goal at first, and in all that is within BLOCKED_WITHIN of it."""
+        """The ball is in the goal at first, and at the corners of the box of BLOCKED_WITHIN around it."""
         return self in (Kind.blocked, Kind.cleared)
 
 
@@ -159,7 +158,7 @@ def _fits(ball: SceneObject, kind: Kind, base: Problem, arm: Arm, workspace: Wor
         return False
     at_goal = alone.distance(base.goal).distance
     if kind.in_goal:
-        corners = product((-BLOCKED_WITHIN, BLOCKED_WITHIN), repeat=len(base.goal))
+        corners = islice(product((-BLOCKED_WITHIN, BLOCKED_WITHIN), repeat=len(base.goal)), MOST_CORNERS)
         return at_goal < 0.0 and all(alone.distance(base.goal + np.array(x)).distance < 0.0 for x in corners)
     if kind is Kind.sudden and at_goal < FROM_GOAL:
         return False

@@ -182,6 +182,7 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
     figures: dict[str, Any] = {"problems": len(items)}
     if moved:
         figures |= {
+            "tolerances": sorted({item.tolerance for item in items}),
             "solved": len(solved),
             "arrived": sum(item.arrived for item in moved),
             "collision": sum(item.collision for item in moved),

@@ -32,14 +32,15 @@ if TYPE_CHECKING:
 
 ALGORITHM_VERSION = 3  # part of the cache's key: a cover of another algorithm is made again
 MAX_COMPONENTS = 80
-MEAN_AIM, MAX_AIM = 4e-3, 14.5e-3  # mean and largest overshoot aimed at on a link of AIM_SIZE or more [m]
+MEAN_AIM, MAX_AIM = (
+    4e-3,
+    14.5e-3,
+)  # of overshoot on a link of AIM_SIZE or more [m]; the largest is to be 15 mm
 AIM_SIZE = 0.15  # a link of an arm [m]
 AIM_POWER = (
-    0.6  # of the size, with which the aims of smaller links go: 1.4 mm and 5.1 mm on a finger of 25 mm
+    0.6  # of the size, with which the aims of smaller links go: 1.4 mm and 4.9 mm on a finger of 25 mm
 )
-FIXED_ALLOWANCE = (
-    2.0  # the mean of links that no joint moves may be this much larger: only self-collision sees them
-)
+FIXED_ALLOWANCE = 2.0  # in the mean, its square beyond MAX_AIM, of links that only self-collision sees
 BEYOND_MAX = 5.0  # what the largest overshoot costs more, as a share of its aim, where it is larger
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
 GROWTH = 1.3  # numbers of ellipsoids tried on a link grow by this factor

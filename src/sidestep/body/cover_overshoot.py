@@ -41,11 +41,12 @@ class Overshoot:
 def overshoot(surface: LinkSurface, ellipsoids: Ellipsoids, *, directions: int = NUM_DIRECTIONS) -> Overshoot:
     """Samples every ellipsoid's boundary evenly and keeps what lies in no other ellipsoid and outside the link."""
     boundary, areas = ellipsoids.boundary(sphere_directions(directions))
-    points, areas = boundary.reshape(-1, 3), areas.reshape(-1)
-    radii = ellipsoids.radii(points)
-    radii[np.arange(len(points)), np.repeat(np.arange(len(ellipsoids)), directions)] = np.inf
-    free = (radii > 1.0).all(axis=1)
-    points, areas = points[free], areas[free]
+    free = np.empty(areas.shape, dtype=bool)
+    for k, points in enumerate(boundary):  # one after another: the radii of all of them are many
+        radii = ellipsoids.radii(points)
+        radii[:, k] = np.inf
+        free[k] = (radii > 1.0).all(axis=1)
+    points, areas = boundary[free], areas[free]
     distances = surface.overshoot(points)
     outside = distances > 0.0
     return Overshoot(points[outside], distances[outside], areas[outside])

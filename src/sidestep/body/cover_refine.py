@@ -159,7 +159,7 @@ def rearranged(
     split = int(ellipsoids.radii(drawn[None])[0].argmin())
     left_out = int((split + rng.integers(1, count)) % count)
     directions, axes, _ = np.linalg.svd(ellipsoids.shapes[split])
-    along = 0 if rng.random() < 0.5 else int(rng.integers(3))  # the longest as often as any
+    along = 0 if rng.random() < 0.5 else int(rng.integers(3))  # the longest in half the cases, else any
     offset = 0.5 * axes[along] * directions[:, along]
     axes[along] *= HALF
     centres, shapes = ellipsoids.centres.copy(), ellipsoids.shapes.copy()

@@ -35,8 +35,8 @@ struct PlannerSettings {
 /// runs out.
 ///
 /// Distances in the trees are √Σ (w_i Δq_i)², w_i the reach of joint i over the mean of all: an edge is as long as what it
-/// moves. A sample is uniform within the limits or, `local` of them, around a node. A node that was trapped grows by steps of
-/// random length.
+/// moves. Seven of ten samples are uniform within the limits, the others around a node. A node that was trapped grows by
+/// steps of random length.
 ///
 /// The first path keeps the `floor`: those are many, and the soonest found. It is improved then: one that keeps `margin` is
 /// looked for with a 400th of the budget, else one that keeps the geometric mean of the two with a 40th, and what was found is

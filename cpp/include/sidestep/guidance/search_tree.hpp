@@ -10,7 +10,7 @@ namespace sidestep {
 /// index. Joints count by their weights w: |Δq| = √Σ (w_i Δq_i)². Room is taken once.
 class SearchTree {
  public:
-  /// weights: (nv), positive.
+  /// weights: (nv), not negative; 0 for a joint that moves nothing.
   SearchTree(const Eigen::VectorXd& weights, int capacity);
 
   void clear() noexcept { size_ = 0; }
