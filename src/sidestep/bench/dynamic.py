@@ -39,6 +39,10 @@ BLOCKED_WITHIN = 0.01  # [rad | m] of a goal with a ball in it, in every joint: 
 MOST_CORNERS = 1024  # of the box around the goal that are looked at: all of ten joints
 FROM_SHOULDER = 0.35  # [m] at least between its way and the shoulder: nearer, the arm cannot yield
 TRIES = 2000  # balls drawn for one problem
+REPLACED_BY = (
+    100_000  # numbers of random problems are this far apart that take the place of one that no ball fits
+)
+REPLACEMENTS = 10
 
 
 class Kind(StrEnum):
@@ -215,11 +219,21 @@ class _Worker:
         if kind.in_goal:  # beside the ball, within a wider tolerance, it would have arrived
             tolerance = min(settings.motion.tolerance, BLOCKED_WITHIN)
             settings = replace(settings, motion=replace(settings.motion, tolerance=tolerance))
-        base: Problem
         if isinstance(source, int):
-            arm, name, base = self._arm, "random", self._generator.problem(source)
+            arm, name, problem = self._arm, "random", self._random_problem(kind, source)
         else:
             arm, name = self._arms.of(source), source.set
             base, _ = arm.problem(source, spacing=settings.spacing, point_radius=settings.point_radius)
-        problem = with_ball(base, kind, arm, self._generator.workspace, seed=self.random.seed)
+            problem = with_ball(base, kind, arm, self._generator.workspace, seed=self.random.seed)
         return judged(arm, problem, settings, set=f"{name} {kind.value}", arrives=kind is not Kind.blocked)
+
+    def _random_problem(self, kind: Kind, index: int) -> DynamicProblem:
+        """The random problem of that number, or the first in its place that a ball fits."""
+        generator = self._generator
+        for number in range(index, index + REPLACEMENTS * REPLACED_BY, REPLACED_BY):
+            base = generator.problem(number)
+            try:
+                return with_ball(base, kind, self._arm, generator.workspace, seed=self.random.seed)
+            except ValueError as error:
+                unfit = error
+        raise unfit
