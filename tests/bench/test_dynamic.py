@@ -114,14 +114,17 @@ def test_every_kind_is_reported_as_a_set() -> None:
 
 def test_an_arm_beside_a_ball_in_its_goal_has_not_arrived() -> None:
     settings = SceneSettings(
-        robot="planar3", method=Method.barrier, motion=MotionSettings(duration=6.0, tolerance=0.5), jobs=1
+        robot="planar3",
+        method=Method.barrier,
+        motion=MotionSettings.of(Method.barrier, duration=6.0, tolerance=0.5),
+        jobs=1,
     )
     result = run_dynamic(settings, count=2, seed=3, obstacles=0)
     ended = {(x.set, x.index): x for x in result.outcomes}
     for index in range(2):
         blocked = ended["random blocked", index]
         assert blocked.outcome is not None
-        assert not blocked.outcome.collision
+        assert blocked.solved
         assert not blocked.outcome.arrived
         assert blocked.outcome.error_rad > BLOCKED_WITHIN
         assert blocked.tolerance == BLOCKED_WITHIN
