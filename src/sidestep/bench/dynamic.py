@@ -39,10 +39,8 @@ BLOCKED_WITHIN = 0.01  # [rad | m] of a goal with a ball in it, in every joint: 
 MOST_CORNERS = 1024  # of the box around the goal that are looked at: all of ten joints
 FROM_SHOULDER = 0.35  # [m] at least between its way and the shoulder: nearer, the arm cannot yield
 TRIES = 2000  # balls drawn for one problem
-REPLACED_BY = (
-    100_000  # numbers of random problems are this far apart that take the place of one that no ball fits
-)
-REPLACEMENTS = 10
+REPLACED_BY = 100_000  # added to the number of a random problem that no ball fits, for another in its place
+REPLACEMENTS = 10  # problems tried
 
 
 class Kind(StrEnum):

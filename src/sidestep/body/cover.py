@@ -32,14 +32,10 @@ if TYPE_CHECKING:
 
 ALGORITHM_VERSION = 3  # part of the cache's key: a cover of another algorithm is made again
 MAX_COMPONENTS = 80
-MEAN_AIM, MAX_AIM = (
-    4e-3,
-    14.5e-3,
-)  # of overshoot on a link of AIM_SIZE or more [m]; the largest is to be 15 mm
+MEAN_AIM = 4e-3  # mean overshoot aimed at on a link of AIM_SIZE or more [m]
+MAX_AIM = 14.5e-3  # the largest, which is to be 15 mm: the search misses up to half a millimetre of a peak
 AIM_SIZE = 0.15  # a link of an arm [m]
-AIM_POWER = (
-    0.6  # of the size, with which the aims of smaller links go: 1.4 mm and 4.9 mm on a finger of 25 mm
-)
+AIM_POWER = 0.6  # of the size, with which the aims of smaller links go: 1.4 and 4.9 mm on a finger of 25 mm
 FIXED_ALLOWANCE = 2.0  # in the mean, its square beyond MAX_AIM, of links that only self-collision sees
 BEYOND_MAX = 5.0  # what the largest overshoot costs more, as a share of its aim, where it is larger
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
@@ -159,10 +155,10 @@ class _Solution:
 class _LinkProblem:
     """One link with the best cover known for every number of ellipsoids tried."""
 
-    def __init__(self, triangles: Array, *, seed: int, mean_allowance: float = 1.0) -> None:
+    def __init__(self, triangles: Array, *, seed: int, allowance: float = 1.0) -> None:
         self.surface = LinkSurface(triangles)
         self.seed = seed
-        self.mean_allowance = mean_allowance
+        self.allowance = allowance
         self.coarse = self.surface.points(NUM_COARSE)
         self.fine = self.surface.points(NUM_FINE)
         self._nearest_fine = cKDTree(self.fine).query(self.coarse)[1]
@@ -230,9 +226,9 @@ class _LinkProblem:
 
     def _excess(self, found: _Outline | _Solution) -> float:
         scale = min(1.0, self.surface.size / AIM_SIZE) ** AIM_POWER
-        mean = found.measured.mean / (MEAN_AIM * scale * self.mean_allowance)
+        mean = found.measured.mean / (MEAN_AIM * scale * self.allowance)
         maximum = found.measured.maximum / (MAX_AIM * scale)
-        return float(0.5 * (mean + maximum) + BEYOND_MAX / self.mean_allowance**2 * max(0.0, maximum - 1.0))
+        return float(0.5 * (mean + maximum) + BEYOND_MAX / self.allowance**2 * max(0.0, maximum - 1.0))
 
     def trade_off(self) -> tuple[TradeOff, ...]:
         found = sorted(self.solutions.items())
@@ -257,7 +253,7 @@ def cover_links(
         key = (np.unique(triangles.reshape(-1, 3).round(9), axis=0).tobytes(), allowance)
         if key not in twins:  # fingers are often equal
             seed = link_seed(link, seed=settings.seed)
-            twins[key] = _LinkProblem(triangles, seed=seed, mean_allowance=allowance)
+            twins[key] = _LinkProblem(triangles, seed=seed, allowance=allowance)
         problems[link] = twins[key]
     numbers = _numbers(problems, settings, progress)
     total = sum(numbers.values())
