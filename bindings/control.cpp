@@ -172,12 +172,15 @@ void bind_safety(nb::module_& m) {
                    [](const Clearances& c) {
                      return std::vector<int>(c.nearest.data(), c.nearest.data() + c.nearest.size());
                    },
-                   "Index of the nearest obstacle point (m), -1 beyond the reach.");
+                   "Index of the nearest obstacle point (m), -1 beyond the reach.")
+      .def_prop_ro("margins", [](const Clearances& c) { return to_numpy(c.margins); },
+                   "No larger margins than these (m,) [m] are kept: inf, or half the activation distance of a Barrier of\n"
+                   "what is not seen, such as self-collision.");
 
   const SafetySettings defaults;
   nb::class_<SafetySettings>(
       m, "SafetySettings",
-      "What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing\n"
+      "What is kept of clearances. margin [m]: the clearance that is kept, or `Clearances.margins` if less; rate [1/s]: close to the margin the closing\n"
       "speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest\n"
       "one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;\n"
       "max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises\n"

@@ -102,7 +102,7 @@ void bind_rollout(nb::module_& m) {
                       "Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until\n"
                       "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
                       "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
-                      "for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal\n"
+                      "for a Flight to one of `tries` random configurations that does not, to be followed until the way to the goal\n"
                       "is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole\n"
                       "times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.\n"
                       "Raises ValueError that names the setting at fault, or if the system has\n"

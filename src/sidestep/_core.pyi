@@ -890,14 +890,14 @@ class Evasion:
     Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until
     the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
     on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
-    for a Flight to a random configuration (`tries` at most) that does not, to be followed until the way to the goal
+    for a Flight to one of `tries` random configurations that does not, to be followed until the way to the goal
     is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole
     times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.
     Raises ValueError that names the setting at fault, or if the system has
     no clearances to obstacles.
     """
 
-    def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 100, seed: int = 0) -> None: ...
+    def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 500, seed: int = 0) -> None: ...
 
     def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: Flight | None = None) -> Flight | None:
         """
@@ -1116,9 +1116,16 @@ class Clearances:
     def nearest(self) -> list[int]:
         """Index of the nearest obstacle point (m), -1 beyond the reach."""
 
+    @property
+    def margins(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        No larger margins than these (m,) [m] are kept: inf, or half the activation distance of a Barrier of
+        what is not seen, such as self-collision.
+        """
+
 class SafetySettings:
     """
-    What is kept of clearances. margin [m]: the clearance that is kept; rate [1/s]: close to the margin the closing
+    What is kept of clearances. margin [m]: the clearance that is kept, or `Clearances.margins` if less; rate [1/s]: close to the margin the closing
     speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest
     one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;
     max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises

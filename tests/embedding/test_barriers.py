@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import sidestep as ss
 from sidestep import _core
+from sidestep.presets import barrier_system
+from sidestep.simulation import SelfCollision
 from support.finite_differences import derivative, second_derivative
 from support.random_scene import random_body
 
@@ -246,8 +248,33 @@ def test_relaxed_barriers_leave_the_goal_flat_and_keep_what_is_far(name: str) ->
     free = clearances > 2.0 * floors / 0.9
     assert np.any(free & (before.values > 0.0))
     np.testing.assert_array_equal(after.values[free], 0.0)
+    # What is seen keeps its safety margin, of what is known no more is kept than half the activation distance.
+    joints = parts[1].num_coordinates
+    np.testing.assert_array_equal(
+        before.clearances.margins, np.repeat([np.inf, 0.25], [len(floors) - joints, joints])
+    )
+    np.testing.assert_array_equal(after.clearances.margins[:-joints], np.inf)
+    expected = 0.5 * np.clip(0.9 * clearances[-joints:], 2.0 * 0.002, 0.5)
+    np.testing.assert_allclose(after.clearances.margins[-joints:], expected, rtol=1e-12)
     # Where nothing is within reach of the goal the activation distance is what it was: elsewhere nothing changes.
     other = robot.random_configuration(rng)
     unchanged = ~np.isfinite(clearances)
     values = [s.acceleration(other, rest, goal, obstacles).values for s in (system, relaxed)]
     np.testing.assert_array_equal(values[0][unchanged], values[1][unchanged])
+
+
+def test_a_goal_at_which_links_almost_touch_is_reached() -> None:
+    """Links 5 and 7 of the panda are 0.8 mm apart there, within the safety margin: it is relaxed with the barrier."""
+    robot = ss.Robot.named("panda")
+    goal = np.array([2.461, -0.181, 0.521, -2.76, -2.88, 0.094, -2.072])
+    start = goal + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0])
+    exact = SelfCollision(robot)
+    assert 0.0 < exact.distance(goal).distance < 0.001
+    none, system = ss.Obstacles.none(), barrier_system(robot)
+    errors = {}
+    for name, moving in (("stiff", system), ("relaxed", system.relaxed_at(goal, none))):
+        guard = ss.AccelerationFilter(robot, period=0.001)
+        motion = ss.rollout(moving, start, 0.0 * start, goal, none, period=0.001, steps=4000, filter=guard)
+        assert exact.minimum_over(motion.q[::20], tolerance=1e-4).distance > 0.0
+        errors[name] = np.abs(motion.q[-1] - goal).max()
+    assert errors["relaxed"] < 0.05 < errors["stiff"]

@@ -98,7 +98,7 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
   const ClearanceState& approach = clearances.approach;
-  if (clearances.curvatures.size() != num || approach.values.size() != num || approach.rates.size() != num ||
+  if (clearances.curvatures.size() != num || clearances.margins.size() != num || approach.values.size() != num || approach.rates.size() != num ||
       approach.curvatures.size() != num || approach.gradients.rows() != normals.cols() ||
       approach.gradients.cols() != num) {
     return false;
@@ -154,6 +154,9 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
   const double tau = stop_time(v, limits, torque);
   const double rate = tau * settings_.rate > 1.0 ? 1.0 / tau : settings_.rate;
   const ClearanceState& approach = clearances.approach;
+  const auto room_of = [&](Eigen::Index k) {
+    return approach.values[k] - std::min(settings_.margin, clearances.margins[k]);
+  };
   // Insert into the list of the most critical, which is kept sorted; it is short.
   clear();
   for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
@@ -161,7 +164,7 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
         !(approach.gradients.col(k).norm() > shortest_gradient)) {
       continue;
     }
-    const double urgency = approach.values[k] - settings_.margin + approach.rates[k] / rate;
+    const double urgency = room_of(k) + approach.rates[k] / rate;
     if (size_ == max_size() && urgency >= urgency_[size_ - 1]) {
       continue;
     }
@@ -183,7 +186,7 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,
                                 rate, settings_.correction};
-    const double room = approach.values[k] - settings_.margin, u = -approach.rates[k];
+    const double room = room_of(k), u = -approach.rates[k];
     // Of the points, but no more than the mean where it says that a surface recedes: see the header.
     const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
     double required = demanded_deceleration(room, u, closing, period) - c;

@@ -18,7 +18,11 @@ constexpr std::array<double, 3> spreads{0.8, 2.2, 6.3};
 constexpr double spread_of_followed = 0.5;
 constexpr double coarse_period = 0.05;  // [s] of the steps by which flights are compared at first
 constexpr double least_steps = 10.0;    // of a coarse motion, where the fine ones have as many
-constexpr std::size_t num_motions = 4;  // flights that are integrated finely in one look, at most
+// Deeper than bodies overshoot [m]: how a motion goes on from there is not looked at. Of such the longest is the best.
+constexpr double touched = -0.02;
+constexpr std::size_t enough_references = 10;  // that go far: the others are sorted out only while there are more
+constexpr int coarse_horizons = 25;            // coarse motions in one look: so many to the horizon, more if they end before
+constexpr std::size_t num_fine = 4;            // fine ones of flights, at most
 
 const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& system) {
   if (system == nullptr) {
@@ -158,22 +162,20 @@ double Evasion::obstacle_clearance() const noexcept {
 
 double Evasion::advance(Motion& motion, Stepper& stepper) {
   const double period = stepper.period;
-  const auto step = [&](const Goal& goal) {
-    return system_->acceleration(motion.q, motion.v, goal, motion.obstacles, workspace_);
-  };
-  StepStatus status = motion.flight ? step(JointGoal(motion.flight->refuge())) : step(motion.goal);
-  Eigen::VectorXd wanted = workspace_.acceleration;
-  const bool brakes = is_fallback(status);  // without clearances, as a loop then does
-  if (brakes) {
-    const JointLimits& limits = system_->robot().limits();
-    status = step(JointGoal(motion.q.cwiseMax(limits.lower).cwiseMin(limits.upper)));
-  } else if (motion.flight) {
-    wanted = motion.flight->acceleration(motion.q, motion.v, period);
-  }
+  bool sees, brakes = false;
+  Eigen::VectorXd wanted;
   if (motion.flight) {
+    sees = system_->embed(motion.q, motion.v, motion.obstacles, workspace_);
+    wanted = motion.flight->acceleration(motion.q, motion.v, period);
     motion.flight->advance(period);
+  } else {
+    const StepStatus status = system_->acceleration(motion.q, motion.v, motion.goal, motion.obstacles, workspace_);
+    sees = status != StepStatus::invalid_state && status != StepStatus::not_finite;
+    brakes = is_fallback(status);  // without clearances, as a loop then does
+    wanted = workspace_.acceleration;
   }
-  const double clearance = is_fallback(status) ? -infinity : obstacle_clearance();
+  ++stepper.steps;
+  const double clearance = sees ? obstacle_clearance() : -infinity;
   const Clearances* clearances = brakes ? nullptr : &workspace_.clearances;
   static_cast<void>(stepper.filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
   motion.v += period * filtered_.acceleration;
@@ -187,18 +189,62 @@ double Evasion::least_clearance(Motion motion, Stepper& stepper, double enough) 
   double least = infinity;
   for (int k = 0; k < whole_periods(settings_.horizon, stepper.period) && least > enough; ++k) {
     least = std::min(least, advance(motion, stepper));
+    if (least < touched) {
+      return touched - (settings_.horizon - k * stepper.period);
+    }
   }
   return least;
 }
 
-std::vector<Evasion::Tried> Evasion::promising(const Motion& now, const std::optional<Flight>& followed) {
-  std::vector<Tried> best;
+std::vector<Flight> Evasion::draw_flights(const Motion& now, const std::optional<Flight>& followed) {
+  struct Reference {
+    Flight flight, moved;
+    int free = 0;  // steps
+  };
+  std::vector<Reference> references;
+  references.reserve(static_cast<std::size_t>(settings_.tries));
   for (int number = 0; number < settings_.tries; ++number) {
     const double spread = spreads[static_cast<std::size_t>(number / 2) % spreads.size()];
     Eigen::VectorXd refuge =
         number % 2 == 1 && followed ? draw(followed->refuge(), spread_of_followed) : draw(now.q, spread);
     const Flight flight(system_->robot().limits(), now.q, now.v, std::move(refuge));
-    const bool full = best.size() == num_motions;
+    references.push_back({flight, flight});
+  }
+  Obstacles obstacles = now.obstacles;
+  std::size_t left = references.size();
+  for (int k = 0; k < whole_periods(settings_.horizon, coarse_.period) && left > enough_references; ++k) {
+    for (Reference& reference : references) {
+      if (reference.free < k) {
+        continue;
+      }
+      if (system_->touches(reference.moved.position(), obstacles, -touched, workspace_)) {
+        --left;
+        continue;
+      }
+      reference.moved.advance(coarse_.period);
+      reference.free = k + 1;
+    }
+    obstacles.advance(coarse_.period);
+  }
+  std::stable_sort(references.begin(), references.end(),
+                   [](const Reference& a, const Reference& b) { return a.free > b.free; });
+  std::vector<Flight> flights;
+  for (Reference& reference : references) {
+    flights.push_back(std::move(reference.flight));
+  }
+  return flights;
+}
+
+std::vector<Evasion::Tried> Evasion::promising(const Motion& now, const std::optional<Flight>& followed) {
+  const int most_steps = coarse_horizons * whole_periods(settings_.horizon, coarse_.period);
+  const double ample = 2.0 * settings_.clearance;
+  std::vector<Tried> best;
+  coarse_.steps = 0;
+  for (Flight& flight : draw_flights(now, followed)) {
+    const bool full = best.size() == num_fine;
+    if (coarse_.steps >= most_steps || (full && best.back().clearance >= ample)) {
+      break;
+    }
     const double enough = full ? best.back().clearance : -infinity;
     const double clearance = least_clearance({now.q, now.v, now.obstacles, now.goal, flight}, coarse_, enough);
     if (full && !(clearance > best.back().clearance)) {
@@ -209,7 +255,7 @@ std::vector<Evasion::Tried> Evasion::promising(const Motion& now, const std::opt
     }
     const auto at = std::upper_bound(best.begin(), best.end(), clearance,
                                      [](double value, const Tried& tried) { return value > tried.clearance; });
-    best.insert(at, {clearance, flight});
+    best.insert(at, {clearance, std::move(flight)});
   }
   return best;
 }

@@ -134,7 +134,7 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
 StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
                                          const Goal& goal, const Obstacles& obstacles,
                                          Workspace& w) const noexcept {
-  if (!all_finite(q) || !all_finite(v)) {
+  if (!embed(q, v, obstacles, w)) {
     return fall_back(StepStatus::invalid_state, v, w);
   }
   const GoalFault fault = check(goal, robot_);
@@ -144,9 +144,6 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
   if (fault == GoalFault::outside_limits) {
     return fall_back(StepStatus::goal_outside_limits, v, w);
   }
-
-  w.state_.update(robot_, q, v);
-  embed(obstacles, w);
   w.metric.update(w.jacobian_transposed);
   w.pull.update(goal, w.state_, stiffness_);
 
@@ -191,7 +188,12 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
   return w.status_;
 }
 
-void GeometricSystem::embed(const Obstacles& obstacles, Workspace& w) const noexcept {
+bool GeometricSystem::embed(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+                            const Obstacles& obstacles, Workspace& w) const noexcept {
+  if (!all_finite(q) || !all_finite(v)) {
+    return false;
+  }
+  w.state_.update(robot_, q, v);
   w.values.setZero();
   w.curvatures.setZero();
   w.jacobian_transposed.setZero();
@@ -205,6 +207,14 @@ void GeometricSystem::embed(const Obstacles& obstacles, Workspace& w) const noex
         w.state_, obstacles);
     start += m;
   }
+  return true;
+}
+
+bool GeometricSystem::touches(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double depth,
+                              Workspace& w) const noexcept {
+  w.state_.update(robot_, q, w.rest_);
+  return std::any_of(embeddings_.begin(), embeddings_.end(),
+                     [&](const auto& embedding) { return embedding->touches(w.state_, obstacles, depth); });
 }
 
 void GeometricSystem::combine(const Obstacles& obstacles, Workspace& w) const noexcept {

@@ -11,6 +11,9 @@ Barrier::Barrier(Robot robot, const BarrierFunction& function, const char* owner
 }
 
 void Barrier::add_barriers(EmbeddingView out) const noexcept {
+  if (!is_seen()) {
+    out.clearances.margins = margin_share * activations_;
+  }
   BarrierFunction function = function_;
   for (Eigen::Index k = 0; k < out.values.size(); ++k) {
     const double h = out.clearances.values[k];

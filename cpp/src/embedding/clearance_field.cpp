@@ -108,14 +108,16 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
   }
   for (int first = 0; first < size();) {
     const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
-    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0};
+    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0};
     while (first + cluster.size < size() && cluster.size < kernels::most_queries &&
            at(first + cluster.size).body.joint == at(first).body.joint) {
       cluster.centre += at(first + cluster.size++).body.mean;
     }
     cluster.centre /= cluster.size;
     for (int k = first; k < first + cluster.size; ++k) {
-      cluster.radius = std::max(cluster.radius, (at(k).body.mean - cluster.centre).norm() + at(k).body.extent);
+      const double distance = (at(k).body.mean - cluster.centre).norm();
+      cluster.radius = std::max(cluster.radius, distance + at(k).body.extent);
+      cluster.inner_radius = std::max(cluster.inner_radius, distance + at(k).semi_axes.minCoeff());
     }
     clusters_.push_back(cluster);
     first += cluster.size;
@@ -220,6 +222,37 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       }
     }
   }
+}
+
+bool ClearanceField::touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept {
+  const PointTree& tree = obstacles.tree();
+  for (const Cluster& cluster : clusters_) {
+    const KinematicState::Link& link = state.link(ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint);
+    const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
+    bool found = false;
+    const auto near = [&](const PointTree::Ball& ball) {
+      const double within = cluster.inner_radius + ball.radius - depth;
+      return !found && within > 0.0 && (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).squaredNorm() < within * within;
+    };
+    tree.visit(centre, near, [&](int first, int count, const PointTree::Ball&, const Eigen::Vector3d&, double) {
+      for (int n = first; n < first + count && !found; ++n) {
+        const Eigen::Vector3d x(tree.coordinate(0)[n], tree.coordinate(1)[n], tree.coordinate(2)[n]);
+        if (!near({x.x(), x.y(), x.z(), tree.radii()[n]})) {
+          continue;
+        }
+        const Eigen::Vector3d in_link = link.R_WL.transpose() * (x - link.p_WL);
+        for (int k = cluster.first; k < cluster.first + cluster.size; ++k) {
+          const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(k)];
+          const double within = ellipsoid.semi_axes.minCoeff() + tree.radii()[n] - depth;
+          found = found || (within > 0.0 && (in_link - ellipsoid.body.mean).squaredNorm() < within * within);
+        }
+      }
+    });
+    if (found) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace sidestep

@@ -2,6 +2,11 @@
 
 namespace sidestep {
 
+bool Embedding::touches(const KinematicState& /*state*/, const Obstacles& /*obstacles*/,
+                        double /*depth*/) const noexcept {
+  return false;
+}
+
 CoordinateLabel Embedding::label(int /*k*/) const { return {}; }
 
 std::shared_ptr<const Embedding> Embedding::relaxed_at(const Eigen::VectorXd& /*goal*/,

@@ -197,6 +197,16 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   const double demand = demanded_deceleration(0.1, 0.4, {2.5, 5.0, 20.0, 0.5}, 0.001);
   BOOST_TEST(rows.lower[0] == (demand + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
 
+  // A smaller margin of the clearance's own holds instead, a larger one does not.
+  for (const double margin : {0.002, 0.05}) {
+    clearances.margins[1] = margin;
+    rows.update(clearances, v, limits, anything, 0.001);
+    const double room = 0.105 - std::min(margin, 0.005);
+    const double expected = demanded_deceleration(room, 0.4, {2.5, 5.0, 20.0, 0.5}, 0.001);
+    BOOST_TEST(rows.lower[0] == (expected + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
+  }
+  clearances.margins[1] = test::infinity;
+
   // With torque: M = diag(4, 1), bias (6, -2): 0.3/4 (30 - 6) + 0.4 (10 - 2) = 1.8 + 3.2 = 5 again; with bias (22, -2)
   // 0.6 + 3.2 = 3.8.
   Eigen::MatrixXd cholesky(2, 2);

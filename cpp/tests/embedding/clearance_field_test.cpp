@@ -189,6 +189,37 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
   use(before);
 }
 
+BOOST_AUTO_TEST_CASE(what_touches_is_found_by_balls_inside) {
+  Random random(4);
+  int touching = 0;
+  constexpr int trials = 300;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Robot robot = test::random_tree(random, 7);
+    const Body body = calibrated(test::random_body(random, robot), random);
+    const ClearanceField field(robot, body, temperature);
+    KinematicState state(robot);
+    state.update(robot, random.vector(robot.num_coordinates()), Eigen::VectorXd::Zero(robot.num_coordinates()));
+    const Obstacles obstacles = test::random_obstacles(random, 1 + trial % 40);
+    const double depth = random.uniform(-0.05, 0.05);
+    bool expected = false;
+    for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, body, "test")) {
+      if (ellipsoid.joint < 0) {
+        continue;
+      }
+      const KinematicState::Link& link = state.link(ellipsoid.joint);
+      const double inside = std::sqrt(ellipsoid.shape.eigenvalues().real().minCoeff());
+      for (int n = 0; n < obstacles.size(); ++n) {
+        const double distance = (obstacles.points().col(n) - link.p_WL - link.R_WL * ellipsoid.mean).norm();
+        expected = expected || distance < inside + obstacles.radii()[n] - depth;
+      }
+    }
+    BOOST_TEST(field.touches(state, obstacles, depth) == expected);
+    touching += expected;
+  }
+  BOOST_TEST(touching > trials / 10);
+  BOOST_TEST(touching < trials - trials / 10);
+}
+
 // Inside, gradients are longer than one: a point may close faster than any bound of a distance says, beside one that is
 // deeper by more than the window.
 BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {

@@ -83,7 +83,7 @@ double demanded_deceleration(double room, double closing_speed, const ClosingLim
 struct SafetySettings {
   /// Clearance that is kept [m]. Covers what the model does not see: the reduction over points is high by up to its
   /// temperature (2 mm by default), tracking error, one period of delay, and 1.5/rate times what obstacles move without
-  /// saying so: 5 mm hold off what comes by up to 0.06 m/s.
+  /// saying so: 5 mm hold off what comes by up to 0.06 m/s. `Clearances::margins` where they are less.
   double margin = 0.005;
   /// γ [1/s] of a slow arm. Larger lets it come close quicker and reacts more to noise; γT must stay well below 1.
   double rate = 20.0;

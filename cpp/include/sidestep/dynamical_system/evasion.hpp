@@ -20,7 +20,7 @@ struct EvasionSettings {
   double period = 0.01;      ///< [s] of the steps of the motions looked at; made shorter to go into `delay` whole times
   double delay = 0.1;        ///< [s] from one look to the next, from when on is followed what it found
   double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
-  int tries = 100;           ///< configurations that are tried in one look, at most
+  int tries = 500;           ///< flights that are drawn in one look
   std::uint64_t seed = 0;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
@@ -33,9 +33,12 @@ struct EvasionSettings {
 /// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from where
 /// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal that comes
 /// nearer to an obstacle than `clearance`, and so does the flight that is followed already, flights to random
-/// configurations are tried: near ones, far ones and such as are near that of the flight followed. First by steps of
-/// 0.05 s; those that keep farthest away are integrated by steps of `period`, until one is found that keeps `clearance`. If
-/// none does, that is followed whose least clearance is largest. The goal is followed again as soon as its own way is free.
+/// configurations are drawn: near ones, far ones and such as are near that of the flight followed. They are sifted three
+/// times. Those come first whose references, without a filter, get farthest before the body is deep in an obstacle, which
+/// is quick to say. They are integrated by steps of 0.05 s, as many as there is time for; then those that keep farthest
+/// away by steps of `period`, until one is found that keeps `clearance`. If none does, that is followed whose least
+/// clearance is largest, or of those that go through an obstacle the one that comes to it last. The goal is followed again
+/// as soon as its own way is free.
 ///
 /// A flight is no motion of the system: its barriers would push it off its way, straight away from what comes. It goes
 /// where it was seen to go, kept off obstacles and itself, and within limits, by the filter or the torque controller, which
@@ -86,15 +89,19 @@ class Evasion {
   struct Stepper {
     double period;
     AccelerationFilter filter;
+    int steps = 0;  // integrated so far
 
     Stepper(const Robot& robot, double period);
   };
 
   /// Moves on by one period; the least clearance from obstacles at its beginning [m].
   double advance(Motion& motion, Stepper& stepper);
-  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`.
+  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that goes
+  /// through an obstacle less, by what is left of the horizon then, at 1 m/s.
   double least_clearance(Motion motion, Stepper& stepper, double enough);
   double obstacle_clearance() const noexcept;
+  /// Random flights from a state, those first whose references get farthest before the body is deep in an obstacle.
+  std::vector<Flight> draw_flights(const Motion& now, const std::optional<Flight>& followed);
   /// The flights from a state that keep farthest away in coarse steps, best first.
   std::vector<Tried> promising(const Motion& now, const std::optional<Flight>& followed);
   Eigen::VectorXd draw(const Eigen::VectorXd& q, double spread);

@@ -96,7 +96,7 @@ class GeometricSystem {
   };
 
   /// One step at (q, v) [rad, rad/s] towards `goal` [rad]. Never throws, never allocates; the status must be read.
-  /// After a fallback only `workspace.acceleration` is of this step.
+  /// After a fallback only `workspace.acceleration` is of this step and, unless the state is invalid, what `embed` writes.
   [[nodiscard]] StepStatus acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
                                         Eigen::Ref<const Eigen::VectorXd> goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
@@ -105,6 +105,16 @@ class GeometricSystem {
   [[nodiscard]] StepStatus acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
                                         const Goal& goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
+
+  /// The embedding alone, without a goal: coordinates and clearances of `workspace`. False, and nothing is written, where q
+  /// or v is not finite. No allocation.
+  [[nodiscard]] bool embed(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+                           const Obstacles& obstacles, Workspace& workspace) const noexcept;
+
+  /// Whether the body at q, finite, reaches deeper than `depth` [m] into an obstacle, see Embedding: quick, and may miss
+  /// it. No allocation.
+  bool touches(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double depth,
+               Workspace& workspace) const noexcept;
 
   /// Why the motion of the step that `workspace` holds is what it is, see diagnosis.hpp. No allocation.
   Diagnosis diagnose(const Workspace& workspace) const noexcept;
@@ -125,7 +135,6 @@ class GeometricSystem {
   int num_embedding_coordinates() const noexcept { return num_embedding_coordinates_; }
 
  private:
-  void embed(const Obstacles& obstacles, Workspace& workspace) const noexcept;
   void combine(const Obstacles& obstacles, Workspace& workspace) const noexcept;
   StepStatus fall_back(StepStatus status, Eigen::Ref<const Eigen::VectorXd> v, Workspace& workspace) const noexcept;
 

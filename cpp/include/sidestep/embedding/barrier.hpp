@@ -12,7 +12,8 @@ namespace sidestep {
 ///
 /// Every coordinate has an activation distance of its own, at first the barrier function's. Where the arm has to come
 /// close, at its goal, it is made shorter (`relaxed_at`): else the metric there is so steep that the pull to the goal
-/// is all but lost, and the arm creeps.
+/// is all but lost, and the arm creeps. The safety margin (SafetySettings) shrinks with it, of what is known and not seen:
+/// a link that has to come near another one can.
 class Barrier : public Embedding {
  public:
   int num_coordinates() const noexcept final { return static_cast<int>(activations_.size()); }
@@ -28,6 +29,8 @@ class Barrier : public Embedding {
   static constexpr double relaxed_share = 0.9;
   /// No activation distance is made shorter than this many floors of the barrier function.
   static constexpr double relaxed_floors = 2.0;
+  /// No more of an activation distance is kept as a safety margin, of what is not seen.
+  static constexpr double margin_share = 0.5;
 
  protected:
   /// Throws std::invalid_argument that names `owner`, the setting at fault, its value and what is allowed.
@@ -44,6 +47,8 @@ class Barrier : public Embedding {
   void add_barriers(EmbeddingView out) const noexcept;
 
   virtual std::shared_ptr<Barrier> clone() const = 0;
+  /// Whether the clearances are from points that a sensor sees, with errors that the safety margin covers.
+  virtual bool is_seen() const noexcept { return false; }
 
  private:
   BarrierFunction function_;

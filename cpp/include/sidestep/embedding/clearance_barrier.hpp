@@ -24,6 +24,9 @@ class ClearanceBarrier final : public Barrier {
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
 
+  bool touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept override {
+    return field_.touches(state, obstacles, depth);
+  }
   CoordinateLabel label(int k) const override;
 
   const ClearanceField& field() const noexcept { return field_; }
@@ -31,6 +34,7 @@ class ClearanceBarrier final : public Barrier {
 
  private:
   std::shared_ptr<Barrier> clone() const override { return std::make_shared<ClearanceBarrier>(*this); }
+  bool is_seen() const noexcept override { return true; }
 
   ClearanceField field_;
   double reach_;

@@ -45,6 +45,10 @@ class ClearanceField {
   void evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
                 ClearanceView out) const noexcept;
 
+  /// Whether a ball inside an ellipsoid, as large as its shortest semi-axis allows, reaches deeper than `depth` [m] into
+  /// that of a point. No allocation.
+  bool touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept;
+
   /// Which component of the body ellipsoid k came from.
   int component(int k) const noexcept { return ellipsoids_[static_cast<std::size_t>(k)].body.component; }
 
@@ -59,6 +63,7 @@ class ClearanceField {
     int first, size;
     Eigen::Vector3d centre;
     double radius;
+    double inner_radius;  // of one around the balls inside them
   };
 
   double temperature_;

@@ -16,6 +16,7 @@ struct ClearanceStateView {
 /// Where an embedding that is a barrier of clearances writes them.
 struct ClearanceView : ClearanceStateView {
   Eigen::Ref<Eigen::VectorXi> nearest;  ///< (m) the nearest point; beyond the reach what approaches; -1: neither
+  Eigen::Ref<Eigen::VectorXd> margins;  ///< (m) SafetyRows keep no larger margins than these [m]
   ClearanceStateView approach;          ///< of what the arm has to mind where it moves, see approach_mean.hpp
 };
 
@@ -39,7 +40,10 @@ struct ClearanceState {
 /// The clearances, +inf beyond the reach, and what approaches. Where `nearest` is -1 the other entries have no meaning.
 struct Clearances : ClearanceState {
   Clearances(int nv, int num)
-      : ClearanceState(nv, num), nearest(Eigen::VectorXi::Constant(num, -1)), approach(nv, num) {}
+      : ClearanceState(nv, num),
+        nearest(Eigen::VectorXi::Constant(num, -1)),
+        margins(Eigen::VectorXd::Constant(num, std::numeric_limits<double>::infinity())),
+        approach(nv, num) {}
 
   /// Forgets everything: nothing is within reach.
   void clear() noexcept {
@@ -50,10 +54,12 @@ struct Clearances : ClearanceState {
   void mind_nearest() { approach = *this; }
 
   ClearanceView view(Eigen::Index start, Eigen::Index num) noexcept {
-    return {state_view(start, num), nearest.segment(start, num), approach.state_view(start, num)};
+    return {state_view(start, num), nearest.segment(start, num), margins.segment(start, num),
+            approach.state_view(start, num)};
   }
 
   Eigen::VectorXi nearest;
+  Eigen::VectorXd margins;
   ClearanceState approach;
 };
 
