@@ -11,6 +11,8 @@ from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_mak
 from .outcome import Judge as Judge
 from .outcome import Outcome as Outcome
 from .parallel import default_jobs as default_jobs
+from .peers import PeerSettings as PeerSettings
+from .peers import run_peers as run_peers
 from .problem import Problem as Problem
 from .problem import SceneProblem as SceneProblem
 from .problem_file import read_problems as read_problems

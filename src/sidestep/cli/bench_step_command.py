@@ -1,4 +1,4 @@
-"""`sidestep bench step`, `sidestep bench compare` and `sidestep bench realtime`."""
+"""`sidestep bench step`, `compare`, `peers` and `realtime`."""
 
 from __future__ import annotations
 
@@ -82,6 +82,49 @@ def compare(
             f"{row['ratio']:.2f}",
         )
     console(quiet=quiet).print(table)
+
+
+def peers(
+    seconds: Annotated[float, typer.Option(min=0.001, help="For each way [s].")] = 3.0,
+    fabrics: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PYTHON", help="An interpreter with `fabrics`, which needs an environment of its own."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of bodies and balls.")] = 0,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """What other software takes for the nearest work to one control step, on one core, in one run.
+
+    The thesis's equations by dense tensors in NumPy, by torch.autograd and by JAX; and among ten balls CBFpy's filter,
+    fabrics and a distance query of Coal. What is not installed is left out, and named.
+    """
+    from rich import box
+    from rich.table import Table
+
+    from sidestep.bench import PeerSettings, run_peers
+
+    settings = PeerSettings(seconds=seconds, seed=seed, fabrics=fabrics)
+    terminal = console(quiet=quiet, to_stderr=json == "-")
+    with terminal.status("") as status:
+        document = run_peers(settings, progress=lambda name: status.update(name))
+    for group in document["groups"]:
+        table = Table(box=box.SIMPLE, pad_edge=False, title=f"{group['name']}: {document['cpu']}")
+        table.add_column("", no_wrap=True)
+        for name in ("median us", "p99 us", "times slower"):
+            table.add_column(name, justify="right")
+        table.add_column("work")
+        for row in group["rows"]:
+            if "missing" in row:
+                table.add_row(row["name"], "-", "-", "-", row["missing"])
+            else:
+                times = (f"{row['median_us']:,.2f}", f"{row['p99_us']:,.2f}", f"{row['times_slower']:,.1f}")
+                table.add_row(row["name"], *times, row["work"])
+        terminal.print(table)
+    if json is not None:
+        write_json(document, json)
 
 
 def realtime(

@@ -1,0 +1,391 @@
+"""What other software takes for the work of one control step, on one core, in one run."""
+
+from __future__ import annotations
+
+import json
+import platform
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import numpy.typing as npt
+
+import sidestep
+from sidestep._core import (
+    AccelerationFilter,
+    CollisionDensity,
+    GeometricSystem,
+    JointType,
+    Obstacles,
+    evaluate_batch,
+    instruction_set,
+    rollout,
+)
+from sidestep.bench import peers_jax
+from sidestep.bench.problems import ProblemGenerator, ProblemSettings
+from sidestep.bench.step import cpu_model
+from sidestep.body import Body
+from sidestep.presets import barrier_system
+from sidestep.reproduce import dense_analytic, torch_autograd
+from sidestep.reproduce.serial_chain import SerialChain
+from sidestep.robot import Robot
+from sidestep.simulation.solid import mesh_model
+
+Array = npt.NDArray[np.float64]
+Call = Callable[[Array, Array], Array]
+
+TABLE_ROBOT, ROBOT = "fr3_arm", "fr3"  # seven joints, without and with a hand
+TABLE_POINT = (0.4, 0.2, 0.5)  # [m] beside the arm
+STIFFNESS, DAMPING = 0.5, 1.5  # the thesis's
+BALLS = 10
+MOTION = 1_000  # steps; the states that every way is asked at
+FEWEST = 3  # calls of a way, however long they take
+WARM_UP = 10  # calls that do not count, if they take less than a tenth of the time
+
+
+@dataclass(frozen=True)
+class PeerSettings:
+    """How long each way is measured.
+
+    Attributes:
+        seconds: for each way [s]. seed: of the balls. fabrics: an interpreter that can import `fabrics`, which needs an
+            environment of its own; None leaves it out.
+
+    Raises:
+        ValueError: seconds is not positive.
+    """
+
+    seconds: float = 3.0
+    seed: int = 0
+    fabrics: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.seconds > 0.0:
+            raise ValueError(f"seconds is {self.seconds}, must be positive")
+
+
+@dataclass(frozen=True)
+class _Way:
+    """One way of doing the work: what is called at a state, or microseconds that it measures itself, or why neither."""
+
+    name: str
+    work: str
+    call: Call | None = None
+    measured: Callable[[], Array] | None = None
+    missing: str = ""
+    check: bool = False  # whether the result is that of the first way
+
+
+def run_peers(settings: PeerSettings, *, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
+    """Times every way and returns a document for JSON; ratios are to the first way of a group, in C++.
+
+    Raises:
+        RuntimeError: a way that should give the accelerations of the first one does not.
+    """
+    groups = []
+    for name, make in (("Table 6.1, 7 joints", _table), (f"whole arm, {BALLS} balls", _whole_arm)):
+        states, ways = make(settings)
+        rows = []
+        for way in ways:
+            if progress is not None:
+                progress(f"{name}: {way.name}")
+            rows.append({"name": way.name, "work": way.work, **_measure(way, states, settings.seconds)})
+        for row in rows:
+            if "median_us" in row:
+                row["times_slower"] = row["median_us"] / rows[0]["median_us"]
+        groups.append({"name": name, "rows": rows})
+    return {
+        "benchmark": "peers",
+        "version": sidestep.__version__,
+        "cpu": cpu_model(),
+        "instruction_set": instruction_set(),
+        "python": platform.python_version(),
+        "seconds": settings.seconds,
+        "groups": groups,
+    }
+
+
+def _measure(way: _Way, states: list[tuple[Array, Array, Array]], seconds: float) -> dict[str, Any]:
+    if way.missing:
+        return {"missing": way.missing}
+    times = way.measured() if way.measured is not None else _times(way, states, seconds)
+    quantiles = np.quantile(times, (0.5, 0.99))
+    return {"calls": len(times), "median_us": float(quantiles[0]), "p99_us": float(quantiles[1])}
+
+
+def _times(way: _Way, states: list[tuple[Array, Array, Array]], seconds: float) -> Array:
+    """Microseconds of calls at the states, which hold q, v and the acceleration to compare with."""
+    assert way.call is not None
+    begin = time.perf_counter()
+    for q, v, expected in states[:WARM_UP]:
+        found = way.call(q, v)
+        if way.check and not np.allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()):
+            raise RuntimeError(f"{way.name}: the acceleration is {found}, not {expected}")
+        if time.perf_counter() - begin > 0.1 * seconds:
+            break
+    times: list[float] = []
+    end = time.perf_counter() + seconds
+    while len(times) < FEWEST or time.perf_counter() < end:
+        q, v, _ = states[len(times) % len(states)]
+        start = time.perf_counter_ns()
+        way.call(q, v)
+        times.append(1e-3 * (time.perf_counter_ns() - start))
+    return np.array(times)
+
+
+def _in_cpp(
+    system: GeometricSystem,
+    start: Array,
+    goal: Array,
+    obstacles: Obstacles,
+    seconds: float,
+    guard: Any = None,
+) -> Array:
+    """Microseconds of steps of the system in motions of it."""
+    times: list[Array] = []
+    end = time.perf_counter() + seconds
+    while not times or time.perf_counter() < end:
+        run = rollout(
+            system, start, 0.0 * start, goal, obstacles, steps=MOTION, time_steps=True, filter=guard
+        )
+        times.append(1e6 * run.step_seconds)
+    return np.concatenate(times)
+
+
+def _table(settings: PeerSettings) -> tuple[list[tuple[Array, Array, Array]], list[_Way]]:
+    """T5.4 with one Gaussian per link and one point: the setting of the thesis's Table 6.1."""
+    robot = Robot.named(TABLE_ROBOT)
+    body = Body.fit(robot, components=1, seed=settings.seed)
+    chain, point = SerialChain.of(robot, body), np.array(TABLE_POINT)
+    obstacles, start, goal = Obstacles(point[None]), robot.neutral, robot.neutral + 0.1
+    system = GeometricSystem([CollisionDensity(robot, body)], stiffness=STIFFNESS, damping=DAMPING)
+    run = rollout(system, start, 0.0 * start, goal, obstacles, steps=MOTION)
+    states = [
+        (q, v, system.acceleration(q, v, goal, obstacles).acceleration)
+        for q, v in zip(run.q, run.v, strict=True)
+    ]
+    gains = {"stiffness": STIFFNESS, "damping": DAMPING}
+    work = "the acceleration of T5.4"
+
+    q_rows, v_rows, goals = run.q, run.v, np.tile(goal, (len(run.q), 1))
+
+    def in_batches() -> Array:
+        times: list[float] = []
+        end = time.perf_counter() + settings.seconds
+        while not times or time.perf_counter() < end:
+            begin = time.perf_counter()
+            evaluate_batch(system, q_rows, v_rows, goals, obstacles, threads=1)
+            times.append(1e6 * (time.perf_counter() - begin) / len(q_rows))
+        return np.array(times)
+
+    def automatic() -> Call:
+        peer = torch_autograd.AutogradSystem(chain, point)
+        return lambda q, v: peer.acceleration(q, v, goal, **gains)
+
+    ways = [
+        _Way(
+            "Sidestep, C++",
+            f"{work}, around each step of a motion",
+            measured=lambda: _in_cpp(system, start, goal, obstacles, settings.seconds),
+        ),
+        _Way(
+            "Sidestep, Python",
+            f"{work}, one call",
+            lambda q, v: system.acceleration(q, v, goal, obstacles).acceleration,
+            check=True,
+        ),
+        _Way("Sidestep, Python, batch", f"{work} of {len(q_rows)} states, one call", measured=in_batches),
+        _Way(
+            "NumPy, dense analytic",
+            f"{work} with dense tensors and Christoffel symbols, as chapter 4 of the thesis",
+            lambda q, v: dense_analytic.acceleration(chain, q, v, goal, point, **gains),
+            check=True,
+        ),
+        _optional(
+            "torch.autograd",
+            f"{work} with the metric's derivative by autograd, as the thesis",
+            "torch",
+            automatic,
+            check=True,
+        ),
+        _optional(
+            "JAX, jitted",
+            f"{work} in closed form, psi's derivatives by JAX, compiled",
+            "jax",
+            lambda: peers_jax.geodesic_system(chain, point, goal, **gains),
+            check=True,
+        ),
+    ]
+    return states, ways
+
+
+def _optional(name: str, work: str, module: str, make: Callable[[], Call], *, check: bool = False) -> _Way:
+    if not peers_jax.available(module):
+        return _Way(name, work, missing=f"{module} is not installed")
+    return _Way(name, work, make(), check=check)
+
+
+def _whole_arm(settings: PeerSettings) -> tuple[list[tuple[Array, Array, Array]], list[_Way]]:
+    """The covering body among the balls of a problem of `bench reach`, along a motion of the recommended system."""
+    robot = Robot.named(ROBOT)
+    body = Body.cover(robot)
+    problem = ProblemGenerator(
+        ProblemSettings(robot=ROBOT, obstacles=BALLS, seed=settings.seed), robot=robot
+    ).problem(0)
+    obstacles, start, goal = problem.obstacles_at(0.0), problem.start, problem.goal
+    system, guard = barrier_system(robot, body), AccelerationFilter(robot)
+    run = rollout(system, start, 0.0 * start, goal, obstacles, steps=MOTION, filter=guard)
+    states = [(q, v, q) for q, v in zip(run.q, run.v, strict=True)]
+    balls = np.column_stack([obstacles.points, obstacles.radii])
+    chain = SerialChain.of(robot, body)
+    # Around each ellipsoid: a sphere as large as its longest semi-axis.
+    moving = _moving(robot)
+    assert body.levels is not None
+    levels = np.array([body.levels[k] for k, link in enumerate(body.links) if link in moving])
+    radii = np.sqrt(levels * np.linalg.eigvalsh(chain.covariances)[:, -1])
+    spheres = f"{len(radii)} spheres around the same ellipsoids"
+
+    def step(q: Array, v: Array) -> Array:
+        found = system.acceleration(q, v, goal, obstacles)
+        return guard.apply(q, v, found.acceleration, clearances=found).acceleration
+
+    ways = [
+        _Way(
+            "Sidestep, C++",
+            f"system and filter: {len(body.links)} ellipsoids, self-collision, limits, quadratic program",
+            measured=lambda: _in_cpp(system, start, goal, obstacles, settings.seconds, guard),
+        ),
+        _Way("Sidestep, Python", "the same, two calls", step),
+        _optional(
+            "CBFpy",
+            f"the filter of a joint velocity: {spheres}, no self-collision, no limits, quadratic program",
+            "cbfpy",
+            lambda: peers_jax.barrier_filter(chain, chain.means, radii, list(chain.owners), balls),
+        ),
+        _Way(
+            "Coal",
+            "the distance of all moving links' meshes from the balls, by two trees of boxes; no derivatives",
+            _coal(robot, balls),
+        ),
+        _fabrics(settings, robot, chain, radii, balls, states, goal),
+    ]
+    return states, ways
+
+
+def _moving(robot: Robot) -> set[str]:
+    return {frame.name for frame in robot.frames if frame.joint >= 0}
+
+
+def _coal(robot: Robot, balls: Array) -> Call:
+    meshes = {name: robot.collision_mesh(name) for name in sorted(_moving(robot))}
+    links = {
+        name: coal.CollisionObject(mesh_model(mesh)) for name, mesh in meshes.items() if mesh is not None
+    }
+    arm, scene = coal.DynamicAABBTreeCollisionManager(), coal.DynamicAABBTreeCollisionManager()
+    kept = [
+        coal.CollisionObject(coal.Sphere(ball[3]), coal.Transform3s(np.eye(3), ball[:3])) for ball in balls
+    ]
+    for item in kept:
+        scene.registerObject(item)
+    for item in links.values():
+        arm.registerObject(item)
+    scene.setup()
+    arm.setup()
+    callback = coal.DistanceCallBackDefault()
+
+    def distance(q: Array, v: Array) -> Array:
+        del v
+        for name, item in links.items():
+            pose = robot.pose(q, name)
+            item.setTransform(coal.Transform3s(pose[:3, :3], pose[:3, 3]))
+            item.computeAABB()
+        arm.update()
+        callback.init()
+        arm.distance(scene, callback)
+        assert kept  # the manager does not hold them
+        return np.array([callback.data.result.min_distance])
+
+    return distance
+
+
+def _fabrics(
+    settings: PeerSettings,
+    robot: Robot,
+    chain: SerialChain,
+    radii: Array,
+    balls: Array,
+    states: list[tuple[Array, Array, Array]],
+    goal: Array,
+) -> _Way:
+    name, work = (
+        "fabrics",
+        f"one action: a sphere per link, the {BALLS} balls, limits, to a position; no self-collision",
+    )
+    if settings.fabrics is None:
+        return _Way(name, work, missing="needs an environment of its own: --fabrics PYTHON")
+    of_link = [radii[np.array(chain.owners) == j].max(initial=0.05) for j in range(chain.num_joints)]
+    scene = {
+        "urdf": _plain_urdf(robot),
+        "root": "link0",
+        "links": [f"link{j + 1}" for j in range(chain.num_joints)],
+        "radii": {f"link{j + 1}": float(radius) for j, radius in enumerate(of_link)},
+        "moved": [f"link{j + 1}" for j in range(chain.num_joints) if _origin_moves(robot, j)],
+        "balls": balls.tolist(),
+        "limits": [robot.limits.lower.tolist(), robot.limits.upper.tolist()],
+        "q": [q.tolist() for q, _, _ in states],
+        "v": [v.tolist() for _, v, _ in states],
+        "goal": goal.tolist(),
+        "goal_position": robot.pose(goal, robot.links[-1].name)[:3, 3].tolist(),
+        "seconds": settings.seconds,
+    }
+
+    def measured() -> Array:
+        script = Path(__file__).with_name("peer_fabrics.py")
+        done = subprocess.run(
+            [str(settings.fabrics), str(script)], input=json.dumps(scene), capture_output=True, text=True
+        )
+        if done.returncode != 0:
+            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            raise RuntimeError(f"fabrics, by {settings.fabrics}: {last}")
+        return np.array(json.loads(done.stdout.splitlines()[-1]))
+
+    return _Way(name, work, measured=measured)
+
+
+def _origin_moves(robot: Robot, joint: int) -> bool:
+    """Whether any joint moves the origin of the frame of another one."""
+    frame = next(frame for frame in robot.frames if frame.joint == joint)
+    poses = [
+        robot.pose(q, frame.name) @ np.linalg.inv(frame.placement)
+        for q in (robot.neutral, robot.neutral + 0.3)
+    ]
+    return bool(np.abs(poses[0][:3, 3] - poses[1][:3, 3]).max() > 1e-9)
+
+
+def _plain_urdf(robot: Robot) -> str:
+    """Joints alone, for readers that know no more."""
+    from scipy.spatial.transform import Rotation
+
+    def numbers(values: Array) -> str:
+        return " ".join(f"{x:.17g}" for x in values)
+
+    def joints() -> Iterator[str]:
+        limits = robot.limits
+        for j, joint in enumerate(robot.joints):
+            if joint.type != JointType.revolute:
+                raise ValueError(f"joint {joint.name!r} of robot {robot.name!r} is not revolute")
+            rpy = Rotation.from_matrix(joint.placement[:3, :3]).as_euler("xyz")
+            yield (
+                f'<joint name="joint{j + 1}" type="revolute"><parent link="link{j}"/><child link="link{j + 1}"/>'
+                f'<origin rpy="{numbers(rpy)}" xyz="{numbers(joint.placement[:3, 3])}"/>'
+                f'<axis xyz="{numbers(joint.axis)}"/><limit lower="{limits.lower[j]}" upper="{limits.upper[j]}" '
+                f'effort="{limits.effort[j]}" velocity="{limits.velocity[j]}"/></joint>'
+            )
+
+    links = "".join(f'<link name="link{j}"/>' for j in range(len(robot.joints) + 1))
+    return f'<robot name="{robot.name}">{links}{"".join(joints())}</robot>'
