@@ -194,6 +194,9 @@ BodyClearance::Found BodyClearance::look_at_points(const Item& item, const Obsta
       double covered = infinity;
       for (const CoverBall& ball : e.cover) {
         covered = std::min(covered, bound(X.p + X.R * ball.centre, ball.radius, found.clearance));
+        if (covered <= std::max(least, 0.0)) {
+          break;  // they say no more
+        }
       }
       if (covered > 0.0) {  // nothing is in them; of depths they say nothing
         least = std::max(least, covered);
