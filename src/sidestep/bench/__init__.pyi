@@ -1,3 +1,6 @@
+from .cloud_size import CloudSizeSettings as CloudSizeSettings
+from .cloud_size import draw_cloud_sizes as draw_cloud_sizes
+from .cloud_size import run_cloud_size_bench as run_cloud_size_bench
 from .dynamic import DynamicProblem as DynamicProblem
 from .dynamic import Kind as Kind
 from .dynamic import run_dynamic as run_dynamic

@@ -48,8 +48,8 @@ class StepTimes:
         return float(min(SHORTEST * 10 ** ((k + 1) / PER_DECADE), self.longest))
 
     def microseconds(self) -> dict[str, float | None]:
-        """median, p99, p99.9 and max [us]."""
-        rows = {"median": 50.0, "p99": 99.0, "p99.9": 99.9}
+        """median, p95, p99, p99.9 and max [us]."""
+        rows = {"median": 50.0, "p95": 95.0, "p99": 99.0, "p99.9": 99.9}
         found = {name: self.percentile(percent) for name, percent in rows.items()}
         found["max"] = self.longest if self.total else None
         return {name: None if value is None else round(1e6 * value, 3) for name, value in found.items()}

@@ -1,4 +1,4 @@
-"""`sidestep bench step`, `compare`, `peers` and `realtime`."""
+"""`sidestep bench step`, `compare`, `peers`, `points` and `realtime`."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def step(
         )
     table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {document['instruction_set']}")
     table.add_column("one step [us]", no_wrap=True)
-    for name in ("", "median", "p99", "p99.9", "max", "steps/s"):
+    for name in ("", "median", "p95", "p99", "p99.9", "max", "steps/s"):
         table.add_column(name, justify="right")
     for row in document["results"]:
-        times = [f"{row[f'{name}_us']:.2f}" for name in ("median", "p99", "p99.9", "max")]
+        times = [f"{row[f'{name}_us']:.2f}" for name in ("median", "p95", "p99", "p99.9", "max")]
         table.add_row(row["name"], row["language"], *times, f"{row['steps_per_s']:,.0f}")
     terminal.print(table)
     if json is not None:
@@ -123,6 +123,42 @@ def peers(
                 times = (f"{row['median_us']:,.2f}", f"{row['p99_us']:,.2f}", f"{row['times_slower']:,.1f}")
                 table.add_row(row["name"], *times, row["work"])
         terminal.print(table)
+    if json is not None:
+        write_json(document, json)
+
+
+def points(
+    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    most: Annotated[int, typer.Option(min=10, help="Points; 10, 100, ... up to so many.")] = 1_000_000,
+    seconds: Annotated[float, typer.Option(min=0.001, help="For each row [s].")] = 1.0,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw a picture, as .png, .svg or .pdf.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of points and configuration.")] = 0,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """What a step costs against the number of points: 0.5 m and more out of reach, and 5 to 10 cm from the body."""
+    from rich import box
+    from rich.table import Table
+
+    from sidestep.bench import CloudSizeSettings, draw_cloud_sizes, run_cloud_size_bench
+
+    settings = CloudSizeSettings(robot=robot, most=most, seconds=seconds, seed=seed)
+    terminal = console(quiet=quiet, to_stderr=json == "-")
+    with terminal.status("") as status:
+        document = run_cloud_size_bench(
+            settings, progress=lambda done, in_all, name: status.update(f"{done + 1} of {in_all}: {name}")
+        )
+    table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {document['instruction_set']}")
+    for name in ("points", "", "median us", "p99 us", "p99.9 us", "max us"):
+        table.add_column(name, justify="left" if name == "" else "right")
+    for row in document["results"]:
+        times = [f"{row[f'{name}_us']:,.1f}" for name in ("median", "p99", "p99.9", "max")]
+        table.add_row(f"{row['points']:,}", row["where"], *times)
+    terminal.print(table)
+    if plot is not None:
+        draw_cloud_sizes(document, plot)
     if json is not None:
         write_json(document, json)
 
