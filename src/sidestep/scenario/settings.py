@@ -27,7 +27,7 @@ class EvasionChoice:
     period: float = 0.01
     delay: float = 0.1
     clearance: float = 0.004
-    tries: int = 100
+    tries: int = 500
 
 
 @dataclass(frozen=True)
