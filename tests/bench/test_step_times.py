@@ -23,4 +23,10 @@ def test_percentiles_match_numpy_and_add_up() -> None:
 
 
 def test_no_steps_have_no_percentiles() -> None:
-    assert StepTimes().microseconds() == {"median": None, "p95": None, "p99": None, "p99.9": None, "max": None}
+    assert StepTimes().microseconds() == {
+        "median": None,
+        "p95": None,
+        "p99": None,
+        "p99.9": None,
+        "max": None,
+    }

@@ -11,7 +11,8 @@ STYLE = (
 def in_box(words: str, facts: str = "") -> str:
     """Words about the state above smaller facts; names that are long are broken, and nothing is cut off."""
     return (
-        f'<div style="min-height:{WORDS_HEIGHT}px;overflow-wrap:anywhere;padding:2px 10px;line-height:1.35">'
+        f'<div style="box-sizing:content-box;min-height:{WORDS_HEIGHT}px;overflow-wrap:anywhere;padding:2px 10px;'
+        f'line-height:1.35">'
         f'<div style="font-size:14px;font-weight:600">{words}</div>'
         f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div></div>'
     )
