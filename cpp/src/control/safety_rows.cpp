@@ -98,9 +98,9 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
   const ClearanceState& approach = clearances.approach;
-  if (clearances.curvatures.size() != num || clearances.margins.size() != num || approach.values.size() != num || approach.rates.size() != num ||
-      approach.curvatures.size() != num || approach.gradients.rows() != normals.cols() ||
-      approach.gradients.cols() != num) {
+  if (clearances.curvatures.size() != num || clearances.margins.size() != num || approach.values.size() != num ||
+      approach.rates.size() != num || approach.curvatures.size() != num ||
+      approach.gradients.rows() != normals.cols() || approach.gradients.cols() != num) {
     return false;
   }
   for (Eigen::Index k = 0; k < num; ++k) {

@@ -60,8 +60,8 @@ class Embedding {
   virtual void lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,
                                const Obstacles& obstacles) const noexcept;
 
-  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle: then the clearance is less than
-  /// −depth, else it may be. Much quicker than `add_to`. False without a body. No allocation.
+  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle; where they do not, the parts may.
+  /// Much quicker than `add_to`. False without a body. No allocation.
   virtual bool touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept;
 
   /// Whether `lower_distances` does anything.
