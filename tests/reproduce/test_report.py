@@ -126,15 +126,14 @@ def test_criteria_of_the_simulated_scenarios(report):
     )  # with correct derivatives the thesis's switch does not arrive here
 
 
-def test_ratios_of_table_6_1_are_in_order(report):
+def test_ways_of_table_6_1_are_orders_of_magnitude_apart(report):
     found = data(report, "table-6.1")
     dense, python, native = (
         found[f"{method} [Hz]"] for method in ("analytic, dense", "core from Python", "core in C++")
     )
-    # One joint more costs the dense tensors more; the core is a hundred times faster, less margin for a busy machine.
+    # Measured more than a thousand times apart: a busy machine cannot bring them to twenty.
     assert np.all(python > 20.0 * dense)
-    assert dense[0] > dense[2]
-    assert native[0] > native[2]
+    assert np.all(native > 20.0 * dense)
     if not torch_autograd.available():
         assert "not installed" in report.items["table-6.1"].rows[0][1]
         pytest.skip("PyTorch is not installed, so its row has no figures to compare")
