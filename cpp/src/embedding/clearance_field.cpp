@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -45,8 +46,13 @@ kernels::Points points_of(const PointTree& tree) noexcept {
   return points;
 }
 
-/// Whether anything is within reach, or approaches.
-bool is_found(const kernels::Query& query) noexcept { return std::min(query.reference, query.ahead) < infinity; }
+static_assert(PointTree::leaf_size == kernels::most_points);
+
+void forget(kernels::Query& query) noexcept {
+  query.reference = query.ahead = infinity;
+  query.nearest = query.minded = 0;
+  query.ready = query.begun = false;
+}
 
 /// The means of a query's points, with wrenches about the world origin.
 class Means {
@@ -131,6 +137,8 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
   const kernels::ClearanceKernel kernel = clearance_kernel();
   kernels::QueryGroup group;
   group.inverse_T = 1.0 / temperature_;
+  group.reach = reach;
+  group.reach_ahead = horizon.distance;
   group.window = window * temperature_;
   group.window_ahead = window_ahead * temperature_;
   group.horizon = horizon.time;
@@ -139,75 +147,103 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
     const int joint = ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint;
     const KinematicState::Link& link = state.link(joint);
     const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
-    const double turning = link.velocity.angular.norm();
+    kernels::MovingBall ball_around;
+    copy(centre, ball_around.centre);
+    ball_around.radius = cluster.radius;
+    copy(link.velocity.linear, ball_around.linear);
+    copy(link.velocity.angular, ball_around.angular);
+    ball_around.turning = link.velocity.angular.norm();
+    ball_around.horizon = horizon.time;
+    ball_around.fastest = tree.fastest();
+    const auto measure = [&](const Balls& balls, int first, int count, PointTree::Bounds& bounds) {
+      kernel.measure(ball_around, balls, first, count, bounds.values.data(), bounds.others.data());
+    };
     double near = reach, ahead = horizon.distance;  // the largest of the group
-    const auto matters = [&](const PointTree::Ball& ball) {
-      const Eigen::Vector3d at(ball.x, ball.y, ball.z), x = at - centre;
-      const double distance = x.norm(), radius = cluster.radius + ball.radius;
-      const double bound = distance - radius;
-      if (bound < near) {
+    double missed = infinity, missed_ahead = infinity;
+    const auto matters = [&](double bound, double after) {
+      if (bound < near || after < ahead) {
         return true;
       }
-      const Eigen::Vector3d v = link.velocity.linear + link.velocity.angular.cross(at);
-      const double closing =
-          Horizon::closing_speed(x.dot(v), distance, radius, v.norm()) + turning * ball.radius + tree.fastest();
-      return bound - horizon.time * closing < ahead;
+      missed = std::min(missed, bound);
+      missed_ahead = std::min(missed_ahead, after);
+      return false;
     };
     bool placed = false;
     kernels::LinkMotion motion;
+    const auto limit = [&group](int k, double to, double to_ahead) {
+      group.near[k] = group.near_leaf[k] = static_cast<float>(to);
+      group.ahead[k] = group.ahead_leaf[k] = static_cast<float>(to_ahead);
+      group.missed[k] = group.missed_ahead[k] = std::numeric_limits<float>::infinity();
+    };
     const auto place = [&] {
+      copy(centre, group.origin);
       motion = motion_of(link);
       group.link = &motion;
       group.size = cluster.size;
-      for (int k = 0; k < kernels::most_queries; ++k) {
-        const bool used = k < cluster.size;
-        const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(cluster.first + (used ? k : 0))];
+      for (int k = 0; k < cluster.size; ++k) {
+        const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(cluster.first + k)];
         const Eigen::Vector3d p = link.p_WL + link.R_WL * ellipsoid.body.mean;
         for (int axis = 0; axis < 3; ++axis) {
           group.centre[axis][k] = p[axis];
+          group.offset[axis][k] = static_cast<float>(p[axis] - centre[axis]);
         }
-        group.extent[k] = ellipsoid.body.extent;
-        group.near[k] = used ? near : -infinity;
-        group.ahead[k] = used ? ahead : -infinity;
+        group.extent[k] = static_cast<float>(ellipsoid.body.extent);
         group.axes_T[k] = ellipsoid.axes_T.data();
         group.semi_axes[k] = ellipsoid.semi_axes.data();
-        group.queries[k].reference = group.queries[k].ahead = infinity;
-        group.queries[k].nearest = group.queries[k].minded = 0;
-        group.queries[k].ready = false;
+        limit(k, reach, horizon.distance);
+        group.near[k] += static_cast<float>(group.window);
+        group.ahead[k] += static_cast<float>(group.window_ahead);
+        kernels::Query& query = group.queries[k];
+        query.near = query.approached = false;
+        forget(query);
+      }
+      for (int k = cluster.size; k < kernels::most_queries; ++k) {  // registers are filled up
+        group.offset[0][k] = group.offset[1][k] = group.offset[2][k] = group.extent[k] = 0.0f;
+        limit(k, -infinity, -infinity);
       }
       placed = true;
     };
-    const auto visit = [&](auto&& look) {
-      tree.visit(centre, matters, [&](int first, int count, const PointTree::Ball& ball, const Eigen::Vector3d& half,
+    const auto visit = [&] {
+      tree.visit(measure, matters, [&](int first, int count, const PointTree::Ball& ball, const Eigen::Vector3d& half,
                                     double largest) {
-        look(kernels::Leaf{first, count, ball.x, ball.y, ball.z, ball.radius, half.x(), half.y(), half.z(), largest});
+        if (!placed) {
+          place();
+        }
+        if (kernel.collect(group, points,
+                           {first, count, ball.x, ball.y, ball.z, ball.radius, half.x(), half.y(), half.z(), largest})) {
+          near = *std::max_element(group.near_leaf, group.near_leaf + cluster.size);
+          ahead = *std::max_element(group.ahead_leaf, group.ahead_leaf + cluster.size);
+        }
       });
     };
-    const auto limit = [&] {
-      near = *std::max_element(group.near, group.near + cluster.size);
-      ahead = *std::max_element(group.ahead, group.ahead + cluster.size);
-    };
-    visit([&](const kernels::Leaf& leaf) {
-      if (!placed) {
-        place();
-      }
-      if (kernel.find(group, points, leaf)) {
-        limit();
-      }
-    });
+    visit();
     if (!placed) {
       continue;
     }
+    // What was left out before anything within reach was known may still weigh beside it.
+    near = ahead = -infinity;
     for (int k = 0; k < cluster.size; ++k) {
-      const kernels::Query& query = group.queries[k];
-      group.near[k] = query.reference < infinity ? query.reference + group.window : -infinity;
-      group.ahead[k] = is_found(query) ? std::min(query.ahead, horizon.distance) + group.window_ahead : -infinity;
+      kernels::Query& query = group.queries[k];
+      const double to = query.near ? group.near[k] : -infinity, to_ahead = query.approached ? group.ahead[k] : -infinity;
+      if (std::min<double>(missed, group.missed[k]) < to || std::min<double>(missed_ahead, group.missed_ahead[k]) < to_ahead) {
+        limit(k, to, to_ahead);
+        forget(query);
+        near = std::max(near, to);
+        ahead = std::max(ahead, to_ahead);
+      } else {
+        limit(k, -infinity, -infinity);
+      }
     }
-    limit();
-    visit([&](const kernels::Leaf& leaf) { kernel.add(group, points, leaf); });
+    if (std::max(near, ahead) > -infinity) {
+      visit();
+    }
     for (int k = 0; k < cluster.size; ++k) {
       const kernels::Query& query = group.queries[k];
-      if (!is_found(query)) {
+      if (!query.near && !query.approached) {
+        continue;
+      }
+      kernel.sum(group, k, points);
+      if (!(std::min(query.reference, query.ahead) < infinity)) {
         continue;
       }
       const Means means(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]});
@@ -230,14 +266,20 @@ bool ClearanceField::touches(const KinematicState& state, const Obstacles& obsta
     const KinematicState::Link& link = state.link(ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint);
     const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
     bool found = false;
-    const auto near = [&](const PointTree::Ball& ball) {
-      const double within = cluster.inner_radius + ball.radius - depth;
-      return !found && within > 0.0 && (Eigen::Vector3d(ball.x, ball.y, ball.z) - centre).squaredNorm() < within * within;
+    const auto distance = [&](double x, double y, double z, double radius) {
+      return (Eigen::Vector3d(x, y, z) - centre).norm() - (cluster.inner_radius + radius - depth);
     };
-    tree.visit(centre, near, [&](int first, int count, const PointTree::Ball&, const Eigen::Vector3d&, double) {
+    const auto measure = [&](const Balls& balls, int first, int count, PointTree::Bounds& bounds) {
+      for (int i = 0; i < count; ++i) {
+        const int n = first + i;
+        bounds.values[static_cast<std::size_t>(i)] = distance(balls.x[n], balls.y[n], balls.z[n], balls.radius[n]);
+      }
+    };
+    const auto near = [&](double value, double) { return !found && value < 0.0; };
+    tree.visit(measure, near, [&](int first, int count, const PointTree::Ball&, const Eigen::Vector3d&, double) {
       for (int n = first; n < first + count && !found; ++n) {
         const Eigen::Vector3d x(tree.coordinate(0)[n], tree.coordinate(1)[n], tree.coordinate(2)[n]);
-        if (!near({x.x(), x.y(), x.z(), tree.radii()[n]})) {
+        if (!(distance(x.x(), x.y(), x.z(), tree.radii()[n]) < 0.0)) {
           continue;
         }
         const Eigen::Vector3d in_link = link.R_WL.transpose() * (x - link.p_WL);

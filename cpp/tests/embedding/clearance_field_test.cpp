@@ -123,8 +123,9 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
       }
     }
     const ClearanceSample expected = mean.result();
-    // Every point beyond the window would change the mean by x e^-x temperatures, x = 24 or more.
-    const double all_beyond = static_cast<double>(obstacles.size()) * 24.0 * std::exp(-24.0) * temperature;
+    // Every point beyond the window would change the mean by x e^-x temperatures, where x is at least the window.
+    constexpr double window = ClearanceField::window;
+    const double all_beyond = static_cast<double>(obstacles.size()) * window * std::exp(-window) * temperature;
     BOOST_TEST(std::abs(expected.value - of_all.result().value) <= all_beyond + 1e-12 * (1.0 + std::abs(expected.value)));
     // 1e-12 of what is summed: clearances of up to 1 m, whose rates and curvatures are divided by the temperature.
     constexpr double tolerance = 1e-12;

@@ -24,9 +24,9 @@ namespace sidestep {
 ///
 /// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
 /// depend on how densely a surface is sampled, of those within a window above the nearest; and to what approaches (see
-/// approach_mean.hpp). Points that do not matter are left out in groups, by h ≥ |e| − a − r
-/// with a the longest semi-axis: first all but what may be nearest, then all but what weighs beside it. The others are
-/// taken side by side, with the widest registers of the machine.
+/// approach_mean.hpp). Points that do not matter are left out in groups, by h ≥ |e| − a − r with a the longest semi-axis, and
+/// then one by one, by h in single precision less its errors. What is left is taken side by side in double precision, with
+/// the widest registers of the machine.
 class ClearanceField {
  public:
   /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, or the

@@ -72,13 +72,20 @@ class PointTree {
   /// Stops every point.
   void freeze() noexcept;
 
-  /// Calls leaf(first, count, ball, half, largest) for every leaf whose ball, and the balls above it, are `near`, the near
-  /// ones of a node in the order of their distance to x. half: of the box around the points, which has the same centre;
-  /// largest: of their radii [m]. near(ball) may become stricter on the way. No allocation.
-  template <class Near, class Leaf>
-  void visit(const Eigen::Vector3d& x, Near&& near, Leaf&& leaf) const noexcept {
+  /// Bounds of what is below up to `fan_out` nodes, by two measures.
+  struct Bounds {
+    alignas(64) std::array<double, fan_out> values, others;
+  };
+
+  /// Calls leaf(first, count, ball, half, largest) for every leaf that matters, as do all nodes above it, those of a node in
+  /// the order of the first measure. measure(Balls, first, count, Bounds&) bounds what is in the balls [first, first + count)
+  /// by arrays that go on for `fan_out` from `first`; matters(value, other), asked just before, may become stricter on the
+  /// way. half: of the box around the points of a leaf, which has the same centre; largest: of their radii [m]. No
+  /// allocation.
+  template <class Measure, class Matters, class Leaf>
+  void visit(Measure&& measure, Matters&& matters, Leaf&& leaf) const noexcept {
     if (!levels_.empty()) {
-      descend(static_cast<int>(levels_.size()) - 1, 0, x, near, leaf);
+      descend(levels_.size() - 1, 0, 1, measure, matters, leaf);
     }
   }
 
@@ -95,6 +102,7 @@ class PointTree {
       return {centre[0].data(), centre[1].data(), centre[2].data(), half[0].data(), half[1].data(), half[2].data(),
               largest.data()};
     }
+    Balls balls() const noexcept { return {centre[0].data(), centre[1].data(), centre[2].data(), radius.data()}; }
     Ball ball(int node) const noexcept {
       const auto n = static_cast<std::size_t>(node);
       return {centre[0][n], centre[1][n], centre[2][n], radius[n]};
@@ -104,34 +112,35 @@ class PointTree {
   void refit() noexcept;
   void fit(std::size_t level, int node) noexcept;
 
-  template <class Near, class Leaf>
-  void descend(int level, int node, const Eigen::Vector3d& x, Near& near, Leaf& leaf) const noexcept {
-    const Ball ball = levels_[static_cast<std::size_t>(level)].ball(node);
-    if (!near(ball)) {
-      return;
-    }
-    const int first = node * (level == 0 ? leaf_size : fan_out);
-    if (level == 0) {
-      const Level& leaves = levels_.front();
-      const auto n = static_cast<std::size_t>(node);
-      const Eigen::Vector3d half(leaves.half[0][n], leaves.half[1][n], leaves.half[2][n]);
-      leaf(first, std::min(leaf_size, size() - first), ball, half, leaves.largest[n]);
-      return;
-    }
-    const Level& below = levels_[static_cast<std::size_t>(level) - 1];
-    const int count = std::min(fan_out, below.size - first);
-    std::array<std::pair<double, int>, fan_out> children;
+  template <class Measure, class Matters, class Leaf>
+  void descend(std::size_t level, int first, int count, Measure& measure, Matters& matters, Leaf& leaf) const noexcept {
+    const Level& nodes = levels_[level];
+    Bounds bounds;
+    measure(nodes.balls(), first, count, bounds);
+    std::array<int, fan_out> order;
     for (int i = 0; i < count; ++i) {
-      const Ball child = below.ball(first + i);
-      const double distance = (Eigen::Vector3d(child.x, child.y, child.z) - x).squaredNorm();
       int at = i;
-      for (; at > 0 && children[static_cast<std::size_t>(at) - 1].first > distance; --at) {
-        children[static_cast<std::size_t>(at)] = children[static_cast<std::size_t>(at) - 1];
+      for (; at > 0 && bounds.values[static_cast<std::size_t>(order[static_cast<std::size_t>(at) - 1])] >
+                           bounds.values[static_cast<std::size_t>(i)];
+           --at) {
+        order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at) - 1];
       }
-      children[static_cast<std::size_t>(at)] = {distance, first + i};
+      order[static_cast<std::size_t>(at)] = i;
     }
-    for (int i = 0; i < count; ++i) {
-      descend(level - 1, children[static_cast<std::size_t>(i)].second, x, near, leaf);
+    for (int n = 0; n < count; ++n) {
+      const auto i = static_cast<std::size_t>(order[static_cast<std::size_t>(n)]);
+      if (!matters(bounds.values[i], bounds.others[i])) {
+        continue;
+      }
+      const int node = first + static_cast<int>(i);
+      if (level == 0) {
+        const auto at = static_cast<std::size_t>(node);
+        const Eigen::Vector3d half(nodes.half[0][at], nodes.half[1][at], nodes.half[2][at]);
+        leaf(node * leaf_size, std::min(leaf_size, size() - node * leaf_size), nodes.ball(node), half, nodes.largest[at]);
+      } else {
+        const int below = node * fan_out;
+        descend(level - 1, below, std::min(fan_out, levels_[level - 1].size - below), measure, matters, leaf);
+      }
     }
   }
 

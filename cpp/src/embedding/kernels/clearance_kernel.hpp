@@ -1,6 +1,7 @@
 #pragma once
 
 #include "most_lanes.hpp"
+#include "sidestep/obstacles/balls.hpp"
 
 // The inner loop of ClearanceField, once per instruction set. Plain arrays only: a translation unit compiled for a newer
 // instruction set must not emit code that others share, such as Eigen's inline functions.
@@ -23,18 +24,35 @@ struct LinkMotion {
 // mean of what approaches: the weight, h, h', h'' and a gradient.
 inline constexpr int approach = 18, sums = 28;
 
+inline constexpr int most_points = 16;        // of a leaf
+inline constexpr int most_candidates = 256;
+
+/// Points that may weigh in the means of an ellipsoid, with what single precision says of them.
+struct Candidates {
+  int size;
+  int point[most_candidates];
+  float t[most_candidates];           // where Newton's iteration begins
+  float least[2][most_candidates];    // bounds of h and of h + τ h'
+  float most[2][most_candidates];
+};
+
 /// An ellipsoid at a state, with the sums of its means over the points so far, lane by lane.
 struct Query {
   alignas(64) double lane_sums[sums][most_lanes];
   double axes[9];                           // world to principal axes, by rows
-  double semi_axes[3], squared_axes[3];     // a and a²
+  double squared_axes[3], precision[3];     // a² and 1/a²
   double linear[3], angular[3];             // velocity of the centre and of the axes, in principal axes
   double bias_linear[3], bias_angular[3];   // the same for the bias
   double reference;                         // smallest clearance; sums are relative to it
   double ahead;                             // smallest h + τ h'
   int nearest, minded;                      // their points
   int shortest;                             // the axis of the smallest a
-  bool ready;                               // whether all but the centre has been set
+  bool near, approached;                    // whether a point may be within reach, or come to be
+  bool ready, begun;                        // whether what bounds and what sums need has been set
+  struct {
+    float axes[9], semi_axes[3], squared_axes[3], linear[3], angular[3];
+  } single;
+  Candidates candidates;
 };
 
 inline constexpr int most_queries = 16;
@@ -42,14 +60,20 @@ inline constexpr int most_queries = 16;
 /// Ellipsoids of one link that are asked together.
 struct QueryGroup {
   int size;
-  alignas(64) double centre[3][most_queries];  // world
-  alignas(64) double extent[most_queries];     // longest semi-axis
-  alignas(64) double near[most_queries];       // clearances from here on do not matter,
-  alignas(64) double ahead[most_queries];      // unless h + τ h' is below this
+  double origin[3], centre[3][most_queries];   // world
+  alignas(64) float offset[3][most_queries];   // from the origin
+  alignas(64) float extent[most_queries];      // longest semi-axis
+  // Clearances from here on do not matter, unless h + τ h' is below that: of the smallest known yet, and a window. Until
+  // one within reach is known, points of leaves that are within reach are kept up to a window beyond, and of other leaves
+  // it is noted what is missed.
+  alignas(64) float near[most_queries], ahead[most_queries];
+  alignas(64) float near_leaf[most_queries], ahead_leaf[most_queries];
+  alignas(64) float missed[most_queries], missed_ahead[most_queries];
   const double* axes_T[most_queries];          // 3 × 3 by columns: link frame to principal axes
   const double* semi_axes[most_queries];       // [m]
   const LinkMotion* link;
   double inverse_T;
+  double reach, reach_ahead;                   // clearances, and h + τ h', from here on are out of reach [m]
   double window, window_ahead;                 // clearances, and h + τ h', so much above the smallest have no weight [m]
   double horizon;                              // τ [s]
   double fastest;                              // speed of any point [m/s], at most
@@ -64,13 +88,24 @@ struct Leaf {
   double half_x, half_y, half_z, largest;
 };
 
-/// What is done with the points of a leaf, for every query of the group that they matter to: what is smallest is found
-/// first, so that only what weighs beside it is looked at when the sums are made.
+/// A ball around ellipsoids of a link.
+struct MovingBall {
+  double centre[3], radius;
+  double linear[3], angular[3];  // velocity at the world origin
+  double turning;                // |angular|
+  double horizon, fastest;       // as above
+};
+
+/// Leaves are looked at in single precision, for every query that their points matter to; what may weigh is summed in
+/// double precision.
 struct ClearanceKernel {
-  /// Lowers `reference` and `ahead` of the queries, `near` and `ahead` of the group to them. Returns whether any fell.
-  bool (*find)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
-  /// Adds to the sums.
-  void (*add)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+  /// Bounds of the clearances of nodes [first, first + count), and of h + τ h'; both have room for whole registers.
+  void (*measure)(const MovingBall& cluster, const Balls& nodes, int first, int count, double* bounds, double* after) noexcept;
+  /// Adds points that may weigh to the candidates, and lowers the limits of the group. Where there is no room, the candidates
+  /// before are summed. Returns whether a limit of leaves fell, or rose to the window.
+  bool (*collect)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+  /// Adds the candidates of query k to its sums, and forgets them.
+  void (*sum)(QueryGroup& group, int k, const Points& points) noexcept;
 };
 
 ClearanceKernel clearance_kernel_baseline() noexcept;

@@ -1,5 +1,5 @@
 // Included by one file per instruction set, after clearance_kernel.hpp and <immintrin.h> where there is one. Defines
-// find_in_leaf and add_leaf in an anonymous namespace.
+// measure, collect and sum_candidates in an anonymous namespace.
 
 namespace sidestep::kernels {
 namespace {
@@ -9,10 +9,13 @@ namespace {
 // Stands for the centre of an ellipsoid, where the clearance has no gradient [m]; far below any size that matters.
 constexpr double centre_offset = 1e-9;
 
-// √S is 1 at the foot of the perpendicular; the iteration ends above by rounding, after at most 6 steps for semi-axes of
-// a ratio up to 6, and 8 up to 24.
-constexpr double converged = 1.0 + 1e-14;
+// S is 1 at the foot of the perpendicular; the iteration ends above by rounding.
+constexpr double converged = 1.0 + 2e-14;
+constexpr float single_converged = 1.0f + 4e-5f;
 constexpr int most_iterations = 16;
+
+// Errors of single precision, of clearances relative to distances, and of rates relative to speeds.
+constexpr float distance_error = 1e-4f, rate_error = 1e-3f;
 
 void rotate(const double* rows, const double* x, double* result) noexcept {
   for (int i = 0; i < 3; ++i) {
@@ -30,6 +33,7 @@ void express(const Query& query, const double* centre, const double* angular, co
   rotate(query.axes, at_centre, linear_E);
 }
 
+/// What the bounds need.
 void prepare(QueryGroup& group, int k) noexcept {
   Query& query = group.queries[k];
   const double* axes_T = group.axes_T[k];
@@ -39,20 +43,40 @@ void prepare(QueryGroup& group, int k) noexcept {
       query.axes[3 * i + j] = axes_T[i] * link.rotation[j] + axes_T[3 + i] * link.rotation[3 + j] +
                               axes_T[6 + i] * link.rotation[6 + j];
     }
-    query.semi_axes[i] = group.semi_axes[k][i];
-    query.squared_axes[i] = query.semi_axes[i] * query.semi_axes[i];
+    query.squared_axes[i] = group.semi_axes[k][i] * group.semi_axes[k][i];
   }
   const double centre[3] = {group.centre[0][k], group.centre[1][k], group.centre[2][k]};
   express(query, centre, link.angular, link.linear, query.angular, query.linear);
-  express(query, centre, link.bias_angular, link.bias_linear, query.bias_angular, query.bias_linear);
   const double* A = query.squared_axes;
   query.shortest = A[0] <= A[1] && A[0] <= A[2] ? 0 : A[1] <= A[2] ? 1 : 2;
+  auto& single = query.single;
+  for (int i = 0; i < 9; ++i) {
+    single.axes[i] = static_cast<float>(query.axes[i]);
+  }
+  for (int i = 0; i < 3; ++i) {
+    single.semi_axes[i] = static_cast<float>(group.semi_axes[k][i]);
+    single.squared_axes[i] = static_cast<float>(query.squared_axes[i]);
+    single.linear[i] = static_cast<float>(query.linear[i]);
+    single.angular[i] = static_cast<float>(query.angular[i]);
+  }
+  query.candidates.size = 0;
+  query.ready = true;
+}
+
+/// What the sums need.
+void begin_sums(QueryGroup& group, int k) noexcept {
+  Query& query = group.queries[k];
+  const double centre[3] = {group.centre[0][k], group.centre[1][k], group.centre[2][k]};
+  express(query, centre, group.link->bias_angular, group.link->bias_linear, query.bias_angular, query.bias_linear);
+  for (int i = 0; i < 3; ++i) {
+    query.precision[i] = 1.0 / query.squared_axes[i];
+  }
   for (auto& lanes : query.lane_sums) {
     for (double& sum : lanes) {
       sum = 0.0;
     }
   }
-  query.ready = true;
+  query.begun = true;
 }
 
 /// Old weights are smaller by the exponential of this.
@@ -60,26 +84,59 @@ Lanes decay(double shift, double inverse_T) noexcept {
   return exponential(all(shift * inverse_T < 690.0 ? -shift * inverse_T : -690.0));
 }
 
-/// As Horizon::closing_speed: the angle of n to x is within that of the ball, asin(radius/|x|).
-inline Lanes closing_speed(Lanes along, Lanes distance, Lanes radius, Lanes speed) noexcept {
-  const Lanes inverse = 1.0 / distance, sine = radius * inverse;
-  const Lanes squared = 1.0 - sine * sine, cosine = root(squared > 0.0 ? squared : Lanes{});
-  const Lanes component = along * inverse, across = speed * speed - component * component;
-  const Lanes turned = component * cosine + root(across > 0.0 ? across : Lanes{}) * sine;
-  return sine < 1.0 ? (component < speed * cosine ? turned : speed) : speed;
+/// As Horizon::closing_speed: the angle of n to x is within that of the ball, asin(radius/|x|). `across` is |x × v|.
+template <class Values>
+Values closing_speed(Values along, Values across, Values inverse_distance, Values radius, Values speed) noexcept {
+  const Values sine = radius * inverse_distance, cosine = root(larger(1 - sine * sine, Values{}));
+  const Values turned = (along * cosine + across * sine) * inverse_distance;
+  return (sine < 1) & (along * inverse_distance < speed * cosine) ? turned : speed;
 }
 
-/// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where Σ A w² = 1.
+/// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where S = Σ A w² = 1.
+template <class Values>
 struct Outside {
-  Lanes t, inverse[3], w[3], flatness, inverse_norm;  // 1 / (A + t), Σ A w² / (A + t), 1 / |w|
+  Values t, inverses[3], w[3], shares[3], S, flatness;  // 1 / (A + t), A w², Σ A w² / (A + t)
+
+  template <class Number>
+  void place(const Number* A, const Values* e) noexcept {
+    const Values sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1];
+    const Values of_all = inverse(product * sums[2]), of_two = of_all * sums[2];
+    inverses[0] = of_two * sums[1];
+    inverses[1] = of_two * sums[0];
+    inverses[2] = of_all * product;
+    S = flatness = Values{};
+    for (int i = 0; i < 3; ++i) {
+      w[i] = e[i] * inverses[i];
+      shares[i] = A[i] * w[i] * w[i];
+      S += shares[i];
+      flatness += shares[i] * inverses[i];
+    }
+  }
+
+  /// Newton's step on 1/√S − 1, which is concave in t: it ends below the root, wherever it begins.
+  Values step(Values root_S) const noexcept { return S * (root_S - 1) * inverse(flatness); }
+
+  /// Chebyshev's step on the same: of an error that is small its third power is left.
+  Values cubic_step(Values root_S) const noexcept {
+    const Values inverse_flatness = inverse(flatness), newton = S * (root_S - 1) * inverse_flatness;
+    Values second = {};  // Σ A w² / (A + t)²
+    for (int i = 0; i < 3; ++i) {
+      second += shares[i] * inverses[i] * inverses[i];
+    }
+    const Values bend = second * inverse_flatness - flatness * (2 - S);  // S is close to 1
+    return newton * (S < 1.01 ? 1 + 1.5 * newton * bend : 1 + Values{});
+  }
+
+  Values inverse_norm() const noexcept { return inverse_root(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]); }
+  Values norm(Values inverse_norm) const noexcept { return (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) * inverse_norm; }
 
   /// n' · v, of points that move by v.
-  Lanes bend(const double* A, const Lanes* v) const noexcept {
+  Lanes bend(const double* A, const Lanes* v, Lanes inverse_norm) const noexcept {
     const Lanes t_dot =
-        (A[0] * w[0] * inverse[0] * v[0] + A[1] * w[1] * inverse[1] * v[1] + A[2] * w[2] * inverse[2] * v[2]) / flatness;
+        (A[0] * w[0] * inverses[0] * v[0] + A[1] * w[1] * inverses[1] * v[1] + A[2] * w[2] * inverses[2] * v[2]) / flatness;
     Lanes along = {}, squared = {}, across = {};
     for (int i = 0; i < 3; ++i) {
-      const Lanes w_dot = (v[i] - w[i] * t_dot) * inverse[i];
+      const Lanes w_dot = (v[i] - w[i] * t_dot) * inverses[i];
       along += w[i] * w_dot;
       across += w[i] * v[i];
       squared += w_dot * v[i];
@@ -121,117 +178,237 @@ struct Inside {
   }
 };
 
-enum class Pass { find, add };
+/// As many of the lanes as there are, as bits.
+inline unsigned first_lanes(int count) noexcept { return count < singles ? (1u << count) - 1u : (2u << (singles - 1)) - 1u; }
 
-void lower(double& limit, double& least, int& point, Lanes values, int first) noexcept {
-  if (below(values, all(limit)) != 0) {
-    for (int i = 0; i < width; ++i) {
-      if (values[i] < limit) {
-        limit = least = values[i];
-        point = first + i;
+/// The points of a leaf in single precision, seen from its centre.
+struct LeafPoints {
+  alignas(64) float position[3][most_points], radius[most_points], velocity[3][most_points];
+
+  LeafPoints(const Points& points, const Leaf& leaf) noexcept {
+    const double centre[3] = {leaf.x, leaf.y, leaf.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double* from = points.position[axis] + leaf.first;
+      for (int n = 0; n < most_points; ++n) {
+        position[axis][n] = static_cast<float>(from[n] - centre[axis]);
+      }
+      if (points.velocity[0] != nullptr) {
+        from = points.velocity[axis] + leaf.first;
+        for (int n = 0; n < most_points; ++n) {
+          velocity[axis][n] = static_cast<float>(from[n]);
+        }
       }
     }
+    for (int n = 0; n < most_points; ++n) {
+      radius[n] = static_cast<float>(points.radius[leaf.first + n]);
+    }
   }
+};
+
+/// Of points within reach, which are bits, the smallest is known to be at most that of these. Returns whether the limit of
+/// leaves changes.
+inline bool lower(bool& found, float& limit, float& limit_of_leaves, Singles most, unsigned lanes, double window) noexcept {
+  found = true;
+  const Singles above = most + static_cast<float>(window);
+  for (lanes &= below(above, all(limit)); lanes != 0; lanes &= lanes - 1) {
+    const float value = above[__builtin_ctz(lanes)];
+    limit = value < limit ? value : limit;
+  }
+  const bool changes = limit != limit_of_leaves;
+  limit_of_leaves = limit;
+  return changes;
 }
 
-/// `closing_of_leaf` [m] bounds what any of the points closes within the horizon.
-template <Pass pass>
-void look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf, double closing_of_leaf) noexcept {
+void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept;
+
+/// Looks at the points of a leaf in single precision. `closing_of_leaf` [m] bounds what any of the points closes within the
+/// horizon. Returns whether a limit of leaves changed.
+bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf, const LeafPoints& in_leaf,
+                    float closing_of_leaf) noexcept {
   Query& query = group.queries[k];
-  const double* R = query.axes;
-  const double* A = query.squared_axes;
-  const bool moving = points.velocity[0] != nullptr;
-  for (int n = leaf.first; n < leaf.first + leaf.count; n += width) {
-    const Lanes x = load(points.position[0] + n) - group.centre[0][k];
-    const Lanes y = load(points.position[1] + n) - group.centre[1][k];
-    const Lanes z = load(points.position[2] + n) - group.centre[2][k];
-    const Lanes radius = load(points.radius + n);
-    const double near = group.near[k], near_after = group.ahead[k] + closing_of_leaf;
-    const Lanes limit = (near > near_after ? near : near_after) + group.extent[k] + radius;
-    if (below(x * x + y * y + z * z, limit > 0.0 ? limit * limit : Lanes{}) == 0) {
+  const float* R = query.single.axes;
+  const float* A = query.single.squared_axes;
+  const float* W = query.single.angular;
+  const float from[3] = {static_cast<float>(leaf.x - group.centre[0][k]), static_cast<float>(leaf.y - group.centre[1][k]),
+                         static_cast<float>(leaf.z - group.centre[2][k])};
+  const float extent = group.extent[k], shortest = query.single.semi_axes[query.shortest];
+  const float horizon = static_cast<float>(group.horizon);
+  bool changed = false;
+  for (int n = 0; n < leaf.count; n += singles) {
+    const float near = group.near[k], ahead = group.ahead[k];
+    const unsigned asked = first_lanes(leaf.count - n);
+    const Singles x = load(in_leaf.position[0] + n) + from[0], y = load(in_leaf.position[1] + n) + from[1],
+                  z = load(in_leaf.position[2] + n) + from[2], radius = load(in_leaf.radius + n);
+    // From below: the clearance of the ball around the ellipsoid, and what may be closed within the horizon.
+    const Singles squared = x * x + y * y + z * z;
+    const Singles inverse_distance = inverse_root(squared > 1e-30f ? squared : all(1e-30f));
+    const Singles distance = squared * inverse_distance, error = distance_error * (distance + extent);
+    const Singles of_ball = distance - extent - radius - error;
+    if ((below(of_ball, all(near > ahead + closing_of_leaf ? near : ahead + closing_of_leaf)) & asked) == 0) {
       continue;
     }
-    Lanes e[3], s[3], v[3];  // the offset in principal axes, and the velocities of the point, there and in moving axes
+    Singles e[3], v[3], across[3];  // the offset in principal axes, the velocity in moving axes, and e × v
     for (int i = 0; i < 3; ++i) {
       e[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
     }
-    const double* W = query.angular;
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
-      v[i] = -query.linear[i] - (W[j] * e[l] - W[l] * e[j]);
+      v[i] = -query.single.linear[i] - (W[j] * e[l] - W[l] * e[j]);
     }
-    if (moving) {
-      const Lanes vx = load(points.velocity[0] + n), vy = load(points.velocity[1] + n), vz = load(points.velocity[2] + n);
+    if (points.velocity[0] != nullptr) {
+      const Singles vx = load(in_leaf.velocity[0] + n), vy = load(in_leaf.velocity[1] + n), vz = load(in_leaf.velocity[2] + n);
       for (int i = 0; i < 3; ++i) {
-        s[i] = R[3 * i] * vx + R[3 * i + 1] * vy + R[3 * i + 2] * vz;
-        v[i] += s[i];
+        v[i] += R[3 * i] * vx + R[3 * i + 1] * vy + R[3 * i + 2] * vz;
       }
     }
-    // From below: the clearance of the ball around the ellipsoid, and what may be closed within the horizon.
-    const Lanes distance = root(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-    const Lanes speed = root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    const Lanes along = -(e[0] * v[0] + e[1] * v[1] + e[2] * v[2]);
-    const Lanes closing = group.horizon * closing_speed(along, distance, all(group.extent[k]), speed);
-    const auto matter = [&](Lanes clearance) noexcept {
-      return below(clearance, all(group.near[k])) | below(clearance - closing, all(group.ahead[k]));
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      across[i] = e[j] * v[l] - e[l] * v[j];
+    }
+    const Singles speed = root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    const Singles along = -(e[0] * v[0] + e[1] * v[1] + e[2] * v[2]);
+    const Singles turning = root(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
+    Singles closing = horizon * (closing_speed(along, turning, inverse_distance, all(extent), speed) + rate_error * speed);
+    closing = closing < closing_of_leaf ? closing : all(closing_of_leaf);
+    const auto matter = [&](Singles least) noexcept {
+      return (below(least, all(near)) | below(least - closing, all(ahead))) & asked;
     };
-    if (matter(distance - group.extent[k] - radius) == 0) {
+    if (matter(of_ball) == 0) {
       continue;
     }
 
-    // t from below. Newton's iteration on 1/√S − 1, which is concave in t, stays below; and so does t |w| below h. It begins
-    // at the best of where it comes to from infinity and, along every axis, of that axis alone.
-    Outside out;
-    Lanes second = {}, fourth = {};
+    // t from below, and so is t |w| below h. It begins at the best of where Newton's iteration comes to from infinity and,
+    // along every axis, of that axis alone.
+    Outside<Singles> out;
+    Singles second = {}, fourth = {};
     for (int i = 0; i < 3; ++i) {
-      const Lanes term = A[i] * e[i] * e[i];
+      const Singles term = A[i] * e[i] * e[i];
       second += term;
       fourth += A[i] * term;
     }
-    const Lanes from_infinity = root(second) - fourth / second;  // not a number at the centre
-    out.t = from_infinity > 0.0 ? from_infinity : Lanes{};
+    out.t = larger(root(second) - fourth * inverse(second > 1e-30f ? second : all(1e-30f)), Singles{});
     for (int i = 0; i < 3; ++i) {
-      const Lanes least = query.semi_axes[i] * magnitude(e[i]) - A[i];
-      out.t = least > out.t ? least : out.t;
+      out.t = larger(query.single.semi_axes[i] * magnitude(e[i]) - A[i], out.t);
     }
-    Lanes S, h;
-    const auto update = [&]() noexcept {
-      Lanes squared = {};
-      S = out.flatness = Lanes{};
-      for (int i = 0; i < 3; ++i) {
-        out.inverse[i] = 1.0 / (A[i] + out.t);
-        out.w[i] = e[i] * out.inverse[i];
-        const Lanes term = A[i] * out.w[i] * out.w[i];
-        S += term;
-        out.flatness += term * out.inverse[i];
-        squared += out.w[i] * out.w[i];
-      }
-      const Lanes norm = root(squared);
-      out.inverse_norm = 1.0 / norm;
-      h = out.t * norm - radius;
-    };
-    update();
-    // S = 1 but for rounding at a first t > 0 that is exact, of points on an axis: they are outside.
-    const Lanes S_if_inside = out.t > 0.0 ? all(1.0) : S;
-    const auto inside = S_if_inside < 1.0;
-    const unsigned any_inside = below(S_if_inside, all(1.0));
-    if ((any_inside | matter(h)) == 0) {
+    out.place(A, e);
+    const Singles S_if_inside = out.t > 0.0f ? all(1.0f) : out.S;
+    const unsigned any_inside = below(S_if_inside, all(1.0f)) & asked;
+    Singles inverse_norm = out.inverse_norm(), least = out.t * out.norm(inverse_norm) - radius - error;
+    if ((any_inside | matter(least)) == 0) {
       continue;
     }
+    Singles root_S = root(out.S);
     for (int i = 0; i < most_iterations; ++i) {
-      const Lanes root_S = root(S);
-      if ((below(all(converged), root_S) & (matter(h) | any_inside)) == 0) {
+      if ((below(all(single_converged), root_S) & matter(least) & ~any_inside) == 0) {
         break;
       }
-      const Lanes step = S * (root_S - 1.0) / out.flatness;
-      out.t += step > 0.0 ? step : Lanes{};
-      update();
+      out.t += larger(out.step(root_S), Singles{});
+      out.place(A, e);
+      inverse_norm = out.inverse_norm();
+      least = out.t * out.norm(inverse_norm) - radius - error;
+      root_S = root(out.S);
     }
-    Lanes g[3];
+    const Singles rate = (out.w[0] * v[0] + out.w[1] * v[1] + out.w[2] * v[2]) * inverse_norm;
+    const Singles after = horizon * rate, after_error = horizon * rate_error * speed;
+    // Inside nothing is known but that the clearance is negative: gradients are longer than one.
+    const float unknown = __builtin_inff();
+    const auto inside = S_if_inside < 1.0f, converged = root_S <= single_converged;
+    const Singles h_least = inside ? all(-unknown) : least;
+    const Singles after_least = inside ? all(-unknown) : converged ? least + after - after_error : least - closing;
+    const unsigned is_near = below(h_least, all(near)) & asked, approaches = below(after_least, all(ahead)) & asked;
+    if ((is_near | approaches) == 0) {
+      continue;
+    }
+    const Singles h_most = inside ? error - radius : converged ? least + 2.0f * error : distance - shortest - radius + error;
+    const Singles after_most = ~inside & converged ? h_most + after + after_error : all(unknown);
+    const unsigned within = below(h_least, all(static_cast<float>(group.reach))) & asked;
+    if (within != 0) {
+      changed |= lower(query.near, group.near[k], group.near_leaf[k], h_most, within, group.window);
+    }
+    const unsigned coming = below(after_least, all(static_cast<float>(group.reach_ahead))) & asked;
+    if (coming != 0) {
+      changed |= lower(query.approached, group.ahead[k], group.ahead_leaf[k], after_most, coming, group.window_ahead);
+    }
+    Candidates& candidates = query.candidates;
+    if (candidates.size + singles > most_candidates) {
+      sum_candidates(group, k, points);
+    }
+    const unsigned kept = is_near | approaches;
+    const int at = candidates.size;
+    compress(candidates.t + at, out.t, kept);
+    compress(candidates.least[0] + at, h_least, kept);
+    compress(candidates.least[1] + at, after_least, kept);
+    compress(candidates.most[0] + at, h_most, kept);
+    compress(candidates.most[1] + at, after_most, kept);
+    for (unsigned lanes = kept; lanes != 0; lanes &= lanes - 1) {
+      candidates.point[candidates.size++] = leaf.first + n + __builtin_ctz(lanes);
+    }
+  }
+  return changed;
+}
+
+/// Candidates in double precision, side by side.
+struct Samples {
+  Lanes e[3], s[3], v[3];  // the offset in principal axes, and the velocities of the point, there and in moving axes
+  Lanes h, g[3], rate, after;
+  Outside<Lanes> out;
+  Lanes inverse_norm;
+  Bits inside;
+  bool any_inside;
+
+  /// The first `count` lanes of `chosen`; in the others clearances are infinite.
+  Samples(const QueryGroup& group, int k, const Points& points, const int* chosen, int count) noexcept {
+    const Query& query = group.queries[k];
+    const double* R = query.axes;
+    const double* A = query.squared_axes;
+    const double* W = query.angular;
+    int point[width];
+    for (int i = 0; i < width; ++i) {
+      const int candidate = chosen[i < count ? i : 0];
+      point[i] = query.candidates.point[candidate];
+      out.t[i] = query.candidates.t[candidate];
+    }
+    const Lanes radius = gather(points.radius, point);
+    Lanes x[3], velocity[3] = {};
+    for (int axis = 0; axis < 3; ++axis) {
+      x[axis] = gather(points.position[axis], point);
+      if (points.velocity[0] != nullptr) {
+        velocity[axis] = gather(points.velocity[axis], point);
+      }
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      x[axis] -= group.centre[axis][k];
+    }
     for (int i = 0; i < 3; ++i) {
-      g[i] = out.w[i] * out.inverse_norm;
+      e[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+      s[i] = R[3 * i] * velocity[0] + R[3 * i + 1] * velocity[1] + R[3 * i + 2] * velocity[2];
     }
-    if (__builtin_expect(any_inside != 0, 0)) {
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      v[i] = s[i] - query.linear[i] - (W[j] * e[l] - W[l] * e[j]);
+    }
+    Lanes m = {};
+    for (int i = 0; i < 3; ++i) {
+      m += e[i] * e[i] * query.precision[i];
+    }
+    inside = m < 1.0;
+    const unsigned are_inside = below(m, all(1.0));
+    any_inside = are_inside != 0;
+    out.t = inside ? Lanes{} : out.t;
+    out.place(A, e);
+    out.t += inside ? Lanes{} : out.cubic_step(root(out.S));
+    out.place(A, e);
+    for (int i = 0; i < most_iterations && (below(all(converged), out.S) & ~are_inside) != 0; ++i) {
+      const Lanes step = out.step(root(out.S));
+      out.t += step > 0.0 ? step : Lanes{};
+      out.place(A, e);
+    }
+    inverse_norm = out.inverse_norm();
+    h = out.t * out.norm(inverse_norm) - radius;
+    for (int i = 0; i < 3; ++i) {
+      g[i] = out.w[i] * inverse_norm;
+    }
+    if (__builtin_expect(any_inside, 0)) {
       const Lanes squared = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
       e[query.shortest] = squared < 1e-300 ? all(centre_offset) : e[query.shortest];
       const Inside in(A, e);
@@ -240,149 +417,257 @@ void look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
         g[i] = inside ? in.gradient[i] : g[i];
       }
     }
-    if (matter(h) == 0) {
-      continue;
+    rate = g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
+    after = h + group.horizon * rate;
+    for (int i = count; i < width; ++i) {
+      h[i] = after[i] = __builtin_inf();
     }
-    const Lanes rate = g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
-    const Lanes ahead = h + group.horizon * rate;
-    if constexpr (pass == Pass::find) {
-      // No lower than what the bounds say: inside an ellipsoid gradients are longer than one, and a point that the second
-      // pass does not look at again must not be what the sums are relative to.
-      const Lanes least = h - closing;
-      lower(group.near[k], query.reference, query.nearest, h, n);
-      lower(group.ahead[k], query.ahead, query.minded, ahead < least ? least : ahead, n);
-      continue;
-    }
+  }
 
-    // The acceleration of the point in the ellipsoid's moving axes.
-    Lanes a[3];
+  /// d²h/dt², with the acceleration of the points in the ellipsoid's moving axes.
+  Lanes curvature(const Query& query) const noexcept {
+    const double* A = query.squared_axes;
     const double* B = query.bias_angular;
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, l = (i + 2) % 3;
-      a[i] = -query.bias_linear[i] - (B[j] * e[l] - B[l] * e[j]) - (W[j] * v[l] - W[l] * v[j]);
-    }
-    if (moving) {
-      for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3, l = (i + 2) % 3;
-        a[i] -= W[j] * s[l] - W[l] * s[j];
-      }
-    }
-    Lanes bend = out.bend(A, v);
-    if (__builtin_expect(any_inside != 0, 0)) {
+    const double* W = query.angular;
+    Lanes bend = out.bend(A, v, inverse_norm);
+    if (__builtin_expect(any_inside, 0)) {
       bend = inside ? Inside(A, e).bend(A, v, rate) : bend;
     }
-    const Lanes curvature = g[0] * a[0] + g[1] * a[1] + g[2] * a[2] + bend;
-
-    const double inverse_T = group.inverse_T;
-    Lanes moment[3];
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
-      moment[i] = e[j] * g[l] - e[l] * g[j];
+      const Lanes a = -query.bias_linear[i] - (B[j] * e[l] - B[l] * e[j]) - (W[j] * (v[l] + s[l]) - W[l] * (v[j] + s[j]));
+      bend += g[i] * a;
     }
-    const auto add = [&query](int sum, Lanes term) {
-      double* at = query.lane_sums[sum];
-      store(at, load(at) + term);
-    };
-    // Weights; those beyond the window, and the padding, are zero.
-    if (below(h, all(group.near[k])) != 0) {
-      const Lanes above = h - query.reference;
-      const auto matters = above < group.window;
-      const Lanes weight = matters ? exponential(matters ? -inverse_T * above : Lanes{}) : Lanes{};
-      const Lanes over = matters ? above : Lanes{};
-      const Lanes weight_dot = -inverse_T * weight * rate;
-      const Lanes weight_ddot = inverse_T * weight * (inverse_T * rate * rate - curvature);
-      add(0, weight);
-      add(1, weight_dot);
-      add(2, weight_ddot);
-      add(3, weight * over);
-      add(4, weight_dot * over + weight * rate);
-      add(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * curvature);
-      const Lanes zeroth = -inverse_T * weight;
-      const Lanes first = weight + zeroth * over;
-      for (int i = 0; i < 3; ++i) {
-        add(6 + i, zeroth * g[i]);
-        add(9 + i, zeroth * moment[i]);
-        add(12 + i, first * g[i]);
-        add(15 + i, first * moment[i]);
-      }
-    }
-    if (below(ahead, all(query.ahead)) != 0) {  // none has been found below the horizon, or it is inside
-      const double before = query.ahead;
-      for (int i = 0; i < width; ++i) {
-        query.ahead = ahead[i] < query.ahead ? ahead[i] : query.ahead;
-      }
-      if (before < __builtin_inf()) {
-        const Lanes factor = decay(before - query.ahead, inverse_T);
-        for (int i = approach; i < sums; ++i) {
-          store(query.lane_sums[i], factor * load(query.lane_sums[i]));
-        }
-      }
-    }
-    const Lanes above_ahead = ahead - query.ahead;
-    if (below(above_ahead, all(group.window_ahead)) != 0) {
-      const auto is_minded = above_ahead < group.window_ahead;
-      const Lanes minded = is_minded ? exponential(is_minded ? -inverse_T * above_ahead : Lanes{}) : Lanes{};
-      add(approach, minded);
-      add(approach + 1, minded * (is_minded ? h : Lanes{}));
-      add(approach + 2, minded * (is_minded ? rate : Lanes{}));
-      add(approach + 3, minded * (is_minded ? curvature : Lanes{}));
-      for (int i = 0; i < 3; ++i) {
-        add(approach + 4 + i, minded * g[i]);
-        add(approach + 7 + i, minded * moment[i]);
-      }
+    return bend;
+  }
+};
+
+/// Lowers `least` to values below limits.
+void lower(double& least, int& point, Lanes limits, Lanes values, const int* points, const int* chosen, int count) noexcept {
+  for (int i = 0; i < count; ++i) {
+    if (values[i] < least && values[i] < limits[i]) {
+      least = values[i];
+      point = points[chosen[i]];
     }
   }
 }
 
-/// Squared distance along one axis from a box.
-inline Lanes beyond(Lanes x, double half) noexcept {
-  const Lanes over = magnitude(x) - half;
-  return over > 0.0 ? over * over : Lanes{};
+/// Old sums become smaller where what they are relative to becomes so.
+void rescale(Query& query, int first, int last, double before, double now, double inverse_T) noexcept {
+  if (now < before && before < __builtin_inf()) {
+    const Lanes factor = decay(before - now, inverse_T);
+    for (int i = first; i < last; ++i) {
+      store(query.lane_sums[i], factor * load(query.lane_sums[i]));
+    }
+  }
 }
 
-/// Returns whether `near` or `ahead` fell.
-template <Pass pass>
-bool look_at_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
-  bool fell = false;
+void add(QueryGroup& group, int k, const Samples& at) noexcept {
+  Query& query = group.queries[k];
+  const double inverse_T = group.inverse_T;
+  const Lanes curvature = at.curvature(query);
+  Lanes moment[3];
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, l = (i + 2) % 3;
+    moment[i] = at.e[j] * at.g[l] - at.e[l] * at.g[j];
+  }
+  const auto add_to = [&query](int sum, Lanes term) {
+    double* sums = query.lane_sums[sum];
+    store(sums, load(sums) + term);
+  };
+  const Lanes above = at.h - query.reference;  // not a number where nothing is within reach
+  if (below(above, all(group.window)) != 0) {
+    const auto weighs = above < group.window;
+    const Lanes over = weighs ? above : Lanes{}, rate = at.rate;
+    const Lanes weight = weighs ? exponential(-inverse_T * over) : Lanes{};
+    const Lanes weight_dot = -inverse_T * weight * rate;
+    const Lanes weight_ddot = inverse_T * weight * (inverse_T * rate * rate - curvature);
+    add_to(0, weight);
+    add_to(1, weight_dot);
+    add_to(2, weight_ddot);
+    add_to(3, weight * over);
+    add_to(4, weight_dot * over + weight * rate);
+    add_to(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * curvature);
+    const Lanes zeroth = -inverse_T * weight;
+    const Lanes first = weight + zeroth * over;
+    for (int i = 0; i < 3; ++i) {
+      add_to(6 + i, zeroth * at.g[i]);
+      add_to(9 + i, zeroth * moment[i]);
+      add_to(12 + i, first * at.g[i]);
+      add_to(15 + i, first * moment[i]);
+    }
+  }
+  // Where nothing comes within reach, of what is nearest.
+  const Lanes beyond_ahead = at.after - query.ahead;
+  const Lanes after = query.ahead < group.reach_ahead ? beyond_ahead : above < group.window ? beyond_ahead : all(__builtin_inf());
+  if (below(after, all(group.window_ahead)) != 0) {
+    const auto weighs = after < group.window_ahead;
+    const Lanes weight = weighs ? exponential(weighs ? -inverse_T * after : Lanes{}) : Lanes{};
+    add_to(approach, weight);
+    add_to(approach + 1, weight * (weighs ? at.h : Lanes{}));
+    add_to(approach + 2, weight * at.rate);
+    add_to(approach + 3, weight * curvature);
+    for (int i = 0; i < 3; ++i) {
+      add_to(approach + 4 + i, weight * at.g[i]);
+      add_to(approach + 7 + i, weight * moment[i]);
+    }
+  }
+}
+
+void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
+  Query& query = group.queries[k];
+  Candidates& candidates = query.candidates;
+  if (!query.begun) {
+    begin_sums(group, k);
+  }
+  int chosen[most_candidates], count;
+  for (int i = candidates.size; i < most_candidates && i % singles != 0; ++i) {  // fill up the last register
+    candidates.most[0][i] = candidates.most[1][i] = __builtin_inff();
+  }
+  // The errors of the bounds are larger than those of rounding the limits.
+  const auto choose = [&](double limit, double limit_ahead) {
+    count = 0;
+    for (int i = 0; i < candidates.size; i += singles) {
+      const unsigned far = below(all(static_cast<float>(limit)), load(candidates.least[0] + i)) &
+                           below(all(static_cast<float>(limit_ahead)), load(candidates.least[1] + i));
+      for (unsigned lanes = ~far & first_lanes(candidates.size - i); lanes != 0; lanes &= lanes - 1) {
+        chosen[count++] = i + __builtin_ctz(lanes);
+      }
+    }
+  };
+  const auto look = [&](auto&& at) {
+    for (int i = 0; i < count; i += width) {
+      at(Samples(group, k, points, chosen + i, count - i < width ? count - i : width), chosen + i,
+         count - i < width ? count - i : width);
+    }
+  };
+  const auto smallest_of = [&](const float* most) {
+    Singles least = load(most);
+    for (int i = singles; i < candidates.size; i += singles) {
+      const Singles next = load(most + i);
+      least = next < least ? next : least;
+    }
+    float value = least[0];
+    for (int i = 1; i < singles; ++i) {
+      value = least[i] < value ? least[i] : value;
+    }
+    return static_cast<double>(value);
+  };
+  const auto find_nearest = [&](const Samples& at, const int* from, int number) {
+    lower(query.reference, query.nearest, all(group.reach), at.h, candidates.point, from, number);
+  };
+  const auto find_minded = [&](const Samples& at, const int* from, int number) {
+    const Lanes limits = at.h < query.reference + group.window ? all(__builtin_inf()) : all(group.reach_ahead);
+    lower(query.ahead, query.minded, limits, at.after, candidates.point, from, number);
+  };
+  const double reference = query.reference, ahead = query.ahead;
+  const auto rescale_both = [&] {
+    rescale(query, 0, approach, reference, query.reference, group.inverse_T);
+    rescale(query, approach, sums, ahead, query.ahead, group.inverse_T);
+  };
+  const double nothing = -__builtin_inf(), everything = __builtin_inf();
+  if (candidates.size <= width) {
+    choose(everything, everything);
+    look([&](const Samples& at, const int* from, int number) {
+      find_nearest(at, from, number);
+      find_minded(at, from, number);
+      rescale_both();
+      add(group, k, at);
+    });
+  } else {
+    choose(smallest_of(candidates.most[0]), nothing);
+    look(find_nearest);
+    choose(nothing, smallest_of(candidates.most[1]));
+    look(find_minded);
+    rescale_both();
+    const bool within = query.reference < __builtin_inf();
+    choose(within ? query.reference + group.window : nothing, query.ahead + group.window_ahead);
+    look([&](const Samples& at, const int*, int) { add(group, k, at); });
+  }
+  candidates.size = 0;
+}
+
+/// Squared distance along one axis from a box.
+inline Singles beyond(Singles x, float half) noexcept {
+  const Singles over = larger(magnitude(x) - half, Singles{});
+  return over * over;
+}
+
+bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
+  bool changed = false;
   // The link's point at the centre of the leaf moves by v, at others of the leaf by a little more.
   const LinkMotion& link = *group.link;
   const double v[3] = {link.linear[0] + link.angular[1] * leaf.z - link.angular[2] * leaf.y,
                        link.linear[1] + link.angular[2] * leaf.x - link.angular[0] * leaf.z,
                        link.linear[2] + link.angular[0] * leaf.y - link.angular[1] * leaf.x};
   const auto norm = [](const double* a) noexcept { return __builtin_sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); };
-  const double speed = norm(v), more = norm(link.angular) * leaf.radius + group.fastest;
-  for (int first = 0; first < group.size; first += width) {
-    const Lanes x = leaf.x - load(group.centre[0] + first);
-    const Lanes y = leaf.y - load(group.centre[1] + first);
-    const Lanes z = leaf.z - load(group.centre[2] + first);
-    const Lanes distance = root(x * x + y * y + z * z), extent = load(group.extent + first);
-    const Lanes radius = extent + leaf.radius;
-    const Lanes from_box = root(beyond(x, leaf.half_x) + beyond(y, leaf.half_y) + beyond(z, leaf.half_z));
-    const Lanes of_ball = distance - radius, of_box = from_box - extent - leaf.largest;
-    const Lanes bound = of_ball > of_box ? of_ball : of_box;
-    const Lanes closing =
-        group.horizon * (closing_speed(x * v[0] + y * v[1] + z * v[2], distance, radius, all(speed)) + more);
-    unsigned near = below(bound, load(group.near + first)) | below(bound - closing, load(group.ahead + first));
-    for (int k = first; near != 0; ++k, near >>= 1) {
-      if ((near & 1u) != 0 && k < group.size) {
+  const float vx = static_cast<float>(v[0]), vy = static_cast<float>(v[1]), vz = static_cast<float>(v[2]);
+  const float speed = static_cast<float>(norm(v));
+  const float more = static_cast<float>(norm(link.angular) * leaf.radius + group.fastest) + rate_error * speed;
+  const float at[3] = {static_cast<float>(leaf.x - group.origin[0]), static_cast<float>(leaf.y - group.origin[1]),
+                       static_cast<float>(leaf.z - group.origin[2])};
+  const float ball = static_cast<float>(leaf.radius), largest = static_cast<float>(leaf.largest);
+  for (int first = 0; first < group.size; first += singles) {
+    const Singles x = at[0] - load(group.offset[0] + first), y = at[1] - load(group.offset[1] + first),
+                  z = at[2] - load(group.offset[2] + first), extent = load(group.extent + first);
+    const Singles squared = x * x + y * y + z * z;
+    const Singles inverse_distance = inverse_root(squared > 1e-30f ? squared : all(1e-30f));
+    const Singles distance = squared * inverse_distance, radius = extent + ball;
+    const Singles from_box = root(beyond(x, static_cast<float>(leaf.half_x)) + beyond(y, static_cast<float>(leaf.half_y)) +
+                                  beyond(z, static_cast<float>(leaf.half_z)));
+    const Singles bound = larger(distance - radius, from_box - extent - largest) - distance_error * (distance + radius);
+    const Singles across[3] = {y * vz - z * vy, z * vx - x * vz, x * vy - y * vx};
+    const Singles turning = root(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
+    const Singles closing =
+        static_cast<float>(group.horizon) *
+        (closing_speed(x * vx + y * vy + z * vz, turning, inverse_distance, radius, all(speed)) + more);
+    const Singles near = load(group.near_leaf + first), ahead = load(group.ahead_leaf + first), after = bound - closing;
+    const auto matters = (bound < near) | (after < ahead);
+    const Singles missed = load(group.missed + first), missed_ahead = load(group.missed_ahead + first);
+    store(group.missed + first, ~matters & (bound < missed) ? bound : missed);
+    store(group.missed_ahead + first, ~matters & (after < missed_ahead) ? after : missed_ahead);
+    unsigned lanes = below(bound, near) | below(after, ahead);
+    if (lanes == 0) {
+      continue;
+    }
+    const LeafPoints in_leaf(points, leaf);
+    for (int k = first; lanes != 0; ++k, lanes >>= 1) {
+      if ((lanes & 1u) != 0 && k < group.size) {
         if (!group.queries[k].ready) {
           prepare(group, k);
         }
-        const double near_before = group.near[k], ahead_before = group.ahead[k];
-        look_at_points<pass>(group, k, points, leaf, closing[k - first]);
-        fell = fell || group.near[k] < near_before || group.ahead[k] < ahead_before;
+        changed |= look_at_points(group, k, points, leaf, in_leaf, closing[k - first]);
       }
     }
   }
-  return fell;
+  return changed;
 }
 
-bool find_in_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
-  return look_at_leaf<Pass::find>(group, points, leaf);
-}
-
-void add_leaf(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
-  look_at_leaf<Pass::add>(group, points, leaf);
+void measure(const MovingBall& cluster, const Balls& nodes, int first, int count, double* bounds, double* after) noexcept {
+  const double* w = cluster.angular;
+  for (int n = 0; n < count; n += width) {
+    const Lanes at[3] = {load(nodes.x + first + n), load(nodes.y + first + n), load(nodes.z + first + n)};
+    const Lanes ball = load(nodes.radius + first + n), radius = cluster.radius + ball;
+    Lanes x[3], v[3], squared = {}, along = {}, speed = {}, across = {};
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      x[i] = at[i] - cluster.centre[i];
+      v[i] = cluster.linear[i] + w[j] * at[l] - w[l] * at[j];
+      squared += x[i] * x[i];
+      along += x[i] * v[i];
+      speed += v[i] * v[i];
+    }
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      const Lanes turned = x[j] * v[l] - x[l] * v[j];
+      across += turned * turned;
+    }
+    const Lanes distance = root(squared);
+    const Lanes closing =
+        closing_speed(along, root(across), 1.0 / distance, radius, root(speed)) + cluster.turning * ball + cluster.fastest;
+    store(bounds + n, distance - radius);
+    store(after + n, distance - radius - cluster.horizon * closing);
+  }
 }
 
 }  // namespace

@@ -14,7 +14,6 @@ constexpr double rounding = 1e-15;  // of φ, relative to the lengths in it
 // Centres closer than this have no direction between them [m]; such ellipsoids overlap deeply anyway.
 constexpr double closest_centres = 1e-6;
 
-inline Lanes larger(Lanes a, Lanes b) noexcept { return a > b ? a : b; }
 inline Lanes dot(const Lanes* a, const Lanes* b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 inline void cross(const double* a, const Lanes* b, Lanes* result) noexcept {
   for (int i = 0; i < 3; ++i) {

@@ -38,6 +38,47 @@ inline Lanes root(Lanes x) noexcept {
 }
 
 inline Lanes magnitude(Lanes x) noexcept { return x < 0.0 ? -x : x; }
+inline Lanes larger(Lanes x, Lanes y) noexcept { return x > y ? x : y; }
+
+/// from[index[0]], from[index[1]], …
+inline Lanes gather(const double* from, const int* index) noexcept {
+#if defined(__AVX512F__)
+  __m256i at;
+  __builtin_memcpy(&at, index, sizeof at);
+  return _mm512_mask_i32gather_pd(Lanes{}, 0xff, at, from, 8);
+#elif defined(__AVX2__)
+  __m128i at;
+  __builtin_memcpy(&at, index, sizeof at);
+  return _mm256_mask_i32gather_pd(Lanes{}, from, at, all(-1.0), 8);
+#else
+  Lanes x;
+  for (int i = 0; i < width; ++i) {
+    x[i] = from[index[i]];
+  }
+  return x;
+#endif
+}
+
+/// 1/x and 1/√x of positive numbers within 2 units in the last place; of others not a number.
+inline Lanes inverse(Lanes x) noexcept {
+#if defined(__AVX512F__)
+  Lanes y = _mm512_maskz_rcp14_pd(0xff, x);
+  y = y * (2.0 - x * y);
+  return y + y * (1.0 - x * y);
+#else
+  return 1.0 / x;
+#endif
+}
+
+inline Lanes inverse_root(Lanes x) noexcept {
+#if defined(__AVX512F__)
+  Lanes y = _mm512_maskz_rsqrt14_pd(0xff, x);
+  y = y * (1.5 - 0.5 * x * y * y);
+  return y + 0.5 * y * (1.0 - x * y * y);
+#else
+  return 1.0 / root(x);
+#endif
+}
 
 /// Lane i is bit i.
 inline unsigned below(Lanes x, Lanes limit) noexcept {
@@ -50,6 +91,87 @@ inline unsigned below(Lanes x, Lanes limit) noexcept {
 #else
   unsigned bits = 0;
   for (int i = 0; i < width; ++i) {
+    bits |= (x[i] < limit[i] ? 1u : 0u) << i;
+  }
+  return bits;
+#endif
+}
+
+// Twice as many floats side by side.
+inline constexpr int singles = 2 * width;
+typedef float Singles __attribute__((vector_size(4 * singles)));
+
+inline Singles all(float x) noexcept { return x - Singles{}; }
+
+inline Singles load(const float* p) noexcept {
+  Singles x;
+  __builtin_memcpy(&x, p, sizeof x);
+  return x;
+}
+
+inline void store(float* p, Singles x) noexcept { __builtin_memcpy(p, &x, sizeof x); }
+
+/// 1/x and 1/√x of positive numbers, within 1e-6: estimates of 12 bits or more, and one step of Newton's.
+inline Singles inverse(Singles x) noexcept {
+#if defined(__AVX512F__)
+  const Singles y = _mm512_maskz_rcp14_ps(0xffff, x);
+#elif defined(__AVX2__)
+  const Singles y = _mm256_rcp_ps(x);
+#elif defined(__SSE2__)
+  const Singles y = _mm_rcp_ps(x);
+#else
+  const Singles y = 1.0f / x;
+#endif
+  return y * (2.0f - x * y);
+}
+
+inline Singles inverse_root(Singles x) noexcept {
+#if defined(__AVX512F__)
+  const Singles y = _mm512_maskz_rsqrt14_ps(0xffff, x);
+#elif defined(__AVX2__)
+  const Singles y = _mm256_rsqrt_ps(x);
+#elif defined(__SSE2__)
+  const Singles y = _mm_rsqrt_ps(x);
+#else
+  Singles y;
+  for (int i = 0; i < singles; ++i) {
+    y[i] = 1.0f / __builtin_sqrtf(x[i]);
+  }
+#endif
+  return y * (1.5f - 0.5f * x * y * y);
+}
+
+/// √x within 1e-6, or 1e-15; of numbers below zero as well.
+inline Singles root(Singles x) noexcept {
+  const Singles positive = x > 1e-30f ? x : all(1e-30f);
+  return positive * inverse_root(positive);
+}
+
+
+/// Writes the lanes that are bits one after another; what lies between them and a full register is overwritten.
+inline void compress(float* p, Singles x, unsigned lanes) noexcept {
+#if defined(__AVX512F__)
+  store(p, _mm512_maskz_compress_ps(static_cast<__mmask16>(lanes), x));
+#else
+  for (; lanes != 0; lanes &= lanes - 1) {
+    *p++ = x[__builtin_ctz(lanes)];
+  }
+#endif
+}
+
+inline Singles magnitude(Singles x) noexcept { return x < 0.0f ? -x : x; }
+inline Singles larger(Singles x, Singles y) noexcept { return x > y ? x : y; }
+
+inline unsigned below(Singles x, Singles limit) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_cmp_ps_mask(x, limit, _CMP_LT_OQ);
+#elif defined(__AVX2__)
+  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(x, limit, _CMP_LT_OQ)));
+#elif defined(__SSE2__)
+  return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(x, limit)));
+#else
+  unsigned bits = 0;
+  for (int i = 0; i < singles; ++i) {
     bits |= (x[i] < limit[i] ? 1u : 0u) << i;
   }
   return bits;
