@@ -2,6 +2,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -20,8 +21,31 @@ struct QuadraticSolution {
   QuadraticProgramStatus status;
   Eigen::VectorXd x, multipliers;
   int iterations;
-  double residual;
+  double residual, seconds;
 };
+
+/// The programs that controllers solve are handed out with the rows alone that have a bound.
+QuadraticProgramData without_unbounded_rows(const QuadraticProgramData& data) {
+  std::vector<Eigen::Index> bounded;
+  for (Eigen::Index k = 0; k < data.A.rows(); ++k) {
+    if (std::isfinite(data.row_lower[k]) || std::isfinite(data.row_upper[k])) {
+      bounded.push_back(k);
+    }
+  }
+  QuadraticProgramData result(static_cast<int>(data.g.size()), static_cast<int>(bounded.size()));
+  result.H = data.H;
+  result.g = data.g;
+  result.lower = data.lower;
+  result.upper = data.upper;
+  result.A = data.A(bounded, Eigen::all);
+  result.row_lower = data.row_lower(bounded);
+  result.row_upper = data.row_upper(bounded);
+  return result;
+}
+
+constexpr const char* program_doc =
+    "The first quadratic program of the last call that had usable input, over the acceleration [rad/s^2 | m/s^2];\n"
+    "rows without bounds are left out.";
 
 void bind_quadratic_program(nb::module_& m) {
   nb::enum_<QuadraticProgramStatus>(m, "QuadraticProgramStatus", "How a quadratic program ended.")
@@ -40,7 +64,19 @@ void bind_quadratic_program(nb::module_& m) {
                    "(n + m,): of the bounds, then of the rows; positive at an upper, negative at a lower limit.")
       .def_ro("iterations", &QuadraticSolution::iterations)
       .def_ro("residual", &QuadraticSolution::residual,
-              "Largest relative violation of the optimality conditions; NaN unless solved.");
+              "Largest relative violation of the optimality conditions; NaN unless solved.")
+      .def_ro("seconds", &QuadraticSolution::seconds, "What the solver took [s], without the copies in and out.");
+
+  nb::class_<QuadraticProgramData>(m, "QuadraticProgramData",
+                                   "minimise 1/2 x'Hx + g'x subject to lower <= x <= upper and\n"
+                                   "row_lower <= A x <= row_upper, with H (n, n) and A (m, n). Bounds may be infinite.")
+      .def_prop_ro("H", [](const QuadraticProgramData& d) { return to_numpy_matrix(d.H); }, "(n, n)")
+      .def_prop_ro("g", [](const QuadraticProgramData& d) { return to_numpy(d.g); }, "(n,)")
+      .def_prop_ro("lower", [](const QuadraticProgramData& d) { return to_numpy(d.lower); }, "(n,)")
+      .def_prop_ro("upper", [](const QuadraticProgramData& d) { return to_numpy(d.upper); }, "(n,)")
+      .def_prop_ro("A", [](const QuadraticProgramData& d) { return to_numpy_matrix(d.A); }, "(m, n)")
+      .def_prop_ro("row_lower", [](const QuadraticProgramData& d) { return to_numpy(d.row_lower); }, "(m,)")
+      .def_prop_ro("row_upper", [](const QuadraticProgramData& d) { return to_numpy(d.row_upper); }, "(m,)");
 
   nb::class_<QuadraticProgram>(m, "QuadraticProgram",
                                "A dense strictly convex quadratic program of fixed size, solved by the dual active-set\n"
@@ -62,10 +98,13 @@ void bind_quadratic_program(nb::module_& m) {
             if (!A.is_none()) data.A = as_matrix(A, "A", rows, n);
             if (!row_lower.is_none()) data.row_lower = as_filled_vector(row_lower, "row_lower", rows);
             if (!row_upper.is_none()) data.row_upper = as_filled_vector(row_upper, "row_upper", rows);
+            const auto start = std::chrono::steady_clock::now();
             const QuadraticProgramStatus status = qp.solve(data);
+            const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
             const bool solved = status == QuadraticProgramStatus::solved;
             return QuadraticSolution{status, qp.solution(), qp.multipliers(), qp.iterations(),
-                                     solved ? optimality_residual(data, qp) : std::numeric_limits<double>::quiet_NaN()};
+                                     solved ? optimality_residual(data, qp) : std::numeric_limits<double>::quiet_NaN(),
+                                     taken.count()};
           },
           nb::arg("H"), nb::arg("g"), nb::kw_only(), nb::arg("lower").none() = nb::none(),
           nb::arg("upper").none() = nb::none(), nb::arg("A").none() = nb::none(),
@@ -326,6 +365,7 @@ void bind_torque_controller(nb::module_& m) {
           "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. Returns a\n"
           "TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.")
       .def_prop_ro("num_coordinates", &TorqueController::num_coordinates)
+      .def_prop_ro("program", [](const TorqueController& c) { return without_unbounded_rows(c.program()); }, program_doc)
       .def("count", &TorqueController::count, nb::arg("status"), "Number of solves that ended with this status.");
 }
 
@@ -368,6 +408,7 @@ void bind_acceleration_filter(nb::module_& m) {
           "Returns a TorqueSolution, of which `acceleration` is the result. Raises ValueError on wrong shapes.")
       .def_prop_ro("period", &AccelerationFilter::period)
       .def_prop_ro("num_coordinates", &AccelerationFilter::num_coordinates)
+      .def_prop_ro("program", [](const AccelerationFilter& f) { return without_unbounded_rows(f.program()); }, program_doc)
       .def("count", &AccelerationFilter::count, nb::arg("status"), "Number of calls that ended with this status.");
 }
 

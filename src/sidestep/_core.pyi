@@ -1029,6 +1029,44 @@ class QuadraticSolution:
         Largest relative violation of the optimality conditions; NaN unless solved.
         """
 
+    @property
+    def seconds(self) -> float:
+        """What the solver took [s], without the copies in and out."""
+
+class QuadraticProgramData:
+    """
+    minimise 1/2 x'Hx + g'x subject to lower <= x <= upper and
+    row_lower <= A x <= row_upper, with H (n, n) and A (m, n). Bounds may be infinite.
+    """
+
+    @property
+    def H(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(n, n)"""
+
+    @property
+    def g(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(n,)"""
+
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(n,)"""
+
+    @property
+    def upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(n,)"""
+
+    @property
+    def A(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(m, n)"""
+
+    @property
+    def row_lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(m,)"""
+
+    @property
+    def row_upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(m,)"""
+
 class QuadraticProgram:
     """
     A dense strictly convex quadratic program of fixed size, solved by the dual active-set
@@ -1296,6 +1334,13 @@ class TorqueController:
     @property
     def num_coordinates(self) -> int: ...
 
+    @property
+    def program(self) -> QuadraticProgramData:
+        """
+        The first quadratic program of the last call that had usable input, over the acceleration [rad/s^2 | m/s^2];
+        rows without bounds are left out.
+        """
+
     def count(self, status: TorqueStatus) -> int:
         """Number of solves that ended with this status."""
 
@@ -1323,6 +1368,13 @@ class AccelerationFilter:
 
     @property
     def num_coordinates(self) -> int: ...
+
+    @property
+    def program(self) -> QuadraticProgramData:
+        """
+        The first quadratic program of the last call that had usable input, over the acceleration [rad/s^2 | m/s^2];
+        rows without bounds are left out.
+        """
 
     def count(self, status: TorqueStatus) -> int:
         """Number of calls that ended with this status."""

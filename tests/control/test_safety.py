@@ -124,6 +124,31 @@ def test_without_the_rows_the_ball_is_hit() -> None:
     assert lowest < 0.0
 
 
+def test_the_program_that_was_solved_can_be_solved_elsewhere() -> None:
+    """Of filter and controller: the rows in use, whose minimiser is the acceleration that they gave."""
+    s = scene("fr3", 1)
+    filter_, controller = ss.AccelerationFilter(s.robot), ss.TorqueController(s.robot)
+    q, v, held = s.start, 0.0 * s.start, 0
+    for _ in range(400):
+        clearances = s.clearances_at(q, v, s.obstacles)
+        wanted = 100.0 * (s.goal - q) - 20.0 * v
+        mass, bias = s.robot.mass_matrix(q), s.robot.bias(q, v)
+        by_torque = controller.solve(q, v, wanted, mass, bias, clearances=clearances)
+        filtered = filter_.apply(q, v, wanted, clearances=clearances)
+        for solution, program in ((by_torque, controller.program), (filtered, filter_.program)):
+            assert np.all(np.isfinite(program.row_lower) | np.isfinite(program.row_upper))
+            found = ss.control.QuadraticProgram(len(program.g), len(program.row_lower)).solve(
+                program.H, program.g, lower=program.lower, upper=program.upper,
+                A=program.A, row_lower=program.row_lower, row_upper=program.row_upper,
+            )  # fmt: skip
+            np.testing.assert_allclose(found.x, solution.acceleration, rtol=1e-9, atol=1e-9)
+            assert found.seconds > 0.0
+            held += found.iterations > 0
+        v = v + PERIOD * filtered.acceleration
+        q = q + PERIOD * v
+    assert held > 50
+
+
 def test_a_rollout_applies_the_filter() -> None:
     s = scene("fr3", 1)
     # Flat space's task pulls through the ball; the embedding measures clearances and is too weak to bend anything.

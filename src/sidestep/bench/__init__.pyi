@@ -24,6 +24,8 @@ from .problems import ProblemGenerator as ProblemGenerator
 from .problems import ProblemSettings as ProblemSettings
 from .problems import ReachProblem as ReachProblem
 from .problems import Workspace as Workspace
+from .quadratic_programs import QuadraticProgramSettings as QuadraticProgramSettings
+from .quadratic_programs import run_quadratic_programs as run_quadratic_programs
 from .reach import BenchResult as BenchResult
 from .reach import BenchSettings as BenchSettings
 from .reach import run_bench as run_bench

@@ -9,7 +9,7 @@ import typer
 
 from sidestep.bench.method import Method
 from sidestep.cli.bench_scenes_command import dynamic, motion_bench_maker
-from sidestep.cli.bench_step_command import compare, peers, points, realtime, step
+from sidestep.cli.bench_step_command import compare, peers, points, qp, realtime, step
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 app = typer.Typer(help="Benchmarks on random and on published problems.", no_args_is_help=True)
@@ -18,6 +18,7 @@ app.command("dynamic")(dynamic)
 app.command("step")(step)
 app.command("compare")(compare)
 app.command("peers")(peers)
+app.command("qp")(qp)
 app.command("points")(points)
 app.command("realtime")(realtime)
 

@@ -1,4 +1,4 @@
-"""`sidestep bench step`, `compare`, `peers`, `points` and `realtime`."""
+"""`sidestep bench step`, `compare`, `peers`, `qp`, `points` and `realtime`."""
 
 from __future__ import annotations
 
@@ -123,6 +123,44 @@ def peers(
                 times = (f"{row['median_us']:,.2f}", f"{row['p99_us']:,.2f}", f"{row['times_slower']:,.1f}")
                 table.add_row(row["name"], *times, row["work"])
         terminal.print(table)
+    if json is not None:
+        write_json(document, json)
+
+
+def qp(
+    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    programs: Annotated[int, typer.Option(min=1, help="Programs, from motions of the robot.")] = 5_000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of places, goals and points.")] = 0,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """What solvers take for the quadratic programs of a step, and whether they find the same minimisers.
+
+    The core's, DAQP, PIQP and ProxQP, each from scratch, by the time that they measure themselves. Programs are those
+    of the filter above a table; most have no constraint that holds. What is not installed is left out, and named.
+    """
+    from rich import box
+    from rich.table import Table
+
+    from sidestep.bench import QuadraticProgramSettings, run_quadratic_programs
+
+    settings = QuadraticProgramSettings(programs=programs, robot=robot, seed=seed)
+    terminal = console(quiet=quiet, to_stderr=json == "-")
+    with terminal.status("") as status:
+        document = run_quadratic_programs(settings, progress=lambda name: status.update(name))
+    title = f"{document['programs']:,} programs, {document['constrained']:,} constrained: {document['cpu']}"
+    table = Table(box=box.SIMPLE, pad_edge=False, title=title)
+    table.add_column("one program [us]", no_wrap=True)
+    for name in ("all: median", "p99", "constrained: median", "p99", "max", "wrong"):
+        table.add_column(name, justify="right")
+    for row in document["rows"]:
+        if "missing" in row:
+            table.add_row(row["name"], row["missing"])
+            continue
+        whole, part = row["all"], row["constrained"]
+        times = (whole["median_us"], whole["p99_us"], part["median_us"], part["p99_us"], part["max_us"])
+        table.add_row(row["name"], *(f"{value:.2f}" for value in times), str(row["wrong"]))
+    terminal.print(table)
     if json is not None:
         write_json(document, json)
 

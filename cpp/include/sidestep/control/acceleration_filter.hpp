@@ -31,6 +31,7 @@ class AccelerationFilter {
   int num_coordinates() const noexcept { return controller_.num_coordinates(); }
   int max_safety_rows() const noexcept { return controller_.settings().safety.max_rows; }
   std::int64_t count(TorqueStatus status) const noexcept { return controller_.count(status); }
+  const QuadraticProgramData& program() const noexcept { return controller_.program(); }  ///< see TorqueController
 
  private:
   Eigen::MatrixXd unit_mass_;

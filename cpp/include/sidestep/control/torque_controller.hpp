@@ -128,6 +128,9 @@ class TorqueController {
 
   const TorqueControllerSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return nv_; }
+  /// The first program of the last solve that had usable input: rows of torque limits, then of clearances, without bounds
+  /// where they are not in use.
+  const QuadraticProgramData& program() const noexcept { return hard_data_; }
   /// Number of solves, since construction, that ended with this status.
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
