@@ -21,6 +21,7 @@
 #include "sidestep/embedding/self_collision_barrier.hpp"
 #include "sidestep/embedding/sum.hpp"
 #include "sidestep/kinematics/instruction_set.hpp"
+#include "sidestep/kinematics/multiply_add_rate.hpp"
 
 namespace sidestep::python {
 void check_fitted_to(const Robot& robot, const Body& body) {
@@ -42,6 +43,9 @@ void check_fitted_to(const Robot& robot, const Body& body) {
 }
 
 void bind_embedding(nb::module_& m) {
+  m.def("multiply_add_rate", &multiply_add_rate, nb::arg("duration") = 0.2,
+        "Floating-point operations a second of one core that does nothing but multiply and add doubles in the widest\n"
+        "registers, at most within `duration` [s]. Raises ValueError unless that is positive and finite.");
   m.def("instruction_set", [] { return std::string(name(instruction_set())); },
         "What the inner loops over points run with on this machine: \"avx512\", \"avx2\" or \"baseline\".");
 
@@ -94,6 +98,8 @@ void bind_embedding(nb::module_& m) {
       "The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),\n"
       "    psi(q) = sum_points sum_links sum_k pi_k N(x | o_l + R_l mu_k, R_l Sigma_k R_l^T + r^2 I)  [1/m^3].\n"
       "`average` divides by the number of points. Links that no joint moves are left out.")
+      .def_prop_ro_static("operations_per_pair", [](nb::handle) { return CollisionDensity::operations_per_pair; },
+                           "Multiplications and additions for a Gaussian and a point at rest without radius.")
       .def(
           "__init__",
           [](CollisionDensity* self, const Robot& robot, const Body& body, bool average) {

@@ -4,6 +4,7 @@ C++ core of sidestep. Use the names re-exported by the sidestep package.
 
 from collections.abc import Sequence
 import enum
+from typing import Final
 
 import numpy
 import numpy.typing
@@ -193,6 +194,12 @@ class Obstacles:
     def advance(self, duration: float) -> None:
         """Moves every point along its velocity for `duration` [s]."""
 
+def multiply_add_rate(duration: float = 0.2) -> float:
+    """
+    Floating-point operations a second of one core that does nothing but multiply and add doubles in the widest
+    registers, at most within `duration` [s]. Raises ValueError unless that is positive and finite.
+    """
+
 def instruction_set() -> str:
     """
     What the inner loops over points run with on this machine: "avx512", "avx2" or "baseline".
@@ -258,6 +265,11 @@ class CollisionDensity(Embedding):
     """
 
     def __init__(self, robot: Robot, body: Body, *, average: bool = False) -> None: ...
+
+    operations_per_pair: Final[int] = ...
+    """
+    Multiplications and additions for a Gaussian and a point at rest without radius.
+    """
 
 class JointLimitPotential(Embedding):
     """

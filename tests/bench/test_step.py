@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep import Obstacles
+from sidestep import Obstacles, _core
 from sidestep.bench import StepSettings, compare_steps, run_step_bench
 from sidestep.bench import step as step_module
 from sidestep.bench.step_scenes import REACH, table_cloud, uniform_cloud
@@ -33,6 +33,21 @@ def test_measures_every_row(document: dict[str, list[dict[str, object]]]) -> Non
     assert [row["joints"] for row in rows[:6:2]] == [2, 3, 7]
     assert {row["points"] for row in rows[6:]} == {5}
     json.dumps(document, allow_nan=False)
+
+
+def test_the_dense_kernel_is_related_to_the_peak_of_the_same_run(
+    document: dict[str, dict[str, float]],
+) -> None:
+    dense = document["dense"]
+    assert dense["gaussians"] == Body.cover(Robot.named("planar3")).num_components
+    assert dense["operations_per_s"] == pytest.approx(1e9 * dense["operations_per_pair"] / dense["pair_ns"])
+    assert dense["share_of_peak"] == pytest.approx(dense["operations_per_s"] / dense["multiply_add_per_s"])
+    assert dense["share_of_peak"] > 0.0
+
+
+def test_the_peak_needs_a_duration() -> None:
+    with pytest.raises(ValueError, match="duration is 0"):
+        _core.multiply_add_rate(0.0)
 
 
 def test_arms_are_drawn_to_where_they_have_clearance() -> None:

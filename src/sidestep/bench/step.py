@@ -19,6 +19,7 @@ from sidestep._core import (
     GeometricSystem,
     Obstacles,
     instruction_set,
+    multiply_add_rate,
     rollout,
 )
 from sidestep.bench.step_scenes import table_cloud, uniform_cloud
@@ -34,6 +35,8 @@ POINTS = (1, 100, 1_000, 10_000, 100_000)
 MOTION = 1_000  # steps towards one goal before the next; 1 s
 CLEARANCE = 0.03  # [m] of goals from every point, of the covering body
 TRIES = 30  # goals that are drawn before the best of them is taken
+DENSE_POINTS = 1_000  # of the kernel that leaves nothing out
+DENSE_CALLS = 20  # fewest
 WARM_UP = 0.1  # share of the steps that run before those that count
 
 
@@ -86,6 +89,38 @@ def run_step_bench(
         "steps": settings.steps,
         "seconds": settings.seconds,
         "results": results,
+        "dense": _dense_kernel(settings),
+    }
+
+
+def _dense_kernel(settings: StepSettings) -> dict[str, Any]:
+    """The density of every Gaussian at every point, and what one core does when it only multiplies and adds."""
+    robot = Robot.named(settings.robot)
+    body = Body.cover(robot)
+    density = CollisionDensity(robot, body)
+    rng = np.random.default_rng(settings.seed)
+    obstacles = Obstacles(rng.uniform(-0.5, 0.5, (DENSE_POINTS, 3)))
+    q, v = robot.random_configuration(rng), rng.normal(size=robot.num_coordinates)
+    peak = multiply_add_rate()
+    moving = {frame.name for frame in robot.frames if frame.joint >= 0}
+    gaussians = sum(link in moving for link in body.links)
+    seconds: list[float] = []
+    end = time.perf_counter() + 0.1 * settings.seconds
+    while len(seconds) < DENSE_CALLS or time.perf_counter() < end:
+        start = time.perf_counter_ns()
+        density.evaluate(q, v, obstacles)
+        seconds.append(1e-9 * (time.perf_counter_ns() - start))
+    peak = max(peak, multiply_add_rate())
+    per_pair = float(np.median(seconds)) / (gaussians * DENSE_POINTS)
+    rate = CollisionDensity.operations_per_pair / per_pair
+    return {
+        "gaussians": gaussians,
+        "points": DENSE_POINTS,
+        "pair_ns": 1e9 * per_pair,
+        "operations_per_pair": CollisionDensity.operations_per_pair,
+        "operations_per_s": rate,
+        "multiply_add_per_s": peak,
+        "share_of_peak": rate / peak,
     }
 
 
