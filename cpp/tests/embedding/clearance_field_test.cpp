@@ -221,6 +221,33 @@ BOOST_AUTO_TEST_CASE(what_touches_is_found_by_balls_inside) {
   BOOST_TEST(touching < trials - trials / 10);
 }
 
+// One leaf holds what is near and what is far away, as where a camera sees through a window.
+BOOST_AUTO_TEST_CASE(points_far_away_do_not_blur_those_nearby) {
+  const InstructionSet before = instruction_set();
+  for (const InstructionSet set : instruction_sets()) {
+    BOOST_TEST_CONTEXT(name(set)) {
+      use(set);
+      Random random(4);
+      for (const double far : {1e3, 1e5, 1e7}) {
+        for (int trial = 0; trial < 5; ++trial) {
+          const Robot robot = test::random_tree(random, 5);
+          const Body body = calibrated(test::random_body(random, robot), random);
+          KinematicState state(robot);
+          state.update(robot, random.vector(robot.num_coordinates()), random.vector(robot.num_coordinates()));
+          const Obstacles nearby = test::random_obstacles(random, 15);
+          Eigen::Matrix3Xd points(3, 16), velocities(3, 16);
+          points << nearby.points(), far * Eigen::Vector3d(0.6, -0.5, 0.7);
+          velocities << nearby.velocities(), Eigen::Vector3d::Zero();
+          Eigen::VectorXd radii(16);
+          radii << nearby.radii(), 0.01;
+          compare(robot, body, state, Obstacles(points, radii, velocities), 0.3, 0.1);
+        }
+      }
+    }
+  }
+  use(before);
+}
+
 // Inside, gradients are longer than one: a point may close faster than any bound of a distance says, beside one that is
 // deeper by more than the window.
 BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {
@@ -274,6 +301,30 @@ BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
       field.evaluate(state, Obstacles(at, Eigen::VectorXd::Zero(1), slip), 1.0, {}, found.view(0, 1));
       BOOST_TEST(std::abs(found.values[0] - h) < 1e-12);
       BOOST_TEST(std::abs(found.curvatures[0] - v * v / (b * b / a + h)) < 1e-9);
+    }
+  }
+  use(before);
+}
+
+BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
+  const InstructionSet before = instruction_set();
+  const Robot robot = test::serial_arm(test::arm_limits(1));
+  const std::string link = robot.frames().back().name;
+  const Eigen::Matrix3d S = Eigen::Vector3d(0.04, 0.01, 0.02).asDiagonal();
+  const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {S}, Eigen::VectorXd::Ones(1));
+  const ClearanceField field(robot, body, temperature);
+  KinematicState state(robot);
+  state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
+  const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
+  for (const InstructionSet set : instruction_sets()) {
+    use(set);
+    for (const double offset : {0.0, 1e-300, 1e-30, 1e-15, 1e-9}) {
+      const Eigen::Matrix3Xd at = X * Eigen::Vector3d(0.0, offset, 0.0);
+      Clearances found(1, 1);
+      field.evaluate(state, Obstacles(at, Eigen::VectorXd::Zero(1), Eigen::Matrix3Xd::Zero(3, 1)), 0.1, {},
+                     found.view(0, 1));
+      BOOST_TEST(std::abs(found.values[0] + 0.1) < 1e-7);
+      BOOST_TEST(found.nearest[0] == 0);
     }
   }
   use(before);

@@ -13,9 +13,11 @@ constexpr double centre_offset = 1e-9;
 constexpr double converged = 1.0 + 2e-14;
 constexpr float single_converged = 1.0f + 4e-5f;
 constexpr int most_iterations = 16;
+constexpr double cubic_within = 1e-4;  // of S: the cube is below what counts, on whatever side of the root it is
 
-// Errors of single precision, of clearances relative to distances, and of rates relative to speeds.
-constexpr float distance_error = 1e-4f, rate_error = 1e-3f;
+// Errors of single precision, of clearances relative to distances, of rates relative to speeds, and of points relative to the
+// size of their leaf, which is large where one of them is far away.
+constexpr float distance_error = 1e-4f, rate_error = 1e-3f, place_error = 1e-6f;
 
 void rotate(const double* rows, const double* x, double* result) noexcept {
   for (int i = 0; i < 3; ++i) {
@@ -116,15 +118,15 @@ struct Outside {
   /// Newton's step on 1/√S − 1, which is concave in t: it ends below the root, wherever it begins.
   Values step(Values root_S) const noexcept { return S * (root_S - 1) * inverse(flatness); }
 
-  /// Chebyshev's step on the same: of an error that is small its third power is left.
+  /// Chebyshev's step on the same where S is close to 1: of an error that is small its third power is left.
   Values cubic_step(Values root_S) const noexcept {
     const Values inverse_flatness = inverse(flatness), newton = S * (root_S - 1) * inverse_flatness;
     Values second = {};  // Σ A w² / (A + t)²
     for (int i = 0; i < 3; ++i) {
       second += shares[i] * inverses[i] * inverses[i];
     }
-    const Values bend = second * inverse_flatness - flatness * (2 - S);  // S is close to 1
-    return newton * (S < 1.01 ? 1 + 1.5 * newton * bend : 1 + Values{});
+    const Values bend = second * inverse_flatness - flatness * (2 - S);  // 1/S is 2 − S, where S is close to 1
+    return (S > 1.0 - cubic_within) & (S < 1.0 + cubic_within) ? newton * (1 + 1.5 * newton * bend) : newton;
   }
 
   Values inverse_norm() const noexcept { return inverse_root(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]); }
@@ -232,7 +234,7 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
   const float from[3] = {static_cast<float>(leaf.x - group.centre[0][k]), static_cast<float>(leaf.y - group.centre[1][k]),
                          static_cast<float>(leaf.z - group.centre[2][k])};
   const float extent = group.extent[k], shortest = query.single.semi_axes[query.shortest];
-  const float horizon = static_cast<float>(group.horizon);
+  const float horizon = static_cast<float>(group.horizon), blur = place_error * static_cast<float>(leaf.radius);
   bool changed = false;
   for (int n = 0; n < leaf.count; n += singles) {
     const float near = group.near[k], ahead = group.ahead[k];
@@ -242,7 +244,7 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
     // From below: the clearance of the ball around the ellipsoid, and what may be closed within the horizon.
     const Singles squared = x * x + y * y + z * z;
     const Singles inverse_distance = inverse_root(squared > 1e-30f ? squared : all(1e-30f));
-    const Singles distance = squared * inverse_distance, error = distance_error * (distance + extent);
+    const Singles distance = squared * inverse_distance, error = distance_error * (distance + extent) + blur;
     const Singles of_ball = distance - extent - radius - error;
     if ((below(of_ball, all(near > ahead + closing_of_leaf ? near : ahead + closing_of_leaf)) & asked) == 0) {
       continue;
@@ -286,7 +288,8 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
       second += term;
       fourth += A[i] * term;
     }
-    out.t = larger(root(second) - fourth * inverse(second > 1e-30f ? second : all(1e-30f)), Singles{});
+    // The root of nothing is not quite nothing: at the centre t is 0.
+    out.t = larger(root(second) - fourth * inverse(second > 1e-30f ? second : all(1e-30f)) - 1e-12f, Singles{});
     for (int i = 0; i < 3; ++i) {
       out.t = larger(query.single.semi_axes[i] * magnitude(e[i]) - A[i], out.t);
     }
@@ -396,7 +399,7 @@ struct Samples {
     any_inside = are_inside != 0;
     out.t = inside ? Lanes{} : out.t;
     out.place(A, e);
-    out.t += inside ? Lanes{} : out.cubic_step(root(out.S));
+    out.t = inside ? Lanes{} : larger(out.t + out.cubic_step(root(out.S)), Lanes{});
     out.place(A, e);
     for (int i = 0; i < most_iterations && (below(all(converged), out.S) & ~are_inside) != 0; ++i) {
       const Lanes step = out.step(root(out.S));
