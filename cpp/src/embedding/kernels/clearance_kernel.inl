@@ -18,6 +18,7 @@ constexpr double cubic_within = 1e-4;  // of S: the cube is below what counts, o
 // Errors of single precision, of clearances relative to distances, of rates relative to speeds, and of points relative to the
 // size of their leaf, which is large where one of them is far away.
 constexpr float distance_error = 1e-4f, rate_error = 1e-3f, place_error = 1e-6f;
+constexpr float blurred = 1e-5f;  // [m] of places, from where on no direction to them counts as known
 
 void rotate(const double* rows, const double* x, double* result) noexcept {
   for (int i = 0; i < 3; ++i) {
@@ -235,6 +236,7 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
                          static_cast<float>(leaf.z - group.centre[2][k])};
   const float extent = group.extent[k], shortest = query.single.semi_axes[query.shortest];
   const float horizon = static_cast<float>(group.horizon), blur = place_error * static_cast<float>(leaf.radius);
+  const float turning_blur = blur * (__builtin_fabsf(W[0]) + __builtin_fabsf(W[1]) + __builtin_fabsf(W[2]));
   bool changed = false;
   for (int n = 0; n < leaf.count; n += singles) {
     const float near = group.near[k], ahead = group.ahead[k];
@@ -270,7 +272,8 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
     const Singles speed = root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     const Singles along = -(e[0] * v[0] + e[1] * v[1] + e[2] * v[2]);
     const Singles turning = root(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-    Singles closing = horizon * (closing_speed(along, turning, inverse_distance, all(extent), speed) + rate_error * speed);
+    const Singles closing_in = blur < blurred ? closing_speed(along, turning, inverse_distance, all(extent), speed) : speed;
+    Singles closing = horizon * (closing_in + rate_error * speed + turning_blur);
     closing = closing < closing_of_leaf ? closing : all(closing_of_leaf);
     const auto matter = [&](Singles least) noexcept {
       return (below(least, all(near)) | below(least - closing, all(ahead))) & asked;
@@ -316,14 +319,15 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
     // Inside nothing is known but that the clearance is negative: gradients are longer than one.
     const float unknown = __builtin_inff();
     const auto inside = S_if_inside < 1.0f, converged = root_S <= single_converged;
+    const auto rate_known = converged & (all(blur) < blurred);
     const Singles h_least = inside ? all(-unknown) : least;
-    const Singles after_least = inside ? all(-unknown) : converged ? least + after - after_error : least - closing;
+    const Singles after_least = inside ? all(-unknown) : rate_known ? least + after - after_error : least - closing;
     const unsigned is_near = below(h_least, all(near)) & asked, approaches = below(after_least, all(ahead)) & asked;
     if ((is_near | approaches) == 0) {
       continue;
     }
     const Singles h_most = inside ? error - radius : converged ? least + 2.0f * error : distance - shortest - radius + error;
-    const Singles after_most = ~inside & converged ? h_most + after + after_error : all(unknown);
+    const Singles after_most = ~inside & rate_known ? h_most + after + after_error : all(unknown);
     const unsigned within = below(h_least, all(static_cast<float>(group.reach))) & asked;
     if (within != 0) {
       changed |= lower(query.near, group.near[k], group.near_leaf[k], h_most, within, group.window);
