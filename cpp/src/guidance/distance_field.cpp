@@ -18,6 +18,23 @@ constexpr double farthest = 1e5;   // [m] that a place may be away to have a blo
 double below(double distance) noexcept { return distance - rounding * (std::abs(distance) + 1.0); }
 double above(double distance) noexcept { return distance + rounding * (std::abs(distance) + 1.0); }
 
+/// One of the cells that a block is divided into, `count` along each edge.
+struct Cell {
+  int number;
+  Eigen::Vector3d centre;  // from the corner of the block
+};
+
+template <int count>
+Cell cell(const Eigen::Vector3d& inside, double block_edge) noexcept {
+  Cell found{0, {}};
+  for (int i = 0; i < 3; ++i) {
+    const int along = std::clamp(static_cast<int>(inside[i] * (count / block_edge)), 0, count - 1);
+    found.number = found.number * count + along;
+    found.centre[i] = (along + 0.5) * (block_edge / count);
+  }
+  return found;
+}
+
 }  // namespace
 
 double distance_to_obstacles(const Eigen::Vector3d& x, const Obstacles& obstacles, double limit) noexcept {
@@ -59,30 +76,21 @@ double DistanceField::bound(const Eigen::Vector3d& x, double enough, const Obsta
     return below(distance_to_obstacles(x, obstacles, PointTree::padding));
   }
   const Eigen::Vector3d inside = x - corner;
-  double best = -std::numeric_limits<double>::infinity(), coarser = PointTree::padding;
-  Eigen::Vector3d coarser_centre = Eigen::Vector3d::Zero();
-  for (const int cells : levels) {
-    const double cell = block_edge / cells, per_length = cells / block_edge;
-    int at = 0;
-    Eigen::Vector3d centre;
-    for (int i = 0; i < 3; ++i) {
-      const int number = std::clamp(static_cast<int>(inside[i] * per_length), 0, cells - 1);
-      at = at * cells + number;
-      centre[i] = (number + 0.5) * cell;
-    }
-    if (known[at] == unknown) {
-      const double limit = above(coarser + (centre - coarser_centre).norm());
-      known[at] = static_cast<float>(distance_to_obstacles(corner + centre, obstacles, limit));
-    }
-    best = std::max(best, below(known[at]) - (inside - centre).norm());
-    if (best >= enough) {
-      break;
-    }
-    coarser = known[at];
-    coarser_centre = centre;
-    known += cells * cells * cells;
+  const Cell coarse = cell<1>(inside, block_edge), fine = cell<divisions>(inside, block_edge);
+  float &at_coarse = known[0], &at_fine = known[1 + fine.number];
+  if (at_coarse == unknown) {
+    at_coarse = static_cast<float>(distance_to_obstacles(corner + coarse.centre, obstacles, PointTree::padding));
   }
-  return best;
+  // At least `enough`, which a square tells too, or else what the fine cell says.
+  const double spare = below(at_coarse) - enough;
+  if (spare >= 0.0 && (inside - coarse.centre).squaredNorm() <= spare * spare) {
+    return enough;
+  }
+  if (at_fine == unknown) {
+    const double limit = above(at_coarse + (fine.centre - coarse.centre).norm());
+    at_fine = static_cast<float>(distance_to_obstacles(corner + fine.centre, obstacles, limit));
+  }
+  return below(at_fine) - (inside - fine.centre).norm();
 }
 
 float* DistanceField::block_of(std::uint64_t key) noexcept {

@@ -20,8 +20,8 @@ constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal m
 constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
 constexpr double local = 0.3;            // of the samples are around a node: narrow places are near others
 constexpr double around_node = 2.4;      // how far each joint of such a sample may be from the node's [rad | m]
-constexpr double octaves = 3.0;          // of the lengths of steps from a node that was trapped, below the range
-constexpr double domain = 2.0;           // of the range: how far samples may be from a node that was trapped
+constexpr double octaves = 2.5;          // of the lengths of steps from a node that was trapped, below the range
+constexpr double domain = 3.0;           // of the range: how far samples may be from a node that was trapped
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
 constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
 
@@ -224,13 +224,9 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
       return;
     }
     const int nearest = draw_sample(low, high, *one, random);
-    if (grow(*one, nearest, sample_, obstacles, margins, random) != Growth::trapped) {
-      const Eigen::VectorXd target = one->node(one->size() - 1);
-      Growth growth = Growth::advanced;
-      while (growth == Growth::advanced && !other->full()) {
-        growth = grow(*other, other->nearest(target), target, obstacles, margins, random);
-      }
-      if (growth == Growth::reached) {
+    if (extend(*one, nearest, sample_, obstacles, margins, random) != Growth::trapped) {
+      const Eigen::VectorXd met = one->node(one->size() - 1);
+      if (extend(*other, other->nearest(met), met, obstacles, margins, random) == Growth::reached) {
         std::vector<Eigen::VectorXd> way = to_root(from_start_, from_start_.size() - 1);
         std::reverse(way.begin(), way.end());
         const std::vector<Eigen::VectorXd> rest = to_root(from_goal_, from_goal_.size() - 1);
@@ -271,6 +267,17 @@ int RrtConnect::draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& h
     }
   }
   return nearest;
+}
+
+RrtConnect::Growth RrtConnect::extend(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles,
+                                      const Margins& margins, RandomStream& random) {
+  const int before = tree.size();
+  Growth growth = Growth::advanced;
+  while (growth == Growth::advanced && !tree.full()) {
+    growth = grow(tree, from, target, obstacles, margins, random);
+    from = tree.size() - 1;
+  }
+  return growth == Growth::trapped && tree.size() > before ? Growth::advanced : growth;
 }
 
 RrtConnect::Growth RrtConnect::grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles,

@@ -40,7 +40,7 @@ class PlannerChoice:
     pair_allowance: float = 0.02
     slack: float = 0.002
     fade: float = 0.3
-    range: float = 1.5
+    range: float = 1.0
     max_nodes: int = 10000
     max_iterations: int = 40000
     shortcuts: int = 100

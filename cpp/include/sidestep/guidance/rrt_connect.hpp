@@ -20,7 +20,7 @@ struct PlannerSettings {
   double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
   double slack = 0.002;     ///< see Margins, at least; else a quarter of the margin [m]
   double fade = 0.3;        ///< see Margins [m]
-  double range = 1.5;       ///< longest edge of the trees, in joints that count by how far they reach, see RrtConnect [rad | m]
+  double range = 1.0;       ///< longest edge of the trees, in joints that count by how far they reach, see RrtConnect [rad | m]
   int max_nodes = 10000;    ///< of both trees
   int max_iterations = 40000;
   double max_seconds = std::numeric_limits<double>::infinity();
@@ -35,8 +35,8 @@ struct PlannerSettings {
 /// runs out.
 ///
 /// Distances in the trees are √Σ (w_i Δq_i)², w_i the reach of joint i over the mean of all: an edge is as long as what it
-/// moves. Seven of ten samples are uniform within the limits, the others around a node. A node that was trapped grows by
-/// steps of random length.
+/// moves. Seven of ten samples are uniform within the limits, the others around a node. Both trees grow as far as they can,
+/// the one towards the sample, the other towards where that led. A node that was trapped grows by steps of random length.
 ///
 /// The first path keeps the `floor`: those are many, and the soonest found. It is improved then: one that keeps `margin` is
 /// looked for with a 400th of the budget, else one that keeps the geometric mean of the two with a 40th, and what was found is
@@ -82,6 +82,10 @@ class RrtConnect {
               const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
   /// Draws sample_ between low and high and returns the node of the tree that is nearest to it.
   int draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& high, SearchTree& tree, RandomStream& random);
+  /// Grows from a node on until the target is reached or no step is free; `trapped` where not even one was.
+  Growth extend(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins,
+                RandomStream& random);
+  /// One step of that.
   Growth grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins,
               RandomStream& random);
 

@@ -9,31 +9,57 @@ constexpr float inside = -0.999f;        // of the least square: t stays above i
 constexpr float tiny = 1e-20f;           // in place of zero, below a fraction line
 constexpr float centre_offset = 1e-6f;   // [m] stands for the centre, where no direction is the nearest
 
-typedef float Floats __attribute__((vector_size(4 * most_balls)));
-typedef int Ints __attribute__((vector_size(4 * most_balls)));
+/// `count` numbers side by side.
+template <class T, int count>
+struct SideBySide {
+  typedef T Type __attribute__((vector_size(sizeof(T) * count)));
+};
+template <int count>
+using Floats = typename SideBySide<float, count>::Type;
 
-inline Floats all(float x) noexcept { return x - Floats{}; }
-inline Floats larger(Floats a, Floats b) noexcept { return a > b ? a : b; }
-inline Floats root(Floats x) noexcept {
-  Floats y;
-  for (int i = 0; i < most_balls; ++i) {
+template <class F>
+inline constexpr int lanes = sizeof(F) / sizeof(float);
+
+/// Numbers from an array less one that is taken off in double precision.
+template <class F>
+inline F load(const double* from, double less = 0.0) noexcept {
+  typename SideBySide<double, lanes<F>>::Type x;
+  __builtin_memcpy(&x, from, sizeof x);
+  return __builtin_convertvector(x - less, F);
+}
+
+template <class F>
+inline F all(float x) noexcept { return x - F{}; }
+template <class F>
+inline F larger(F a, F b) noexcept { return a > b ? a : b; }
+template <class F>
+inline F root(F x) noexcept {
+  F y;
+  for (int i = 0; i < lanes<F>; ++i) {
     y[i] = __builtin_sqrtf(x[i]);
   }
   return y;
 }
 
 /// Which x are below the limit, as bits.
-inline unsigned below(Floats x, float limit) noexcept {
+template <class F>
+inline unsigned below(F x, float limit) noexcept {
 #if defined(__AVX512F__)
-  return _mm512_cmp_ps_mask((__m512)x, _mm512_set1_ps(limit), _CMP_LT_OQ);
-#else
-  const Ints is = x < limit;
+  if constexpr (lanes<F> == 16) {
+    return _mm512_cmp_ps_mask((__m512)x, _mm512_set1_ps(limit), _CMP_LT_OQ);
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (lanes<F> == 8) {
+    return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps((__m256)x, _mm256_set1_ps(limit), _CMP_LT_OQ)));
+  }
+#endif
+  const typename SideBySide<int, lanes<F>>::Type is = x < limit;
   unsigned bits = 0;
-  for (int i = 0; i < most_balls; ++i) {
+  for (int i = 0; i < lanes<F>; ++i) {
     bits |= static_cast<unsigned>(is[i] & 1) << i;
   }
   return bits;
-#endif
 }
 
 /// For every direction n the supporting plane gives a lower bound of the signed distance of e, and the best of them is
@@ -45,13 +71,12 @@ inline unsigned below(Floats x, float limit) noexcept {
 /// distance; Newton's steps on 1/|a_i n_i| − 1, which is concave, come to the root from below.
 unsigned distances_to_balls(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
                       float* distances) noexcept {
-  Floats offset[3], radius, e[3];
-  for (int i = 0; i < most_balls; ++i) {
-    offset[0][i] = static_cast<float>(balls.x[first + i] - ellipsoid.centre[0]);
-    offset[1][i] = static_cast<float>(balls.y[first + i] - ellipsoid.centre[1]);
-    offset[2][i] = static_cast<float>(balls.z[first + i] - ellipsoid.centre[2]);
-    radius[i] = static_cast<float>(balls.radius[first + i]);
-  }
+  using Floats = Floats<most_balls>;
+  const Floats offset[3] = {load<Floats>(balls.x + first, ellipsoid.centre[0]),
+                            load<Floats>(balls.y + first, ellipsoid.centre[1]),
+                            load<Floats>(balls.z + first, ellipsoid.centre[2])};
+  const Floats radius = load<Floats>(balls.radius + first);
+  Floats e[3];
   float squares[3];
   for (int i = 0; i < 3; ++i) {
     const double* A = ellipsoid.axes + 3 * i;
@@ -65,7 +90,7 @@ unsigned distances_to_balls(const PlacedEllipsoid& ellipsoid, const Balls& balls
   Floats distance = root(squared) - static_cast<float>(ellipsoid.extent);
   unsigned near = below(distance - radius, least) & asked;
   if (near != 0 && ellipsoid.extent > 0.0) {
-    e[0] = squared < centre_offset * centre_offset ? all(centre_offset) : e[0];
+    e[0] = squared < centre_offset * centre_offset ? all<Floats>(centre_offset) : e[0];
     Floats along{}, length{}, second{}, fourth{};
     for (int i = 0; i < 3; ++i) {
       const Floats normal = (1.0f / squares[i]) * e[i];
@@ -82,7 +107,7 @@ unsigned distances_to_balls(const PlacedEllipsoid& ellipsoid, const Balls& balls
       // From infinity the first step is to |a e| − Σ a⁴e² / Σ a²e²: the better of the two starts counts.
       Floats t = larger(along * (support - 1.0f) / length, root(second) - fourth / second);
       for (int k = 0; k < refinements; ++k) {
-        t = larger(t, all(inside * squares[0]));
+        t = larger(t, all<Floats>(inside * squares[0]));
         Floats square{}, slope{};
         along = length = Floats{};
         for (int i = 0; i < 3; ++i) {
@@ -111,24 +136,20 @@ unsigned distances_to_balls(const PlacedEllipsoid& ellipsoid, const Balls& balls
 ///     d ≥ (min over the box of n·x − √(nᵀ S n)) / |n|.
 ///
 /// n is that of the point of the box that is nearest to the centre, where the first steps of the search above lead.
-unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes, int first, int count, double limit,
+template <class Floats>
+unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes, int first, int count, float least,
                             float* distances) noexcept {
   const double* const middles[3] = {boxes.x, boxes.y, boxes.z};
   const double* const halves[3] = {boxes.half_x, boxes.half_y, boxes.half_z};
-  Floats low[3], high[3], nearest[3], radius, squared{};
-  for (int i = 0; i < most_balls; ++i) {
-    radius[i] = static_cast<float>(boxes.radius[first + i]);
-  }
+  const Floats radius = load<Floats>(boxes.radius + first);
+  Floats low[3], high[3], nearest[3], squared{};
   for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < most_balls; ++i) {
-      const double middle = middles[k][first + i] - ellipsoid.centre[k], half = halves[k][first + i];
-      low[k][i] = static_cast<float>(middle - half);
-      high[k][i] = static_cast<float>(middle + half);
-    }
-    nearest[k] = larger(low[k], all(0.0f)) - larger(-high[k], all(0.0f));
+    const Floats middle = load<Floats>(middles[k] + first, ellipsoid.centre[k]), half = load<Floats>(halves[k] + first);
+    low[k] = middle - half;
+    high[k] = middle + half;
+    nearest[k] = larger(low[k], all<Floats>(0.0f)) - larger(-high[k], all<Floats>(0.0f));
     squared += nearest[k] * nearest[k];
   }
-  const float least = static_cast<float>(limit);
   const unsigned asked = (2u << (count - 1)) - 1u;
   Floats distance = root(squared) - static_cast<float>(ellipsoid.extent);
   unsigned near = below(distance - radius, least) & asked;
@@ -143,9 +164,9 @@ unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes
       second += a2e2;
       fourth += a2 * a2e2;
     }
-    e[0] = squared < centre_offset * centre_offset ? all(centre_offset) : e[0];
+    e[0] = squared < centre_offset * centre_offset ? all<Floats>(centre_offset) : e[0];
     // One step of Newton from infinity.
-    const Floats t = larger(root(second) - fourth / larger(second, all(tiny)), all(0.0f));
+    const Floats t = larger(root(second) - fourth / larger(second, all<Floats>(tiny)), all<Floats>(0.0f));
     Floats n[3], length{}, square{};
     for (int i = 0; i < 3; ++i) {
       const float a2 = static_cast<float>(ellipsoid.squares[i]);
@@ -165,6 +186,16 @@ unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes
   distance -= radius;
   __builtin_memcpy(distances, &distance, sizeof distance);
   return near;
+}
+
+unsigned distances_to_boxes(const PlacedEllipsoid& ellipsoid, const Boxes& boxes, int first, int count, double limit,
+                            float* distances) noexcept {
+  constexpr int half = most_balls / 2;  // a node of the tree has as many below it, the top of it more
+  const float least = static_cast<float>(limit);
+  if (count <= half) {
+    return distances_to_boxes<Floats<half>>(ellipsoid, boxes, first, count, least, distances);
+  }
+  return distances_to_boxes<Floats<most_balls>>(ellipsoid, boxes, first, count, least, distances);
 }
 
 }  // namespace
