@@ -214,6 +214,14 @@ void bind_guide(nb::module_& m) {
             return guidance;
           },
           nb::arg("q"), nb::arg("time"), "Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.")
+      .def(
+          "disturbed",
+          [](Guide& g, const ArrayLike& q, const Obstacles& obstacles) {
+            return g.disturbed(as_finite_vector(q, "q", g.body().robot().num_coordinates()), obstacles);
+          },
+          nb::arg("q"), nb::arg("obstacles"),
+          "Whether an obstacle that moves is within 10 cm of the arm at q (nv,) [rad], or could be in a second at its\n"
+          "speed, by balls around the links.")
       .def_prop_ro("plan", &Guide::last_plan, "What the last search found.")
       .def_prop_ro("searches", [](const Guide& g) { return g.counts().searches; }, "How often it searched.")
       .def_prop_ro("period", [](const Guide& g) { return g.settings().period; }, "[s] between two looks at the scene.");

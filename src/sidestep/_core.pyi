@@ -1696,6 +1696,12 @@ class Guide:
         Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.
         """
 
+    def disturbed(self, q: numpy.typing.ArrayLike, obstacles: Obstacles) -> bool:
+        """
+        Whether an obstacle that moves is within 10 cm of the arm at q (nv,) [rad], or could be in a second at its
+        speed, by balls around the links.
+        """
+
     @property
     def plan(self) -> Plan:
         """What the last search found."""

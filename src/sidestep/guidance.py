@@ -101,8 +101,9 @@ class GuidedMotion:
     def moving(self) -> GeometricSystem:
         """The system with barriers that leave room where the arm has to come close, as of the last step.
 
-        Relaxed at the narrow places of the path ahead, and at the goal where there is none and at the end, as long as
-        all that is seen is at rest; never below the barriers' floors, see `GeometricSystem.relaxed_at`.
+        Relaxed at the narrow places of the path ahead, and at the goal where there is none and at the end, unless
+        something that moves is near (`Guide.disturbed`); never below the barriers' floors, see
+        `GeometricSystem.relaxed_at`.
         """
         return self._moving
 
@@ -140,11 +141,12 @@ class GuidedMotion:
             self._next_look = time + self.guide.period
         guidance = self.guide.step(q, time)
         if looks:
-            self._relax(guidance, obstacles)
+            self._relax(guidance, q, obstacles)
         return guidance
 
-    def _relax(self, guidance: Guidance, obstacles: Obstacles) -> None:
-        if guidance.status is GuideStatus.idle or np.any(obstacles.velocities):
+    def _relax(self, guidance: Guidance, q: npt.ArrayLike, obstacles: Obstacles) -> None:
+        known = guidance.status is not GuideStatus.idle and np.all(np.isfinite(q))
+        if not known or self.guide.disturbed(q, obstacles):
             self._moving, self._relaxed = self.system, None
             return
         places = [*guidance.places, *([self._goal] if guidance.arrives else [])]
@@ -157,4 +159,8 @@ class GuidedMotion:
 
 
 def _same(a: Obstacles, b: Obstacles) -> bool:
-    return a is b or (np.array_equal(a.points, b.points) and np.array_equal(a.radii, b.radii))
+    """What rests is the same."""
+    if a is b:
+        return True
+    rest, before = (~np.any(x.velocities, axis=1) for x in (a, b))
+    return np.array_equal(a.points[rest], b.points[before]) and np.array_equal(a.radii[rest], b.radii[before])

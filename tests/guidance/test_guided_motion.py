@@ -155,3 +155,25 @@ def test_at_the_end_barriers_leave_room_at_the_goal_as_well(robot: ss.Robot, bod
     rest = np.zeros(3)
     assert motion.system.acceleration(GOAL, rest, GOAL, beside).values.max() > 0.0
     assert motion.moving.acceleration(GOAL, rest, GOAL, beside).values.max() == 0.0
+
+
+def test_what_moves_far_away_leaves_the_goal_free(robot: ss.Robot, body: _core.Body) -> None:
+    """Near it, barriers are whole: what room they leave is for what rests."""
+    motion = guided(robot, body)
+    motion.set_goal(GOAL)
+    # 2.5 cm from the ellipsoids at the goal, within the activation of 6 cm, rests a ball; another moves.
+    resting = [np.cos(-0.8), np.sin(-0.8), 0.15]
+    at, rest = GOAL + np.array([0.02, 0.0, 0.0]), np.zeros(3)
+
+    def value(away: float, speed: float, time: float) -> float:
+        seen = ss.Obstacles([resting, [away, 0.0, 2.0]], 0.1, velocities=[[0.0] * 3, [0.0, 0.0, -speed]])
+        motion.step(at, rest, seen, time=time)
+        return float(motion.moving.acceleration(at, rest, ss.JointGoal(GOAL), seen).values.max())
+
+    full = motion.system.acceleration(at, rest, GOAL, ss.Obstacles([resting], 0.1)).values.max()
+    assert full > 0.0
+    assert value(5.0, 0.2, 0.0) == 0.0
+    assert value(5.1, 0.2, 0.03) == 0.0  # it has moved, what rests has not
+    assert value(0.5, 0.2, 0.06) == 0.0  # at most 1.7 m away after a second
+    assert value(0.5, 2.0, 0.09) == pytest.approx(full, rel=1e-12)
+    assert value(5.0, 0.2, 0.12) == 0.0

@@ -317,6 +317,26 @@ BodyClearance::Nearest BodyClearance::nearest(int item, Eigen::Ref<const Eigen::
   return {found.clearance, found.clearance < cap ? item : -1, found.point};
 }
 
+double BodyClearance::nearest_moving(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double time,
+                                     Workspace& w) const noexcept {
+  double nearest = infinity;
+  if (!obstacles.tree().moves()) {
+    return nearest;
+  }
+  place(q, w);
+  for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
+    const double speed = obstacles.velocities().col(n).norm();
+    for (const Item& item : items_) {
+      if (speed > 0.0 && item.label.kind == CoordinateLabel::Kind::obstacle) {
+        const auto link = static_cast<std::size_t>(item.link);
+        const double away = (obstacles.points().col(n) - w.centres_[link]).norm() - links_[link].radius;
+        nearest = std::min(nearest, away - obstacles.radii()[n] - time * speed);
+      }
+    }
+  }
+  return nearest;
+}
+
 void BodyClearance::clearances(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w,
                                Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   w.field_.follow(obstacles);

@@ -8,6 +8,12 @@
 #include "../settings.hpp"
 
 namespace sidestep {
+namespace {
+
+constexpr double disturbing = 0.1;  // [m] from the arm of what moves
+constexpr double foresight = 1.0;   // [s] in which it could be
+
+}  // namespace
 
 const char* name(GuideStatus status) noexcept {
   switch (status) {
@@ -43,6 +49,7 @@ Guide::Guide(BodyClearance body, const GuideSettings& settings)
       last_q_(goal_),
       velocity_(goal_),
       progress_(settings.patience),
+      here_(body_),
       states_(State{goal_, goal_}),
       answers_(Answer{}),
       newest_(std::make_shared<const Obstacles>(Obstacles::none())),
@@ -90,6 +97,10 @@ void Guide::set_obstacles(const Obstacles& obstacles) {
   }
   newest_.swap(copy);
   ++scene_number_;
+}
+
+bool Guide::disturbed(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles) noexcept {
+  return body_.nearest_moving(q, obstacles, foresight, here_) < disturbing;
 }
 
 GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept {

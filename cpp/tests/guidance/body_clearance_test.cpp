@@ -352,3 +352,26 @@ BOOST_AUTO_TEST_CASE(links_far_apart_are_free_whatever_their_contact) {
     BOOST_TEST(checked.nearest(q, Obstacles::none(), 0.01, w).item == -1);
   }
 }
+
+BOOST_AUTO_TEST_CASE(what_moves_is_nearer_than_it_is_said_to_be) {
+  Random random(5);
+  const Robot robot = test::random_tree(random, 6);
+  const BodyClearance body(robot, calibrated(random, robot, 0.05));
+  BodyClearance::Workspace w(body);
+  constexpr double far = 10.0, time = 0.5, speed = 0.4;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
+    const Eigen::Matrix3Xd points = 2.0 * random.matrix(3, 2);
+    const Eigen::VectorXd radii = Eigen::Vector2d(0.1, 0.2);
+    Eigen::Matrix3Xd velocities = Eigen::Matrix3Xd::Zero(3, 2);
+    BOOST_TEST(body.nearest_moving(q, Obstacles(points, radii, velocities), time, w) == std::numeric_limits<double>::infinity());
+    velocities(1, 1) = speed;
+    const Obstacles obstacles(points, radii, velocities);
+    const double distance = body.nearest(q, Obstacles(points.rightCols(1), radii.tail(1), Eigen::Matrix3Xd::Zero(3, 1)), far, w).clearance;
+    double found = 0.0;
+    BOOST_TEST(test::allocations_of([&] { found = body.nearest_moving(q, obstacles, time, w); }) == 0);
+    BOOST_TEST(found <= distance - time * speed + 1e-6);  // rounding of distances in single precision
+    // Not nearer than the far sides of the balls around the links are.
+    BOOST_TEST(found == body.nearest_moving(q, obstacles, 0.0, w) - time * speed, boost::test_tools::tolerance(1e-12));
+  }
+}

@@ -22,7 +22,7 @@ from sidestep.bench.parallel import Progress, Worker, cpu_name, run_tasks
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
-from sidestep.simulation import Clearance, EllipsoidClearance
+from sidestep.simulation import Clearance, EllipsoidClearance, SceneObject
 
 Array = npt.NDArray[np.float64]
 Task = TypeVar("Task")
@@ -62,7 +62,7 @@ class SceneSettings:
 
 @dataclass(frozen=True, eq=False)
 class EndClearances:
-    """How near an end of a problem is to its solids: exactly, and for the covering body.
+    """How near an end of a problem is to solids: exactly, and for the covering body.
 
     Attributes:
         exact: of the meshes. covered: of the ellipsoids, None for a body without; below 0 it is inside.
@@ -72,12 +72,12 @@ class EndClearances:
     covered: Clearance | None
 
     @classmethod
-    def at(cls, q: Array, arm: Arm, problem: Problem) -> EndClearances:
-        """Measured at q (nv,)."""
+    def at(cls, q: Array, arm: Arm, objects: Sequence[SceneObject]) -> EndClearances:
+        """Measured at q (nv,), where the objects are at first."""
         covered = None
         if arm.body.levels is not None:
-            covered = EllipsoidClearance(arm.robot, arm.body, problem.objects).distance(q)
-        return cls(arm.clearance.among(problem.objects).distance(q), covered)
+            covered = EllipsoidClearance(arm.robot, arm.body, objects).distance(q)
+        return cls(arm.clearance.among(objects).distance(q), covered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,8 +298,8 @@ def judged(
     outcome = SceneOutcome(
         set=set,
         index=problem.index,
-        start=EndClearances.at(problem.start, arm, problem),
-        goal=EndClearances.at(published, arm, problem),
+        start=EndClearances.at(problem.start, arm, problem.objects),
+        goal=EndClearances.at(published, arm, [o for o in problem.objects if o.present[1] == np.inf]),
         goal_beyond_limits=float(np.abs(published - problem.goal).max()),
         outcome=None if motion is None else arm.judge.judge(problem, motion, settings.motion),
         path_length=0.0 if motion is None else motion.path_length,

@@ -123,6 +123,11 @@ class BodyClearance {
   void clearances(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
+  /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls around the
+  /// links; infinity where all are at rest.
+  double nearest_moving(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double time,
+                        Workspace& w) const noexcept;
+
   /// What `margins` ask of an item away from the ends [m].
   double margin(int item, const Margins& margins) const noexcept {
     return label(item).kind == CoordinateLabel::Kind::self ? std::min(margins.pair_margin, margins.margin) : margins.margin;

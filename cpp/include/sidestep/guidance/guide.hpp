@@ -86,6 +86,10 @@ class Guide {
     bool arrives = false;
   };
 
+  /// Whether an obstacle that moves is within 10 cm of the arm, or could be in a second: barriers that leave room at places are
+  /// for what rests. For the loop; allocates nothing.
+  [[nodiscard]] bool disturbed(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles) noexcept;
+
   /// One step of the loop, at a time [s] that does not go back. Never blocks; allocates nothing unless synchronous.
   [[nodiscard]] GuideStatus step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept;
 
@@ -144,6 +148,7 @@ class Guide {
   ProgressMonitor progress_;
   RouteFollower follower_;
   std::uint64_t stops_ = 0, followed_ = 0, measured_ = 0;
+  BodyClearance::Workspace here_;
 
   // Between the two.
   Handover<State> states_;
