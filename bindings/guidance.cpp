@@ -132,7 +132,12 @@ void bind_settings(nb::module_& m) {
           nb::arg("slowest") = RouteSettings{}.slowest, nb::arg("lead") = RouteSettings{}.lead,
           nb::arg("delay") = RouteSettings{}.delay)
       .def_ro("speed", &RouteSettings::speed)
-      .def_ro("lead", &RouteSettings::lead);
+      .def_ro("speed_share", &RouteSettings::speed_share)
+      .def_ro("acceleration", &RouteSettings::acceleration)
+      .def_ro("wide", &RouteSettings::wide)
+      .def_ro("slowest", &RouteSettings::slowest)
+      .def_ro("lead", &RouteSettings::lead)
+      .def_ro("delay", &RouteSettings::delay);
 }
 
 /// What Python gets from a step of a guide.

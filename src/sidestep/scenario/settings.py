@@ -56,6 +56,7 @@ class RouteChoice:
     wide: float = 0.03
     slowest: float = 0.35
     lead: float = 0.4
+    delay: float = 0.18
 
 
 @dataclass(frozen=True)
