@@ -214,6 +214,7 @@ GUIDE: tuple[Parameter, ...] = (
     _r("wide", "m", 0.005, 0.2, "Clearance of full speed: higher is slower in passages."),
     _r("slowest", "", 0.05, 1.0, "Of the speed that is left without clearance: lower creeps."),
     _r("lead", "rad", 0.05, 2.0, "Higher pulls harder along the path, and cuts its corners."),
+    _r("delay", "s", 0.02, 1.0, "By which the arm leaves corners: higher passes tight ones more slowly."),
 )
 
 _t = _number(TorqueChoice, "torque", "torque_")
