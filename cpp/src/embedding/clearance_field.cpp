@@ -114,8 +114,9 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
   }
   for (int first = 0; first < size();) {
     const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
-    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0};
-    while (first + cluster.size < size() && cluster.size < kernels::most_queries &&
+    static_assert(Cluster::most == kernels::most_queries);
+    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0, decltype(Cluster::shapes)::Zero()};
+    while (first + cluster.size < size() && cluster.size < Cluster::most &&
            at(first + cluster.size).body.joint == at(first).body.joint) {
       cluster.centre += at(first + cluster.size++).body.mean;
     }
@@ -124,6 +125,11 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
       const double distance = (at(k).body.mean - cluster.centre).norm();
       cluster.radius = std::max(cluster.radius, distance + at(k).body.extent);
       cluster.inner_radius = std::max(cluster.inner_radius, distance + at(k).semi_axes.minCoeff());
+      const Eigen::Matrix3d& S = at(k).body.shape;
+      const double distinct[] = {S(0, 0), S(0, 1), S(0, 2), S(1, 1), S(1, 2), S(2, 2)};
+      for (int i = 0; i < 6; ++i) {
+        cluster.shapes(k - first, i) = static_cast<float>(distinct[i]);
+      }
     }
     clusters_.push_back(cluster);
     first += cluster.size;
@@ -179,6 +185,7 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       copy(centre, group.origin);
       motion = motion_of(link);
       group.link = &motion;
+      group.shapes = cluster.shapes.data();
       group.size = cluster.size;
       for (int k = 0; k < cluster.size; ++k) {
         const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(cluster.first + k)];

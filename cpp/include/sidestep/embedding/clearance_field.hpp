@@ -60,10 +60,13 @@ class ClearanceField {
   };
   /// Consecutive ellipsoids of one joint, with a ball around them in the frame of its child.
   struct Cluster {
+    static constexpr int most = 16;
+
     int first, size;
     Eigen::Vector3d centre;
     double radius;
     double inner_radius;  // of one around the balls inside them
+    Eigen::Matrix<float, most, 6> shapes;  // S in the frame of the link: xx, xy, xz, yy, yz, zz
   };
 
   double temperature_;

@@ -72,6 +72,7 @@ struct QueryGroup {
   const double* axes_T[most_queries];          // 3 × 3 by columns: link frame to principal axes
   const double* semi_axes[most_queries];       // [m]
   const LinkMotion* link;
+  const float* shapes;                         // S in the frame of the link: xx, xy, xz, yy, yz, zz; most_queries of each
   double inverse_T;
   double reach, reach_ahead;                   // clearances, and h + τ h', from here on are out of reach [m]
   double window, window_ahead;                 // clearances, and h + τ h', so much above the smallest have no weight [m]

@@ -11,7 +11,7 @@ constexpr double centre_offset = 1e-9;
 
 // S is 1 at the foot of the perpendicular; the iteration ends above by rounding.
 constexpr double converged = 1.0 + 2e-14;
-constexpr float single_converged = 1.0f + 4e-5f;
+constexpr float squared_converged = 1.0f + 8e-5f;
 constexpr int most_iterations = 16;
 constexpr double cubic_within = 1e-4;  // of S: the cube is below what counts, on whatever side of the root it is
 
@@ -120,14 +120,15 @@ struct Outside {
   Values step(Values root_S) const noexcept { return S * (root_S - 1) * inverse(flatness); }
 
   /// Chebyshev's step on the same where S is close to 1: of an error that is small its third power is left.
-  Values cubic_step(Values root_S) const noexcept {
-    const Values inverse_flatness = inverse(flatness), newton = S * (root_S - 1) * inverse_flatness;
+  Values cubic_step() const noexcept {
+    const Values over = S - 1, inverse_flatness = inverse(flatness);
+    const Values newton = S * (over * (0.5 - over * (0.125 - 0.0625 * over))) * inverse_flatness;
     Values second = {};  // Σ A w² / (A + t)²
     for (int i = 0; i < 3; ++i) {
       second += shares[i] * inverses[i] * inverses[i];
     }
-    const Values bend = second * inverse_flatness - flatness * (2 - S);  // 1/S is 2 − S, where S is close to 1
-    return (S > 1.0 - cubic_within) & (S < 1.0 + cubic_within) ? newton * (1 + 1.5 * newton * bend) : newton;
+    const Values bend = second * inverse_flatness - flatness * (1 - over);  // 1/S is 2 − S, where S is close to 1
+    return newton * (1 + 1.5 * newton * bend);
   }
 
   Values inverse_norm() const noexcept { return inverse_root(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]); }
@@ -224,40 +225,79 @@ inline bool lower(bool& found, float& limit, float& limit_of_leaves, Singles mos
 
 void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept;
 
-/// Looks at the points of a leaf in single precision. `closing_of_leaf` [m] bounds what any of the points closes within the
-/// horizon. Returns whether a limit of leaves changed.
-bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& leaf, const LeafPoints& in_leaf,
-                    float closing_of_leaf) noexcept {
-  Query& query = group.queries[k];
-  const float* R = query.single.axes;
-  const float* A = query.single.squared_axes;
-  const float* W = query.single.angular;
-  const float from[3] = {static_cast<float>(leaf.x - group.centre[0][k]), static_cast<float>(leaf.y - group.centre[1][k]),
-                         static_cast<float>(leaf.z - group.centre[2][k])};
-  const float extent = group.extent[k], shortest = query.single.semi_axes[query.shortest];
-  const float horizon = static_cast<float>(group.horizon), blur = place_error * static_cast<float>(leaf.radius);
-  const float turning_blur = blur * (__builtin_fabsf(W[0]) + __builtin_fabsf(W[1]) + __builtin_fabsf(W[2]));
-  bool changed = false;
-  for (int n = 0; n < leaf.count; n += singles) {
-    const float near = group.near[k], ahead = group.ahead[k];
-    const unsigned asked = first_lanes(leaf.count - n);
+/// What an ellipsoid sees of a register of a leaf's points, in single precision. It is found out in steps, each for all
+/// ellipsoids that look at the leaf: one's chain of operations is long, and the next one's runs beside it.
+struct Look {
+  int k, n;                // ellipsoid and first point
+  unsigned asked;          // lanes
+  float blur;              // [m] of places
+  Singles e[3], second;    // the offset in principal axes, and Σ A e²
+  Singles distance, radius, error, closing;  // the last: within the horizon, at most
+  Outside<Singles> out;
+  Singles inverse_norm, least;  // h from below
+
+  /// Where nothing is known but that the clearance is negative: gradients are longer than one.
+  auto is_inside() const noexcept { return (out.t <= 0.0f) & (out.S < 1.0f); }
+
+  /// Lanes with bounds of h that matter.
+  unsigned matters(const QueryGroup& group, Singles value) const noexcept {
+    return (below(value, all(group.near[k])) | below(value - closing, all(group.ahead[k]))) & asked;
+  }
+
+  /// Whether any point may matter by the ball around the ellipsoid, and by the plane across the way to the point, towards
+  /// which the ellipsoid reaches √(Σ A e²)/|e|.
+  bool begin(const QueryGroup& group, int ellipsoid, const Points& points, const Leaf& leaf, const LeafPoints& in_leaf,
+             int first_point, float closing_of_leaf) noexcept {
+    k = ellipsoid, n = first_point;
+    const auto& single = group.queries[k].single;
+    const float* R = single.axes;
+    const float* A = single.squared_axes;
+    const float* W = single.angular;
+    const float from[3] = {static_cast<float>(leaf.x - group.centre[0][k]), static_cast<float>(leaf.y - group.centre[1][k]),
+                           static_cast<float>(leaf.z - group.centre[2][k])};
+    const float extent = group.extent[k];
+    blur = place_error * static_cast<float>(leaf.radius), closing = all(closing_of_leaf);
+    asked = first_lanes(leaf.count - n);
     const Singles x = load(in_leaf.position[0] + n) + from[0], y = load(in_leaf.position[1] + n) + from[1],
-                  z = load(in_leaf.position[2] + n) + from[2], radius = load(in_leaf.radius + n);
-    // From below: the clearance of the ball around the ellipsoid, and what may be closed within the horizon.
-    const Singles squared = x * x + y * y + z * z;
-    const Singles inverse_distance = inverse_root(squared > 1e-30f ? squared : all(1e-30f));
-    const Singles distance = squared * inverse_distance, error = distance_error * (distance + extent) + blur;
-    const Singles of_ball = distance - extent - radius - error;
-    if ((below(of_ball, all(near > ahead + closing_of_leaf ? near : ahead + closing_of_leaf)) & asked) == 0) {
-      continue;
+                  z = load(in_leaf.position[2] + n) + from[2];
+    radius = load(in_leaf.radius + n);
+    const Singles squared = larger(x * x + y * y + z * z, all(1e-30f)), inverse_distance = inverse_root(squared);
+    distance = squared * inverse_distance;
+    error = distance_error * (distance + extent) + blur;
+    if (matters(group, distance - extent - radius - error) == 0) {
+      return false;
     }
-    Singles e[3], v[3], across[3];  // the offset in principal axes, the velocity in moving axes, and e × v
+    second = Singles{};
     for (int i = 0; i < 3; ++i) {
       e[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
+      second += A[i] * e[i] * e[i];
     }
+    const Singles least_by_plane = distance - root(second) * inverse_distance - radius - error;
+    if (leaf.radius > extent && blur < blurred) {  // its points close at speeds that differ
+      Singles v[3], across[3], along = {};
+      velocities(group, points, in_leaf, v);
+      for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, l = (i + 2) % 3;
+        across[i] = e[j] * v[l] - e[l] * v[j];
+        along -= e[i] * v[i];
+      }
+      const Singles speed = length(v), of_point = closing_speed(along, length(across), inverse_distance, all(extent), speed);
+      const Singles more = rate_error * speed + blur * (__builtin_fabsf(W[0]) + __builtin_fabsf(W[1]) + __builtin_fabsf(W[2]));
+      closing = smaller(static_cast<float>(group.horizon) * (of_point + more), closing);
+    }
+    return matters(group, least_by_plane) != 0;
+  }
+
+  static Singles length(const Singles* x) noexcept { return root(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); }
+
+  /// Of the points, in moving axes.
+  void velocities(const QueryGroup& group, const Points& points, const LeafPoints& in_leaf, Singles* v) const noexcept {
+    const auto& single = group.queries[k].single;
+    const float* R = single.axes;
+    const float* W = single.angular;
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
-      v[i] = -query.single.linear[i] - (W[j] * e[l] - W[l] * e[j]);
+      v[i] = -single.linear[i] - (W[j] * e[l] - W[l] * e[j]);
     }
     if (points.velocity[0] != nullptr) {
       const Singles vx = load(in_leaf.velocity[0] + n), vy = load(in_leaf.velocity[1] + n), vz = load(in_leaf.velocity[2] + n);
@@ -265,74 +305,63 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
         v[i] += R[3 * i] * vx + R[3 * i + 1] * vy + R[3 * i + 2] * vz;
       }
     }
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, l = (i + 2) % 3;
-      across[i] = e[j] * v[l] - e[l] * v[j];
-    }
-    const Singles speed = root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    const Singles along = -(e[0] * v[0] + e[1] * v[1] + e[2] * v[2]);
-    const Singles turning = root(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-    const Singles closing_in = blur < blurred ? closing_speed(along, turning, inverse_distance, all(extent), speed) : speed;
-    Singles closing = horizon * (closing_in + rate_error * speed + turning_blur);
-    closing = closing < closing_of_leaf ? closing : all(closing_of_leaf);
-    const auto matter = [&](Singles least) noexcept {
-      return (below(least, all(near)) | below(least - closing, all(ahead))) & asked;
-    };
-    if (matter(of_ball) == 0) {
-      continue;
-    }
+  }
 
-    // t from below, and so is t |w| below h. It begins at the best of where Newton's iteration comes to from infinity and,
-    // along every axis, of that axis alone.
-    Outside<Singles> out;
-    Singles second = {}, fourth = {};
+  void place(const float* A) noexcept {
+    out.place(A, e);
+    inverse_norm = out.inverse_norm();
+    least = is_inside() ? all(-__builtin_inff()) : out.t * out.norm(inverse_norm) - radius - error;
+  }
+
+  /// t from below, and so is t |w| below h: the best of where Newton's iteration comes to from infinity and, along every axis,
+  /// of that axis alone. Returns whether any point may matter.
+  bool bound(const QueryGroup& group) noexcept {
+    const auto& single = group.queries[k].single;
+    const float* A = single.squared_axes;
+    Singles fourth = {};
     for (int i = 0; i < 3; ++i) {
-      const Singles term = A[i] * e[i] * e[i];
-      second += term;
-      fourth += A[i] * term;
+      fourth += A[i] * A[i] * e[i] * e[i];
     }
     // The root of nothing is not quite nothing: at the centre t is 0.
     out.t = larger(root(second) - fourth * inverse(second > 1e-30f ? second : all(1e-30f)) - 1e-12f, Singles{});
     for (int i = 0; i < 3; ++i) {
-      out.t = larger(query.single.semi_axes[i] * magnitude(e[i]) - A[i], out.t);
+      out.t = larger(single.semi_axes[i] * magnitude(e[i]) - A[i], out.t);
     }
-    out.place(A, e);
-    const Singles S_if_inside = out.t > 0.0f ? all(1.0f) : out.S;
-    const unsigned any_inside = below(S_if_inside, all(1.0f)) & asked;
-    Singles inverse_norm = out.inverse_norm(), least = out.t * out.norm(inverse_norm) - radius - error;
-    if ((any_inside | matter(least)) == 0) {
-      continue;
+    place(A);
+    return matters(group, least) != 0;
+  }
+
+  /// Newton's iteration, as far as it matters.
+  void refine(const QueryGroup& group) noexcept {
+    const float* A = group.queries[k].single.squared_axes;
+    for (int i = 0; i < most_iterations && (below(all(squared_converged), out.S) & matters(group, least)) != 0; ++i) {
+      out.t += larger(out.step(root(out.S)), Singles{});
+      place(A);
     }
-    Singles root_S = root(out.S);
-    for (int i = 0; i < most_iterations; ++i) {
-      if ((below(all(single_converged), root_S) & matter(least) & ~any_inside) == 0) {
-        break;
-      }
-      out.t += larger(out.step(root_S), Singles{});
-      out.place(A, e);
-      inverse_norm = out.inverse_norm();
-      least = out.t * out.norm(inverse_norm) - radius - error;
-      root_S = root(out.S);
-    }
+  }
+
+  /// Adds the points that matter to the candidates. Returns whether a limit of leaves changed.
+  bool keep(QueryGroup& group, const Points& points, const Leaf& leaf, const LeafPoints& in_leaf) noexcept {
+    Query& query = group.queries[k];
+    Singles v[3];
+    velocities(group, points, in_leaf, v);
+    const float horizon = static_cast<float>(group.horizon), shortest = query.single.semi_axes[query.shortest];
+    const Singles speed = length(v);
     const Singles rate = (out.w[0] * v[0] + out.w[1] * v[1] + out.w[2] * v[2]) * inverse_norm;
     const Singles after = horizon * rate, after_error = horizon * rate_error * speed;
-    // Inside nothing is known but that the clearance is negative: gradients are longer than one.
-    const float unknown = __builtin_inff();
-    const auto inside = S_if_inside < 1.0f, converged = root_S <= single_converged;
-    const auto rate_known = converged & (all(blur) < blurred);
-    const Singles h_least = inside ? all(-unknown) : least;
-    const Singles after_least = inside ? all(-unknown) : rate_known ? least + after - after_error : least - closing;
-    const unsigned is_near = below(h_least, all(near)) & asked, approaches = below(after_least, all(ahead)) & asked;
-    if ((is_near | approaches) == 0) {
-      continue;
-    }
+    const auto inside = is_inside(), converged = out.S <= squared_converged;
+    const auto rate_known = ~inside & converged & (all(blur) < blurred);
+    const Singles after_least = rate_known ? least + after - after_error : least - closing;
+    const unsigned is_near = below(least, all(group.near[k])) & asked;
+    const unsigned kept = is_near | (below(after_least, all(group.ahead[k])) & asked);
     const Singles h_most = inside ? error - radius : converged ? least + 2.0f * error : distance - shortest - radius + error;
-    const Singles after_most = ~inside & rate_known ? h_most + after + after_error : all(unknown);
-    const unsigned within = below(h_least, all(static_cast<float>(group.reach))) & asked;
+    const Singles after_most = rate_known ? h_most + after + after_error : all(__builtin_inff());
+    bool changed = false;
+    const unsigned within = below(least, all(static_cast<float>(group.reach))) & kept;
     if (within != 0) {
       changed |= lower(query.near, group.near[k], group.near_leaf[k], h_most, within, group.window);
     }
-    const unsigned coming = below(after_least, all(static_cast<float>(group.reach_ahead))) & asked;
+    const unsigned coming = below(after_least, all(static_cast<float>(group.reach_ahead))) & kept;
     if (coming != 0) {
       changed |= lower(query.approached, group.ahead[k], group.ahead_leaf[k], after_most, coming, group.window_ahead);
     }
@@ -340,42 +369,62 @@ bool look_at_points(QueryGroup& group, int k, const Points& points, const Leaf& 
     if (candidates.size + singles > most_candidates) {
       sum_candidates(group, k, points);
     }
-    const unsigned kept = is_near | approaches;
     const int at = candidates.size;
     compress(candidates.t + at, out.t, kept);
-    compress(candidates.least[0] + at, h_least, kept);
+    compress(candidates.least[0] + at, least, kept);
     compress(candidates.least[1] + at, after_least, kept);
     compress(candidates.most[0] + at, h_most, kept);
     compress(candidates.most[1] + at, after_most, kept);
-    for (unsigned lanes = kept; lanes != 0; lanes &= lanes - 1) {
-      candidates.point[candidates.size++] = leaf.first + n + __builtin_ctz(lanes);
+    compress(candidates.point + at, leaf.first + n, kept);
+    candidates.size += __builtin_popcount(kept);
+    return changed;
+  }
+};
+
+/// Points that are looked at in double precision, and where their iteration begins, with room for whole registers.
+struct Chosen {
+  int size;
+  int point[most_candidates + singles];
+  float t[most_candidates + singles];
+
+  /// Those of the candidates of which either bound is below its limit. The errors of the bounds are larger than those of
+  /// rounding the limits.
+  Chosen(const Candidates& candidates, double limit, double limit_ahead) noexcept : size(0) {
+    const Singles limits = all(static_cast<float>(limit)), limits_ahead = all(static_cast<float>(limit_ahead));
+    for (int i = 0; i < candidates.size; i += singles) {
+      const unsigned far = below(limits, load(candidates.least[0] + i)) & below(limits_ahead, load(candidates.least[1] + i));
+      const unsigned near = ~far & first_lanes(candidates.size - i);
+      compress(t + size, load(candidates.t + i), near);
+      compress(point + size, candidates.point + i, near);
+      size += __builtin_popcount(near);
+    }
+    for (int i = size; i % width != 0; ++i) {
+      t[i] = t[0];
+      point[i] = point[0];
     }
   }
-  return changed;
-}
+};
+
+constexpr int together = 4;  // registers, as the chain of operations of one is long
 
 /// Candidates in double precision, side by side.
 struct Samples {
   Lanes e[3], s[3], v[3];  // the offset in principal axes, and the velocities of the point, there and in moving axes
-  Lanes h, g[3], rate, after;
+  Lanes radius, h, g[3], rate, after;
   Outside<Lanes> out;
   Lanes inverse_norm;
   Bits inside;
-  bool any_inside;
+  unsigned are_inside;
 
-  /// The first `count` lanes of `chosen`; in the others clearances are infinite.
-  Samples(const QueryGroup& group, int k, const Points& points, const int* chosen, int count) noexcept {
+  /// Where a register from `first` on lies, and Newton's iteration up to where it nearly ends.
+  void begin(const QueryGroup& group, int k, const Points& points, const Chosen& chosen, int first) noexcept {
     const Query& query = group.queries[k];
     const double* R = query.axes;
     const double* A = query.squared_axes;
     const double* W = query.angular;
-    int point[width];
-    for (int i = 0; i < width; ++i) {
-      const int candidate = chosen[i < count ? i : 0];
-      point[i] = query.candidates.point[candidate];
-      out.t[i] = query.candidates.t[candidate];
-    }
-    const Lanes radius = gather(points.radius, point);
+    const int* point = chosen.point + first;
+    out.t = widen(chosen.t + first);
+    radius = gather(points.radius, point);
     Lanes x[3], velocity[3] = {};
     for (int axis = 0; axis < 3; ++axis) {
       x[axis] = gather(points.position[axis], point);
@@ -399,11 +448,21 @@ struct Samples {
       m += e[i] * e[i] * query.precision[i];
     }
     inside = m < 1.0;
-    const unsigned are_inside = below(m, all(1.0));
-    any_inside = are_inside != 0;
+    are_inside = below(m, all(1.0));
     out.t = inside ? Lanes{} : out.t;
     out.place(A, e);
-    out.t = inside ? Lanes{} : larger(out.t + out.cubic_step(root(out.S)), Lanes{});
+    Lanes step = out.cubic_step();
+    const Lanes error = magnitude(out.S - 1.0);
+    if (__builtin_expect((below(all(cubic_within), error) & ~are_inside) != 0, 0)) {
+      step = error > cubic_within ? out.step(root(out.S)) : step;
+    }
+    out.t = inside ? Lanes{} : larger(out.t + step, Lanes{});
+  }
+
+  /// Clearances and their gradients; infinite where no more are chosen.
+  void finish(const QueryGroup& group, int k, int count) noexcept {
+    const Query& query = group.queries[k];
+    const double* A = query.squared_axes;
     out.place(A, e);
     for (int i = 0; i < most_iterations && (below(all(converged), out.S) & ~are_inside) != 0; ++i) {
       const Lanes step = out.step(root(out.S));
@@ -415,7 +474,7 @@ struct Samples {
     for (int i = 0; i < 3; ++i) {
       g[i] = out.w[i] * inverse_norm;
     }
-    if (__builtin_expect(any_inside, 0)) {
+    if (__builtin_expect(are_inside != 0, 0)) {
       const Lanes squared = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
       e[query.shortest] = squared < 1e-300 ? all(centre_offset) : e[query.shortest];
       const Inside in(A, e);
@@ -426,8 +485,10 @@ struct Samples {
     }
     rate = g[0] * v[0] + g[1] * v[1] + g[2] * v[2];
     after = h + group.horizon * rate;
-    for (int i = count; i < width; ++i) {
-      h[i] = after[i] = __builtin_inf();
+    if (count < width) {
+      const auto is_chosen = lane_numbers() < count;
+      h = is_chosen ? h : all(__builtin_inf());
+      after = is_chosen ? after : all(__builtin_inf());
     }
   }
 
@@ -437,7 +498,7 @@ struct Samples {
     const double* B = query.bias_angular;
     const double* W = query.angular;
     Lanes bend = out.bend(A, v, inverse_norm);
-    if (__builtin_expect(any_inside, 0)) {
+    if (__builtin_expect(are_inside != 0, 0)) {
       bend = inside ? Inside(A, e).bend(A, v, rate) : bend;
     }
     for (int i = 0; i < 3; ++i) {
@@ -449,12 +510,13 @@ struct Samples {
   }
 };
 
-/// Lowers `least` to values below limits.
-void lower(double& least, int& point, Lanes limits, Lanes values, const int* points, const int* chosen, int count) noexcept {
-  for (int i = 0; i < count; ++i) {
-    if (values[i] < least && values[i] < limits[i]) {
+/// Lowers `least` to values below limits, of points.
+void lower(double& least, int& point, Lanes limits, Lanes values, const int* points) noexcept {
+  for (unsigned lanes = below(values, limits) & below(values, all(least)); lanes != 0; lanes &= lanes - 1) {
+    const int i = __builtin_ctz(lanes);
+    if (values[i] < least) {
       least = values[i];
-      point = points[chosen[i]];
+      point = points[i];
     }
   }
 }
@@ -527,25 +589,23 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
   if (!query.begun) {
     begin_sums(group, k);
   }
-  int chosen[most_candidates], count;
   for (int i = candidates.size; i < most_candidates && i % singles != 0; ++i) {  // fill up the last register
     candidates.most[0][i] = candidates.most[1][i] = __builtin_inff();
   }
-  // The errors of the bounds are larger than those of rounding the limits.
-  const auto choose = [&](double limit, double limit_ahead) {
-    count = 0;
-    for (int i = 0; i < candidates.size; i += singles) {
-      const unsigned far = below(all(static_cast<float>(limit)), load(candidates.least[0] + i)) &
-                           below(all(static_cast<float>(limit_ahead)), load(candidates.least[1] + i));
-      for (unsigned lanes = ~far & first_lanes(candidates.size - i); lanes != 0; lanes &= lanes - 1) {
-        chosen[count++] = i + __builtin_ctz(lanes);
+  const auto look = [&](double limit, double limit_ahead, auto&& at) {
+    const Chosen chosen(candidates, limit, limit_ahead);
+    for (int first = 0; first < chosen.size; first += together * width) {
+      Samples samples[together];
+      const int size = chosen.size - first, number = size < together * width ? (size + width - 1) / width : together;
+      for (int i = 0; i < number; ++i) {
+        samples[i].begin(group, k, points, chosen, first + i * width);
       }
-    }
-  };
-  const auto look = [&](auto&& at) {
-    for (int i = 0; i < count; i += width) {
-      at(Samples(group, k, points, chosen + i, count - i < width ? count - i : width), chosen + i,
-         count - i < width ? count - i : width);
+      for (int i = 0; i < number; ++i) {
+        samples[i].finish(group, k, size - i * width);
+      }
+      for (int i = 0; i < number; ++i) {
+        at(samples[i], chosen.point + first + i * width);
+      }
     }
   };
   const auto smallest_of = [&](const float* most) {
@@ -560,12 +620,12 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
     }
     return static_cast<double>(value);
   };
-  const auto find_nearest = [&](const Samples& at, const int* from, int number) {
-    lower(query.reference, query.nearest, all(group.reach), at.h, candidates.point, from, number);
+  const auto find_nearest = [&](const Samples& at, const int* from) {
+    lower(query.reference, query.nearest, all(group.reach), at.h, from);
   };
-  const auto find_minded = [&](const Samples& at, const int* from, int number) {
+  const auto find_minded = [&](const Samples& at, const int* from) {
     const Lanes limits = at.h < query.reference + group.window ? all(__builtin_inf()) : all(group.reach_ahead);
-    lower(query.ahead, query.minded, limits, at.after, candidates.point, from, number);
+    lower(query.ahead, query.minded, limits, at.after, from);
   };
   const double reference = query.reference, ahead = query.ahead;
   const auto rescale_both = [&] {
@@ -574,30 +634,26 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
   };
   const double nothing = -__builtin_inf(), everything = __builtin_inf();
   if (candidates.size <= width) {
-    choose(everything, everything);
-    look([&](const Samples& at, const int* from, int number) {
-      find_nearest(at, from, number);
-      find_minded(at, from, number);
+    look(everything, everything, [&](const Samples& at, const int* from) {
+      find_nearest(at, from);
+      find_minded(at, from);
       rescale_both();
       add(group, k, at);
     });
   } else {
-    choose(smallest_of(candidates.most[0]), nothing);
-    look(find_nearest);
-    choose(nothing, smallest_of(candidates.most[1]));
-    look(find_minded);
+    look(smallest_of(candidates.most[0]), nothing, find_nearest);
+    look(nothing, smallest_of(candidates.most[1]), find_minded);
     rescale_both();
     const bool within = query.reference < __builtin_inf();
-    choose(within ? query.reference + group.window : nothing, query.ahead + group.window_ahead);
-    look([&](const Samples& at, const int*, int) { add(group, k, at); });
+    look(within ? query.reference + group.window : nothing, query.ahead + group.window_ahead,
+         [&](const Samples& at, const int*) { add(group, k, at); });
   }
   candidates.size = 0;
 }
 
-/// Squared distance along one axis from a box.
+/// How far a box lies away along one axis.
 inline Singles beyond(Singles x, float half) noexcept {
-  const Singles over = larger(magnitude(x) - half, Singles{});
-  return over * over;
+  return x > half ? x - half : x < -half ? x + half : Singles{};
 }
 
 bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
@@ -614,15 +670,31 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
   const float at[3] = {static_cast<float>(leaf.x - group.origin[0]), static_cast<float>(leaf.y - group.origin[1]),
                        static_cast<float>(leaf.z - group.origin[2])};
   const float ball = static_cast<float>(leaf.radius), largest = static_cast<float>(leaf.largest);
+  float R[9];  // world to link, by rows
+  for (int i = 0; i < 9; ++i) {
+    R[i] = static_cast<float>(link.rotation[i]);
+  }
   for (int first = 0; first < group.size; first += singles) {
     const Singles x = at[0] - load(group.offset[0] + first), y = at[1] - load(group.offset[1] + first),
                   z = at[2] - load(group.offset[2] + first), extent = load(group.extent + first);
     const Singles squared = x * x + y * y + z * z;
     const Singles inverse_distance = inverse_root(squared > 1e-30f ? squared : all(1e-30f));
     const Singles distance = squared * inverse_distance, radius = extent + ball;
-    const Singles from_box = root(beyond(x, static_cast<float>(leaf.half_x)) + beyond(y, static_cast<float>(leaf.half_y)) +
-                                  beyond(z, static_cast<float>(leaf.half_z)));
-    const Singles bound = larger(distance - radius, from_box - extent - largest) - distance_error * (distance + radius);
+    // All of the box lies beyond the plane across the shortest way to it, and the ellipsoid reaches √(xᵀ S x)/|x| along it.
+    const Singles to_box[3] = {beyond(x, static_cast<float>(leaf.half_x)), beyond(y, static_cast<float>(leaf.half_y)),
+                               beyond(z, static_cast<float>(leaf.half_z))};
+    Singles in_link[3], squared_to_box = {};
+    for (int i = 0; i < 3; ++i) {
+      squared_to_box += to_box[i] * to_box[i];
+      in_link[i] = R[3 * i] * to_box[0] + R[3 * i + 1] * to_box[1] + R[3 * i + 2] * to_box[2];
+    }
+    const auto shape = [&](int i) { return load(group.shapes + i * most_queries + first); };
+    const Singles product =
+        in_link[0] * (in_link[0] * shape(0) + 2.0f * (in_link[1] * shape(1) + in_link[2] * shape(2))) +
+        in_link[1] * (in_link[1] * shape(3) + 2.0f * in_link[2] * shape(4)) + in_link[2] * in_link[2] * shape(5);
+    const Singles inverse_to_box = inverse_root(larger(squared_to_box, all(1e-30f)));
+    const Singles beyond_box = (squared_to_box - root(product)) * inverse_to_box;
+    const Singles bound = larger(distance - radius, beyond_box - largest) - distance_error * (distance + radius);
     const Singles across[3] = {y * vz - z * vy, z * vx - x * vz, x * vy - y * vx};
     const Singles turning = root(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
     const Singles closing =
@@ -638,12 +710,25 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
       continue;
     }
     const LeafPoints in_leaf(points, leaf);
-    for (int k = first; lanes != 0; ++k, lanes >>= 1) {
-      if ((lanes & 1u) != 0 && k < group.size) {
-        if (!group.queries[k].ready) {
-          prepare(group, k);
+    for (int n = 0; n < leaf.count; n += singles) {
+      Look looks[singles];
+      int num_looks = 0, num_bounded = 0, bounded[singles];
+      for (unsigned left = lanes; left != 0; left &= left - 1) {
+        const int lane = __builtin_ctz(left);
+        if (!group.queries[first + lane].ready) {
+          prepare(group, first + lane);
         }
-        changed |= look_at_points(group, k, points, leaf, in_leaf, closing[k - first]);
+        num_looks += looks[num_looks].begin(group, first + lane, points, leaf, in_leaf, n, closing[lane]);
+      }
+      for (int i = 0; i < num_looks; ++i) {
+        bounded[num_bounded] = i;
+        num_bounded += looks[i].bound(group);
+      }
+      for (int i = 0; i < num_bounded; ++i) {
+        looks[bounded[i]].refine(group);
+      }
+      for (int i = 0; i < num_bounded; ++i) {
+        changed |= looks[bounded[i]].keep(group, points, leaf, in_leaf);
       }
     }
   }

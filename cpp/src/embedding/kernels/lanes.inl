@@ -159,8 +159,51 @@ inline void compress(float* p, Singles x, unsigned lanes) noexcept {
 #endif
 }
 
+/// The same of numbers, and of first + lane.
+inline void compress(int* p, const int* from, unsigned lanes) noexcept {
+#if defined(__AVX512F__)
+  __m512i x;
+  __builtin_memcpy(&x, from, sizeof x);
+  x = _mm512_maskz_compress_epi32(static_cast<__mmask16>(lanes), x);
+  __builtin_memcpy(p, &x, sizeof x);
+#else
+  for (; lanes != 0; lanes &= lanes - 1) {
+    *p++ = from[__builtin_ctz(lanes)];
+  }
+#endif
+}
+
+inline void compress(int* p, int first, unsigned lanes) noexcept {
+#if defined(__AVX512F__)
+  const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  const __m512i x = _mm512_maskz_compress_epi32(static_cast<__mmask16>(lanes), _mm512_add_epi32(lane, _mm512_set1_epi32(first)));
+  __builtin_memcpy(p, &x, sizeof x);
+#else
+  for (; lanes != 0; lanes &= lanes - 1) {
+    *p++ = first + __builtin_ctz(lanes);
+  }
+#endif
+}
+
+/// 0, 1, 2, …
+inline Lanes lane_numbers() noexcept {
+  Lanes x;
+  for (int i = 0; i < width; ++i) {
+    x[i] = i;
+  }
+  return x;
+}
+
+inline Lanes widen(const float* p) noexcept {
+  typedef float Halves __attribute__((vector_size(4 * width)));
+  Halves x;
+  __builtin_memcpy(&x, p, sizeof x);
+  return __builtin_convertvector(x, Lanes);
+}
+
 inline Singles magnitude(Singles x) noexcept { return x < 0.0f ? -x : x; }
 inline Singles larger(Singles x, Singles y) noexcept { return x > y ? x : y; }
+inline Singles smaller(Singles x, Singles y) noexcept { return x < y ? x : y; }
 
 inline unsigned below(Singles x, Singles limit) noexcept {
 #if defined(__AVX512F__)
