@@ -28,28 +28,32 @@ inline void multiply(const Lanes* S, const Lanes* x, Lanes* result) noexcept {
   result[2] = S[2] * x[0] + S[4] * x[1] + S[5] * x[2];
 }
 inline void normalise(Lanes* x) noexcept {
-  const Lanes inverse = 1.0 / root(dot(x, x));
+  const Lanes inverse = inverse_root(dot(x, x));
   for (int i = 0; i < 3; ++i) {
     x[i] *= inverse;
   }
 }
 
-/// An ellipsoid with its half-width s along n, and S n.
+/// An ellipsoid with its half-width s along n, and its boundary's farthest point along n, k = S n / s.
 struct HalfWidth {
-  Lanes S[6], p[3], s;
+  Lanes S[6], k[3], s, inverse_s;
 
   void update(const Lanes* n) noexcept {
-    multiply(S, n, p);
-    s = root(dot(n, p));
+    multiply(S, n, k);
+    const Lanes squared = dot(n, k);
+    inverse_s = inverse_root(squared);
+    s = squared * inverse_s;
+    for (int i = 0; i < 3; ++i) {
+      k[i] *= inverse_s;
+    }
   }
 
-  /// Adds ∂²s = (S − p pᵀ / s²) / s, which maps n to zero.
+  /// Adds ∂²s = (S − k kᵀ) / s, which maps n to zero.
   void add_curvature(Lanes* H) const noexcept {
-    const Lanes inverse = 1.0 / s, squared = inverse * inverse;
     int entry = 0;
     for (int i = 0; i < 3; ++i) {
       for (int j = i; j < 3; ++j, ++entry) {
-        H[entry] += (S[entry] - p[i] * p[j] * squared) * inverse;
+        H[entry] += (S[entry] - k[i] * k[j]) * inverse_s;
       }
     }
   }
@@ -104,7 +108,7 @@ void find(EllipsoidPairs& pairs, int first) noexcept {
     // Across n: the slope of φ, and the second derivative −H − φ of unit vectors, where H has two eigenvalues.
     Lanes slope[3];
     for (int i = 0; i < 3; ++i) {
-      slope[i] = d[i] - a.p[i] / a.s - b.p[i] / b.s - value * n[i];
+      slope[i] = d[i] - a.k[i] - b.k[i] - value * n[i];
     }
     for (Lanes& entry : H) {
       entry = Lanes{};
@@ -114,11 +118,14 @@ void find(EllipsoidPairs& pairs, int first) noexcept {
     const Lanes trace = H[0] + H[3] + H[5];
     const Lanes det = (H[0] * H[3] - H[1] * H[1]) + (H[0] * H[5] - H[2] * H[2]) + (H[3] * H[5] - H[4] * H[4]);
     // Ellipsoids that overlap more deeply than they are curved have no maximum here: a definite matrix leads upwards.
-    const Lanes least = 0.5 * trace - root(larger(0.25 * trace * trace - det, Lanes{}));
-    const Lanes shift = larger(value, -0.5 * least);
+    Lanes shift = value;
+    if (below(value, Lanes{}) != 0) {
+      const Lanes least = 0.5 * trace - root(larger(0.25 * trace * trace - det, Lanes{}));
+      shift = value < 0.0 ? larger(value, -0.5 * least) : value;
+    }
     // The inverse of H + shift across n is ((trace + shift) (1 − n nᵀ) − H) / (det + shift trace + shift²).
     across = trace + shift;
-    inverse = 1.0 / (det + shift * across);
+    inverse = 1.0 / (det + shift * across);  // which may be zero
     const Lanes small = accuracy * (length + a.s + b.s);
     const Lanes squared = dot(slope, slope);
     if (step == most_steps || below(small * small, squared) == 0) {
@@ -154,10 +161,8 @@ void find(EllipsoidPairs& pairs, int first) noexcept {
   // Of b, seen from a: how its centre and S n / s move, with n held. ṁ = n × ω, and m̈, is n seen from b.
   const RelativeMotion& motion = pairs.motion;
   const double *omega = motion.angular, *alpha = motion.bias_angular;
-  Lanes k[3], d_dot[3], d_ddot[3], turned[3], m_dot[3], S_m_dot[3], m_ddot[3], bent[3], k_turned[3];
-  for (int i = 0; i < 3; ++i) {
-    k[i] = b.p[i] / b.s;
-  }
+  Lanes d_dot[3], d_ddot[3], turned[3], m_dot[3], S_m_dot[3], m_ddot[3], bent[3], k_turned[3];
+  const Lanes* k = b.k;
   cross(omega, centre, turned);
   for (int i = 0; i < 3; ++i) {
     d_dot[i] = motion.linear[i] + turned[i];
@@ -178,11 +183,11 @@ void find(EllipsoidPairs& pairs, int first) noexcept {
     m_ddot[i] = bent[i] - turned[i];
   }
   const Lanes s_dot = dot(k, m_dot);
-  const Lanes s_ddot = dot(k, m_ddot) + (dot(m_dot, S_m_dot) - s_dot * s_dot) / b.s;
+  const Lanes s_ddot = dot(k, m_ddot) + (dot(m_dot, S_m_dot) - s_dot * s_dot) * b.inverse_s;
   cross(omega, k, k_turned);
   Lanes g[3], W_g[3];
   for (int i = 0; i < 3; ++i) {
-    g[i] = d_dot[i] - k_turned[i] - (S_m_dot[i] - k[i] * s_dot) / b.s;
+    g[i] = d_dot[i] - k_turned[i] - (S_m_dot[i] - k[i] * s_dot) * b.inverse_s;
   }
   const Lanes along = dot(g, n);
   for (int i = 0; i < 3; ++i) {
