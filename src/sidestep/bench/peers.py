@@ -18,6 +18,7 @@ import numpy.typing as npt
 import sidestep
 from sidestep._core import (
     AccelerationFilter,
+    ClearanceBarrier,
     CollisionDensity,
     GeometricSystem,
     JointType,
@@ -26,6 +27,7 @@ from sidestep._core import (
     instruction_set,
     rollout,
 )
+from sidestep.barriers import Barriers
 from sidestep.bench import peers_jax
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.bench.step import cpu_model
@@ -38,12 +40,14 @@ from sidestep.simulation.solid import mesh_model
 
 Array = npt.NDArray[np.float64]
 Call = Callable[[Array, Array], Array]
+States = list[tuple[Array, Array, Array]]  # q, v, and what to compare with
 
 TABLE_ROBOT, ROBOT = "fr3_arm", "fr3"  # seven joints, without and with a hand
 TABLE_POINT = (0.4, 0.2, 0.5)  # [m] beside the arm
 STIFFNESS, DAMPING = 0.5, 1.5  # the thesis's
 BALLS = 10
 MOTION = 1_000  # steps; the states that every way is asked at
+BATCH = 50  # states of them in one call
 FEWEST = 3  # calls of a way, however long they take
 WARM_UP = 10  # calls that do not count, if they take less than a tenth of the time
 
@@ -88,7 +92,11 @@ def run_peers(settings: PeerSettings, *, progress: Callable[[str], None] | None 
         RuntimeError: a way that should give the accelerations of the first one does not.
     """
     groups = []
-    for name, make in (("Table 6.1, 7 joints", _table), (f"whole arm, {BALLS} balls", _whole_arm)):
+    for name, make in (
+        ("Table 6.1, 7 joints", _table),
+        (f"whole arm, {BALLS} balls", _whole_arm),
+        (f"distances of the arm, {BALLS} balls", _distances),
+    ):
         states, ways = make(settings)
         rows = []
         for way in ways:
@@ -110,7 +118,7 @@ def run_peers(settings: PeerSettings, *, progress: Callable[[str], None] | None 
     }
 
 
-def _measure(way: _Way, states: list[tuple[Array, Array, Array]], seconds: float) -> dict[str, Any]:
+def _measure(way: _Way, states: States, seconds: float) -> dict[str, Any]:
     if way.missing:
         return {"missing": way.missing}
     times = way.measured() if way.measured is not None else _times(way, states, seconds)
@@ -118,7 +126,7 @@ def _measure(way: _Way, states: list[tuple[Array, Array, Array]], seconds: float
     return {"calls": len(times), "median_us": float(quantiles[0]), "p99_us": float(quantiles[1])}
 
 
-def _times(way: _Way, states: list[tuple[Array, Array, Array]], seconds: float) -> Array:
+def _times(way: _Way, states: States, seconds: float) -> Array:
     """Microseconds of calls at the states, which hold q, v and the acceleration to compare with."""
     assert way.call is not None
     begin = time.perf_counter()
@@ -157,7 +165,24 @@ def _in_cpp(
     return np.concatenate(times)
 
 
-def _table(settings: PeerSettings) -> tuple[list[tuple[Array, Array, Array]], list[_Way]]:
+def _in_batches(
+    system: GeometricSystem, states: States, goal: Array, obstacles: Obstacles, seconds: float, size: int
+) -> Array:
+    """Microseconds of each of the states, `size` of them in one call from Python."""
+    q_rows, v_rows = (np.array([state[k] for state in states]) for k in range(2))
+    goals = np.tile(goal, (size, 1))
+    times: list[float] = []
+    end = time.perf_counter() + seconds
+    while not times or time.perf_counter() < end:
+        for first in range(0, len(states) - size + 1, size):
+            q, v = q_rows[first : first + size], v_rows[first : first + size]
+            begin = time.perf_counter()
+            evaluate_batch(system, q, v, goals, obstacles, threads=1)
+            times.append(1e6 * (time.perf_counter() - begin) / size)
+    return np.array(times)
+
+
+def _table(settings: PeerSettings) -> tuple[States, list[_Way]]:
     """T5.4 with one Gaussian per link and one point: the setting of the thesis's Table 6.1."""
     robot = Robot.named(TABLE_ROBOT)
     body = Body.fit(robot, components=1, seed=settings.seed)
@@ -171,17 +196,6 @@ def _table(settings: PeerSettings) -> tuple[list[tuple[Array, Array, Array]], li
     ]
     gains = {"stiffness": STIFFNESS, "damping": DAMPING}
     work = "the acceleration of T5.4"
-
-    q_rows, v_rows, goals = run.q, run.v, np.tile(goal, (len(run.q), 1))
-
-    def in_batches() -> Array:
-        times: list[float] = []
-        end = time.perf_counter() + settings.seconds
-        while not times or time.perf_counter() < end:
-            begin = time.perf_counter()
-            evaluate_batch(system, q_rows, v_rows, goals, obstacles, threads=1)
-            times.append(1e6 * (time.perf_counter() - begin) / len(q_rows))
-        return np.array(times)
 
     def automatic() -> Call:
         peer = torch_autograd.AutogradSystem(chain, point)
@@ -199,7 +213,11 @@ def _table(settings: PeerSettings) -> tuple[list[tuple[Array, Array, Array]], li
             lambda q, v: system.acceleration(q, v, goal, obstacles).acceleration,
             check=True,
         ),
-        _Way("Sidestep, Python, batch", f"{work} of {len(q_rows)} states, one call", measured=in_batches),
+        _Way(
+            "Sidestep, Python, batch",
+            f"{work} of {len(states)} states, one call",
+            measured=lambda: _in_batches(system, states, goal, obstacles, settings.seconds, len(states)),
+        ),
         _Way(
             "NumPy, dense analytic",
             f"{work} with dense tensors and Christoffel symbols, as chapter 4 of the thesis",
@@ -230,18 +248,42 @@ def _optional(name: str, work: str, module: str, make: Callable[[], Call], *, ch
     return _Way(name, work, make(), check=check)
 
 
-def _whole_arm(settings: PeerSettings) -> tuple[list[tuple[Array, Array, Array]], list[_Way]]:
+@dataclass(frozen=True)
+class _Arm:
     """The covering body among the balls of a problem of `bench reach`, along a motion of the recommended system."""
-    robot = Robot.named(ROBOT)
-    body = Body.cover(robot)
-    problem = ProblemGenerator(
-        ProblemSettings(robot=ROBOT, obstacles=BALLS, seed=settings.seed), robot=robot
-    ).problem(0)
-    obstacles, start, goal = problem.obstacles_at(0.0), problem.start, problem.goal
-    system, guard = barrier_system(robot, body), AccelerationFilter(robot)
-    run = rollout(system, start, 0.0 * start, goal, obstacles, steps=MOTION, filter=guard)
-    states = [(q, v, q) for q, v in zip(run.q, run.v, strict=True)]
-    balls = np.column_stack([obstacles.points, obstacles.radii])
+
+    robot: Robot
+    body: Body
+    system: GeometricSystem
+    guard: AccelerationFilter
+    obstacles: Obstacles
+    start: Array
+    goal: Array
+    states: States
+
+    @classmethod
+    def of(cls, settings: PeerSettings) -> _Arm:
+        robot = Robot.named(ROBOT)
+        body = Body.cover(robot)
+        problem = ProblemGenerator(
+            ProblemSettings(robot=ROBOT, obstacles=BALLS, seed=settings.seed), robot=robot
+        ).problem(0)
+        obstacles, start, goal = problem.obstacles_at(0.0), problem.start, problem.goal
+        system, guard = barrier_system(robot, body), AccelerationFilter(robot)
+        run = rollout(system, start, 0.0 * start, goal, obstacles, steps=MOTION, filter=guard)
+        states = [(q, v, q) for q, v in zip(run.q, run.v, strict=True)]
+        return cls(robot, body, system, guard, obstacles, start, goal, states)
+
+    @property
+    def balls(self) -> Array:
+        return np.column_stack([self.obstacles.points, self.obstacles.radii])
+
+
+def _whole_arm(settings: PeerSettings) -> tuple[States, list[_Way]]:
+    """Steps with a filter."""
+    arm = _Arm.of(settings)
+    robot, body, system, guard = arm.robot, arm.body, arm.system, arm.guard
+    obstacles, start, goal, states, balls = arm.obstacles, arm.start, arm.goal, arm.states, arm.balls
     chain = SerialChain.of(robot, body)
     # Around each ellipsoid: a sphere as large as its longest semi-axis.
     moving = _moving(robot)
@@ -267,11 +309,6 @@ def _whole_arm(settings: PeerSettings) -> tuple[list[tuple[Array, Array, Array]]
             "cbfpy",
             lambda: peers_jax.barrier_filter(chain, chain.means, radii, list(chain.owners), balls),
         ),
-        _Way(
-            "Coal",
-            "the distance of all moving links' meshes from the balls, by two trees of boxes; no derivatives",
-            _coal(robot, balls),
-        ),
         _fabrics(settings, robot, chain, radii, balls, states, goal),
     ]
     return states, ways
@@ -281,7 +318,32 @@ def _moving(robot: Robot) -> set[str]:
     return {frame.name for frame in robot.frames if frame.joint >= 0}
 
 
-def _coal(robot: Robot, balls: Array) -> Call:
+def _distances(settings: PeerSettings) -> tuple[States, list[_Way]]:
+    """How far the arm is from the balls, at the states of `_whole_arm`."""
+    arm = _Arm.of(settings)
+    activation = Barriers().activation
+    clearances = GeometricSystem([ClearanceBarrier(arm.robot, arm.body, activation=activation)])
+    moving = sum(link in _moving(arm.robot) for link in arm.body.links)
+    ways = [
+        _Way(
+            "Sidestep, Python, batch",
+            f"clearances of {moving} ellipsoids with their derivatives, where below {100.0 * activation:.0f} cm or soon "
+            f"to be, kinematics and the acceleration; {BATCH} states in a call",
+            measured=lambda: _in_batches(
+                clearances, arm.states, arm.goal, arm.obstacles, settings.seconds, BATCH
+            ),
+        ),
+        _Way(
+            "Coal",
+            "the smallest distance of all moving links' meshes, by two trees of boxes, poses given; no derivatives",
+            measured=lambda: _coal(arm.robot, arm.balls, arm.states, settings.seconds),
+        ),
+    ]
+    return arm.states, ways
+
+
+def _coal(robot: Robot, balls: Array, states: States, seconds: float) -> Array:
+    """Microseconds of one distance between arm and balls; what sets the poses from Python does not count."""
     meshes = {name: robot.collision_mesh(name) for name in sorted(_moving(robot))}
     links = {
         name: coal.CollisionObject(mesh_model(mesh)) for name, mesh in meshes.items() if mesh is not None
@@ -290,27 +352,27 @@ def _coal(robot: Robot, balls: Array) -> Call:
     kept = [
         coal.CollisionObject(coal.Sphere(ball[3]), coal.Transform3s(np.eye(3), ball[:3])) for ball in balls
     ]
-    for item in kept:
+    for item in kept:  # the managers do not hold them
         scene.registerObject(item)
     for item in links.values():
         arm.registerObject(item)
     scene.setup()
     arm.setup()
     callback = coal.DistanceCallBackDefault()
-
-    def distance(q: Array, v: Array) -> Array:
-        del v
+    times: list[float] = []
+    end = time.perf_counter() + seconds
+    while len(times) < FEWEST or time.perf_counter() < end:
+        q, _, _ = states[len(times) % len(states)]
         for name, item in links.items():
             pose = robot.pose(q, name)
             item.setTransform(coal.Transform3s(pose[:3, :3], pose[:3, 3]))
             item.computeAABB()
+        start = time.perf_counter_ns()
         arm.update()
         callback.init()
         arm.distance(scene, callback)
-        assert kept  # the manager does not hold them
-        return np.array([callback.data.result.min_distance])
-
-    return distance
+        times.append(1e-3 * (time.perf_counter_ns() - start))
+    return np.array(times)
 
 
 def _fabrics(
@@ -319,7 +381,7 @@ def _fabrics(
     chain: SerialChain,
     radii: Array,
     balls: Array,
-    states: list[tuple[Array, Array, Array]],
+    states: States,
     goal: Array,
 ) -> _Way:
     name, work = (

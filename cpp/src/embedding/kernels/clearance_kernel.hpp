@@ -50,7 +50,7 @@ struct Query {
   bool near, approached;                    // whether a point may be within reach, or come to be
   bool ready, begun;                        // whether what bounds and what sums need has been set
   struct {
-    float axes[9], semi_axes[3], squared_axes[3], linear[3], angular[3];
+    float axes[9], semi_axes[3], squared_axes[3];
   } single;
   Candidates candidates;
 };

@@ -59,8 +59,6 @@ void prepare(QueryGroup& group, int k) noexcept {
   for (int i = 0; i < 3; ++i) {
     single.semi_axes[i] = static_cast<float>(group.semi_axes[k][i]);
     single.squared_axes[i] = static_cast<float>(query.squared_axes[i]);
-    single.linear[i] = static_cast<float>(query.linear[i]);
-    single.angular[i] = static_cast<float>(query.angular[i]);
   }
   query.candidates.size = 0;
   query.ready = true;
@@ -185,26 +183,42 @@ struct Inside {
 /// As many of the lanes as there are, as bits.
 inline unsigned first_lanes(int count) noexcept { return count < singles ? (1u << count) - 1u : (2u << (singles - 1)) - 1u; }
 
-/// The points of a leaf in single precision, seen from its centre.
+/// The points of a leaf in single precision, seen from its centre, and how they move as a link sees them.
 struct LeafPoints {
   alignas(64) float position[3][most_points], radius[most_points], velocity[3][most_points];
+  alignas(64) float closing[most_points];  // [m] within the horizon, at most
+  float blur, turning_blur;                // [m] of places and [m/s] of velocities
 
-  LeafPoints(const Points& points, const Leaf& leaf) noexcept {
+  /// `motion` is the velocity of the link's point at the leaf's centre.
+  LeafPoints(const Points& points, const Leaf& leaf, const LinkMotion& link, const float* motion, float horizon) noexcept
+      : blur(place_error * static_cast<float>(leaf.radius)), turning_blur(0.0f) {
     const double centre[3] = {leaf.x, leaf.y, leaf.z};
     for (int axis = 0; axis < 3; ++axis) {
       const double* from = points.position[axis] + leaf.first;
       for (int n = 0; n < most_points; ++n) {
         position[axis][n] = static_cast<float>(from[n] - centre[axis]);
       }
-      if (points.velocity[0] != nullptr) {
-        from = points.velocity[axis] + leaf.first;
-        for (int n = 0; n < most_points; ++n) {
-          velocity[axis][n] = static_cast<float>(from[n]);
-        }
-      }
     }
     for (int n = 0; n < most_points; ++n) {
       radius[n] = static_cast<float>(points.radius[leaf.first + n]);
+    }
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      const float W_j = static_cast<float>(link.angular[j]), W_l = static_cast<float>(link.angular[l]);
+      turning_blur += blur * __builtin_fabsf(W_j);
+      for (int n = 0; n < most_points; ++n) {
+        velocity[i][n] = -motion[i] - (W_j * position[l][n] - W_l * position[j][n]);
+      }
+      if (points.velocity[0] != nullptr) {
+        const double* own = points.velocity[i] + leaf.first;
+        for (int n = 0; n < most_points; ++n) {
+          velocity[i][n] += static_cast<float>(own[n]);
+        }
+      }
+    }
+    for (int n = 0; n < most_points; n += singles) {
+      const Singles vx = load(velocity[0] + n), vy = load(velocity[1] + n), vz = load(velocity[2] + n);
+      store(closing + n, horizon * ((1.0f + rate_error) * root(vx * vx + vy * vy + vz * vz) + turning_blur));
     }
   }
 };
@@ -228,13 +242,15 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept;
 /// What an ellipsoid sees of a register of a leaf's points, in single precision. It is found out in steps, each for all
 /// ellipsoids that look at the leaf: one's chain of operations is long, and the next one's runs beside it.
 struct Look {
-  int k, n;                // ellipsoid and first point
-  unsigned asked;          // lanes
-  float blur;              // [m] of places
-  Singles e[3], second;    // the offset in principal axes, and Σ A e²
-  Singles distance, radius, error, closing;  // the last: within the horizon, at most
+  int k, n;        // ellipsoid and first point
+  unsigned asked;  // lanes
+  Singles x[3], e[3], second;  // the offset in the world and in principal axes, and Σ A e²
+  Singles distance, inverse_distance, radius, error;
+  Singles closing;             // within the horizon, at most
   Outside<Singles> out;
   Singles inverse_norm, least;  // h from below
+
+  static Singles dot(const Singles* a, const Singles* b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
   /// Where nothing is known but that the clearance is negative: gradients are longer than one.
   auto is_inside() const noexcept { return (out.t <= 0.0f) & (out.S < 1.0f); }
@@ -244,67 +260,51 @@ struct Look {
     return (below(value, all(group.near[k])) | below(value - closing, all(group.ahead[k]))) & asked;
   }
 
-  /// Whether any point may matter by the ball around the ellipsoid, and by the plane across the way to the point, towards
-  /// which the ellipsoid reaches √(Σ A e²)/|e|.
-  bool begin(const QueryGroup& group, int ellipsoid, const Points& points, const Leaf& leaf, const LeafPoints& in_leaf,
-             int first_point, float closing_of_leaf) noexcept {
+  /// Whether any point may matter by the ball around the ellipsoid.
+  bool begin(const QueryGroup& group, int ellipsoid, const Leaf& leaf, const LeafPoints& in_leaf, int first_point,
+             float closing_of_leaf) noexcept {
     k = ellipsoid, n = first_point;
-    const auto& single = group.queries[k].single;
-    const float* R = single.axes;
-    const float* A = single.squared_axes;
-    const float* W = single.angular;
-    const float from[3] = {static_cast<float>(leaf.x - group.centre[0][k]), static_cast<float>(leaf.y - group.centre[1][k]),
-                           static_cast<float>(leaf.z - group.centre[2][k])};
     const float extent = group.extent[k];
-    blur = place_error * static_cast<float>(leaf.radius), closing = all(closing_of_leaf);
     asked = first_lanes(leaf.count - n);
-    const Singles x = load(in_leaf.position[0] + n) + from[0], y = load(in_leaf.position[1] + n) + from[1],
-                  z = load(in_leaf.position[2] + n) + from[2];
+    x[0] = load(in_leaf.position[0] + n) + static_cast<float>(leaf.x - group.centre[0][k]);
+    x[1] = load(in_leaf.position[1] + n) + static_cast<float>(leaf.y - group.centre[1][k]);
+    x[2] = load(in_leaf.position[2] + n) + static_cast<float>(leaf.z - group.centre[2][k]);
     radius = load(in_leaf.radius + n);
-    const Singles squared = larger(x * x + y * y + z * z, all(1e-30f)), inverse_distance = inverse_root(squared);
+    const Singles squared = larger(dot(x, x), all(1e-30f));
+    inverse_distance = inverse_root(squared);
     distance = squared * inverse_distance;
-    error = distance_error * (distance + extent) + blur;
-    if (matters(group, distance - extent - radius - error) == 0) {
+    error = distance_error * (distance + extent) + in_leaf.blur;
+    closing = smaller(load(in_leaf.closing + n), all(closing_of_leaf));
+    const Singles least_by_ball = distance - extent - radius - error;
+    if (matters(group, least_by_ball) == 0) {
       return false;
     }
-    second = Singles{};
-    for (int i = 0; i < 3; ++i) {
-      e[i] = R[3 * i] * x + R[3 * i + 1] * y + R[3 * i + 2] * z;
-      second += A[i] * e[i] * e[i];
-    }
-    const Singles least_by_plane = distance - root(second) * inverse_distance - radius - error;
-    if (leaf.radius > extent && blur < blurred) {  // its points close at speeds that differ
-      Singles v[3], across[3], along = {};
-      velocities(group, points, in_leaf, v);
+    if (leaf.radius > extent && in_leaf.blur < blurred) {  // a bound for all of the leaf says little of a point
+      Singles v[3], across[3];
+      for (int i = 0; i < 3; ++i) {
+        v[i] = load(in_leaf.velocity[i] + n);
+      }
       for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3, l = (i + 2) % 3;
-        across[i] = e[j] * v[l] - e[l] * v[j];
-        along -= e[i] * v[i];
+        across[i] = x[j] * v[l] - x[l] * v[j];
       }
-      const Singles speed = length(v), of_point = closing_speed(along, length(across), inverse_distance, all(extent), speed);
-      const Singles more = rate_error * speed + blur * (__builtin_fabsf(W[0]) + __builtin_fabsf(W[1]) + __builtin_fabsf(W[2]));
-      closing = smaller(static_cast<float>(group.horizon) * (of_point + more), closing);
+      const Singles speed = root(dot(v, v));
+      const Singles of_point = closing_speed(-dot(x, v), root(dot(across, across)), inverse_distance, all(extent), speed);
+      closing = smaller(static_cast<float>(group.horizon) * (of_point + rate_error * speed + in_leaf.turning_blur), closing);
     }
-    return matters(group, least_by_plane) != 0;
+    return matters(group, least_by_ball) != 0;
   }
 
-  static Singles length(const Singles* x) noexcept { return root(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); }
-
-  /// Of the points, in moving axes.
-  void velocities(const QueryGroup& group, const Points& points, const LeafPoints& in_leaf, Singles* v) const noexcept {
-    const auto& single = group.queries[k].single;
-    const float* R = single.axes;
-    const float* W = single.angular;
+  /// The same by the plane across the way to the point, towards which the ellipsoid reaches √(Σ A e²)/|e|.
+  bool turn(const QueryGroup& group) noexcept {
+    const float* R = group.queries[k].single.axes;
+    const float* A = group.queries[k].single.squared_axes;
+    second = Singles{};
     for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, l = (i + 2) % 3;
-      v[i] = -single.linear[i] - (W[j] * e[l] - W[l] * e[j]);
+      e[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+      second += A[i] * e[i] * e[i];
     }
-    if (points.velocity[0] != nullptr) {
-      const Singles vx = load(in_leaf.velocity[0] + n), vy = load(in_leaf.velocity[1] + n), vz = load(in_leaf.velocity[2] + n);
-      for (int i = 0; i < 3; ++i) {
-        v[i] += R[3 * i] * vx + R[3 * i + 1] * vy + R[3 * i + 2] * vz;
-      }
-    }
+    return matters(group, distance - root(second) * inverse_distance - radius - error) != 0;
   }
 
   void place(const float* A) noexcept {
@@ -343,14 +343,18 @@ struct Look {
   /// Adds the points that matter to the candidates. Returns whether a limit of leaves changed.
   bool keep(QueryGroup& group, const Points& points, const Leaf& leaf, const LeafPoints& in_leaf) noexcept {
     Query& query = group.queries[k];
-    Singles v[3];
-    velocities(group, points, in_leaf, v);
+    const float* R = query.single.axes;
+    const Singles from[3] = {load(in_leaf.velocity[0] + n), load(in_leaf.velocity[1] + n), load(in_leaf.velocity[2] + n)};
+    Singles v[3];  // in moving axes
+    for (int i = 0; i < 3; ++i) {
+      v[i] = R[3 * i] * from[0] + R[3 * i + 1] * from[1] + R[3 * i + 2] * from[2];
+    }
     const float horizon = static_cast<float>(group.horizon), shortest = query.single.semi_axes[query.shortest];
-    const Singles speed = length(v);
-    const Singles rate = (out.w[0] * v[0] + out.w[1] * v[1] + out.w[2] * v[2]) * inverse_norm;
+    const Singles speed = root(dot(v, v));
+    const Singles rate = dot(out.w, v) * inverse_norm;
     const Singles after = horizon * rate, after_error = horizon * rate_error * speed;
     const auto inside = is_inside(), converged = out.S <= squared_converged;
-    const auto rate_known = ~inside & converged & (all(blur) < blurred);
+    const auto rate_known = ~inside & converged & (all(in_leaf.blur) < blurred);
     const Singles after_least = rate_known ? least + after - after_error : least - closing;
     const unsigned is_near = below(least, all(group.near[k])) & asked;
     const unsigned kept = is_near | (below(after_least, all(group.ahead[k])) & asked);
@@ -709,16 +713,21 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
     if (lanes == 0) {
       continue;
     }
-    const LeafPoints in_leaf(points, leaf);
+    const float motion[3] = {vx, vy, vz};
+    const LeafPoints in_leaf(points, leaf, link, motion, static_cast<float>(group.horizon));
     for (int n = 0; n < leaf.count; n += singles) {
       Look looks[singles];
       int num_looks = 0, num_bounded = 0, bounded[singles];
       for (unsigned left = lanes; left != 0; left &= left - 1) {
-        const int lane = __builtin_ctz(left);
-        if (!group.queries[first + lane].ready) {
-          prepare(group, first + lane);
+        const int k = first + __builtin_ctz(left);
+        Look& look = looks[num_looks];
+        if (!look.begin(group, k, leaf, in_leaf, n, closing[k - first])) {
+          continue;
         }
-        num_looks += looks[num_looks].begin(group, first + lane, points, leaf, in_leaf, n, closing[lane]);
+        if (!group.queries[k].ready) {
+          prepare(group, k);
+        }
+        num_looks += look.turn(group);
       }
       for (int i = 0; i < num_looks; ++i) {
         bounded[num_bounded] = i;
