@@ -46,9 +46,10 @@ class PairOfLinks {
         if (!near(centre, a.mean, a.extent + b.extent + limit)) {
           continue;
         }
-        const double length = std::max(d.norm(), closest_centres);
-        const Eigen::Vector3d n = d / length, n_b = R_.transpose() * n;
-        const double bound = length - std::sqrt(n.dot(a.shape * n)) - std::sqrt(n_b.dot(b.shape * n_b));
+        // φ of the unit vector along d, see ellipsoid_gap.hpp.
+        const Eigen::Vector3d d_b = R_.transpose() * d;
+        const double bound =
+            d.norm() - (std::sqrt(d.dot(a.shape * d)) + std::sqrt(d_b.dot(b.shape * d_b))) / std::max(d.norm(), closest_centres);
         if (bound < limit) {
           act(a, b, bound);
         }
