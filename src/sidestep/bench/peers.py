@@ -327,8 +327,8 @@ def _distances(settings: PeerSettings) -> tuple[States, list[_Way]]:
     ways = [
         _Way(
             "Sidestep, Python, batch",
-            f"clearances of {moving} ellipsoids with their derivatives, where below {100.0 * activation:.0f} cm or soon "
-            f"to be, kinematics and the acceleration; {BATCH} states in a call",
+            f"clearances of {moving} ellipsoids with derivatives, where below {100.0 * activation:.0f} cm or soon so, "
+            f"kinematics and the acceleration; {BATCH} states in a call",
             measured=lambda: _in_batches(
                 clearances, arm.states, arm.goal, arm.obstacles, settings.seconds, BATCH
             ),
