@@ -35,6 +35,8 @@ kernels::LinkMotion motion_of(const KinematicState::Link& link) noexcept {
   copy(link.velocity.linear, motion.linear);
   copy(link.bias.angular, motion.bias_angular);
   copy(link.bias.linear, motion.bias_linear);
+  motion.turning = link.velocity.angular.norm();
+  Eigen::Matrix3f::Map(motion.to_link) = link.R_WL.cast<float>();  // the columns of a rotation are the rows of its inverse
   return motion;
 }
 

@@ -2,7 +2,9 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 namespace sidestep {
 
@@ -18,11 +20,11 @@ void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_trans
   for (Eigen::Index a = 0; a < jacobian_transposed.cols(); ++a) {
     // Of most columns every entry is zero.
     const double* column = jacobian_transposed.data() + a * jacobian_transposed.outerStride();
-    Eigen::Index i = 0;
-    while (i < nv && column[i] == 0.0) {
-      ++i;
+    std::uint64_t bits = 0;  // of all entries, but for their signs
+    for (Eigen::Index i = 0; i < nv; ++i) {
+      bits |= std::bit_cast<std::uint64_t>(column[i]) << 1;
     }
-    if (i < nv) {
+    if (bits != 0) {
       jacobian_transposed_.col(num_used_) = jacobian_transposed.col(a);
       used_[static_cast<std::size_t>(num_used_++)] = a;
     }

@@ -47,7 +47,7 @@ TABLE_POINT = (0.4, 0.2, 0.5)  # [m] beside the arm
 STIFFNESS, DAMPING = 0.5, 1.5  # the thesis's
 BALLS = 10
 MOTION = 1_000  # steps; the states that every way is asked at
-BATCH = 50  # states of them in one call
+BATCH = 100  # states of them in one call
 FEWEST = 3  # calls of a way, however long they take
 WARM_UP = 10  # calls that do not count, if they take less than a tenth of the time
 

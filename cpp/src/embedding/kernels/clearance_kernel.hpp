@@ -18,6 +18,8 @@ struct Points {
 struct LinkMotion {
   double rotation[9];  // R_WL, by columns
   double angular[3], linear[3], bias_angular[3], bias_linear[3];
+  double turning;      // |angular|
+  float to_link[9];    // R_LW, by rows
 };
 
 // Of the Boltzmann mean s0, ṡ0, s̈0, s1, ṡ1, s̈1 and two gradients of force and moment; from `approach` on, of the

@@ -667,17 +667,13 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
   const double v[3] = {link.linear[0] + link.angular[1] * leaf.z - link.angular[2] * leaf.y,
                        link.linear[1] + link.angular[2] * leaf.x - link.angular[0] * leaf.z,
                        link.linear[2] + link.angular[0] * leaf.y - link.angular[1] * leaf.x};
-  const auto norm = [](const double* a) noexcept { return __builtin_sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); };
   const float vx = static_cast<float>(v[0]), vy = static_cast<float>(v[1]), vz = static_cast<float>(v[2]);
-  const float speed = static_cast<float>(norm(v));
-  const float more = static_cast<float>(norm(link.angular) * leaf.radius + group.fastest) + rate_error * speed;
+  const float speed = __builtin_sqrtf(vx * vx + vy * vy + vz * vz);
+  const float more = static_cast<float>(link.turning * leaf.radius + group.fastest) + rate_error * speed;
   const float at[3] = {static_cast<float>(leaf.x - group.origin[0]), static_cast<float>(leaf.y - group.origin[1]),
                        static_cast<float>(leaf.z - group.origin[2])};
   const float ball = static_cast<float>(leaf.radius), largest = static_cast<float>(leaf.largest);
-  float R[9];  // world to link, by rows
-  for (int i = 0; i < 9; ++i) {
-    R[i] = static_cast<float>(link.rotation[i]);
-  }
+  const float* R = link.to_link;
   for (int first = 0; first < group.size; first += singles) {
     const Singles x = at[0] - load(group.offset[0] + first), y = at[1] - load(group.offset[1] + first),
                   z = at[2] - load(group.offset[2] + first), extent = load(group.extent + first);
