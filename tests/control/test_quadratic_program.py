@@ -71,3 +71,35 @@ def test_wrong_shapes_raise():
         program.solve(np.eye(2), [0.0, 0.0], row_upper=[1.0, 2.0])
     with pytest.raises(ValueError, match="at least 1"):
         QuadraticProgram(0)
+
+
+def test_slacks_of_what_the_box_just_allows_do_not_go_in_circles():
+    # Rows that ask for the most that the box has are met where their slacks are zero, as differences of much larger
+    # numbers: such a slack is below its bound by rounding.
+    num, rows = 6, 8
+    program = QuadraticProgram(num + rows, rows)
+    lower, upper = (
+        np.r_[np.full(num, -10.0), np.zeros(rows)],
+        np.r_[np.full(num, 10.0), np.full(rows, np.inf)],
+    )
+    for seed in range(3500):
+        rng = np.random.default_rng(seed)
+        normals = rng.normal(size=(rows, num)) * (rng.random((rows, num)) < 0.5)
+        normals[:, 0] += 0.1
+        normals[: rows // 2] = np.abs(normals[: rows // 2]) * np.sign(
+            normals[0] + 1e-9
+        )  # met in the same corner
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        g = np.r_[rng.normal(size=num) * 10 ** rng.uniform(0, 4), np.full(rows, 8e9)]
+        solution = program.solve(
+            np.eye(num + rows),
+            g,
+            lower=lower,
+            upper=upper,
+            A=np.hstack([normals, np.eye(rows)]),
+            row_lower=10.0 * np.abs(normals).sum(axis=1),
+        )
+        assert solution.status == QuadraticProgramStatus.solved, seed
+        assert solution.residual < 1e-12
+        assert (solution.x >= lower).all()
+        assert (solution.x <= upper).all()

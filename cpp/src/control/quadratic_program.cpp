@@ -148,6 +148,18 @@ void QuadraticProgram::project_normal(const QuadraticProgramData& data, int cons
   }
 }
 
+double QuadraticProgram::energy_norm(const QuadraticProgramData& data) const noexcept {
+  double sum = 0.0;
+  for (int i = 0; i < n_; ++i) {
+    double off_diagonal = 0.0;
+    for (int j = 0; j < i; ++j) {
+      off_diagonal += data.H(i, j) * x_[j];
+    }
+    sum += x_[i] * (data.H(i, i) * x_[i] + 2.0 * off_diagonal);
+  }
+  return std::sqrt(std::max(sum, 0.0));
+}
+
 double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& constraint, double& sign) const noexcept {
   double worst = 0.0;
   for (int i = 0; i < n_ + m_; ++i) {
@@ -174,7 +186,9 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
     if (!(violation > 0.0)) {
       continue;
     }
-    const double terms = i < n_ ? std::abs(value) : data.A.row(i - n_).cwiseAbs().dot(x_.cwiseAbs().transpose());
+    // What cancels in x_i = J_i y is |J_i| |y|, with |y|² = x' H x, at most: a slack of zero is the difference of much more.
+    const double terms =
+        i < n_ ? J_.row(i).norm() * energy_norm(data) : data.A.row(i - n_).cwiseAbs().dot(x_.cwiseAbs().transpose());
     if (!(violation > feasibility_tolerance * (terms + std::abs(side)))) {
       continue;
     }
@@ -376,6 +390,7 @@ QuadraticProgramStatus QuadraticProgram::iterate(const QuadraticProgramData& dat
       x_[active.constraint] = active.sign * active.rhs;  // an active bound holds to the last bit
     }
   }
+  x_ = x_.cwiseMax(data.lower).cwiseMin(data.upper);  // and the others but for rounding
   return QuadraticProgramStatus::solved;
 }
 

@@ -143,24 +143,4 @@ void accumulate_generalised_force(const KinematicState& state, int joint, const 
   }
 }
 
-void GeneralisedForce::add(int joint, const SpatialForce& wrench) noexcept {
-  go_down_to(joint);
-  if (joint_ != joint) {  // on another branch, or the first
-    go_down_to(-1);
-    joint_ = joint;
-    wrench_ = wrench;
-  } else {
-    wrench_.angular += wrench.angular;
-    wrench_.linear += wrench.linear;
-  }
-}
-
-void GeneralisedForce::go_down_to(int joint) noexcept {
-  while (joint_ > joint) {
-    const Link& link = state_.link(joint_);
-    force_[link.coordinate] += link.screw.angular.dot(wrench_.angular) + link.screw.linear.dot(wrench_.linear);
-    joint_ = link.parent;
-  }
-}
-
 }  // namespace sidestep

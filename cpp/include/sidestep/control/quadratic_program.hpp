@@ -77,6 +77,8 @@ class QuadraticProgram {
   void find_supports(const QuadraticProgramData& data) noexcept;
   double along_row(const QuadraticProgramData& data, int row, const Eigen::VectorXd& x) const noexcept;
   void project_normal(const QuadraticProgramData& data, int constraint, double sign) noexcept;
+  /// √(x' H x).
+  double energy_norm(const QuadraticProgramData& data) const noexcept;
   double most_violated(const QuadraticProgramData& data, int& constraint, double& sign) const noexcept;
   void add(const Active& active, double multiplier) noexcept;
   void drop(int position) noexcept;

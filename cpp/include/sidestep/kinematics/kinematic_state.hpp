@@ -85,12 +85,28 @@ class GeneralisedForce {
       : state_(state), force_(generalised_force.data()) {}
 
   /// `joint` is not after those before.
-  void add(int joint, const SpatialForce& wrench) noexcept;
+  void add(int joint, const SpatialForce& wrench) noexcept {
+    go_down_to(joint);
+    if (joint_ != joint) {  // on another branch, or the first
+      go_down_to(-1);
+      joint_ = joint;
+      wrench_ = wrench;
+    } else {
+      wrench_.angular += wrench.angular;
+      wrench_.linear += wrench.linear;
+    }
+  }
   /// To be called once, after all.
   void finish() noexcept { go_down_to(-1); }
 
  private:
-  void go_down_to(int joint) noexcept;
+  void go_down_to(int joint) noexcept {
+    while (joint_ > joint) {
+      const KinematicState::Link& link = state_.link(joint_);
+      force_[link.coordinate] += link.screw.angular.dot(wrench_.angular) + link.screw.linear.dot(wrench_.linear);
+      joint_ = link.parent;
+    }
+  }
 
   const KinematicState& state_;
   double* force_;
