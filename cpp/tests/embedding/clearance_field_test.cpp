@@ -279,6 +279,37 @@ BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {
   use(before);
 }
 
+BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
+  // Of eleven points that recede and one beyond the window that comes closer than they will be, but not within reach of the
+  // horizon: the nearest is what is left to be minded.
+  const InstructionSet before = instruction_set();
+  const Robot robot = test::serial_arm(test::arm_limits(1));
+  const std::string link = robot.frames().back().name;
+  const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {0.01 * Eigen::Matrix3d::Identity()},
+                  Eigen::VectorXd::Ones(1));
+  const ClearanceField field(robot, body, temperature);
+  KinematicState state(robot);
+  state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
+  const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
+  constexpr double tau = 0.05, h = 0.05, beyond = h + ClearanceField::window * temperature + 0.002;
+  Eigen::Matrix3Xd points(3, 12), velocities(3, 12);
+  for (int n = 0; n < 12; ++n) {
+    const Eigen::Vector3d away = X.linear() * Eigen::Vector3d(std::cos(0.1 * n), std::sin(0.1 * n), 0.0);
+    points.col(n) = X.translation() + (0.1 + (n == 11 ? beyond : h)) * away;
+    velocities.col(n) = (n == 11 ? -0.5 : 1.0) * away;
+  }
+  for (const InstructionSet set : instruction_sets()) {
+    use(set);
+    Clearances found(1, 1);
+    field.evaluate(state, Obstacles(points, Eigen::VectorXd::Zero(12), velocities), 0.08, {tau, 0.06}, found.view(0, 1));
+    BOOST_TEST(std::abs(found.values[0] - h) < 1e-9);
+    BOOST_TEST(std::abs(found.approach.values[0] - h) < 1e-9);
+    BOOST_TEST(std::abs(found.approach.rates[0] - 1.0) < 1e-9);
+    BOOST_TEST(std::isfinite(found.approach.curvatures[0]));
+  }
+  use(before);
+}
+
 BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
   // There the iteration begins at its end, where S is 1 but for rounding. A foot that stays on an axis a of curvature
   // radius b²/a bends the distance h by v²/(b²/a + h) for a speed v across.

@@ -612,11 +612,14 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
       }
     }
   };
-  const auto smallest_of = [&](const float* most) {
-    Singles least = load(most);
-    for (int i = singles; i < candidates.size; i += singles) {
-      const Singles next = load(most + i);
-      least = next < least ? next : least;
+  // The smallest bound from above of candidates that may be it: of h whatever it is, of h + τ h' where h is within the window
+  // of the smallest, or h + τ h' within reach.
+  const auto smallest = [&](int which, double window_end, double within) {
+    const Singles ends = all(static_cast<float>(window_end)), limits = all(static_cast<float>(within));
+    Singles least = all(__builtin_inff());
+    for (int i = 0; i < candidates.size; i += singles) {
+      const Singles h = load(candidates.most[0] + i), bound = load(candidates.most[which] + i);
+      least = (h <= ends) | (bound < limits) ? smaller(bound, least) : least;
     }
     float value = least[0];
     for (int i = 1; i < singles; ++i) {
@@ -645,8 +648,8 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
       add(group, k, at);
     });
   } else {
-    look(smallest_of(candidates.most[0]), nothing, find_nearest);
-    look(nothing, smallest_of(candidates.most[1]), find_minded);
+    look(smallest(0, everything, everything), nothing, find_nearest);
+    look(nothing, smallest(1, query.reference + group.window, group.reach_ahead), find_minded);
     rescale_both();
     const bool within = query.reference < __builtin_inf();
     look(within ? query.reference + group.window : nothing, query.ahead + group.window_ahead,
