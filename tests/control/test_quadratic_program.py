@@ -78,17 +78,14 @@ def test_slacks_of_what_the_box_just_allows_do_not_go_in_circles():
     # numbers: such a slack is below its bound by rounding.
     num, rows = 6, 8
     program = QuadraticProgram(num + rows, rows)
-    lower, upper = (
-        np.r_[np.full(num, -10.0), np.zeros(rows)],
-        np.r_[np.full(num, 10.0), np.full(rows, np.inf)],
-    )
+    lower = np.r_[np.full(num, -10.0), np.zeros(rows)]
+    upper = np.r_[np.full(num, 10.0), np.full(rows, np.inf)]
     for seed in range(3500):
         rng = np.random.default_rng(seed)
         normals = rng.normal(size=(rows, num)) * (rng.random((rows, num)) < 0.5)
         normals[:, 0] += 0.1
-        normals[: rows // 2] = np.abs(normals[: rows // 2]) * np.sign(
-            normals[0] + 1e-9
-        )  # met in the same corner
+        corner = np.sign(normals[0] + 1e-9)  # in which half of the rows are met
+        normals[: rows // 2] = np.abs(normals[: rows // 2]) * corner
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         g = np.r_[rng.normal(size=num) * 10 ** rng.uniform(0, 4), np.full(rows, 8e9)]
         solution = program.solve(

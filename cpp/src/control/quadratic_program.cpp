@@ -161,7 +161,7 @@ double QuadraticProgram::energy_norm(const QuadraticProgramData& data) const noe
 }
 
 double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& constraint, double& sign) const noexcept {
-  double worst = 0.0;
+  double worst = 0.0, size = -1.0;  // √(x' H x), once it is asked for
   for (int i = 0; i < n_ + m_; ++i) {
     if (is_active_[static_cast<std::size_t>(i)]) {
       continue;
@@ -187,8 +187,10 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
       continue;
     }
     // What cancels in x_i = J_i y is |J_i| |y|, with |y|² = x' H x, at most: a slack of zero is the difference of much more.
-    const double terms =
-        i < n_ ? J_.row(i).norm() * energy_norm(data) : data.A.row(i - n_).cwiseAbs().dot(x_.cwiseAbs().transpose());
+    if (i < n_ && size < 0.0) {
+      size = energy_norm(data);
+    }
+    const double terms = i < n_ ? J_.row(i).norm() * size : data.A.row(i - n_).cwiseAbs().dot(x_.cwiseAbs().transpose());
     if (!(violation > feasibility_tolerance * (terms + std::abs(side)))) {
       continue;
     }

@@ -24,8 +24,9 @@ namespace sidestep {
 ///
 /// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
 /// depend on how densely a surface is sampled, of those within a window above the nearest; and to what approaches (see
-/// approach_mean.hpp). Points that do not matter are left out in groups, by h ≥ |e| − a − r with a the longest semi-axis, and
-/// then one by one, by h in single precision less its errors. What is left is taken side by side in double precision, with
+/// approach_mean.hpp). Points that do not matter are left out in groups, by h ≥ |e| − a − r with a the longest semi-axis and by
+/// h ≥ |e| − √(eᵀ S e) / |e| − r with e the shortest way to a box around them, and then one by one, by h in single precision
+/// less its errors. What is left is taken side by side in double precision, with
 /// the widest registers of the machine.
 class ClearanceField {
  public:

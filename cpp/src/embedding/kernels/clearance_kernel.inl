@@ -279,19 +279,21 @@ struct Look {
     if (matters(group, least_by_ball) == 0) {
       return false;
     }
-    if (leaf.radius > extent && in_leaf.blur < blurred) {  // a bound for all of the leaf says little of a point
-      Singles v[3], across[3];
-      for (int i = 0; i < 3; ++i) {
-        v[i] = load(in_leaf.velocity[i] + n);
-      }
-      for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3, l = (i + 2) % 3;
-        across[i] = x[j] * v[l] - x[l] * v[j];
-      }
-      const Singles speed = root(dot(v, v));
-      const Singles of_point = closing_speed(-dot(x, v), root(dot(across, across)), inverse_distance, all(extent), speed);
-      closing = smaller(static_cast<float>(group.horizon) * (of_point + rate_error * speed + in_leaf.turning_blur), closing);
+    if (!(leaf.radius > extent && in_leaf.blur < blurred)) {
+      return true;
     }
+    // A bound for all of a large leaf says little of a point.
+    Singles v[3], across[3];
+    for (int i = 0; i < 3; ++i) {
+      v[i] = load(in_leaf.velocity[i] + n);
+    }
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      across[i] = x[j] * v[l] - x[l] * v[j];
+    }
+    const Singles speed = root(dot(v, v));
+    const Singles of_point = closing_speed(-dot(x, v), root(dot(across, across)), inverse_distance, all(extent), speed);
+    closing = smaller(static_cast<float>(group.horizon) * (of_point + rate_error * speed + in_leaf.turning_blur), closing);
     return matters(group, least_by_ball) != 0;
   }
 
