@@ -86,8 +86,8 @@ AccelerationBounds::AccelerationBounds(int num_coordinates)
       position_lower(lower),
       position_upper(upper) {}
 
-void AccelerationBounds::update(const JointLimits& limits, const Eigen::Ref<const Eigen::VectorXd>& q,
-                                const Eigen::Ref<const Eigen::VectorXd>& v, double period,
+void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q,
+                                ConstVectorRef v, double period,
                                 double position_margin) noexcept {
   for (Eigen::Index i = 0; i < lower.size(); ++i) {
     const ScalarLimits joint{limits.lower[i] + position_margin, limits.upper[i] - position_margin, limits.velocity[i],

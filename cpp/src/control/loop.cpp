@@ -19,8 +19,8 @@ Loop::Loop(std::shared_ptr<const GeometricSystem> system, TorqueController contr
   }
 }
 
-LoopStatus Loop::step(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
-                      Eigen::Ref<const Eigen::MatrixXd> mass_matrix, Eigen::Ref<const Eigen::VectorXd> bias) noexcept {
+LoopStatus Loop::step(ConstVectorRef q, ConstVectorRef v,
+                      Eigen::Ref<const Eigen::MatrixXd> mass_matrix, ConstVectorRef bias) noexcept {
   const Goal& goal = goal_.get();
   const Obstacles& obstacles = obstacles_.get();
   const Eigen::Index nv = controller_.num_coordinates();

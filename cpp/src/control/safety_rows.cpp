@@ -114,7 +114,7 @@ bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   return true;
 }
 
-double SafetyRows::hardest_by_torque(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
+double SafetyRows::hardest_by_torque(ConstVectorRef gradient, const JointLimits& limits,
                                      const BrakingTorque& torque) noexcept {
   response_ = gradient;
   solve_in_place(torque.mass_cholesky, response_);

@@ -141,11 +141,11 @@ TorqueController::Relaxed::Relaxed(int nv, int num)
   data.lower.tail(nv + num).setZero();
 }
 
-TorqueStatus TorqueController::solve(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                     const Eigen::Ref<const Eigen::VectorXd>& v,
-                                     const Eigen::Ref<const Eigen::VectorXd>& acceleration,
+TorqueStatus TorqueController::solve(ConstVectorRef q,
+                                     ConstVectorRef v,
+                                     ConstVectorRef acceleration,
                                      const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                     const Eigen::Ref<const Eigen::VectorXd>& bias, const Clearances* clearances,
+                                     ConstVectorRef bias, const Clearances* clearances,
                                      TorqueSolution& solution) noexcept {
   const auto usable = [this](const auto& x) { return x.size() == nv_ && x.allFinite(); };
   const bool q_known = usable(q), v_known = usable(v), wanted_known = usable(acceleration), bias_known = usable(bias);

@@ -162,7 +162,7 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
   return d;
 }
 
-Diagnosis GeometricSystem::diagnose(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+Diagnosis GeometricSystem::diagnose(ConstVectorRef q, ConstVectorRef v,
                                     const Goal& goal, const Obstacles& obstacles, Workspace& w) const noexcept {
   static_cast<void>(acceleration(q, v, goal, obstacles, w));
   const Diagnosis here = diagnose(w);

@@ -22,13 +22,13 @@ const EscapeSettings& validated(const EscapeSettings& settings) {
 }
 
 /// Falls as the goal gets nearer. Of a configuration it is known at once; of a pose it is that of the step before.
-double way_left(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential) noexcept {
+double way_left(const Goal& goal, ConstVectorRef q, double potential) noexcept {
   const auto* joint = std::get_if<JointGoal>(&goal);
   return joint == nullptr ? potential : (q - joint->position).squaredNorm();
 }
 
 /// Whether every joint, or a pose's position and rotation together, is within at_goal of the goal.
-bool arrived(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential) noexcept {
+bool arrived(const Goal& goal, ConstVectorRef q, double potential) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     return (q - joint->position).cwiseAbs().maxCoeff() <= at_goal;
   }
@@ -55,7 +55,7 @@ Escape::Escape(const Robot& robot, EscapeSettings settings)
       sub_goal_(JointGoal(Eigen::VectorXd::Zero(robot.num_coordinates()))),
       configuration_(Eigen::VectorXd::Zero(robot.num_coordinates())) {}
 
-const Goal& Escape::pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential,
+const Goal& Escape::pursue(const Goal& goal, ConstVectorRef q, double potential,
                            double period) noexcept {
   time_ += period;
   if (is_elsewhere(goal)) {
@@ -101,7 +101,7 @@ bool Escape::is_elsewhere(const Goal& goal) noexcept {
   return !here;
 }
 
-void Escape::turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept {
+void Escape::turn(bool escape, ConstVectorRef q) noexcept {
   escaping_ = escape;
   turned_ = true;
   since_ = time_;

@@ -124,16 +124,23 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
       recovery_(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       joint_goal_(JointGoal(acceleration)) {}
 
-StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
-                                         Eigen::Ref<const Eigen::VectorXd> goal, const Obstacles& obstacles,
+StepStatus GeometricSystem::acceleration(ConstVectorRef q, ConstVectorRef v,
+                                         ConstVectorRef goal, const Obstacles& obstacles,
                                          Workspace& w) const noexcept {
-  std::get<JointGoal>(w.joint_goal_).position = goal;
+  with_size(robot_.num_coordinates(),
+            [&](auto nv) { sized(std::get<JointGoal>(w.joint_goal_).position, nv) = sized(goal, nv); });
   return acceleration(q, v, w.joint_goal_, obstacles, w);
 }
 
-StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+StepStatus GeometricSystem::acceleration(ConstVectorRef q, ConstVectorRef v,
                                          const Goal& goal, const Obstacles& obstacles,
                                          Workspace& w) const noexcept {
+  return with_size(robot_.num_coordinates(), [&](auto nv) { return step(q, v, goal, obstacles, w, nv); });
+}
+
+template <class Size>
+StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v,
+                                 const Goal& goal, const Obstacles& obstacles, Workspace& w, Size nv) const noexcept {
   if (!embed(q, v, obstacles, w)) {
     return fall_back(StepStatus::invalid_state, v, w);
   }
@@ -148,18 +155,21 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
   w.pull.update(goal, w.state_, stiffness_);
 
   // h = −G⁻¹ ∂U − D (v − v*), its first term perhaps one-sided, or with D (v − v*) under G⁻¹ too.
-  w.attraction = -w.pull.gradient;
+  const auto velocity = sized(v, nv);
+  auto attraction = sized(w.attraction, nv), harmonic = sized(w.harmonic, nv), geodesic = sized(w.geodesic, nv);
+  attraction = -sized(w.pull.gradient, nv);
   if (settings_.pull_form == PullForm::one_sided) {
     w.one_sided_.solve_in_place(w.jacobian_transposed, w.attraction);
   } else {
     w.metric.solve_in_place(w.attraction);
   }
-  w.relative_velocity_ = v - w.pull.velocity;
-  damping_.multiply(w.relative_velocity_, w.harmonic);
+  auto relative_velocity = sized(w.relative_velocity_, nv);
+  relative_velocity = velocity - sized(w.pull.velocity, nv);
+  damping_.multiply(relative_velocity, harmonic, nv);
   if (settings_.damping_form == DampingForm::metric) {
     w.metric.solve_in_place(w.harmonic);
   }
-  w.harmonic = w.attraction - w.harmonic;
+  harmonic = attraction - harmonic;
   // g = −G⁻¹ Jᵀ d²ψ/dt², in the one-sided form of recovery.hpp unless it is all there is.
   const bool falls_freely = std::holds_alternative<GeodesicOnly>(settings_.combination);
   w.inside = w.recovery_.update(settings_.recovery, floors_, w.clearances, w.jacobian_transposed, w.recovery);
@@ -168,29 +178,30 @@ StepStatus GeometricSystem::acceleration(Eigen::Ref<const Eigen::VectorXd> q, Ei
   } else {
     w.recovery_.solve_pullback(settings_.recovery, w.clearances, w.jacobian_transposed, w.curvatures, w.metric, w.geodesic);
   }
-  w.geodesic = -w.geodesic;
+  geodesic = -geodesic;
 
-  combine(obstacles, w);
+  combine(obstacles, w, nv);
+  auto acceleration = sized(w.acceleration, nv);
   if (!falls_freely) {
-    w.acceleration += w.recovery;
+    acceleration += sized(w.recovery, nv);
   }
   if (settings_.speed) {
     w.speed = (*settings_.speed)(v, w.acceleration, robot_.limits(), w.clearances);
-    w.acceleration += w.speed.drag * v;
+    acceleration += w.speed.drag * velocity;
   }
-  if (!all_finite(w.acceleration)) {
+  if (!all_finite(acceleration)) {
     return fall_back(StepStatus::not_finite, v, w);
   }
-  w.status_ = w.inside >= 0                      ? StepStatus::inside_barrier
-              : is_outside(q, robot_.limits())   ? StepStatus::outside_limits
-              : fault == GoalFault::out_of_reach ? StepStatus::goal_out_of_reach
-                                                 : StepStatus::ok;
+  w.status_ = w.inside >= 0                                       ? StepStatus::inside_barrier
+              : is_outside(sized(q, nv), robot_.limits(), nv)     ? StepStatus::outside_limits
+              : fault == GoalFault::out_of_reach                  ? StepStatus::goal_out_of_reach
+                                                                  : StepStatus::ok;
   return w.status_;
 }
 
-bool GeometricSystem::embed(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+bool GeometricSystem::embed(ConstVectorRef q, ConstVectorRef v,
                             const Obstacles& obstacles, Workspace& w) const noexcept {
-  if (!all_finite(q) || !all_finite(v)) {
+  if (!with_size(robot_.num_coordinates(), [&](auto nv) { return all_finite(sized(q, nv)) && all_finite(sized(v, nv)); })) {
     return false;
   }
   w.state_.update(robot_, q, v);
@@ -201,45 +212,47 @@ bool GeometricSystem::embed(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<cons
   Eigen::Index start = 0;
   for (const auto& embedding : embeddings_) {
     const Eigen::Index m = embedding->num_coordinates();
-    embedding->add_to(
-        {w.values.segment(start, m), w.jacobian_transposed.middleCols(start, m), w.curvatures.segment(start, m),
-         w.clearances.view(start, m)},
-        w.state_, obstacles);
+    embedding->add_to({{w.values.data() + start, m},
+                       {w.jacobian_transposed.data() + start * q.size(), q.size(), m},
+                       {w.curvatures.data() + start, m},
+                       w.clearances.view(start, m)},
+                      w.state_, obstacles);
     start += m;
   }
   return true;
 }
 
-bool GeometricSystem::touches(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double depth,
+bool GeometricSystem::touches(ConstVectorRef q, const Obstacles& obstacles, double depth,
                               Workspace& w) const noexcept {
   w.state_.update(robot_, q, w.rest_);
   return std::any_of(embeddings_.begin(), embeddings_.end(),
                      [&](const auto& embedding) { return embedding->touches(w.state_, obstacles, depth); });
 }
 
-void GeometricSystem::combine(const Obstacles& obstacles, Workspace& w) const noexcept {
-  const auto blend = [&w] {
-    w.acceleration = w.switch_weights.cwiseProduct(w.harmonic - w.geodesic) + w.geodesic;
-  };
+template <class Size>
+void GeometricSystem::combine(const Obstacles& obstacles, Workspace& w, Size nv) const noexcept {
+  const auto harmonic = sized(w.harmonic, nv), geodesic = sized(w.geodesic, nv);
+  auto weights = sized(w.switch_weights, nv), acceleration = sized(w.acceleration, nv);
+  const auto blend = [&] { acceleration = weights.cwiseProduct(harmonic - geodesic) + geodesic; };
   std::visit(Overloaded{
                  [&](const Unswitched&) {
-                   w.switch_weights.setOnes();
-                   w.acceleration = w.harmonic + w.geodesic;
+                   weights.setOnes();
+                   acceleration = harmonic + geodesic;
                  },
                  [&](const HarmonicOnly&) {
-                   w.switch_weights.setOnes();
-                   w.acceleration = w.harmonic;
+                   weights.setOnes();
+                   acceleration = harmonic;
                  },
                  [&](const GeodesicOnly&) {
-                   w.switch_weights.setZero();
-                   w.acceleration = w.geodesic;
+                   weights.setZero();
+                   acceleration = geodesic;
                  },
                  [&](const BinarySwitch& s) {
-                   w.switch_weights.setConstant(w.values.sum() <= s.threshold ? 1.0 : 0.0);
+                   weights.setConstant(w.values.sum() <= s.threshold ? 1.0 : 0.0);
                    blend();
                  },
                  [&](const SigmoidSwitch& s) {
-                   w.switch_weights.setConstant(1.0 - sigmoid(s.slope * (w.values.sum() - s.threshold)));
+                   weights.setConstant(1.0 - sigmoid(s.slope * (w.values.sum() - s.threshold)));
                    blend();
                  },
                  [&](const DistanceSwitch& s) {
@@ -248,7 +261,7 @@ void GeometricSystem::combine(const Obstacles& obstacles, Workspace& w) const no
                      embedding->lower_distances(w.distances_, w.state_, obstacles);
                    }
                    for (Eigen::Index i = 0; i < w.distances_.size(); ++i) {
-                     w.switch_weights[i] = sigmoid(s.slope * (w.distances_[i] - s.thresholds[i]));
+                     weights[i] = sigmoid(s.slope * (w.distances_[i] - s.thresholds[i]));
                    }
                    blend();
                  },
@@ -256,7 +269,7 @@ void GeometricSystem::combine(const Obstacles& obstacles, Workspace& w) const no
              settings_.combination);
 }
 
-StepStatus GeometricSystem::fall_back(StepStatus status, Eigen::Ref<const Eigen::VectorXd> v,
+StepStatus GeometricSystem::fall_back(StepStatus status, ConstVectorRef v,
                                       Workspace& w) const noexcept {
   for (Eigen::Index i = 0; i < v.size(); ++i) {
     const double limit = robot_.limits().acceleration[i];

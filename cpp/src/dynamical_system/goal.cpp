@@ -113,12 +113,14 @@ void advance(Goal& goal, double duration) noexcept {
 
 GoalFault check(const Goal& goal, const Robot& robot) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
-    for (const Eigen::VectorXd* part : {&joint->position, &joint->velocity, &joint->acceleration}) {
-      if (part->size() != robot.num_coordinates() || !all_finite(*part)) {
-        return GoalFault::invalid;
+    return with_size(robot.num_coordinates(), [&](auto nv) {
+      for (const Eigen::VectorXd* part : {&joint->position, &joint->velocity, &joint->acceleration}) {
+        if (part->size() != nv || !all_finite(sized(*part, nv))) {
+          return GoalFault::invalid;
+        }
       }
-    }
-    return is_outside(joint->position, robot.limits()) ? GoalFault::outside_limits : GoalFault::none;
+      return is_outside(sized(joint->position, nv), robot.limits(), nv) ? GoalFault::outside_limits : GoalFault::none;
+    });
   }
   const PoseGoal& frame = std::get<PoseGoal>(goal);
   if (frame.num_coordinates() != robot.num_coordinates() || frame.num_joints() != robot.num_joints() ||
@@ -144,12 +146,15 @@ void GoalPull::update(const Goal& goal, const KinematicState& state, const Gain&
 }
 
 void GoalPull::update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept {
-  displacement_ = state.q() - goal.position;
-  stiffness.multiply(displacement_, gradient);
-  potential = 0.5 * displacement_.dot(gradient);
-  gradient -= goal.acceleration;
-  velocity = goal.velocity;
-  joint_error = displacement_.lpNorm<Eigen::Infinity>();
+  with_size(gradient.size(), [&](auto nv) {
+    auto displacement = sized(displacement_, nv), force = sized(gradient, nv);
+    displacement = sized(state.q(), nv) - sized(goal.position, nv);
+    stiffness.multiply(displacement, force, nv);
+    potential = 0.5 * displacement.dot(force);
+    force -= sized(goal.acceleration, nv);
+    sized(velocity, nv) = sized(goal.velocity, nv);
+    joint_error = displacement.cwiseAbs().maxCoeff();
+  });
   position_error = rotation_error = nan;
 }
 

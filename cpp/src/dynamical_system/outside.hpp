@@ -6,13 +6,10 @@
 
 namespace sidestep {
 
-/// Whether a configuration is outside the position limits.
-inline bool is_outside(const Eigen::Ref<const Eigen::VectorXd>& q, const JointLimits& limits) noexcept {
-  bool outside = false;
-  for (Eigen::Index i = 0; i < q.size(); ++i) {
-    outside |= q[i] < limits.lower[i] || q[i] > limits.upper[i];
-  }
-  return outside;
+/// Whether a configuration, finite, is outside the position limits. `nv` is from with_size.
+template <class Vector, class Size>
+bool is_outside(const Eigen::MatrixBase<Vector>& q, const JointLimits& limits, Size nv) noexcept {
+  return (q - sized(limits.lower, nv)).cwiseMin(sized(limits.upper, nv) - q).minCoeff() < 0.0;
 }
 
 }  // namespace sidestep

@@ -23,8 +23,8 @@ void SpeedRegulatorSettings::validate() const {
 
 SpeedRegulator::SpeedRegulator(SpeedRegulatorSettings settings) : settings_((settings.validate(), settings)) {}
 
-SpeedRegulator::Result SpeedRegulator::operator()(const Eigen::Ref<const Eigen::VectorXd>& v,
-                                                  const Eigen::Ref<const Eigen::VectorXd>& a,
+SpeedRegulator::Result SpeedRegulator::operator()(ConstVectorRef v,
+                                                  ConstVectorRef a,
                                                   const JointLimits& limits,
                                                   const Clearances& clearances) const noexcept {
   // With f = Σ r^8 and f' = Σ 8 r^7 r': ρ = f^(1/8), ρ'/ρ = f'/(8 f).

@@ -99,13 +99,13 @@ CollisionDensity::CollisionDensity(const Robot& robot, const Body& body, bool av
 
 void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
                               const Obstacles& obstacles) const noexcept {
-  const kernels::DensityPoints points{static_cast<int>(obstacles.size()), obstacles.points().data(),
-                                      obstacles.radii().data(),
-                                      obstacles.tree().moves() ? obstacles.velocities().data() : nullptr};
-  if (points.num == 0) {
+  if (obstacles.size() == 0) {
     return;
   }
-  const double share = average_ ? 1.0 / points.num : 1.0;
+  const kernels::DensityPoints points{static_cast<int>(obstacles.size()),
+                                      average_ ? 1.0 / static_cast<double>(obstacles.size()) : 1.0,
+                                      obstacles.points().data(), obstacles.radii().data(),
+                                      obstacles.tree().moves() ? obstacles.velocities().data() : nullptr};
   const kernels::AddDensity add = add_density();
   kernels::DensitySums sums;
   std::fill(std::begin(sums.value), std::end(sums.value), 0.0);
@@ -118,14 +118,15 @@ void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
     }
     add(block, links, points, sums);
     for (int i = 0; i < block.num; ++i) {
-      gradient.add(block.joints[i],
-                   {share * Eigen::Vector3d(sums.moment[0][i], sums.moment[1][i], sums.moment[2][i]),
-                    share * Eigen::Vector3d(sums.force[0][i], sums.force[1][i], sums.force[2][i])});
+      Vector6d wrench;
+      wrench << sums.moment[0][i], sums.moment[1][i], sums.moment[2][i], sums.force[0][i], sums.force[1][i],
+          sums.force[2][i];
+      gradient.add(block.joints[i], wrench);
     }
   }
   gradient.finish();
-  out.values[0] += share * sum(sums.value);
-  out.curvatures[0] += share * sum(sums.curvature);
+  out.values[0] += sum(sums.value);
+  out.curvatures[0] += sum(sums.curvature);
 }
 
 void CollisionDensity::lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,

@@ -26,7 +26,11 @@ EmbeddingEvaluation evaluate(const Embedding& embedding, const Eigen::VectorXd& 
   EmbeddingEvaluation result{Eigen::VectorXd::Zero(m), {}, Eigen::VectorXd::Zero(m),
                              Clearances(robot.num_coordinates(), m)};
   Eigen::MatrixXd jacobian_transposed = Eigen::MatrixXd::Zero(robot.num_coordinates(), m);
-  embedding.add_to({result.values, jacobian_transposed, result.curvatures, result.clearances.view(0, m)}, state, obstacles);
+  embedding.add_to({{result.values.data(), m},
+                    {jacobian_transposed.data(), jacobian_transposed.rows(), m},
+                    {result.curvatures.data(), m},
+                    result.clearances.view(0, m)},
+                   state, obstacles);
   result.jacobian = jacobian_transposed.transpose();
   return result;
 }

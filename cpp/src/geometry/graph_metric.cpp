@@ -2,9 +2,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <bit>
-#include <cmath>
-#include <cstdint>
 
 namespace sidestep {
 
@@ -16,23 +13,20 @@ GraphMetric::GraphMetric(int nv, int m)
 
 void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed) noexcept {
   num_used_ = 0;
-  const Eigen::Index nv = jacobian_transposed.rows();
-  for (Eigen::Index a = 0; a < jacobian_transposed.cols(); ++a) {
-    // Of most columns every entry is zero.
-    const double* column = jacobian_transposed.data() + a * jacobian_transposed.outerStride();
-    std::uint64_t bits = 0;  // of all entries, but for their signs
-    for (Eigen::Index i = 0; i < nv; ++i) {
-      bits |= std::bit_cast<std::uint64_t>(column[i]) << 1;
+  with_size(jacobian_transposed.rows(), [&](auto nv) {
+    for (Eigen::Index a = 0; a < jacobian_transposed.cols(); ++a) {
+      const auto column = sized(jacobian_transposed.data() + a * jacobian_transposed.outerStride(), nv);
+      if (column.cwiseAbs().sum() != 0.0) {  // of most columns every entry is zero
+        sized(jacobian_transposed_.col(num_used_), nv) = column;
+        used_[static_cast<std::size_t>(num_used_++)] = a;
+      }
     }
-    if (bits != 0) {
-      jacobian_transposed_.col(num_used_) = jacobian_transposed.col(a);
-      used_[static_cast<std::size_t>(num_used_++)] = a;
+    if (num_used_ == 1) {
+      factor_(0, 0) = 1.0 + sized(jacobian_transposed_, nv).squaredNorm();
     }
-  }
+  });
   const auto J_T = columns();
-  if (num_used_ == 1) {
-    factor_(0, 0) = std::sqrt(1.0 + J_T.squaredNorm());
-  } else if (num_used_ > 1) {
+  if (num_used_ > 1) {
     const Eigen::Index size = std::min(num_used_, J_T.rows());
     Eigen::Ref<Eigen::MatrixXd> matrix = factor_.topLeftCorner(size, size);
     matrix.setIdentity();
@@ -65,9 +59,11 @@ void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept {
     return;
   }
   if (num_used_ == 1) {
-    const auto J_T = jacobian_transposed_.col(0);
-    const double share = J_T.dot(x) / (factor_(0, 0) * factor_(0, 0));
-    x -= share * J_T;
+    with_size(x.size(), [&](auto nv) {
+      const auto J_T = sized(jacobian_transposed_, nv);
+      auto result = sized(x, nv);
+      result -= J_T.dot(result) / factor_(0, 0) * J_T;
+    });
     return;
   }
   auto along = along_.head(num_used_);
@@ -76,10 +72,9 @@ void GraphMetric::solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept {
   x -= columns().lazyProduct(along);
 }
 
-void GraphMetric::solve_pullback(const Eigen::Ref<const Eigen::VectorXd>& c, Eigen::Ref<Eigen::VectorXd> x) noexcept {
+void GraphMetric::solve_pullback(ConstVectorRef c, Eigen::Ref<Eigen::VectorXd> x) noexcept {
   if (num_used_ == 1) {
-    const double share = c[used_[0]] / (factor_(0, 0) * factor_(0, 0));
-    x = share * jacobian_transposed_.col(0);
+    with_size(x.size(), [&](auto nv) { sized(x, nv) = c[used_[0]] / factor_(0, 0) * sized(jacobian_transposed_, nv); });
     return;
   }
   auto along = along_.head(num_used_);

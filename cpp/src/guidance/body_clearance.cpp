@@ -123,7 +123,7 @@ BodyClearance::Workspace::Workspace(const BodyClearance& body)
   intervals_.reserve(most_intervals);
 }
 
-void BodyClearance::place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept {
+void BodyClearance::place(ConstVectorRef q, Workspace& w) const noexcept {
   w.placed_ = q;
   for (std::size_t i = 0; i < rotations_.size(); ++i) {
     const Joint& joint = robot_.joints()[i];
@@ -295,7 +295,7 @@ double BodyClearance::look_at_plane(const Link& link, const Plane& plane, double
   return least;
 }
 
-BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap,
+BodyClearance::Nearest BodyClearance::nearest(ConstVectorRef q, const Obstacles& obstacles, double cap,
                                               Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
@@ -309,7 +309,7 @@ BodyClearance::Nearest BodyClearance::nearest(Eigen::Ref<const Eigen::VectorXd> 
   return nearest;
 }
 
-BodyClearance::Nearest BodyClearance::nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles,
+BodyClearance::Nearest BodyClearance::nearest(int item, ConstVectorRef q, const Obstacles& obstacles,
                                               double cap, Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
@@ -317,7 +317,7 @@ BodyClearance::Nearest BodyClearance::nearest(int item, Eigen::Ref<const Eigen::
   return {found.clearance, found.clearance < cap ? item : -1, found.point};
 }
 
-double BodyClearance::nearest_moving(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double time,
+double BodyClearance::nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time,
                                      Workspace& w) const noexcept {
   double nearest = infinity;
   if (!obstacles.tree().moves()) {
@@ -337,7 +337,7 @@ double BodyClearance::nearest_moving(Eigen::Ref<const Eigen::VectorXd> q, const 
   return nearest;
 }
 
-void BodyClearance::clearances(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w,
+void BodyClearance::clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
                                Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);

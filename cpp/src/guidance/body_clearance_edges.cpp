@@ -30,7 +30,7 @@ struct Motion {
 
 }  // namespace
 
-void BodyClearance::move(Eigen::Ref<const Eigen::VectorXd> velocity, Workspace& w) const noexcept {
+void BodyClearance::move(ConstVectorRef velocity, Workspace& w) const noexcept {
   for (std::size_t i = 0; i < rotations_.size(); ++i) {
     const Joint& joint = robot_.joints()[i];
     const Workspace::Pose& parent = pose(w, joint.parent);
@@ -61,7 +61,7 @@ double BodyClearance::speed(const Item& item, const Workspace& w) const noexcept
   return sum;
 }
 
-void BodyClearance::bound_motions(Eigen::Ref<const Eigen::VectorXd> displacement, Workspace& w) const noexcept {
+void BodyClearance::bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept {
   const Eigen::Index nv = displacement.size();
   w.lengths_ = displacement.cwiseAbs();
   w.motions_.noalias() = reaches_ * w.lengths_;
@@ -71,7 +71,7 @@ void BodyClearance::bound_motions(Eigen::Ref<const Eigen::VectorXd> displacement
   w.curvatures_.noalias() = bends_ * w.products_;
 }
 
-double BodyClearance::motion(int item, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> displacement,
+double BodyClearance::motion(int item, ConstVectorRef q, ConstVectorRef displacement,
                              Workspace& w) const noexcept {
   place(q, w);
   bound_motions(displacement, w);
@@ -80,7 +80,7 @@ double BodyClearance::motion(int item, Eigen::Ref<const Eigen::VectorXd> q, Eige
   return moved.distance(1.0);
 }
 
-double BodyClearance::margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, const Margins& margins,
+double BodyClearance::margin_at(int item, ConstVectorRef q, const Margins& margins,
                                 double& slope) const noexcept {
   double lowered = 0.0;
   for (const Margins::End& end : margins.ends) {
@@ -94,7 +94,7 @@ double BodyClearance::margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, c
   return margin(item, margins) - lowered;
 }
 
-bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, const Margins& margins,
+bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins,
                          Workspace& w) const noexcept {
   if (!q.allFinite()) {
     return false;
@@ -114,7 +114,7 @@ bool BodyClearance::free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& o
   return true;
 }
 
-bool BodyClearance::edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b,
+bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b,
                               const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
   w.difference_ = b - a;
   if (!a.allFinite() || !w.difference_.allFinite()) {

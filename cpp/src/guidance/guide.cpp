@@ -99,11 +99,11 @@ void Guide::set_obstacles(const Obstacles& obstacles) {
   ++scene_number_;
 }
 
-bool Guide::disturbed(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles) noexcept {
+bool Guide::disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept {
   return body_.nearest_moving(q, obstacles, foresight, here_) < disturbing;
 }
 
-GuideStatus Guide::step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept {
+GuideStatus Guide::step(ConstVectorRef q, double time, Attractor& attractor) noexcept {
   attractor.velocity.setZero(goal_.size());
   attractor.acceleration.setZero(goal_.size());
   attractor.places.col(0) = goal_;

@@ -101,8 +101,8 @@ Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const O
   return route;
 }
 
-void RouteFollower::enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q,
-                          Eigen::Ref<const Eigen::VectorXd> v) noexcept {
+void RouteFollower::enter(const Route& route, ConstVectorRef q,
+                          ConstVectorRef v) noexcept {
   at = 0;
   double nearest = (route.q.col(0) - q).squaredNorm();
   for (Eigen::Index k = 1; k < std::min(first, route.q.cols()); ++k) {
@@ -139,7 +139,7 @@ Eigen::Index RouteFollower::narrow(const Route& route, const RouteSettings& sett
   return count;
 }
 
-void RouteFollower::advance(const Route& route, const RouteSettings& settings, Eigen::Ref<const Eigen::VectorXd> q,
+void RouteFollower::advance(const Route& route, const RouteSettings& settings, ConstVectorRef q,
                             double duration, Eigen::Ref<Eigen::VectorXd> position,
                             Eigen::Ref<Eigen::VectorXd> velocity,
                             Eigen::Ref<Eigen::VectorXd> acceleration) noexcept {

@@ -29,33 +29,33 @@ kernels::UpdateLinks update_links() noexcept {
   return kernels::update_links_baseline;
 }
 
-using Column = Eigen::Map<Eigen::Vector4d>;
+void set(double (&column)[4], const Eigen::Vector3d& v) { Eigen::Map<Eigen::Vector4d>(column) << v, 0.0; }
 
-void set_columns(double (&columns)[3][4], const Eigen::Matrix3d& matrix) {
-  for (int k = 0; k < 3; ++k) {
-    Column(columns[k]) << matrix.col(k), 0.0;
-  }
-}
-
-/// A revolute joint turns by R_PJ exp(θ [a]×) = R_PJ (a aᵀ + cos θ (I − a aᵀ) + sin θ [a]×) (Rodrigues).
+/// A revolute joint turns by R_PJ exp(θ [a]×) = R_PJ B exp(θ [e_z]×) Bᵀ for a rotation B with B e_z = a.
 kernels::JointModel model_of(const Joint& joint) {
-  const Eigen::Matrix3d R_PJ = joint.X_PJ.linear();
   const Eigen::Vector3d& a = joint.axis;
+  Eigen::Matrix3d B;
+  B << Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), a;
+  const bool straight = a == Eigen::Vector3d::UnitZ();
+  if (!straight) {
+    B.col(0) = a.unitOrthogonal();
+    B.col(1) = a.cross(B.col(0));
+  }
+  const Eigen::Matrix3d axes = joint.X_PJ.linear() * B;
   kernels::JointModel model{};
-  Column(model.translation) << joint.X_PJ.translation(), 0.0;
-  Column(model.axis) << R_PJ * a, 0.0;
+  set(model.x, axes.col(0));
+  set(model.y, axes.col(1));
+  set(model.axis, axes.col(2));
+  set(model.translation, joint.X_PJ.translation());
+  for (int k = 0; k < 3; ++k) {
+    set(model.child[k], B.row(k));
+  }
   model.multiplier = joint.multiplier;
+  model.offset = joint.offset;
+  model.coordinate = joint.coordinate;
   model.parent = joint.parent;
   model.slides = joint.type == JointType::prismatic;
-  if (model.slides) {
-    set_columns(model.fixed, R_PJ);
-  } else {
-    Eigen::Matrix3d cross;
-    cross << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-    set_columns(model.fixed, R_PJ * a * a.transpose());
-    set_columns(model.cosine, R_PJ - R_PJ * a * a.transpose());
-    set_columns(model.sine, R_PJ * cross);
-  }
+  model.straight = straight;
   return model;
 }
 
@@ -74,26 +74,22 @@ KinematicState::KinematicState(const Robot& robot)
     links_[i].coordinate = joint.coordinate;
     joints->models.push_back(model_of(joint));
   }
-  joints_ = std::move(joints);
   constexpr std::size_t block = kernels::joint_block;
-  positions_.resize((links_.size() + block - 1) / block * block);
-  velocities_.resize(positions_.size());
+  joints->models.resize((links_.size() + block - 1) / block * block);
+  joints_ = std::move(joints);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.num_coordinates());
   update(robot, zero, zero);
 }
 
-void KinematicState::update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd> q,
-                            Eigen::Ref<const Eigen::VectorXd> v) noexcept {
-  q_ = q;
-  v_ = v;
-  for (std::size_t i = 0; i < links_.size(); ++i) {
-    const Joint& joint = robot.joints()[i];
-    positions_[i] = joint.multiplier * q[joint.coordinate] + joint.offset;
-    velocities_[i] = v[joint.coordinate];
-  }
+void KinematicState::update(const Robot& robot, ConstVectorRef q,
+                            ConstVectorRef v) noexcept {
+  with_size(robot.num_coordinates(), [&](auto nv) {
+    sized(q_, nv) = sized(q, nv);
+    sized(v_, nv) = sized(v, nv);
+  });
   if (!links_.empty()) {
-    update_links()(joints_->models.data(), num_links(), positions_.data(), velocities_.data(),
-                   links_.front().R_WL.data(), static_cast<int>(sizeof(Link) / sizeof(double)));
+    update_links()(joints_->models.data(), num_links(), q_.data(), v_.data(), links_.front().R_WL.data(),
+                   static_cast<int>(sizeof(Link) / sizeof(double)));
   }
 }
 

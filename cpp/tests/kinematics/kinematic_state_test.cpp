@@ -100,7 +100,9 @@ BOOST_AUTO_TEST_CASE(generalised_forces_of_many_wrenches_add_up) {
     for (int joint = 7; joint >= 0; --joint) {
       for (int k = random.integer(0, 2); k > 0; --k) {
         const SpatialForce wrench{random.vector(3), random.vector(3)};
-        sum.add(joint, wrench);
+        Vector6d numbers;
+        numbers << wrench.angular, wrench.linear;
+        sum.add(joint, numbers);
         accumulate_generalised_force(state, joint, wrench, one_by_one);
       }
     }

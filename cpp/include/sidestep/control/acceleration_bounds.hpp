@@ -83,8 +83,8 @@ struct AccelerationBounds {
 
   /// q [rad | m], v [/s] finite (nv); period [s]; the position limits are moved inwards by `position_margin`
   /// [rad | m]. No allocation.
-  void update(const JointLimits& limits, const Eigen::Ref<const Eigen::VectorXd>& q,
-              const Eigen::Ref<const Eigen::VectorXd>& v, double period, double position_margin = 0.0) noexcept;
+  void update(const JointLimits& limits, ConstVectorRef q,
+              ConstVectorRef v, double period, double position_margin = 0.0) noexcept;
 
   Eigen::VectorXd lower, upper;  ///< (nv) [rad/s^2 | m/s^2]
   std::vector<Limit> lower_limit, upper_limit;

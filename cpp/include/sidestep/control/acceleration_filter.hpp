@@ -20,9 +20,9 @@ class AccelerationFilter {
   explicit AccelerationFilter(const Robot& robot, AccelerationFilterSettings settings = {});
 
   /// Writes `solution`, of which `acceleration` is the result; always finite. Clearances: none if null. No allocation.
-  [[nodiscard]] TorqueStatus apply(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                   const Eigen::Ref<const Eigen::VectorXd>& v,
-                                   const Eigen::Ref<const Eigen::VectorXd>& acceleration, const Clearances* clearances,
+  [[nodiscard]] TorqueStatus apply(ConstVectorRef q,
+                                   ConstVectorRef v,
+                                   ConstVectorRef acceleration, const Clearances* clearances,
                                    TorqueSolution& solution) noexcept {
     return controller_.solve(q, v, acceleration, unit_mass_, no_bias_, clearances, solution);
   }

@@ -30,9 +30,9 @@ class Loop {
 
   /// One period at q [rad | m] and v [/s] (nv), with the mass matrix (nv, nv) and the bias (nv) [Nm | N] there. A size
   /// that is wrong counts as invalid input.
-  [[nodiscard]] LoopStatus step(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+  [[nodiscard]] LoopStatus step(ConstVectorRef q, ConstVectorRef v,
                                 Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
-                                Eigen::Ref<const Eigen::VectorXd> bias) noexcept;
+                                ConstVectorRef bias) noexcept;
 
   /// Of the last step: torque [Nm | N] and what was in its way.
   const TorqueSolution& solution() const noexcept { return solution_; }

@@ -145,7 +145,7 @@ class SafetyRows {
  private:
   /// τ [s], see above.
   double stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept;
-  double hardest_by_torque(const Eigen::Ref<const Eigen::VectorXd>& gradient, const JointLimits& limits,
+  double hardest_by_torque(ConstVectorRef gradient, const JointLimits& limits,
                            const BrakingTorque& torque) noexcept;
 
   SafetySettings settings_;

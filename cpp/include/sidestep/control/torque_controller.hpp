@@ -110,20 +110,20 @@ class TorqueController {
 
   /// q [rad | m], v [/s], wanted acceleration [/s^2], mass matrix M (nv, nv, symmetric), bias h [Nm | N]. A wrong size
   /// counts as invalid input. Writes all of `solution`, which must have been made for the same number of coordinates.
-  [[nodiscard]] TorqueStatus solve(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                   const Eigen::Ref<const Eigen::VectorXd>& v,
-                                   const Eigen::Ref<const Eigen::VectorXd>& acceleration,
+  [[nodiscard]] TorqueStatus solve(ConstVectorRef q,
+                                   ConstVectorRef v,
+                                   ConstVectorRef acceleration,
                                    const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                   const Eigen::Ref<const Eigen::VectorXd>& bias, TorqueSolution& solution) noexcept {
+                                   ConstVectorRef bias, TorqueSolution& solution) noexcept {
     return solve(q, v, acceleration, mass_matrix, bias, nullptr, solution);
   }
 
   /// The same with the clearances at (q, v), for example those of a GeometricSystem::Workspace; none if null.
-  [[nodiscard]] TorqueStatus solve(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                   const Eigen::Ref<const Eigen::VectorXd>& v,
-                                   const Eigen::Ref<const Eigen::VectorXd>& acceleration,
+  [[nodiscard]] TorqueStatus solve(ConstVectorRef q,
+                                   ConstVectorRef v,
+                                   ConstVectorRef acceleration,
                                    const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                   const Eigen::Ref<const Eigen::VectorXd>& bias, const Clearances* clearances,
+                                   ConstVectorRef bias, const Clearances* clearances,
                                    TorqueSolution& solution) noexcept;
 
   const TorqueControllerSettings& settings() const noexcept { return settings_; }

@@ -38,7 +38,7 @@ class Escape {
   /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. q (nv) [rad | m] is the state. `potential`,
   /// that of the goal followed in the step before (GoalPull::potential; NaN where there was none), serves for poses;
   /// of configurations the distance is known. No allocation.
-  const Goal& pursue(const Goal& goal, Eigen::Ref<const Eigen::VectorXd> q, double potential, double period) noexcept;
+  const Goal& pursue(const Goal& goal, ConstVectorRef q, double potential, double period) noexcept;
 
   /// Whether the last step followed a sub-goal.
   bool escaping() const noexcept { return escaping_; }
@@ -49,7 +49,7 @@ class Escape {
 
  private:
   bool is_elsewhere(const Goal& goal) noexcept;
-  void turn(bool escape, Eigen::Ref<const Eigen::VectorXd> q) noexcept;
+  void turn(bool escape, ConstVectorRef q) noexcept;
 
   EscapeSettings settings_;
   Eigen::VectorXd lower_, upper_;

@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <utility>
 
+#include "sidestep/kinematics/vectors.hpp"
+
 namespace sidestep {
 
 /// A square gain matrix; a diagonal one costs only what its diagonal does.
@@ -11,10 +13,11 @@ class Gain {
   explicit Gain(Eigen::MatrixXd matrix)
       : matrix_(std::move(matrix)), diagonal_(matrix_.diagonal()), is_diagonal_(matrix_.isDiagonal(0.0)) {}
 
-  /// result = matrix x. No allocation.
-  void multiply(const Eigen::VectorXd& x, Eigen::VectorXd& result) const noexcept {
+  /// result = matrix x, which do not overlap; `nv` is from with_size. No allocation.
+  template <class Vector, class Result, class Size>
+  void multiply(const Vector& x, Result&& result, Size nv) const noexcept {
     if (is_diagonal_) {
-      result = diagonal_.cwiseProduct(x);
+      result = sized(diagonal_, nv).cwiseProduct(x);
     } else {
       result = matrix_.lazyProduct(x);
     }

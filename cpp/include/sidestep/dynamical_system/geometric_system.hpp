@@ -97,23 +97,23 @@ class GeometricSystem {
 
   /// One step at (q, v) [rad, rad/s] towards `goal` [rad]. Never throws, never allocates; the status must be read.
   /// After a fallback only `workspace.acceleration` is of this step and, unless the state is invalid, what `embed` writes.
-  [[nodiscard]] StepStatus acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
-                                        Eigen::Ref<const Eigen::VectorXd> goal, const Obstacles& obstacles,
+  [[nodiscard]] StepStatus acceleration(ConstVectorRef q, ConstVectorRef v,
+                                        ConstVectorRef goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
 
   /// The same towards any goal, see goal.hpp.
-  [[nodiscard]] StepStatus acceleration(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+  [[nodiscard]] StepStatus acceleration(ConstVectorRef q, ConstVectorRef v,
                                         const Goal& goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
 
   /// The embedding alone, without a goal: coordinates and clearances of `workspace`. False, and nothing is written, where q
   /// or v is not finite. No allocation.
-  [[nodiscard]] bool embed(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v,
+  [[nodiscard]] bool embed(ConstVectorRef q, ConstVectorRef v,
                            const Obstacles& obstacles, Workspace& workspace) const noexcept;
 
   /// Whether the body at q, finite, reaches deeper than `depth` [m] into an obstacle, see Embedding: quick, and may miss
   /// it. No allocation.
-  bool touches(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double depth,
+  bool touches(ConstVectorRef q, const Obstacles& obstacles, double depth,
                Workspace& workspace) const noexcept;
 
   /// Why the motion of the step that `workspace` holds is what it is, see diagnosis.hpp. No allocation.
@@ -121,7 +121,7 @@ class GeometricSystem {
 
   /// The same, and whether a stop is because the goal itself is blocked. Takes a step at the goal too, so not for every
   /// step of a loop. A pose may be reached in many configurations and is not examined.
-  Diagnosis diagnose(Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v, const Goal& goal,
+  Diagnosis diagnose(ConstVectorRef q, ConstVectorRef v, const Goal& goal,
                      const Obstacles& obstacles, Workspace& workspace) const noexcept;
 
   /// This system with barriers that leave a goal (nv) [rad | m] free, see Barrier. Allocates: to be made when the goal or
@@ -135,8 +135,13 @@ class GeometricSystem {
   int num_embedding_coordinates() const noexcept { return num_embedding_coordinates_; }
 
  private:
-  void combine(const Obstacles& obstacles, Workspace& workspace) const noexcept;
-  StepStatus fall_back(StepStatus status, Eigen::Ref<const Eigen::VectorXd> v, Workspace& workspace) const noexcept;
+  // `nv` is from with_size (vectors.hpp).
+  template <class Size>
+  StepStatus step(ConstVectorRef q, ConstVectorRef v,
+                  const Goal& goal, const Obstacles& obstacles, Workspace& workspace, Size nv) const noexcept;
+  template <class Size>
+  void combine(const Obstacles& obstacles, Workspace& workspace, Size nv) const noexcept;
+  StepStatus fall_back(StepStatus status, ConstVectorRef v, Workspace& workspace) const noexcept;
 
   Robot robot_;
   std::vector<std::shared_ptr<const Embedding>> embeddings_;

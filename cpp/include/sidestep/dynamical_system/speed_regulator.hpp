@@ -48,7 +48,7 @@ class SpeedRegulator {
   };
 
   /// At velocity v and acceleration a without regulation (nv each). No allocation.
-  Result operator()(const Eigen::Ref<const Eigen::VectorXd>& v, const Eigen::Ref<const Eigen::VectorXd>& a,
+  Result operator()(ConstVectorRef v, ConstVectorRef a,
                     const JointLimits& limits, const Clearances& clearances) const noexcept;
 
   const SpeedRegulatorSettings& settings() const noexcept { return settings_; }

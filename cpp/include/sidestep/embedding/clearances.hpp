@@ -7,16 +7,16 @@ namespace sidestep {
 
 /// Where a clearance is and goes, one entry per coordinate.
 struct ClearanceStateView {
-  Eigen::Ref<Eigen::VectorXd> values;      ///< h (m) [m], signed
-  Eigen::Ref<Eigen::VectorXd> rates;       ///< dh/dt (m) [m/s], obstacle velocities included
-  Eigen::Ref<Eigen::VectorXd> curvatures;  ///< d²h/dt² at q̈ = 0 (m) [m/s²]
-  Eigen::Ref<Eigen::MatrixXd> gradients;   ///< ∂h/∂q as columns (nv × m) [m/rad]
+  Eigen::Map<Eigen::VectorXd> values;      ///< h (m) [m], signed
+  Eigen::Map<Eigen::VectorXd> rates;       ///< dh/dt (m) [m/s], obstacle velocities included
+  Eigen::Map<Eigen::VectorXd> curvatures;  ///< d²h/dt² at q̈ = 0 (m) [m/s²]
+  Eigen::Map<Eigen::MatrixXd> gradients;   ///< ∂h/∂q as columns (nv × m) [m/rad]
 };
 
 /// Where an embedding that is a barrier of clearances writes them.
 struct ClearanceView : ClearanceStateView {
-  Eigen::Ref<Eigen::VectorXi> nearest;  ///< (m) the nearest point; beyond the reach what approaches; -1: neither
-  Eigen::Ref<Eigen::VectorXd> margins;  ///< (m) SafetyRows keep no larger margins than these [m]
+  Eigen::Map<Eigen::VectorXi> nearest;  ///< (m) the nearest point; beyond the reach what approaches; -1: neither
+  Eigen::Map<Eigen::VectorXd> margins;  ///< (m) SafetyRows keep no larger margins than these [m]
   ClearanceStateView approach;          ///< of what the arm has to mind where it moves, see approach_mean.hpp
 };
 
@@ -29,8 +29,10 @@ struct ClearanceState {
         gradients(Eigen::MatrixXd::Zero(nv, num)) {}
 
   ClearanceStateView state_view(Eigen::Index start, Eigen::Index num) noexcept {
-    return {values.segment(start, num), rates.segment(start, num), curvatures.segment(start, num),
-            gradients.middleCols(start, num)};
+    return {{values.data() + start, num},
+            {rates.data() + start, num},
+            {curvatures.data() + start, num},
+            {gradients.data() + start * gradients.rows(), gradients.rows(), num}};
   }
 
   Eigen::VectorXd values, rates, curvatures;
@@ -54,7 +56,9 @@ struct Clearances : ClearanceState {
   void mind_nearest() { approach = *this; }
 
   ClearanceView view(Eigen::Index start, Eigen::Index num) noexcept {
-    return {state_view(start, num), nearest.segment(start, num), margins.segment(start, num),
+    return {state_view(start, num),
+            {nearest.data() + start, num},
+            {margins.data() + start, num},
             approach.state_view(start, num)};
   }
 

@@ -15,9 +15,9 @@ namespace sidestep {
 
 /// Where an embedding adds its m coordinates ψ, their gradients and their curvatures.
 struct EmbeddingView {
-  Eigen::Ref<Eigen::VectorXd> values;               ///< ψ (m)
-  Eigen::Ref<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m)
-  Eigen::Ref<Eigen::VectorXd> curvatures;           ///< d²ψ/dt² along q̇ = v, q̈ = 0 (m)
+  Eigen::Map<Eigen::VectorXd> values;               ///< ψ (m)
+  Eigen::Map<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m)
+  Eigen::Map<Eigen::VectorXd> curvatures;           ///< d²ψ/dt² along q̇ = v, q̈ = 0 (m)
   ClearanceView clearances;                         ///< for barriers of clearances; others leave it as it is
 };
 

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "sidestep/kinematics/vectors.hpp"
+
 namespace sidestep {
 
 /// The metric of the graph q ↦ (q, ψ(q)), from J = ∂ψ/∂q (m × nv):
@@ -31,7 +33,7 @@ class GraphMetric {
   void solve_in_place(Eigen::Ref<Eigen::VectorXd> x) noexcept;
 
   /// x ← G⁻¹ Jᵀ c for c (m). No allocation.
-  void solve_pullback(const Eigen::Ref<const Eigen::VectorXd>& c, Eigen::Ref<Eigen::VectorXd> x) noexcept;
+  void solve_pullback(ConstVectorRef c, Eigen::Ref<Eigen::VectorXd> x) noexcept;
 
   /// G itself (nv × nv), for tests and plots.
   Eigen::MatrixXd matrix() const;
@@ -44,7 +46,7 @@ class GraphMetric {
   Eigen::Index num_used_ = 0;            // coordinates with a gradient
   std::vector<Eigen::Index> used_;       // which ones
   Eigen::MatrixXd jacobian_transposed_;  // their gradients, as columns
-  Eigen::MatrixXd factor_;               // Cholesky factor of S, or of G, in the top left corner
+  Eigen::MatrixXd factor_;               // S if it is a number; else the Cholesky factor of S, or of G, top left
   Eigen::VectorXd along_;                // J x, then S⁻¹ J x
 };
 

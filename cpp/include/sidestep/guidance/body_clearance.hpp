@@ -113,19 +113,19 @@ class BodyClearance {
     int item = -1;   ///< -1: all are as far as `cap`
     int point = -1;  ///< which obstacle point, for an item of obstacles
   };
-  Nearest nearest(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
+  Nearest nearest(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
 
   /// The same of one item.
-  Nearest nearest(int item, Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap,
+  Nearest nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap,
                   Workspace& w) const noexcept;
 
   /// The clearance of every item, not above `cap` [m], into out (num_items).
-  void clearances(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double cap, Workspace& w,
+  void clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
   /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls around the
   /// links; infinity where all are at rest.
-  double nearest_moving(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, double time,
+  double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time,
                         Workspace& w) const noexcept;
 
   /// What `margins` ask of an item away from the ends [m].
@@ -134,20 +134,20 @@ class BodyClearance {
   }
 
   /// Whether every item keeps its margin at q. Ends at the first that does not.
-  bool free(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles, const Margins& margins,
+  bool free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins,
             Workspace& w) const noexcept;
 
   /// Whether every item keeps its margin, less the slack, everywhere on the straight edge from a to b.
-  bool edge_free(Eigen::Ref<const Eigen::VectorXd> a, Eigen::Ref<const Eigen::VectorXd> b, const Obstacles& obstacles,
+  bool edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles,
                  const Margins& margins, Workspace& w) const noexcept;
 
   /// How far a point of `item` can move, relative to what it keeps off, for a displacement of the joints [m].
-  double motion(int item, Eigen::Ref<const Eigen::VectorXd> displacement) const noexcept {
+  double motion(int item, ConstVectorRef displacement) const noexcept {
     return items_[static_cast<std::size_t>(item)].reach.dot(displacement.cwiseAbs());
   }
 
   /// The same from q on, by the smaller of the two bounds.
-  double motion(int item, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> displacement,
+  double motion(int item, ConstVectorRef q, ConstVectorRef displacement,
                 Workspace& w) const noexcept;
 
   /// R of every coordinate, of the item that moves most: (nv) [m], or 1 for a prismatic joint.
@@ -194,10 +194,10 @@ class BodyClearance {
   int add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name);
   void add_reach(Item& item, const Link& link) const;
   void add_tables();
-  void place(Eigen::Ref<const Eigen::VectorXd> q, Workspace& w) const noexcept;
-  void move(Eigen::Ref<const Eigen::VectorXd> velocity, Workspace& w) const noexcept;
+  void place(ConstVectorRef q, Workspace& w) const noexcept;
+  void move(ConstVectorRef velocity, Workspace& w) const noexcept;
   double speed(const Item& item, const Workspace& w) const noexcept;
-  void bound_motions(Eigen::Ref<const Eigen::VectorXd> displacement, Workspace& w) const noexcept;
+  void bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept;
   const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
   // How exact a clearance must be: not above `cap`, a lower bound from `near` on, and any that is below `stop`.
   struct Asked {
@@ -207,7 +207,7 @@ class BodyClearance {
   Found look_at_points(const Item& item, const Obstacles& obstacles, const Asked& asked, Workspace& w) const noexcept;
   double look_at_pair(const Item& item, const Asked& asked, const Workspace& w) const noexcept;
   double look_at_plane(const Link& link, const Plane& plane, double cap, const Workspace& w) const noexcept;
-  double margin_at(int item, Eigen::Ref<const Eigen::VectorXd> q, const Margins& margins, double& slope) const noexcept;
+  double margin_at(int item, ConstVectorRef q, const Margins& margins, double& slope) const noexcept;
 
   Robot robot_;
   std::vector<Link> links_;

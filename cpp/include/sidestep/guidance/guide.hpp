@@ -88,10 +88,10 @@ class Guide {
 
   /// Whether an obstacle that moves is within 10 cm of the arm, or could be in a second: barriers that leave room at places are
   /// for what rests. For the loop; allocates nothing.
-  [[nodiscard]] bool disturbed(Eigen::Ref<const Eigen::VectorXd> q, const Obstacles& obstacles) noexcept;
+  [[nodiscard]] bool disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept;
 
   /// One step of the loop, at a time [s] that does not go back. Never blocks; allocates nothing unless synchronous.
-  [[nodiscard]] GuideStatus step(Eigen::Ref<const Eigen::VectorXd> q, double time, Attractor& attractor) noexcept;
+  [[nodiscard]] GuideStatus step(ConstVectorRef q, double time, Attractor& attractor) noexcept;
 
   /// What the guide found last: the path, or what is in the way. A copy; not for the loop.
   Plan last_plan() const;

@@ -41,7 +41,7 @@ struct RouteFollower {
   Eigen::Index at = 0;  ///< the sample before it
 
   /// Onto a new route, at the sample nearest to q among the first ones, as fast as the arm moves along it at v (nv).
-  void enter(const Route& route, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v) noexcept;
+  void enter(const Route& route, ConstVectorRef q, ConstVectorRef v) noexcept;
 
   static constexpr Eigen::Index most_places = 5;
   /// The narrow samples between the attractor and as far behind it as the arm may be, or every second, third, … of them:
@@ -49,7 +49,7 @@ struct RouteFollower {
   Eigen::Index narrow(const Route& route, const RouteSettings& settings, Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
 
   /// Moves on for `duration` [s]; writes attractor, its velocity and, along the route, its acceleration (nv).
-  void advance(const Route& route, const RouteSettings& settings, Eigen::Ref<const Eigen::VectorXd> q, double duration,
+  void advance(const Route& route, const RouteSettings& settings, ConstVectorRef q, double duration,
                Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity,
                Eigen::Ref<Eigen::VectorXd> acceleration) noexcept;
 };

@@ -34,9 +34,9 @@ class KinematicState {
   explicit KinematicState(const Robot& robot);
 
   /// Computes everything at (q, v); q and v have `robot.num_coordinates()` entries. No allocation.
-  void update(const Robot& robot, Eigen::Ref<const Eigen::VectorXd> q, Eigen::Ref<const Eigen::VectorXd> v) noexcept;
+  void update(const Robot& robot, ConstVectorRef q, ConstVectorRef v) noexcept;
 
-  struct Link {
+  struct alignas(64) Link {
     int parent;                 ///< index of the parent joint, -1 for the base
     int coordinate;             ///< which entry of q drives the joint
     Eigen::Matrix3d R_WL;       ///< orientation in the world
@@ -48,6 +48,8 @@ class KinematicState {
 
     /// The numbers from R_WL (by columns) to bias, one after the other, as inner loops read and write them.
     const double* numbers() const noexcept { return R_WL.data(); }
+    /// Those of the screw.
+    const double* screw_numbers() const noexcept { return screw.angular.data(); }
   };
   const Eigen::VectorXd& q() const noexcept { return q_; }
   const Eigen::VectorXd& v() const noexcept { return v_; }
@@ -60,7 +62,6 @@ class KinematicState {
   Eigen::VectorXd q_, v_;
   std::vector<Link> links_;
   std::shared_ptr<const Joints> joints_;
-  std::vector<double> positions_, velocities_;  // of the joints, to whole blocks
 };
 
 /// Pose X_WF of a frame.
@@ -84,16 +85,15 @@ class GeneralisedForce {
   GeneralisedForce(const KinematicState& state, Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept
       : state_(state), force_(generalised_force.data()) {}
 
-  /// `joint` is not after those before.
-  void add(int joint, const SpatialForce& wrench) noexcept {
+  /// A wrench about the world origin, its moment first; `joint` is not after those before.
+  void add(int joint, const Vector6d& wrench) noexcept {
     go_down_to(joint);
     if (joint_ != joint) {  // on another branch, or the first
       go_down_to(-1);
       joint_ = joint;
       wrench_ = wrench;
     } else {
-      wrench_.angular += wrench.angular;
-      wrench_.linear += wrench.linear;
+      wrench_ += wrench;
     }
   }
   /// To be called once, after all.
@@ -103,14 +103,14 @@ class GeneralisedForce {
   void go_down_to(int joint) noexcept {
     while (joint_ > joint) {
       const KinematicState::Link& link = state_.link(joint_);
-      force_[link.coordinate] += link.screw.angular.dot(wrench_.angular) + link.screw.linear.dot(wrench_.linear);
+      force_[link.coordinate] += Eigen::Map<const Vector6d>(link.screw_numbers()).dot(wrench_);
       joint_ = link.parent;
     }
   }
 
   const KinematicState& state_;
   double* force_;
-  SpatialForce wrench_ = {};
+  Vector6d wrench_ = Vector6d::Zero();
   int joint_ = -1;
 };
 

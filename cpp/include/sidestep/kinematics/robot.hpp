@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "sidestep/kinematics/vectors.hpp"
+
 namespace sidestep {
 
 /// How a joint moves its child. A continuous joint is a revolute one whose position limits are infinite.

@@ -28,10 +28,11 @@ struct GaussianBlock {
 /// Points, three numbers after three. `velocities` is null where all are at rest.
 struct DensityPoints {
   int num;
+  double weight;  // of each
   const double *positions, *radii, *velocities;
 };
 
-/// Sums over the points of the density and its second time derivative, lane by lane; and the wrench of every Gaussian
+/// Weighted sums over the points of the density and its second time derivative, lane by lane; and the wrench of every Gaussian
 /// on its link about the world origin.
 struct DensitySums {
   alignas(64) double value[most_lanes], curvature[most_lanes];

@@ -36,8 +36,44 @@ inline void store(double (&rows)[3][most_lanes], int first, const Vectors& v) no
   store(rows[2] + first, v.z);
 }
 
+#if defined(__AVX2__)
+/// Two numbers of every other link.
+inline Lanes pairs(const double* const* links, int at) noexcept {
+#if defined(__AVX512F__)
+  __m512d x = _mm512_castpd128_pd512(_mm_loadu_pd(links[0] + at));
+  x = _mm512_insertf64x2(x, _mm_loadu_pd(links[2] + at), 1);
+  x = _mm512_insertf64x2(x, _mm_loadu_pd(links[4] + at), 2);
+  return _mm512_insertf64x2(x, _mm_loadu_pd(links[6] + at), 3);
+#else
+  return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(links[0] + at)), _mm_loadu_pd(links[2] + at), 1);
+#endif
+}
+
+inline Lanes first_of_pairs(Lanes even, Lanes odd) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_maskz_unpacklo_pd(0xff, even, odd);
+#else
+  return _mm256_unpacklo_pd(even, odd);
+#endif
+}
+
+inline Lanes second_of_pairs(Lanes even, Lanes odd) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_maskz_unpackhi_pd(0xff, even, odd);
+#else
+  return _mm256_unpackhi_pd(even, odd);
+#endif
+}
+#endif
+
 /// Three numbers of the link of every lane.
 inline Vectors gather(const double* const* links, int at) noexcept {
+#if defined(__AVX2__)
+  // Two at a time: one by one they all have to be shuffled into place.
+  const Lanes even = pairs(links, at), odd = pairs(links + 1, at);
+  return {first_of_pairs(even, odd), second_of_pairs(even, odd),
+          second_of_pairs(pairs(links, at + 1), pairs(links + 1, at + 1))};
+#else
   Vectors v;
   for (int i = 0; i < width; ++i) {
     v.x[i] = links[i][at];
@@ -45,6 +81,7 @@ inline Vectors gather(const double* const* links, int at) noexcept {
     v.z[i] = links[i][at + 2];
   }
   return v;
+#endif
 }
 
 /// The links of the lanes, from their numbers (see link_numbers.hpp).
@@ -122,7 +159,7 @@ void add_density(const GaussianBlock& gaussians, const double* const* numbers, c
       const Vectors t = peak * e;
       const Lanes exponent = -0.5 * e.dot(t);
       const auto counts = exponent > least_exponent;
-      const Lanes density = counts ? peak.scale * exponential(counts ? exponent : Lanes{}) : Lanes{};
+      const Lanes density = counts ? points.weight * peak.scale * exponential(counts ? exponent : Lanes{}) : Lanes{};
       const Lanes slope = t.dot(y_dot);
       // δψ = f · (δv + δω × x − δx): the wrench (x × f, f) about the world origin.
       const Vectors f = link.to_world({density * t.x, density * t.y, density * t.z});

@@ -221,26 +221,18 @@ inline unsigned below(Singles x, Singles limit) noexcept {
 #endif
 }
 
-/// eˣ for −700 < x < 700, within 2 units in the last place: x = n ln 2 + r, |r| ≤ ln 2 / 2, and Taylor in r.
+/// eˣ for −700 < x < 700, within 2 units in the last place: x = n ln 2 + r, |r| ≤ ln 2 / 2, and Taylor in r. Its terms are
+/// taken in pairs, and these in pairs (Estrin): one after the other they would wait for each other.
 inline Lanes exponential(Lanes x) noexcept {
   const Lanes magic = all(0x1.8p52);  // adding it leaves the nearest integer in the low bits
   const Lanes shifted = x * 0x1.71547652b82fep+0 + magic;
   const Lanes n = shifted - magic;
   const Lanes r = (x - n * 0x1.62e42fefap-1) - n * 0x1.cf79abc9e3b39p-40;  // ln 2 in two parts: the first product is exact
-  Lanes p = all(1.0 / 6227020800.0);
-  p = p * r + 1.0 / 479001600.0;
-  p = p * r + 1.0 / 39916800.0;
-  p = p * r + 1.0 / 3628800.0;
-  p = p * r + 1.0 / 362880.0;
-  p = p * r + 1.0 / 40320.0;
-  p = p * r + 1.0 / 5040.0;
-  p = p * r + 1.0 / 720.0;
-  p = p * r + 1.0 / 120.0;
-  p = p * r + 1.0 / 24.0;
-  p = p * r + 1.0 / 6.0;
-  p = p * r + 0.5;
-  p = p * r + 1.0;
-  p = p * r + 1.0;
+  const Lanes r2 = r * r, r4 = r2 * r2;
+  const Lanes p2 = r * (1.0 / 6.0) + 0.5 + r2 * (r * (1.0 / 120.0) + 1.0 / 24.0);
+  const Lanes p6 = r * (1.0 / 5040.0) + 1.0 / 720.0 + r2 * (r * (1.0 / 362880.0) + 1.0 / 40320.0);
+  const Lanes p10 = r * (1.0 / 39916800.0) + 1.0 / 3628800.0 + r2 * (r * (1.0 / 6227020800.0) + 1.0 / 479001600.0);
+  const Lanes p = 1.0 + (r + r2 * (p2 + r4 * (p6 + r4 * p10)));
   Bits bits;
   __builtin_memcpy(&bits, &shifted, sizeof bits);
   bits = (bits << 52) + (1023LL << 52);

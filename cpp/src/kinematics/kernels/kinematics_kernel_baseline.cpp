@@ -5,9 +5,9 @@
 
 namespace sidestep::kernels {
 
-void update_links_baseline(const JointModel* joints, int num, const double* positions, const double* velocities,
-                           double* links, int stride) noexcept {
-  update_links(joints, num, positions, velocities, links, stride);
+void update_links_baseline(const JointModel* joints, int num, const double* q, const double* v, double* links,
+                           int stride) noexcept {
+  update_links(joints, num, q, v, links, stride);
 }
 
 }  // namespace sidestep::kernels
