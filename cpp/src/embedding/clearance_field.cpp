@@ -41,7 +41,11 @@ kernels::LinkMotion motion_of(const KinematicState::Link& link) noexcept {
 }
 
 kernels::Points points_of(const PointTree& tree) noexcept {
-  kernels::Points points{{tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), {}};
+  kernels::Points points{{tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), {}, {}, {}};
+  if (tree.size() > 0) {
+    points.leaf_balls = tree.leaf_balls();
+    points.leaf_boxes = tree.leaf_boxes();
+  }
   for (int axis = 0; axis < 3 && tree.moves(); ++axis) {
     points.velocity[axis] = tree.velocity(axis);
   }
@@ -213,13 +217,11 @@ void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obst
       placed = true;
     };
     const auto visit = [&] {
-      tree.visit(measure, matters, [&](int first, int count, const PointTree::Ball& ball, const Eigen::Vector3d& half,
-                                    double largest) {
+      tree.visit(measure, matters, [&](int leaf, int count) {
         if (!placed) {
           place();
         }
-        if (kernel.collect(group, points,
-                           {first, count, ball.x, ball.y, ball.z, ball.radius, half.x(), half.y(), half.z(), largest})) {
+        if (kernel.collect(group, points, leaf, count)) {
           near = *std::max_element(group.near_leaf, group.near_leaf + cluster.size);
           ahead = *std::max_element(group.ahead_leaf, group.ahead_leaf + cluster.size);
         }
@@ -285,7 +287,8 @@ bool ClearanceField::touches(const KinematicState& state, const Obstacles& obsta
       }
     };
     const auto near = [&](double value, double) { return !found && value < 0.0; };
-    tree.visit(measure, near, [&](int first, int count, const PointTree::Ball&, const Eigen::Vector3d&, double) {
+    tree.visit(measure, near, [&](int leaf, int count) {
+      const int first = leaf * PointTree::leaf_size;
       for (int n = first; n < first + count && !found; ++n) {
         const Eigen::Vector3d x(tree.coordinate(0)[n], tree.coordinate(1)[n], tree.coordinate(2)[n]);
         if (!(distance(x.x(), x.y(), x.z(), tree.radii()[n]) < 0.0)) {

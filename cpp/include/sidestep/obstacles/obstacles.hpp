@@ -38,6 +38,9 @@ class Obstacles {
 
   /// Moves every point along its velocity: x += s * duration. No allocation.
   void advance(double duration) noexcept {
+    if (!tree_.moves()) {
+      return;
+    }
     points_ += duration * velocities_;
     tree_.advance(duration);
     version_ = next_version();

@@ -42,6 +42,10 @@ class PointTree {
   const double* velocity(int axis) const noexcept { return columns_[static_cast<std::size_t>(4 + axis)].data(); }
   static constexpr double padding = 1e9;  ///< [m], out of every reach
 
+  /// Of the leaves, around the same centres; leaf k holds the points from k `leaf_size` on. Not of a tree without points.
+  Balls leaf_balls() const noexcept { return levels_.front().balls(); }
+  Boxes leaf_boxes() const noexcept { return levels_.front().boxes(); }
+
   struct Nearest {
     double distance;
     int point;  ///< in tree order; -1: none
@@ -57,10 +61,7 @@ class PointTree {
   Nearest nearest(double limit, double stop, Measure&& measure) const noexcept {
     Nearest found{limit, -1};
     if (!levels_.empty()) {
-      std::size_t top = levels_.size() - 1;  // of levels that one measurement holds the lowest
-      while (top > 0 && levels_[top - 1].size <= leaf_size) {
-        --top;
-      }
+      const std::size_t top = top_level(leaf_size);
       descend_to_nearest(top, 0, levels_[top].size, stop, measure, found);
     }
     return found;
@@ -77,15 +78,15 @@ class PointTree {
     alignas(64) std::array<double, fan_out> values, others;
   };
 
-  /// Calls leaf(first, count, ball, half, largest) for every leaf that matters, as do all nodes above it, those of a node in
-  /// the order of the first measure. measure(Balls, first, count, Bounds&) bounds what is in the balls [first, first + count)
-  /// by arrays that go on for `fan_out` from `first`; matters(value, other), asked just before, may become stricter on the
-  /// way. half: of the box around the points of a leaf, which has the same centre; largest: of their radii [m]. No
-  /// allocation.
+  /// Calls leaf(k, count) for every leaf k that matters, with its number of points, as do all nodes above it, those of a node
+  /// in the order of the first measure. measure(Balls, first, count, Bounds&) bounds what is in the balls [first, first + count)
+  /// by arrays that go on for `fan_out` from `first`; matters(value, other), asked again just before, may become stricter on
+  /// the way. No allocation.
   template <class Measure, class Matters, class Leaf>
   void visit(Measure&& measure, Matters&& matters, Leaf&& leaf) const noexcept {
     if (!levels_.empty()) {
-      descend(levels_.size() - 1, 0, 1, measure, matters, leaf);
+      const std::size_t top = top_level(fan_out);
+      descend(top, 0, levels_[top].size, measure, matters, leaf);
     }
   }
 
@@ -109,6 +110,15 @@ class PointTree {
     }
   };
 
+  /// The lowest level that one measurement holds.
+  std::size_t top_level(int most) const noexcept {
+    std::size_t top = levels_.size() - 1;
+    while (top > 0 && levels_[top - 1].size <= most) {
+      --top;
+    }
+    return top;
+  }
+
   void refit() noexcept;
   void fit(std::size_t level, int node) noexcept;
 
@@ -118,25 +128,30 @@ class PointTree {
     Bounds bounds;
     measure(nodes.balls(), first, count, bounds);
     std::array<int, fan_out> order;
+    int num = 0;  // that matter, nearest first
     for (int i = 0; i < count; ++i) {
-      int at = i;
-      for (; at > 0 && bounds.values[static_cast<std::size_t>(order[static_cast<std::size_t>(at) - 1])] >
-                           bounds.values[static_cast<std::size_t>(i)];
-           --at) {
-        order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at) - 1];
+      const double value = bounds.values[static_cast<std::size_t>(i)];
+      if (!matters(value, bounds.others[static_cast<std::size_t>(i)])) {
+        continue;
+      }
+      int at = num++;
+      for (; at > 0; --at) {
+        const int before = order[static_cast<std::size_t>(at) - 1];
+        if (!(bounds.values[static_cast<std::size_t>(before)] > value)) {
+          break;
+        }
+        order[static_cast<std::size_t>(at)] = before;
       }
       order[static_cast<std::size_t>(at)] = i;
     }
-    for (int n = 0; n < count; ++n) {
+    for (int n = 0; n < num; ++n) {
       const auto i = static_cast<std::size_t>(order[static_cast<std::size_t>(n)]);
-      if (!matters(bounds.values[i], bounds.others[i])) {
+      if (n > 0 && !matters(bounds.values[i], bounds.others[i])) {  // it may do so no more
         continue;
       }
       const int node = first + static_cast<int>(i);
       if (level == 0) {
-        const auto at = static_cast<std::size_t>(node);
-        const Eigen::Vector3d half(nodes.half[0][at], nodes.half[1][at], nodes.half[2][at]);
-        leaf(node * leaf_size, std::min(leaf_size, size() - node * leaf_size), nodes.ball(node), half, nodes.largest[at]);
+        leaf(node, std::min(leaf_size, size() - node * leaf_size));
       } else {
         const int below = node * fan_out;
         descend(level - 1, below, std::min(fan_out, levels_[level - 1].size - below), measure, matters, leaf);

@@ -7,11 +7,13 @@
 // instruction set must not emit code that others share, such as Eigen's inline functions.
 namespace sidestep::kernels {
 
-/// Points as structure of arrays, padded to whole registers. `velocity[0]` is null where all are at rest.
+/// Points as structure of arrays, padded to whole leaves of `most_points`. `velocity[0]` is null where all are at rest.
 struct Points {
   const double* position[3];
   const double* radius;
   const double* velocity[3];
+  Balls leaf_balls;  // hold the balls of a leaf's points
+  Boxes leaf_boxes;  // hold the points themselves, around the same centres, with their largest radius
 };
 
 /// How a link moves: spatial velocity and bias at the world origin, in the world (see kinematic_state.hpp).
@@ -83,14 +85,6 @@ struct QueryGroup {
   Query queries[most_queries];
 };
 
-/// The balls of a leaf's points lie within `radius` of (x, y, z); the points lie in a box with that centre, and have radii
-/// of up to `largest`.
-struct Leaf {
-  int first, count;
-  double x, y, z, radius;
-  double half_x, half_y, half_z, largest;
-};
-
 /// A ball around ellipsoids of a link.
 struct MovingBall {
   double centre[3], radius;
@@ -104,9 +98,9 @@ struct MovingBall {
 struct ClearanceKernel {
   /// Bounds of the clearances of nodes [first, first + count), and of h + τ h'; both have room for whole registers.
   void (*measure)(const MovingBall& cluster, const Balls& nodes, int first, int count, double* bounds, double* after) noexcept;
-  /// Adds points that may weigh to the candidates, and lowers the limits of the group. Where there is no room, the candidates
+  /// Adds points of a leaf that may weigh to the candidates, and lowers the limits of the group. Where there is no room, the candidates
   /// before are summed. Returns whether a limit of leaves fell, or rose to the window.
-  bool (*collect)(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept;
+  bool (*collect)(QueryGroup& group, const Points& points, int leaf, int count) noexcept;
   /// Adds the candidates of query k to its sums, and forgets them.
   void (*sum)(QueryGroup& group, int k, const Points& points) noexcept;
 };

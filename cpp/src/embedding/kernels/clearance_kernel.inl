@@ -88,7 +88,7 @@ Lanes decay(double shift, double inverse_T) noexcept {
 /// As Horizon::closing_speed: the angle of n to x is within that of the ball, asin(radius/|x|). `across` is |x × v|.
 template <class Values>
 Values closing_speed(Values along, Values across, Values inverse_distance, Values radius, Values speed) noexcept {
-  const Values sine = radius * inverse_distance, cosine = root(larger(1 - sine * sine, Values{}));
+  const Values sine = radius * inverse_distance, cosine = quick_root(1 - sine * sine);
   const Values turned = (along * cosine + across * sine) * inverse_distance;
   return (sine < 1) & (along * inverse_distance < speed * cosine) ? turned : speed;
 }
@@ -183,6 +183,19 @@ struct Inside {
 /// As many of the lanes as there are, as bits.
 inline unsigned first_lanes(int count) noexcept { return count < singles ? (1u << count) - 1u : (2u << (singles - 1)) - 1u; }
 
+struct Leaf {
+  int first, count;
+  double x, y, z, radius;
+
+  Leaf(const Points& points, int leaf, int number) noexcept
+      : first(leaf * most_points),
+        count(number),
+        x(points.leaf_balls.x[leaf]),
+        y(points.leaf_balls.y[leaf]),
+        z(points.leaf_balls.z[leaf]),
+        radius(points.leaf_balls.radius[leaf]) {}
+};
+
 /// The points of a leaf in single precision, seen from its centre, and how they move as a link sees them.
 struct LeafPoints {
   alignas(64) float position[3][most_points], radius[most_points], velocity[3][most_points];
@@ -244,8 +257,8 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept;
 struct Look {
   int k, n;        // ellipsoid and first point
   unsigned asked;  // lanes
-  Singles x[3], e[3], second;  // the offset in the world and in principal axes, and Σ A e²
-  Singles distance, inverse_distance, radius, error;
+  Singles x[3], e[3];  // the offset in the world and in principal axes
+  Singles distance, radius, error;
   Singles closing;             // within the horizon, at most
   Outside<Singles> out;
   Singles inverse_norm, least;  // h from below
@@ -271,7 +284,7 @@ struct Look {
     x[2] = load(in_leaf.position[2] + n) + static_cast<float>(leaf.z - group.centre[2][k]);
     radius = load(in_leaf.radius + n);
     const Singles squared = larger(dot(x, x), all(1e-30f));
-    inverse_distance = inverse_root(squared);
+    const Singles inverse_distance = inverse_root(squared);
     distance = squared * inverse_distance;
     error = distance_error * (distance + extent) + in_leaf.blur;
     closing = smaller(load(in_leaf.closing + n), all(closing_of_leaf));
@@ -297,18 +310,6 @@ struct Look {
     return matters(group, least_by_ball) != 0;
   }
 
-  /// The same by the plane across the way to the point, towards which the ellipsoid reaches √(Σ A e²)/|e|.
-  bool turn(const QueryGroup& group) noexcept {
-    const float* R = group.queries[k].single.axes;
-    const float* A = group.queries[k].single.squared_axes;
-    second = Singles{};
-    for (int i = 0; i < 3; ++i) {
-      e[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
-      second += A[i] * e[i] * e[i];
-    }
-    return matters(group, distance - root(second) * inverse_distance - radius - error) != 0;
-  }
-
   void place(const float* A) noexcept {
     out.place(A, e);
     inverse_norm = out.inverse_norm();
@@ -316,13 +317,16 @@ struct Look {
   }
 
   /// t from below, and so is t |w| below h: the best of where Newton's iteration comes to from infinity and, along every axis,
-  /// of that axis alone. Returns whether any point may matter.
-  bool bound(const QueryGroup& group) noexcept {
+  /// of that axis alone.
+  void bound(const QueryGroup& group) noexcept {
     const auto& single = group.queries[k].single;
-    const float* A = single.squared_axes;
-    Singles fourth = {};
+    const float *R = single.axes, *A = single.squared_axes;
+    Singles second = {}, fourth = {};  // Σ A e² and Σ A² e²
     for (int i = 0; i < 3; ++i) {
-      fourth += A[i] * A[i] * e[i] * e[i];
+      e[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+      const Singles share = A[i] * e[i];
+      second += share * e[i];
+      fourth += share * share;
     }
     // The root of nothing is not quite nothing: at the centre t is 0.
     out.t = larger(root(second) - fourth * inverse(second > 1e-30f ? second : all(1e-30f)) - 1e-12f, Singles{});
@@ -330,7 +334,6 @@ struct Look {
       out.t = larger(single.semi_axes[i] * magnitude(e[i]) - A[i], out.t);
     }
     place(A);
-    return matters(group, least) != 0;
   }
 
   /// Newton's iteration, as far as it matters.
@@ -360,6 +363,9 @@ struct Look {
     const Singles after_least = rate_known ? least + after - after_error : least - closing;
     const unsigned is_near = below(least, all(group.near[k])) & asked;
     const unsigned kept = is_near | (below(after_least, all(group.ahead[k])) & asked);
+    if (kept == 0) {
+      return false;
+    }
     const Singles h_most = inside ? error - radius : converged ? least + 2.0f * error : distance - shortest - radius + error;
     const Singles after_most = rate_known ? h_most + after + after_error : all(__builtin_inff());
     bool changed = false;
@@ -665,7 +671,9 @@ inline Singles beyond(Singles x, float half) noexcept {
   return x > half ? x - half : x < -half ? x + half : Singles{};
 }
 
-bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept {
+bool collect(QueryGroup& group, const Points& points, int leaf_number, int count) noexcept {
+  const Leaf leaf(points, leaf_number, count);
+  const Boxes& boxes = points.leaf_boxes;
   bool changed = false;
   // The link's point at the centre of the leaf moves by v, at others of the leaf by a little more.
   const LinkMotion& link = *group.link;
@@ -677,7 +685,7 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
   const float more = static_cast<float>(link.turning * leaf.radius + group.fastest) + rate_error * speed;
   const float at[3] = {static_cast<float>(leaf.x - group.origin[0]), static_cast<float>(leaf.y - group.origin[1]),
                        static_cast<float>(leaf.z - group.origin[2])};
-  const float ball = static_cast<float>(leaf.radius), largest = static_cast<float>(leaf.largest);
+  const float ball = static_cast<float>(leaf.radius), largest = static_cast<float>(boxes.radius[leaf_number]);
   const float* R = link.to_link;
   for (int first = 0; first < group.size; first += singles) {
     const Singles x = at[0] - load(group.offset[0] + first), y = at[1] - load(group.offset[1] + first),
@@ -686,8 +694,9 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
     const Singles inverse_distance = inverse_root(squared > 1e-30f ? squared : all(1e-30f));
     const Singles distance = squared * inverse_distance, radius = extent + ball;
     // All of the box lies beyond the plane across the shortest way to it, and the ellipsoid reaches √(xᵀ S x)/|x| along it.
-    const Singles to_box[3] = {beyond(x, static_cast<float>(leaf.half_x)), beyond(y, static_cast<float>(leaf.half_y)),
-                               beyond(z, static_cast<float>(leaf.half_z))};
+    const Singles to_box[3] = {beyond(x, static_cast<float>(boxes.half_x[leaf_number])),
+                               beyond(y, static_cast<float>(boxes.half_y[leaf_number])),
+                               beyond(z, static_cast<float>(boxes.half_z[leaf_number]))};
     Singles in_link[3], squared_to_box = {};
     for (int i = 0; i < 3; ++i) {
       squared_to_box += to_box[i] * to_box[i];
@@ -718,7 +727,7 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
     const LeafPoints in_leaf(points, leaf, link, motion, static_cast<float>(group.horizon));
     for (int n = 0; n < leaf.count; n += singles) {
       Look looks[singles];
-      int num_looks = 0, num_bounded = 0, bounded[singles];
+      int num_looks = 0;
       for (unsigned left = lanes; left != 0; left &= left - 1) {
         const int k = first + __builtin_ctz(left);
         Look& look = looks[num_looks];
@@ -728,17 +737,16 @@ bool collect(QueryGroup& group, const Points& points, const Leaf& leaf) noexcept
         if (!group.queries[k].ready) {
           prepare(group, k);
         }
-        num_looks += look.turn(group);
+        ++num_looks;
       }
       for (int i = 0; i < num_looks; ++i) {
-        bounded[num_bounded] = i;
-        num_bounded += looks[i].bound(group);
+        looks[i].bound(group);
       }
-      for (int i = 0; i < num_bounded; ++i) {
-        looks[bounded[i]].refine(group);
+      for (int i = 0; i < num_looks; ++i) {
+        looks[i].refine(group);
       }
-      for (int i = 0; i < num_bounded; ++i) {
-        changed |= looks[bounded[i]].keep(group, points, leaf, in_leaf);
+      for (int i = 0; i < num_looks; ++i) {
+        changed |= looks[i].keep(group, points, leaf, in_leaf);
       }
     }
   }
@@ -764,9 +772,9 @@ void measure(const MovingBall& cluster, const Balls& nodes, int first, int count
       const Lanes turned = x[j] * v[l] - x[l] * v[j];
       across += turned * turned;
     }
-    const Lanes distance = root(squared);
-    const Lanes closing =
-        closing_speed(along, root(across), 1.0 / distance, radius, root(speed)) + cluster.turning * ball + cluster.fastest;
+    const Lanes inverse_distance = inverse_root(larger(squared, all(1e-300))), distance = squared * inverse_distance;
+    const Lanes closing = closing_speed(along, quick_root(across), inverse_distance, radius, quick_root(speed)) +
+                          cluster.turning * ball + cluster.fastest;
     store(bounds + n, distance - radius);
     store(after + n, distance - radius - cluster.horizon * closing);
   }

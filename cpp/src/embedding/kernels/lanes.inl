@@ -80,6 +80,16 @@ inline Lanes inverse_root(Lanes x) noexcept {
 #endif
 }
 
+/// √x within 1e-15, or 1e-150; of numbers below zero as well.
+inline Lanes quick_root(Lanes x) noexcept {
+#if defined(__AVX512F__)
+  const Lanes positive = larger(x, all(1e-300));
+  return positive * inverse_root(positive);
+#else
+  return root(larger(x, Lanes{}));
+#endif
+}
+
 /// Lane i is bit i.
 inline unsigned below(Lanes x, Lanes limit) noexcept {
 #if defined(__AVX512F__)
@@ -146,7 +156,7 @@ inline Singles root(Singles x) noexcept {
   const Singles positive = x > 1e-30f ? x : all(1e-30f);
   return positive * inverse_root(positive);
 }
-
+inline Singles quick_root(Singles x) noexcept { return root(x); }
 
 /// Writes the lanes that are bits one after another; what lies between them and a full register is overwritten.
 inline void compress(float* p, Singles x, unsigned lanes) noexcept {
