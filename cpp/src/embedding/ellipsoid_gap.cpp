@@ -6,19 +6,18 @@
 namespace sidestep {
 namespace {
 
-kernels::FindGaps find_gaps() noexcept {
+kernels::GapKernel gap_kernel() noexcept {
 #if defined(SIDESTEP_X86_KERNELS)
   switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::find_gaps_avx512;
-    case InstructionSet::avx2: return kernels::find_gaps_avx2;
+    case InstructionSet::avx512: return kernels::gap_kernel_avx512();
+    case InstructionSet::avx2: return kernels::gap_kernel_avx2();
     case InstructionSet::baseline: break;
   }
 #endif
-  return kernels::find_gaps_baseline;
+  return kernels::gap_kernel_baseline();
 }
 
-constexpr int capacity = EllipsoidPairs::capacity;
-
+template <int capacity>
 void write(const Eigen::Matrix3d& S, double (&columns)[6][capacity], int k) noexcept {
   int entry = 0;
   for (int i = 0; i < 3; ++i) {
@@ -52,13 +51,28 @@ void EllipsoidGaps::add(const Eigen::Vector3d& centre_a, const Eigen::Matrix3d& 
   write(S_b, pairs_.shape_b, k);
 }
 
-void EllipsoidGaps::solve() noexcept { find_gaps()(pairs_); }
+void EllipsoidGaps::solve() noexcept { gap_kernel().find(pairs_); }
 
 EllipsoidGap EllipsoidGaps::operator[](int k) const noexcept {
-  const auto column = [k](const double (&columns)[3][capacity]) {
+  const auto column = [k](const double (&columns)[3][EllipsoidPairs::capacity]) {
     return Eigen::Vector3d(columns[0][k], columns[1][k], columns[2][k]);
   };
   return {pairs_.value[k], pairs_.rate[k], pairs_.curvature[k], column(pairs_.normal), column(pairs_.contact)};
+}
+
+void EllipsoidRow::add(const Eigen::Vector3d& centre, const Eigen::Matrix3d& S) noexcept {
+  const int k = columns_.size++;
+  for (int i = 0; i < 3; ++i) {
+    columns_.centre[i][k] = centre[i];
+  }
+  write(S, columns_.shape, k);
+}
+
+void EllipsoidRow::bound(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& centre_b, const Eigen::Matrix3d& S_b,
+                         std::array<double, capacity>& bounds) const noexcept {
+  double shape[6][1];
+  write(S_b, shape, 0);
+  gap_kernel().bound(columns_, R_AB.data(), centre_b.data(), shape[0], bounds.data());
 }
 
 EllipsoidGap ellipsoid_gap(const Eigen::Vector3d& d, const Eigen::Matrix3d& S_a, const Eigen::Matrix3d& S_b) noexcept {

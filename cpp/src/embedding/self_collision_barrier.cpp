@@ -6,14 +6,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "sidestep/embedding/ellipsoid_gap.hpp"
+#include "kernels/most_lanes.hpp"
 
 namespace sidestep {
 namespace {
 
 constexpr const char* self_owner = "self-collision barrier";
 constexpr const char* plane_owner = "plane barrier";
-constexpr double closest_centres = 1e-6;  // [m] of which a direction is taken
 
 /// The ellipsoids of two links at a state, in the frame of the first.
 class PairOfLinks {
@@ -26,35 +25,34 @@ class PairOfLinks {
         p_(first_.R_WL.transpose() * (second_.p_WL - first_.p_WL)),
         velocity_(in_first(second_.velocity.angular - first_.velocity.angular,
                            second_.velocity.linear - first_.velocity.linear)),
-        a_{first.ellipsoids, first.centre, first.radius},
-        b_{second.ellipsoids, R_ * second.centre + p_, second.radius} {}
+        a_{first.ellipsoids, first.rows, first.centre, first.radius},
+        b_{second.ellipsoids, second.rows, R_ * second.centre + p_, second.radius} {}
 
-  /// Calls act(a, b, bound) for pairs of ellipsoids of which a lower bound of the gap is below the limit, which `act` may
-  /// lower. Balls are tested from the whole links down: most pairs of links, then of ellipsoids, are too far apart.
+  /// Calls act(a, b, bound) for pairs of ellipsoids of which a lower bound of the gap is below the limit, until it returns
+  /// true; returns whether it did. Most ellipsoids are too far from a ball around all of the other link.
   template <class Act>
-  void for_each_below(const double& limit, Act&& act) const noexcept {
-    if (!near(a_.centre, b_.centre, a_.radius + b_.radius + limit)) {
-      return;
+  bool find_below(double limit, Act&& act) const noexcept {
+    if (!within(limit)) {
+      return false;
     }
     for (const BodyEllipsoid& b : b_.ellipsoids) {
       const Eigen::Vector3d centre = R_ * b.mean + p_;
       if (!near(a_.centre, centre, a_.radius + b.extent + limit)) {
         continue;
       }
-      for (const BodyEllipsoid& a : a_.ellipsoids) {
-        const Eigen::Vector3d d = centre - a.mean;
-        if (!near(centre, a.mean, a.extent + b.extent + limit)) {
-          continue;
-        }
-        // φ of the unit vector along d, see ellipsoid_gap.hpp.
-        const Eigen::Vector3d d_b = R_.transpose() * d;
-        const double bound =
-            d.norm() - (std::sqrt(d.dot(a.shape * d)) + std::sqrt(d_b.dot(b.shape * d_b))) / std::max(d.norm(), closest_centres);
-        if (bound < limit) {
-          act(a, b, bound);
+      auto a = a_.ellipsoids.begin();
+      for (const EllipsoidRow& row : a_.rows) {
+        std::array<double, EllipsoidRow::capacity> bounds;
+        row.bound(R_, centre, b.shape, bounds);
+        for (int i = 0; i < row.size(); ++i, ++a) {
+          const double bound = bounds[static_cast<std::size_t>(i)];
+          if (bound < limit && act(*a, b, bound)) {
+            return true;
+          }
         }
       }
     }
+    return false;
   }
 
   EllipsoidGaps gaps() const noexcept {
@@ -66,7 +64,11 @@ class PairOfLinks {
                      second_.bias.linear - first_.bias.linear - own.angular.cross(linear) - own.linear.cross(angular))};
   }
 
+  /// Whether the balls around the links are so near that a gap may be below the limit.
+  bool within(double limit) const noexcept { return near(a_.centre, b_.centre, a_.radius + b_.radius + limit); }
   /// No gap shrinks faster [m/s].
+  double speed() const noexcept { return velocity_at(b_.centre).norm() + velocity_.angular.norm() * b_.radius; }
+  /// Nor faster than this, which takes longer.
   double closing_speed() const noexcept { return closing_speed(a_.centre, a_.radius, b_.centre, b_.radius); }
   /// Nor that of a and b.
   double closing_speed(const BodyEllipsoid& a, const BodyEllipsoid& b) const noexcept {
@@ -82,20 +84,21 @@ class PairOfLinks {
  private:
   struct Ellipsoids {
     const std::vector<BodyEllipsoid>& ellipsoids;
+    const std::vector<EllipsoidRow>& rows;
     Eigen::Vector3d centre;  // of a ball around them
     double radius;
-
-    auto begin() const noexcept { return ellipsoids.begin(); }
-    auto end() const noexcept { return ellipsoids.end(); }
   };
   /// What is taken at the world origin and expressed in the world, at the origin of the first link and in its frame.
   SpatialMotion in_first(const Eigen::Vector3d& angular, const Eigen::Vector3d& linear) const noexcept {
     return {first_.R_WL.transpose() * angular, first_.R_WL.transpose() * (linear + angular.cross(first_.p_WL))};
   }
+  Eigen::Vector3d velocity_at(const Eigen::Vector3d& point) const noexcept {
+    return velocity_.linear + velocity_.angular.cross(point);
+  }
   /// Of balls.
   double closing_speed(const Eigen::Vector3d& a, double radius_a, const Eigen::Vector3d& b,
                        double radius_b) const noexcept {
-    const Eigen::Vector3d d = a - b, v = velocity_.linear + velocity_.angular.cross(b);
+    const Eigen::Vector3d d = a - b, v = velocity_at(b);
     return Horizon::closing_speed(d.dot(v), d.norm(), radius_a + radius_b, v.norm()) +
            velocity_.angular.norm() * radius_b;
   }
@@ -110,33 +113,70 @@ class PairOfLinks {
   Ellipsoids a_, b_;
 };
 
-/// The means of the gaps of two links, from pairs of ellipsoids that come in any order.
+/// The means of the gaps of two links, over pairs of ellipsoids that come in any order, with lower bounds of their gaps.
 class MeanGap {
  public:
-  MeanGap(const PairOfLinks& links, double temperature, double horizon) noexcept
-      : links_(links), mean_(temperature), approach_(temperature, horizon), gaps_(links.gaps()) {}
+  /// Gaps matter up to a window beyond `reach`, or beyond `reach_ahead` once the horizon is over [m].
+  MeanGap(const PairOfLinks& links, double temperature, double horizon, double reach, double reach_ahead) noexcept
+      : links_(links),
+        mean_(temperature),
+        approach_(temperature, horizon),
+        gaps_(links.gaps()),
+        horizon_(horizon),
+        window_(BoltzmannMean::window * temperature),
+        least_(reach),
+        least_ahead_(reach_ahead) {}
 
-  /// Of one pair, which is not added; to be called before any is.
-  EllipsoidGap gap(const BodyEllipsoid& a, const BodyEllipsoid& b) noexcept {
-    gaps_.add(a.mean, a.shape, b.mean, b.shape);
-    gaps_.solve();
-    gaps_.clear();
-    return gaps_[0];
-  }
-
-  void add(const BodyEllipsoid& a, const BodyEllipsoid& b) noexcept {
-    if (gaps_.full()) {
-      flush();
+  void add(const BodyEllipsoid& a, const BodyEllipsoid& b, double bound) noexcept {
+    if (size_ == capacity) {
+      solve();
     }
-    components_[static_cast<std::size_t>(gaps_.size())] = b.component;
-    gaps_.add(a.mean, a.shape, b.mean, b.shape);
+    pairs_[static_cast<std::size_t>(size_++)] = {&a, &b, bound};
   }
 
   /// To be called after all have been added, and before what follows.
-  void flush() noexcept {
+  void solve() noexcept {
+    // After those of the smallest bounds, most others need no solution.
+    const auto first = pairs_.begin() + std::min(size_, kernels::most_lanes), last = pairs_.begin() + size_;
+    std::nth_element(pairs_.begin(), first, last, [](const Pair& x, const Pair& y) { return x.bound < y.bound; });
+    std::for_each(pairs_.begin(), first, [&](const Pair& pair) { choose(pair); });
+    solve_chosen();
+    const double near = least_ + window_, minded = least_ahead_ + window_;
+    std::for_each(first, last, [&](const Pair& pair) {
+      if (pair.bound < near || pair.bound - horizon_ * links_.closing_speed(*pair.a, *pair.b) < minded) {
+        choose(pair);
+      }
+    });
+    solve_chosen();
+    size_ = 0;
+  }
+
+  ClearanceSample mean() const noexcept { return mean_.result(); }
+  ClearanceSample approach() const noexcept { return approach_.result(); }
+  int nearest() const noexcept { return nearest_; }  ///< of the second link
+
+ private:
+  static constexpr int capacity = 128;
+
+  struct Pair {
+    const BodyEllipsoid *a, *b;
+    double bound;
+  };
+
+  void choose(const Pair& pair) noexcept {
+    if (gaps_.full()) {
+      solve_chosen();
+    }
+    components_[static_cast<std::size_t>(gaps_.size())] = pair.b->component;
+    gaps_.add(pair.a->mean, pair.a->shape, pair.b->mean, pair.b->shape);
+  }
+
+  void solve_chosen() noexcept {
     gaps_.solve();
     for (int k = 0; k < gaps_.size(); ++k) {
       const ClearanceSample sample = links_.sample(gaps_[k]);
+      least_ = std::min(least_, sample.value);
+      least_ahead_ = std::min(least_ahead_, sample.value + horizon_ * sample.rate);
       approach_.add(sample);
       if (mean_.matters(sample.value) && mean_.add(sample)) {
         nearest_ = components_[static_cast<std::size_t>(k)];
@@ -145,17 +185,16 @@ class MeanGap {
     gaps_.clear();
   }
 
-  ClearanceSample mean() const noexcept { return mean_.result(); }
-  ClearanceSample approach() const noexcept { return approach_.result(); }
-  int nearest() const noexcept { return nearest_; }  ///< of the second link
-
- private:
   const PairOfLinks& links_;
   BoltzmannMean mean_;
   ApproachMean approach_;
   EllipsoidGaps gaps_;
   std::array<int, EllipsoidPairs::capacity> components_;  // of the second link
   int nearest_ = -1;
+  double horizon_, window_;
+  double least_, least_ahead_;  // gaps, and h + τ h', so far
+  int size_ = 0;
+  std::array<Pair, capacity> pairs_;
 };
 
 /// Half-width s of a link's ellipsoid along a unit vector n that stands still, with s' and s'' at q̈ = 0.
@@ -217,8 +256,12 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
   const std::vector<BodyEllipsoid> all = body_ellipsoids(robot, body, self_owner);
   const auto group = [&](const std::string& link) {
     Group g{link, robot.frames()[static_cast<std::size_t>(robot.frame_index(link))].joint,
-            of_link(all, body, link, self_owner), Eigen::Vector3d::Zero(), 0.0};
+            of_link(all, body, link, self_owner), {}, Eigen::Vector3d::Zero(), 0.0};
     for (const BodyEllipsoid& e : g.ellipsoids) {
+      if (g.rows.empty() || g.rows.back().full()) {
+        g.rows.emplace_back();
+      }
+      g.rows.back().add(e.mean, e.shape);
       g.centre += e.mean / static_cast<double>(g.ellipsoids.size());
     }
     for (const BodyEllipsoid& e : g.ellipsoids) {
@@ -243,38 +286,27 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
 
 void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state,
                                   const Obstacles& /*obstacles*/) const noexcept {
-  const double window = BoltzmannMean::window * temperature_;
   const Horizon ahead = horizon(state);
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const double contact = pairs_[i].contact;
     const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
-    // Most pairs of links end here. Of the others, what lies near the gap of the smallest bound matters, which is no
-    // smaller than the smallest.
-    const double closing = ahead.time * pair.closing_speed();
-    const double reach = std::max(reach_, ahead.distance + closing);
-    double least_bound = reach + pairs_[i].contact;  // of the gap
-    const BodyEllipsoid *first = nullptr, *second = nullptr;
-    pair.for_each_below(least_bound, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double bound) {
-      first = &a, second = &b;
-      least_bound = bound;
-    });
-    if (first == nullptr) {
+    // Most pairs of links end here.
+    if (!pair.within(std::max(reach_, ahead.distance + ahead.time * pair.speed()) + contact)) {
       continue;
     }
-    MeanGap gaps(pair, temperature_, ahead.time);
-    const EllipsoidGap gap = gaps.gap(*first, *second);
-    const double near = std::min(reach + pairs_[i].contact, gap.value) + window;
-    const double minded =
-        std::min(ahead.distance + pairs_[i].contact, gap.value + ahead.time * gap.rate) + window;
-    const double limit = std::max(near, minded + closing);
-    pair.for_each_below(limit, [&](const BodyEllipsoid& a, const BodyEllipsoid& b, double bound) {
-      if (bound < near || bound - ahead.time * pair.closing_speed(a, b) < minded) {
-        gaps.add(a, b);
-      }
+    const double reach = std::max(reach_, ahead.distance + ahead.time * pair.closing_speed());
+    if (!pair.find_below(reach + contact, [](const auto&...) { return true; })) {
+      continue;
+    }
+    MeanGap gaps(pair, temperature_, ahead.time, reach + contact, ahead.distance + contact);
+    pair.find_below(reach + contact + BoltzmannMean::window * temperature_, [&](const auto&... near) {
+      gaps.add(near...);
+      return false;
     });
-    gaps.flush();
+    gaps.solve();
     ClearanceSample mean = gaps.mean(), approach = gaps.approach();
-    mean.value -= pairs_[i].contact;
-    approach.value -= pairs_[i].contact;
+    mean.value -= contact;
+    approach.value -= contact;
     if (mean.value < reach) {
       const int first_joint = pairs_[i].first.joint, second_joint = pairs_[i].second.joint;
       const auto k = static_cast<Eigen::Index>(i);

@@ -1,6 +1,7 @@
 // The gap is proven: a point of each ellipsoid, so far apart, and a direction along which they are no less apart.
 #include "sidestep/embedding/ellipsoid_gap.hpp"
 
+#include <array>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <vector>
@@ -105,6 +106,38 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_finds_the_same_in_any_company) {
       for (int k = 0; k < gaps.size(); ++k) {
         // Normals differ by the accuracy at which the iteration ends, 1e-12, over the curvature; the same code not at all.
         agree(gaps[k], alone[static_cast<std::size_t>(k)], set == before ? 0.0 : 1e-11);
+      }
+    }
+  }
+  use(before);
+}
+
+BOOST_AUTO_TEST_CASE(bounds_are_those_of_the_line_of_centres) {
+  const InstructionSet before = instruction_set();
+  Random random(5);
+  for (const InstructionSet set : instruction_sets()) {
+    use(set);
+    for (int trial = 0; trial < 100; ++trial) {
+      const Eigen::Matrix3d R = test::random_pose(random, 0.0).linear(), S_b = shape(random, 0.01, 0.2);
+      const Eigen::Vector3d b = random.uniform(0.0, 0.6) * random.vector(3).normalized();
+      EllipsoidRow row;
+      std::vector<Eigen::Vector3d> centres;
+      std::vector<Eigen::Matrix3d> shapes;
+      for (int k = random.integer(1, EllipsoidRow::capacity); k > 0; --k) {
+        centres.push_back(0.3 * random.vector(3));
+        shapes.push_back(shape(random, 0.01, 0.2));
+        row.add(centres.back(), shapes.back());
+      }
+      BOOST_TEST(row.size() == static_cast<int>(centres.size()));
+      BOOST_TEST(row.full() == (row.size() == EllipsoidRow::capacity));
+      std::array<double, EllipsoidRow::capacity> bounds;
+      row.bound(R, b, S_b, bounds);
+      for (std::size_t k = 0; k < centres.size(); ++k) {
+        const Eigen::Vector3d d = b - centres[k], n = d.normalized();
+        const Eigen::Matrix3d S_here = R * S_b * R.transpose();
+        const double bound = d.norm() - std::sqrt(n.dot(shapes[k] * n)) - std::sqrt(n.dot(S_here * n));
+        BOOST_TEST(std::abs(bounds[k] - bound) < 1e-14);
+        BOOST_TEST(bounds[k] <= ellipsoid_gap(d, shapes[k], S_here).value + 1e-14);
       }
     }
   }

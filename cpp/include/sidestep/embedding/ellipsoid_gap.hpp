@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "sidestep/embedding/ellipsoid_pairs.hpp"
 #include "sidestep/kinematics/kinematic_state.hpp"
@@ -50,6 +51,25 @@ class EllipsoidGaps {
 
  private:
   EllipsoidPairs pairs_;
+};
+
+/// Ellipsoids of one link that gaps to an ellipsoid of another are bounded of, from below: φ of the line of centres.
+class EllipsoidRow {
+ public:
+  static constexpr int capacity = EllipsoidColumns::capacity;
+
+  bool full() const noexcept { return columns_.size == capacity; }
+  int size() const noexcept { return columns_.size; }
+
+  /// As in EllipsoidGaps. Not to be called when full.
+  void add(const Eigen::Vector3d& centre, const Eigen::Matrix3d& S) noexcept;
+
+  /// Writes a bound [m] for each to b, which has its centre at `centre_b` (3) here, and S in its own frame.
+  void bound(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& centre_b, const Eigen::Matrix3d& S_b,
+             std::array<double, capacity>& bounds) const noexcept;
+
+ private:
+  EllipsoidColumns columns_;
 };
 
 /// The gap of one pair at rest, with centres d apart.

@@ -26,4 +26,12 @@ struct EllipsoidPairs {
   alignas(64) double contact[3][capacity];                                  // the point of b nearest to a [m]
 };
 
+/// Ellipsoids of one link side by side, in its frame. What lies beyond `size` is finite.
+struct EllipsoidColumns {
+  static constexpr int capacity = 16;
+
+  int size = 0;
+  alignas(64) double centre[3][capacity] = {}, shape[6][capacity] = {};  // [m], S [m²]
+};
+
 }  // namespace sidestep

@@ -6,6 +6,7 @@
 #include "sidestep/embedding/barrier.hpp"
 #include "sidestep/embedding/body_ellipsoid.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
+#include "sidestep/embedding/ellipsoid_gap.hpp"
 #include "sidestep/embedding/link_pair.hpp"
 
 namespace sidestep {
@@ -17,8 +18,9 @@ namespace sidestep {
 /// mean (see boltzmann_mean.hpp).
 class SelfCollisionBarrier final : public Barrier {
  public:
-  /// Clearances are measured up to `reach` [m], at least to the activation distance, as in ClearanceBarrier. Throws std::invalid_argument if there is no pair, a link is unknown or has no ellipsoid, the two are
-  /// rigidly connected or `contact` is not finite; or names the setting at fault.
+  /// Clearances are measured up to `reach` [m], at least to the activation distance, as in ClearanceBarrier. Throws
+  /// std::invalid_argument if there is no pair, a link is unknown or has no ellipsoid, the two are rigidly connected or
+  /// `contact` is not finite; or names the setting at fault.
   SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<LinkPair>& pairs, BarrierFunction barrier,
                        double temperature = 0.002, double reach = 0.0);
 
@@ -32,6 +34,7 @@ class SelfCollisionBarrier final : public Barrier {
     std::string link;
     int joint;
     std::vector<BodyEllipsoid> ellipsoids;
+    std::vector<EllipsoidRow> rows;  // the same, side by side
     Eigen::Vector3d centre;  // of a ball around them
     double radius;
   };

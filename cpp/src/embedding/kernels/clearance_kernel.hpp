@@ -98,8 +98,8 @@ struct MovingBall {
 struct ClearanceKernel {
   /// Bounds of the clearances of nodes [first, first + count), and of h + τ h'; both have room for whole registers.
   void (*measure)(const MovingBall& cluster, const Balls& nodes, int first, int count, double* bounds, double* after) noexcept;
-  /// Adds points of a leaf that may weigh to the candidates, and lowers the limits of the group. Where there is no room, the candidates
-  /// before are summed. Returns whether a limit of leaves fell, or rose to the window.
+  /// Adds points of a leaf that may weigh to the candidates, and lowers the limits of the group. Where there is no room, the
+  /// candidates before are summed. Returns whether a limit of leaves fell, or rose to the window.
   bool (*collect)(QueryGroup& group, const Points& points, int leaf, int count) noexcept;
   /// Adds the candidates of query k to its sums, and forgets them.
   void (*sum)(QueryGroup& group, int k, const Points& points) noexcept;

@@ -1,5 +1,5 @@
 // Included by one file per instruction set, after gap_kernel.hpp and <immintrin.h> where there is one. Defines
-// find_gaps in an anonymous namespace.
+// find_gaps and bound_gaps in an anonymous namespace.
 
 namespace sidestep::kernels {
 namespace {
@@ -223,6 +223,33 @@ void find_gaps(EllipsoidPairs& pairs) noexcept {
   repeat_last(pairs.shape_b);
   for (int first = 0; first < pairs.size; first += width) {
     find(pairs, first);
+  }
+}
+
+/// φ of the unit vector along the line of centres.
+void bound_gaps(const EllipsoidColumns& a, const double* rotation, const double* centre, const double* shape,
+                double* bounds) noexcept {
+  Lanes S_b[6];
+  for (int i = 0; i < 6; ++i) {
+    S_b[i] = all(shape[i]);
+  }
+  for (int first = 0; first < a.size; first += width) {
+    Lanes S_a[6], d[3], d_b[3], S_d[3];
+    for (int i = 0; i < 6; ++i) {
+      S_a[i] = load(a.shape[i] + first);
+    }
+    for (int i = 0; i < 3; ++i) {
+      d[i] = centre[i] - load(a.centre[i] + first);
+    }
+    for (int i = 0; i < 3; ++i) {
+      d_b[i] = rotation[3 * i] * d[0] + rotation[3 * i + 1] * d[1] + rotation[3 * i + 2] * d[2];
+    }
+    const Lanes squared = dot(d, d), least = all(closest_centres * closest_centres);
+    multiply(S_a, d, S_d);
+    Lanes half_widths = quick_root(dot(d, S_d));
+    multiply(S_b, d_b, S_d);
+    half_widths += quick_root(dot(d_b, S_d));
+    store(bounds + first, (squared - half_widths) * inverse_root(larger(squared, least)));
   }
 }
 

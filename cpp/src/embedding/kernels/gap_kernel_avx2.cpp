@@ -8,9 +8,7 @@
 
 namespace sidestep::kernels {
 
-void find_gaps_avx2(EllipsoidPairs& pairs) noexcept {
-  find_gaps(pairs);
-}
+GapKernel gap_kernel_avx2() noexcept { return {find_gaps, bound_gaps}; }
 
 }  // namespace sidestep::kernels
 #endif

@@ -9,8 +9,6 @@
 
 namespace sidestep::kernels {
 
-void find_gaps_baseline(EllipsoidPairs& pairs) noexcept {
-  find_gaps(pairs);
-}
+GapKernel gap_kernel_baseline() noexcept { return {find_gaps, bound_gaps}; }
 
 }  // namespace sidestep::kernels
