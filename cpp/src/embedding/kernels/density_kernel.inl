@@ -135,6 +135,43 @@ struct Peak {
   }
 };
 
+/// A point as Gaussians see it. It is found out in steps, each for several points: the chain of operations of one is long,
+/// and the next one's runs beside it.
+struct Seen {
+  Vectors x, drag;            // the point, and −R ÿ for q̈ = 0 and ẍ = 0
+  Vectors t;                  // P e
+  Lanes exponent, scale;      // of the density
+  Lanes slope, bend;          // eᵀ P ẏ and ẏᵀ P ẏ
+
+  void place(const Links& link, const Vectors& mean, const GaussianBlock& gaussians, int first, const DensityPoints& points,
+             int n) noexcept {
+    // The point seen from the link: y and ẏ there.
+    x = all(points.positions + 3 * n);
+    const Vectors motion = link.linear + cross(link.angular, x);
+    Vectors slip = Vectors{} - motion, twice_own_less_motion = slip;
+    if (points.velocities != nullptr) {
+      const Vectors own = all(points.velocities + 3 * n);
+      slip = slip + own;
+      twice_own_less_motion = slip + own;
+    }
+    const Vectors e = link.from_world(x - link.position) - mean, y_dot = link.from_world(slip);
+    drag = link.bias_linear + cross(link.bias_angular, x) + cross(link.angular, twice_own_less_motion);
+    const Peak peak(gaussians, first, points.radii[n]);
+    t = peak * e;
+    exponent = -0.5 * e.dot(t);
+    scale = points.weight * peak.scale;
+    slope = t.dot(y_dot);
+    bend = y_dot.dot(peak * y_dot);
+  }
+
+  Lanes density() const noexcept {
+    const auto counts = exponent > least_exponent;
+    return counts ? scale * exponential(counts ? exponent : Lanes{}) : Lanes{};
+  }
+};
+
+constexpr int together = 4;  // points
+
 void add_density(const GaussianBlock& gaussians, const double* const* numbers, const DensityPoints& points,
                  DensitySums& sums) noexcept {
   for (int first = 0; first < gaussians.num; first += width) {
@@ -142,31 +179,26 @@ void add_density(const GaussianBlock& gaussians, const double* const* numbers, c
     const Vectors mean = load(gaussians.mean, first);
     Lanes value = load(sums.value + first), curvature = load(sums.curvature + first);
     Vectors force = {}, moment = {};
-    for (int n = 0; n < points.num; ++n) {
-      // The point seen from the link: y and ẏ there; and −R ÿ for q̈ = 0 and ẍ = 0.
-      const Vectors x = all(points.positions + 3 * n);
-      const Vectors motion = link.linear + cross(link.angular, x);
-      Vectors slip = Vectors{} - motion, twice_own_less_motion = slip;
-      if (points.velocities != nullptr) {
-        const Vectors own = all(points.velocities + 3 * n);
-        slip = slip + own;
-        twice_own_less_motion = slip + own;
+    for (int start = 0; start < points.num; start += together) {
+      const int number = points.num - start < together ? points.num - start : together;
+      Seen seen[together];
+      Lanes densities[together];
+      for (int i = 0; i < number; ++i) {
+        seen[i].place(link, mean, gaussians, first, points, start + i);
       }
-      const Vectors e = link.from_world(x - link.position) - mean, y_dot = link.from_world(slip);
-      const Vectors drag =
-          link.bias_linear + cross(link.bias_angular, x) + cross(link.angular, twice_own_less_motion);
-      const Peak peak(gaussians, first, points.radii[n]);
-      const Vectors t = peak * e;
-      const Lanes exponent = -0.5 * e.dot(t);
-      const auto counts = exponent > least_exponent;
-      const Lanes density = counts ? points.weight * peak.scale * exponential(counts ? exponent : Lanes{}) : Lanes{};
-      const Lanes slope = t.dot(y_dot);
-      // δψ = f · (δv + δω × x − δx): the wrench (x × f, f) about the world origin.
-      const Vectors f = link.to_world({density * t.x, density * t.y, density * t.z});
-      value += density;
-      curvature += density * (slope * slope - y_dot.dot(peak * y_dot)) + f.dot(drag);
-      force = force + f;
-      moment = moment + cross(x, f);
+      for (int i = 0; i < number; ++i) {
+        densities[i] = seen[i].density();
+      }
+      for (int i = 0; i < number; ++i) {
+        const Seen& at = seen[i];
+        const Lanes density = densities[i];
+        // δψ = f · (δv + δω × x − δx): the wrench (x × f, f) about the world origin.
+        const Vectors f = link.to_world({density * at.t.x, density * at.t.y, density * at.t.z});
+        value += density;
+        curvature += density * (at.slope * at.slope - at.bend) + f.dot(at.drag);
+        force = force + f;
+        moment = moment + cross(at.x, f);
+      }
     }
     store(sums.value + first, value);
     store(sums.curvature + first, curvature);
