@@ -125,18 +125,19 @@ void bind_embedding(nb::module_& m) {
       "and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between\n"
       "neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More\n"
       "costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What\n"
-      "approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises\n"
-      "ValueError that names what is wrong.")
+      "approaches is seen from as far as the arm needs to stop. window [temperatures]: points that are farther than\n"
+      "the nearest by more do not count, each of which would change the mean by window exp(-window) temperature at most,\n"
+      "2e-7 m; fewer cost less. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")
       .def(
           "__init__",
           [](ClearanceBarrier* self, const Robot& robot, const Body& body, double activation, double strength,
-             double power, double floor, double temperature, double reach) {
+             double power, double floor, double temperature, double reach, double window) {
             check_fitted_to(robot, body);
-            new (self) ClearanceBarrier(robot, body, {activation, strength, power, floor}, temperature, reach);
+            new (self) ClearanceBarrier(robot, body, {activation, strength, power, floor}, temperature, reach, window);
           },
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("activation") = 0.10, nb::arg("strength") = 0.1,
           nb::arg("power") = 2.0, nb::arg("floor") = 0.002, nb::arg("temperature") = 0.002,
-          nb::arg("reach") = 0.0)
+          nb::arg("reach") = 0.0, nb::arg("window") = ClearanceField::default_window)
       .def_prop_ro("activation", [](const ClearanceBarrier& b) { return b.function().activation; })
       .def_prop_ro("reach", &ClearanceBarrier::reach)
       .def_prop_ro("components",

@@ -68,17 +68,18 @@ def test_a_bad_pose_is_named(robot: ss.Robot, system: ss.GeometricSystem) -> Non
 
 def test_an_arm_found_inside_moves_out_and_says_so(robot: ss.Robot, system: ss.GeometricSystem) -> None:
     q = robot.neutral
-    beside = robot.pose(q, "fr3_link5")[:3, 3] + [0.0, 0.09, 0.0]
+    # Not link5 or link6, whose origins coincide: rounding tells which of them is nearer.
+    beside = robot.pose(q, "fr3_link7")[:3, 3] + [0.0, 0.09, 0.0]
     ball = ss.Obstacles([beside], 0.04)  # 3 cm deep
     step = system.acceleration(q, np.zeros(7), q, ball)
     assert step.status == ss.StepStatus.inside_barrier
     assert not ss.is_fallback(step.status)
     assert step.diagnosis.state == ss.MotionState.inside_barrier
     assert step.diagnosis.kind == ss.CoordinateKind.obstacle
-    assert (step.diagnosis.name, step.diagnosis.point) == ("fr3_link5", 0)
+    assert (step.diagnosis.name, step.diagnosis.point) == ("fr3_link7", 0)
     assert step.diagnosis.clearance == pytest.approx(-0.03)
     assert str(step.diagnosis) == (
-        "link fr3_link5 is inside the barrier of obstacle point 0, 30 mm deep, and moves out"
+        "link fr3_link7 is inside the barrier of obstacle point 0, 30 mm deep, and moves out"
     )
     motion = ss.rollout(system, q, np.zeros(7), q, ball, steps=5000)
     assert motion.statuses[-1] == ss.StepStatus.ok

@@ -46,7 +46,8 @@ def barrier_cases() -> dict[str, Callable[[ss.Robot, ss.Body], ss.Embedding]]:
     """Wide and soft, so that most states are within reach and differences resolve them."""
     wide = {"activation": 0.8, "temperature": 0.02, "floor": 0.02}
     return {
-        "obstacles": lambda robot, body: ss.ClearanceBarrier(robot, body, reach=0.8, **wide),
+        # Points that come into a narrower window are seen by second differences.
+        "obstacles": lambda robot, body: ss.ClearanceBarrier(robot, body, reach=0.8, window=24.0, **wide),
         "self": lambda robot, body: ss.SelfCollisionBarrier(robot, body, pairs_of(robot), **wide),
         "plane": lambda robot, body: ss.PlaneBarrier(
             robot, body, point=[0, 0, -0.4], normal=[0.1, -0.2, 1.0], links=[pairs_of(robot)[0][1]], **wide
@@ -107,6 +108,32 @@ def test_derivatives(name: str, kind: str) -> None:
     # Where the motion crosses the activation distance within the step, d2psi/dt2 jumps (power 2): few do.
     assert np.quantile(np.concatenate(errors), 0.99) < TIME_TOLERANCE
     assert seen > NUM_STATES // 4  # the states do exercise the barrier
+
+
+@pytest.mark.parametrize("window", [6.0, 12.0])
+def test_points_beyond_the_window_hardly_matter(window: float) -> None:
+    robot = ss.Robot.named("panda")
+    body = covering(robot, 0)
+    rng = np.random.default_rng(3)
+    temperature, num_points = 0.002, 3000
+    points = np.column_stack([rng.uniform(-0.8, 0.8, (num_points, 2)), np.full(num_points, 0.35)])
+    obstacles = ss.Obstacles(points)
+    narrow = ss.ClearanceBarrier(robot, body, window=window)
+    wide = ss.ClearanceBarrier(robot, body, window=30.0)
+    seen, differs = 0, 0.0
+    for _ in range(20):
+        q, v = robot.random_configuration(rng), rng.normal(size=robot.num_coordinates)
+        e, f = narrow.evaluate(q, v, obstacles), wide.evaluate(q, v, obstacles)
+        near = np.isfinite(f.clearances) & np.isfinite(e.clearances)
+        seen += int(near.sum())
+        difference = f.clearances[near] - e.clearances[near]
+        # The weighted mean of what is left out, which is farther than the window: more, and by no more than all of it.
+        assert np.all(difference >= -1e-15)
+        assert np.all(difference < num_points * window * np.exp(-window) * temperature)
+        differs = max(differs, float(difference.max(initial=0.0)))
+    assert seen > 20
+    # It is window exp(-window) temperature where as many points lie at every clearance, and more lie farther off here.
+    assert 0.0 < differs < 4.0 * window * np.exp(-window) * temperature
 
 
 def test_clearance_is_a_lower_bound_exact_on_the_axes() -> None:
@@ -217,6 +244,7 @@ def test_a_wall_sampled_finely_moves_the_arm_as_one_sampled_coarsely() -> None:
         (lambda r, b: ss.ClearanceBarrier(r, b, power=1.0), "power is 1.0*, must be at least 2"),
         (lambda r, b: ss.ClearanceBarrier(r, b, floor=0.2), "floor is 0.2.*, must be positive and below"),
         (lambda r, b: ss.ClearanceBarrier(r, b, temperature=np.nan), "temperature is nan"),
+        (lambda r, b: ss.ClearanceBarrier(r, b, window=0.5), "window is 0.5.* temperatures, must be from 1"),
         (lambda r, b: ss.SelfCollisionBarrier(r, b, []), "there is no pair of links"),
         (lambda r, b: ss.SelfCollisionBarrier(r, b, [("link1", "link9")]), "has no link 'link9'"),
         (lambda r, b: ss.SelfCollisionBarrier(r, b, [("link1", "link1")]), "rigidly connected"),

@@ -7,9 +7,9 @@
 
 namespace sidestep {
 ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature,
-                                   double reach)
+                                   double reach, double window)
     : Barrier(robot, barrier, "clearance barrier"),
-      field_(robot, body, temperature),
+      field_(robot, body, temperature, window),
       reach_(std::max(reach, barrier.activation)),
       links_(body.links) {
   if (!std::isfinite(reach)) {

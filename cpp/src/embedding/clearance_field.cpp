@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -57,7 +58,8 @@ static_assert(PointTree::leaf_size == kernels::most_points);
 void forget(kernels::Query& query) noexcept {
   query.reference = query.ahead = infinity;
   query.nearest = query.minded = 0;
-  query.ready = query.begun = false;
+  query.begun = false;
+  query.candidates.size = 0;
 }
 
 /// The means of a query's points, with wrenches about the world origin.
@@ -67,6 +69,9 @@ class Means {
     for (int i = 0; i < kernels::sums; ++i) {
       sums_[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
     }
+    sums_[2] -= of_bias(6);
+    sums_[5] -= of_bias(12);
+    sums_[kernels::approach + 3] -= of_bias(kernels::approach + 4);
   }
 
   ClearanceSample nearest() const noexcept {
@@ -86,6 +91,11 @@ class Means {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
 
   Vector6 gradient(int first) const noexcept { return Vector6::Map(sums_ + first); }
+  /// What the bias of the link makes of sums of h'', from those of the gradient.
+  double of_bias(int first) const noexcept {
+    return Eigen::Vector3d::Map(query_.bias_linear).dot(gradient(first).head<3>()) +
+           Eigen::Vector3d::Map(query_.bias_angular).dot(gradient(first).tail<3>());
+  }
   WrenchPair wrench(const Vector6& gradient) const noexcept {
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query_.axes);
     const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
@@ -99,12 +109,17 @@ class Means {
 
 }  // namespace
 
-ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temperature)
-    : temperature_(temperature) {
+ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temperature, double window)
+    : temperature_(temperature), window_(window) {
   constexpr const char* owner = "clearance field";
   if (!(temperature > 0.0) || temperature == infinity) {
     throw std::invalid_argument(std::string(owner) + ": temperature is " + std::to_string(temperature) +
                                 " m, must be positive and finite");
+  }
+  constexpr double most_window = 600.0;  // beyond e^−700 the exponential of the sums ends
+  if (!(window >= 1.0 && window <= most_window)) {
+    throw std::invalid_argument(std::string(owner) + ": window is " + std::to_string(window) +
+                                " temperatures, must be from 1 to 600");
   }
   for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, body, owner)) {
     if (ellipsoid.joint >= 0) {
@@ -121,7 +136,7 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
   for (int first = 0; first < size();) {
     const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
     static_assert(Cluster::most == kernels::most_queries);
-    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0, decltype(Cluster::shapes)::Zero()};
+    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0, decltype(Cluster::principal)::Ones()};
     while (first + cluster.size < size() && cluster.size < Cluster::most &&
            at(first + cluster.size).body.joint == at(first).body.joint) {
       cluster.centre += at(first + cluster.size++).body.mean;
@@ -131,141 +146,228 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
       const double distance = (at(k).body.mean - cluster.centre).norm();
       cluster.radius = std::max(cluster.radius, distance + at(k).body.extent);
       cluster.inner_radius = std::max(cluster.inner_radius, distance + at(k).semi_axes.minCoeff());
-      const Eigen::Matrix3d& S = at(k).body.shape;
-      const double distinct[] = {S(0, 0), S(0, 1), S(0, 2), S(1, 1), S(1, 2), S(2, 2)};
-      for (int i = 0; i < 6; ++i) {
-        cluster.shapes(k - first, i) = static_cast<float>(distinct[i]);
-      }
+      const Eigen::Array3d a = at(k).semi_axes;
+      float row_of_axes[9];
+      auto row = cluster.principal.row(k - first);
+      Eigen::Matrix<float, 3, 3, Eigen::RowMajor>::Map(row_of_axes) = at(k).axes_T.cast<float>();
+      row << Eigen::Map<const Eigen::Matrix<float, 1, 9>>(row_of_axes), a.square().matrix().transpose().cast<float>(),
+          a.matrix().transpose().cast<float>(), static_cast<float>(a.minCoeff() * a.minCoeff() / a.maxCoeff());
     }
     clusters_.push_back(cluster);
     first += cluster.size;
   }
 }
 
-void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
-                              const Horizon& horizon, ClearanceView out) const noexcept {
-  const PointTree& tree = obstacles.tree();
-  const kernels::Points points = points_of(tree);
-  const kernels::ClearanceKernel kernel = clearance_kernel();
-  kernels::QueryGroup group;
-  group.inverse_T = 1.0 / temperature_;
-  group.reach = reach;
-  group.reach_ahead = horizon.distance;
-  group.window = window * temperature_;
-  group.window_ahead = window_ahead * temperature_;
-  group.horizon = horizon.time;
-  group.fastest = tree.fastest();
-  for (const Cluster& cluster : clusters_) {
-    const int joint = ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint;
-    const KinematicState::Link& link = state.link(joint);
-    const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
-    kernels::MovingBall ball_around;
-    copy(centre, ball_around.centre);
-    ball_around.radius = cluster.radius;
-    copy(link.velocity.linear, ball_around.linear);
-    copy(link.velocity.angular, ball_around.angular);
-    ball_around.turning = link.velocity.angular.norm();
-    ball_around.horizon = horizon.time;
-    ball_around.fastest = tree.fastest();
-    const auto measure = [&](const Balls& balls, int first, int count, PointTree::Bounds& bounds) {
-      kernel.measure(ball_around, balls, first, count, bounds.values.data(), bounds.others.data());
-    };
-    double near = reach, ahead = horizon.distance;  // the largest of the group
-    double missed = infinity, missed_ahead = infinity;
-    const auto matters = [&](double bound, double after) {
-      if (bound < near || after < ahead) {
-        return true;
+/// Looks for the points that weigh in the means of one cluster's ellipsoids after another.
+class ClearanceField::Search {
+ public:
+  Search(const ClearanceField& field, const PointTree& tree, double reach, const Horizon& horizon) noexcept
+      : field_(field), tree_(tree), points_(points_of(tree)), kernel_(clearance_kernel()), reach_(reach), horizon_(horizon) {
+    group_.inverse_T = 1.0 / field.temperature_;
+    group_.reach = reach;
+    group_.reach_ahead = horizon.distance;
+    group_.window = field.window_ * field.temperature_;
+    group_.window_ahead = window_ahead * field.temperature_;
+    group_.horizon = horizon.time;
+    group_.fastest = tree.fastest();
+  }
+
+  /// Whether any may matter.
+  bool find(const Cluster& cluster, const KinematicState::Link& link) noexcept {
+    cluster_ = &cluster;
+    link_ = &link;
+    is_placed_ = false;
+    surround();
+    near_ = reach_;
+    ahead_ = horizon_.distance;
+    int num_seen = 0;  // leaves, those that there is room for first
+    visit([&](int leaf) {
+      if (num_seen < most_seen) {
+        seen_[static_cast<std::size_t>(num_seen)] = leaf;
       }
-      missed = std::min(missed, bound);
-      missed_ahead = std::min(missed_ahead, after);
+      ++num_seen;
+      return true;
+    }, [&] {  // nothing lies beyond the reach that is looked at now, but farther in than that
+      near_ = std::min<double>(reach_, largest(group_.near_leaf));
+      ahead_ = std::min<double>(horizon_.distance, largest(group_.ahead_leaf));
+    });
+    if (!is_placed_) {
       return false;
-    };
-    bool placed = false;
-    kernels::LinkMotion motion;
-    const auto limit = [&group](int k, double to, double to_ahead) {
-      group.near[k] = group.near_leaf[k] = static_cast<float>(to);
-      group.ahead[k] = group.ahead_leaf[k] = static_cast<float>(to_ahead);
-      group.missed[k] = group.missed_ahead[k] = std::numeric_limits<float>::infinity();
-    };
-    const auto place = [&] {
-      copy(centre, group.origin);
-      motion = motion_of(link);
-      group.link = &motion;
-      group.shapes = cluster.shapes.data();
-      group.size = cluster.size;
-      for (int k = 0; k < cluster.size; ++k) {
-        const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(cluster.first + k)];
-        const Eigen::Vector3d p = link.p_WL + link.R_WL * ellipsoid.body.mean;
-        for (int axis = 0; axis < 3; ++axis) {
-          group.centre[axis][k] = p[axis];
-          group.offset[axis][k] = static_cast<float>(p[axis] - centre[axis]);
-        }
-        group.extent[k] = static_cast<float>(ellipsoid.body.extent);
-        group.axes_T[k] = ellipsoid.axes_T.data();
-        group.semi_axes[k] = ellipsoid.semi_axes.data();
-        limit(k, reach, horizon.distance);
-        group.near[k] += static_cast<float>(group.window);
-        group.ahead[k] += static_cast<float>(group.window_ahead);
-        kernels::Query& query = group.queries[k];
-        query.near = query.approached = false;
-        forget(query);
-      }
-      for (int k = cluster.size; k < kernels::most_queries; ++k) {  // registers are filled up
-        group.offset[0][k] = group.offset[1][k] = group.offset[2][k] = group.extent[k] = 0.0f;
-        limit(k, -infinity, -infinity);
-      }
-      placed = true;
-    };
-    const auto visit = [&] {
-      tree.visit(measure, matters, [&](int leaf, int count) {
-        if (!placed) {
-          place();
-        }
-        if (kernel.collect(group, points, leaf, count)) {
-          near = *std::max_element(group.near_leaf, group.near_leaf + cluster.size);
-          ahead = *std::max_element(group.ahead_leaf, group.ahead_leaf + cluster.size);
-        }
-      });
-    };
-    visit();
-    if (!placed) {
-      continue;
     }
-    // What was left out before anything within reach was known may still weigh beside it.
-    near = ahead = -infinity;
+    // What was left out before anything within reach was known may still weigh beside it: beyond the reach, and of leaves that
+    // were looked at.
+    const double nearest_end = largest_known(group_.near, true), ahead_end = largest_known(group_.ahead, false);
+    const bool goes_beyond = nearest_end > reach_ || ahead_end > horizon_.distance;
+    if (goes_beyond && num_seen <= most_seen) {
+      near_ = std::max(reach_, nearest_end);
+      ahead_ = std::max(horizon_.distance, ahead_end);
+      int next = 0;  // the same leaves come in the same order
+      visit([&](int leaf) {
+        const bool is_seen = next < num_seen && seen_[static_cast<std::size_t>(next)] == leaf;
+        next += is_seen;
+        return !is_seen;
+      }, [] {});
+    }
+    near_ = ahead_ = -infinity;
     for (int k = 0; k < cluster.size; ++k) {
-      kernels::Query& query = group.queries[k];
-      const double to = query.near ? group.near[k] : -infinity, to_ahead = query.approached ? group.ahead[k] : -infinity;
-      if (std::min<double>(missed, group.missed[k]) < to || std::min<double>(missed_ahead, group.missed_ahead[k]) < to_ahead) {
+      kernels::Query& query = group_.queries[k];
+      const double to = query.near ? group_.near[k] : -infinity, to_ahead = query.approached ? group_.ahead[k] : -infinity;
+      const bool is_missed = goes_beyond && num_seen > most_seen && (to > reach_ || to_ahead > horizon_.distance);
+      if (is_missed || group_.missed[k] < to || group_.missed_ahead[k] < to_ahead) {
         limit(k, to, to_ahead);
         forget(query);
-        near = std::max(near, to);
-        ahead = std::max(ahead, to_ahead);
-      } else {
-        limit(k, -infinity, -infinity);
+        near_ = std::max(near_, to);
+        ahead_ = std::max(ahead_, to_ahead);
+      } else {  // is asked no more
+        group_.near_leaf[k] = group_.ahead_leaf[k] = -std::numeric_limits<float>::infinity();
       }
     }
-    if (std::max(near, ahead) > -infinity) {
-      visit();
+    if (std::max(near_, ahead_) > -infinity) {
+      visit([](int) { return true; }, [] {});
     }
-    for (int k = 0; k < cluster.size; ++k) {
-      const kernels::Query& query = group.queries[k];
-      if (!query.near && !query.approached) {
-        continue;
+    return true;
+  }
+
+  /// Writes the means of ellipsoid k of the cluster.
+  void write(int k, const KinematicState& state, ClearanceView out) noexcept {
+    const kernels::Query& query = group_.queries[k];
+    if (!query.near && !query.approached) {
+      return;
+    }
+    kernel_.sum(group_, k, points_);
+    if (!(std::min(query.reference, query.ahead) < infinity)) {
+      return;
+    }
+    const Means means(query, {group_.centre[0][k], group_.centre[1][k], group_.centre[2][k]});
+    const Eigen::Index at = cluster_->first + k;
+    const int joint = ellipsoid(k).body.joint;
+    const ClearanceSample approach = means.approach();
+    const ClearanceSample nearest = query.reference < infinity ? means.nearest() : approach;
+    const bool within = query.reference < infinity && nearest.value < reach_;
+    if (within || query.ahead < horizon_.distance) {
+      sidestep::write(within ? nearest : approach, state, joint, -1, at, out);
+      sidestep::write(approach, state, joint, -1, at, out.approach);
+      out.nearest[at] = tree_.order()[static_cast<std::size_t>(within ? query.nearest : query.minded)];
+    }
+  }
+
+ private:
+  static constexpr int most_seen = 1024;
+
+  const Ellipsoid& ellipsoid(int k) const noexcept {
+    return field_.ellipsoids_[static_cast<std::size_t>(cluster_->first + k)];
+  }
+
+  void surround() noexcept {
+    copy(link_->p_WL + link_->R_WL * cluster_->centre, ball_.centre);
+    ball_.radius = cluster_->radius;
+    copy(link_->velocity.linear, ball_.linear);
+    copy(link_->velocity.angular, ball_.angular);
+    ball_.turning = link_->velocity.angular.norm();
+    ball_.horizon = horizon_.time;
+    ball_.fastest = tree_.fastest();
+  }
+
+  void limit(int k, double to, double to_ahead) noexcept {
+    group_.near[k] = group_.near_leaf[k] = static_cast<float>(to);
+    group_.ahead[k] = group_.ahead_leaf[k] = static_cast<float>(to_ahead);
+    group_.missed[k] = group_.missed_ahead[k] = std::numeric_limits<float>::infinity();
+  }
+
+  void place() noexcept {
+    copy(Eigen::Vector3d::Map(ball_.centre), group_.origin);
+    motion_ = motion_of(*link_);
+    group_.link = &motion_;
+    group_.principal = cluster_->principal.data();
+    group_.size = cluster_->size;
+    for (int k = 0; k < cluster_->size; ++k) {
+      const Eigen::Vector3d p = link_->p_WL + link_->R_WL * ellipsoid(k).body.mean;
+      for (int axis = 0; axis < 3; ++axis) {
+        group_.centre[axis][k] = p[axis];
+        group_.offset[axis][k] = static_cast<float>(p[axis] - ball_.centre[axis]);
       }
-      kernel.sum(group, k, points);
-      if (!(std::min(query.reference, query.ahead) < infinity)) {
-        continue;
+      group_.extent[k] = static_cast<float>(ellipsoid(k).body.extent);
+      group_.axes_T[k] = ellipsoid(k).axes_T.data();
+      group_.semi_axes[k] = ellipsoid(k).semi_axes.data();
+      limit(k, reach_, horizon_.distance);
+      group_.near[k] += static_cast<float>(group_.window);
+      group_.ahead[k] += static_cast<float>(group_.window_ahead);
+      kernels::Query& query = group_.queries[k];
+      query.near = query.approached = false;
+      forget(query);
+    }
+    for (int k = cluster_->size; k < kernels::most_queries; ++k) {  // registers are filled up
+      group_.offset[0][k] = group_.offset[1][k] = group_.offset[2][k] = group_.extent[k] = 0.0f;
+    }
+    kernel_.begin(group_);
+    is_placed_ = true;
+  }
+
+  double largest(const float* limits) const noexcept { return *std::max_element(limits, limits + cluster_->size); }
+  /// Of those below which something is known.
+  double largest_known(const float* limits, bool near) const noexcept {
+    double most = -infinity;
+    for (int k = 0; k < cluster_->size; ++k) {
+      if (near ? group_.queries[k].near : group_.queries[k].approached) {
+        most = std::max<double>(most, limits[k]);
       }
-      const Means means(query, {group.centre[0][k], group.centre[1][k], group.centre[2][k]});
-      const Eigen::Index at = cluster.first + k;
-      const ClearanceSample approach = means.approach();
-      const ClearanceSample nearest = query.reference < infinity ? means.nearest() : approach;
-      const bool within = query.reference < infinity && nearest.value < reach;
-      if (within || query.ahead < horizon.distance) {
-        write(within ? nearest : approach, state, joint, -1, at, out);
-        write(approach, state, joint, -1, at, out.approach);
-        out.nearest[at] = tree.order()[static_cast<std::size_t>(within ? query.nearest : query.minded)];
+    }
+    return most;
+  }
+
+  /// Collects from the leaves that matter and are wanted, many at a time; `after` is called in between.
+  template <class Wanted, class After>
+  void visit(Wanted&& wanted, After&& after) noexcept {
+    kernels::Leaves& leaves = group_.leaves;
+    const auto collect = [&] {
+      if (!is_placed_) {
+        place();
+      }
+      kernel_.collect(group_, points_);
+      leaves.num = 0;
+      after();
+    };
+    const auto measure = [&](const Balls& balls, const Boxes& boxes, int first, int count, PointTree::Bounds& bounds) {
+      return kernel_.measure(ball_, balls, boxes, first, count, near_, ahead_, bounds.data());
+    };
+    tree_.visit(measure, [&](int leaf, int count) {
+      if (!wanted(leaf)) {
+        return;
+      }
+      leaves.leaf[leaves.num] = leaf;
+      leaves.count[leaves.num++] = count;
+      if (leaves.num == kernels::most_leaves) {
+        collect();
+      }
+    });
+    if (leaves.num > 0) {
+      collect();
+    }
+  }
+
+  const ClearanceField& field_;
+  const PointTree& tree_;
+  kernels::Points points_;
+  kernels::ClearanceKernel kernel_;
+  double reach_;
+  Horizon horizon_;
+  const Cluster* cluster_ = nullptr;
+  const KinematicState::Link* link_ = nullptr;
+  kernels::MovingBall ball_;
+  kernels::LinkMotion motion_;
+  bool is_placed_ = false;
+  double near_ = 0.0, ahead_ = 0.0;  // bounds of the cluster below which nodes of the tree matter
+  kernels::QueryGroup group_;
+  std::array<int, most_seen> seen_;
+};
+
+void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
+                              const Horizon& horizon, ClearanceView out) const noexcept {
+  Search search(*this, obstacles.tree(), reach, horizon);
+  for (const Cluster& cluster : clusters_) {
+    if (search.find(cluster, state.link(ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint))) {
+      for (int k = 0; k < cluster.size; ++k) {
+        search.write(k, state, out);
       }
     }
   }
@@ -280,14 +382,16 @@ bool ClearanceField::touches(const KinematicState& state, const Obstacles& obsta
     const auto distance = [&](double x, double y, double z, double radius) {
       return (Eigen::Vector3d(x, y, z) - centre).norm() - (cluster.inner_radius + radius - depth);
     };
-    const auto measure = [&](const Balls& balls, int first, int count, PointTree::Bounds& bounds) {
-      for (int i = 0; i < count; ++i) {
+    const auto measure = [&](const Balls& balls, const Boxes&, int first, int count, PointTree::Bounds& bounds) {
+      unsigned near = 0;
+      for (int i = 0; i < count && !found; ++i) {
         const int n = first + i;
-        bounds.values[static_cast<std::size_t>(i)] = distance(balls.x[n], balls.y[n], balls.z[n], balls.radius[n]);
+        bounds[static_cast<std::size_t>(i)] = distance(balls.x[n], balls.y[n], balls.z[n], balls.radius[n]);
+        near |= (bounds[static_cast<std::size_t>(i)] < 0.0 ? 1u : 0u) << i;
       }
+      return near;
     };
-    const auto near = [&](double value, double) { return !found && value < 0.0; };
-    tree.visit(measure, near, [&](int leaf, int count) {
+    tree.visit(measure, [&](int leaf, int count) {
       const int first = leaf * PointTree::leaf_size;
       for (int n = first; n < first + count && !found; ++n) {
         const Eigen::Vector3d x(tree.coordinate(0)[n], tree.coordinate(1)[n], tree.coordinate(2)[n]);

@@ -89,8 +89,8 @@ Body calibrated(const Body& body, Random& random) {
 }
 
 void compare(const Robot& robot, const Body& body, const KinematicState& state, const Obstacles& obstacles,
-             double reach, double horizon) {
-  const ClearanceField field(robot, body, temperature);
+             double reach, double horizon, double window = ClearanceField::default_window) {
+  const ClearanceField field(robot, body, temperature, window);
   Clearances found(robot.num_coordinates(), field.size());
   // Beyond what can be closed within the horizon by as much as is looked at anyway: all that is within reach is found.
   field.evaluate(state, obstacles, reach, {horizon, reach}, found.view(0, field.size()));
@@ -118,13 +118,12 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
       if (after(at) < least_after + ClearanceField::window_ahead * temperature) {
         ahead.add(at);
       }
-      if (at.value < least + ClearanceField::window * temperature && mean.add(at)) {
+      if (at.value < least + window * temperature && mean.add(at)) {
         nearest = n;
       }
     }
     const ClearanceSample expected = mean.result();
     // Every point beyond the window would change the mean by x e^-x temperatures, where x is at least the window.
-    constexpr double window = ClearanceField::window;
     const double all_beyond = static_cast<double>(obstacles.size()) * window * std::exp(-window) * temperature;
     BOOST_TEST(std::abs(expected.value - of_all.result().value) <= all_beyond + 1e-12 * (1.0 + std::abs(expected.value)));
     // 1e-12 of what is summed: clearances of up to 1 m, whose rates and curvatures are divided by the temperature.
@@ -178,6 +177,7 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
           for (const double reach : {-0.01, 0.1, 0.5}) {
             compare(robot, body, state, obstacles, reach, 0.0);
             compare(robot, body, state, obstacles, reach, 0.2);
+            compare(robot, body, state, obstacles, reach, 0.2, 24.0);
             compare(robot, body, state, obstacles.frozen(), reach, 0.1);
           }
           Obstacles moved = obstacles;
@@ -287,11 +287,12 @@ BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
   const std::string link = robot.frames().back().name;
   const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {0.01 * Eigen::Matrix3d::Identity()},
                   Eigen::VectorXd::Ones(1));
-  const ClearanceField field(robot, body, temperature);
+  constexpr double window = 24.0;
+  const ClearanceField field(robot, body, temperature, window);
   KinematicState state(robot);
   state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
   const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
-  constexpr double tau = 0.05, h = 0.05, beyond = h + ClearanceField::window * temperature + 0.002;
+  constexpr double tau = 0.05, h = 0.05, beyond = h + window * temperature + 0.002;
   Eigen::Matrix3Xd points(3, 12), velocities(3, 12);
   for (int n = 0; n < 12; ++n) {
     const Eigen::Vector3d away = X.linear() * Eigen::Vector3d(std::cos(0.1 * n), std::sin(0.1 * n), 0.0);
@@ -343,7 +344,8 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
   const std::string link = robot.frames().back().name;
   const Eigen::Matrix3d S = Eigen::Vector3d(0.04, 0.01, 0.02).asDiagonal();
   const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {S}, Eigen::VectorXd::Ones(1));
-  const ClearanceField field(robot, body, temperature);
+  constexpr double window = 24.0;
+  const ClearanceField field(robot, body, temperature, window);
   KinematicState state(robot);
   state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
   const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));

@@ -17,10 +17,11 @@ namespace sidestep {
 class ClearanceBarrier final : public Barrier {
  public:
   /// The body must be calibrated. Clearances are measured up to `reach` [m], at least to the activation distance, and
-  /// what approaches as far as the arm needs to stop, for what keeps them (TorqueController, AccelerationFilter).
+  /// what approaches as far as the arm needs to stop, for what keeps them (TorqueController, AccelerationFilter). For
+  /// temperature [m] and window see ClearanceField.
   /// Throws std::invalid_argument that names what is wrong.
   ClearanceBarrier(const Robot& robot, const Body& body, BarrierFunction barrier, double temperature = 0.002,
-                   double reach = 0.0);
+                   double reach = 0.0, double window = ClearanceField::default_window);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
 

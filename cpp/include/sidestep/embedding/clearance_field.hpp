@@ -30,15 +30,18 @@ namespace sidestep {
 /// the widest registers of the machine.
 class ClearanceField {
  public:
-  /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, or the
-  /// temperature is not positive and finite.
-  ClearanceField(const Robot& robot, const Body& body, double temperature = 0.002);
+  /// Points that are farther than the nearest by `window` temperatures do not count: each would weigh less than e^−window and
+  /// change the mean by window e^−window T at most, 2e-7 m at 12 and 2 mm, far below what a sensor sees. Derivatives do not
+  /// know of points that come into the window; second differences see them up to about 24, where the change is 2e-12 m.
+  static constexpr double default_window = 12.0;
+  /// Of what approaches, whose weights are not differentiated, points count up to e⁻⁸ = 3e-4.
+  static constexpr double window_ahead = 8.0;
 
-  /// Points that are farther than the nearest by so many temperatures do not count: each would weigh less than e⁻²⁴ = 4e-11
-  /// and change the mean by 24 e⁻²⁴ T at most, 2e-12 m at 2 mm, so that its derivatives are those of what is computed. Of
-  /// what approaches, whose weights are not differentiated, points count up to e⁻⁸ = 3e-4.
-  static constexpr double window = 24.0, window_ahead = 8.0;
+  /// Throws std::invalid_argument if the body is not calibrated, has an unknown link or nothing that moves, the temperature
+  /// [m] is not positive and finite, or the window not within 1 to 600.
+  ClearanceField(const Robot& robot, const Body& body, double temperature = 0.002, double window = default_window);
 
+  double window() const noexcept { return window_; }
   int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
 
   /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared, and what approaches: of
@@ -54,6 +57,7 @@ class ClearanceField {
   int component(int k) const noexcept { return ellipsoids_[static_cast<std::size_t>(k)].body.component; }
 
  private:
+  class Search;
   struct Ellipsoid {
     BodyEllipsoid body;
     Eigen::Matrix3d axes_T;     // rotates into the principal axes
@@ -67,10 +71,10 @@ class ClearanceField {
     Eigen::Vector3d centre;
     double radius;
     double inner_radius;  // of one around the balls inside them
-    Eigen::Matrix<float, most, 6> shapes;  // S in the frame of the link: xx, xy, xz, yy, yz, zz
+    Eigen::Matrix<float, most, 16> principal;  // of every ellipsoid, as inner loops read it
   };
 
-  double temperature_;
+  double temperature_, window_;
   std::vector<Ellipsoid> ellipsoids_;  // those of one joint stand together
   std::vector<Cluster> clusters_;
 };

@@ -73,20 +73,17 @@ class PointTree {
   /// Stops every point.
   void freeze() noexcept;
 
-  /// Bounds of what is below up to `fan_out` nodes, by two measures.
-  struct Bounds {
-    alignas(64) std::array<double, fan_out> values, others;
-  };
+  /// A measure of each of up to `fan_out` nodes.
+  using Bounds = std::array<double, fan_out>;
 
-  /// Calls leaf(k, count) for every leaf k that matters, with its number of points, as do all nodes above it, those of a node
-  /// in the order of the first measure. measure(Balls, first, count, Bounds&) bounds what is in the balls [first, first + count)
-  /// by arrays that go on for `fan_out` from `first`; matters(value, other), asked again just before, may become stricter on
-  /// the way. No allocation.
-  template <class Measure, class Matters, class Leaf>
-  void visit(Measure&& measure, Matters&& matters, Leaf&& leaf) const noexcept {
+  /// Calls leaf(k, count) for every leaf k that matters, with its number of points, as do all nodes above it; of a node those
+  /// first that measure least. measure(Balls, Boxes, first, count, Bounds&) measures what is in the nodes [first, first + count),
+  /// of which arrays go on for `fan_out` from `first`, and returns those that matter as bits. No allocation.
+  template <class Measure, class Leaf>
+  void visit(Measure&& measure, Leaf&& leaf) const noexcept {
     if (!levels_.empty()) {
       const std::size_t top = top_level(fan_out);
-      descend(top, 0, levels_[top].size, measure, matters, leaf);
+      descend(top, 0, levels_[top].size, measure, leaf);
     }
   }
 
@@ -122,40 +119,27 @@ class PointTree {
   void refit() noexcept;
   void fit(std::size_t level, int node) noexcept;
 
-  template <class Measure, class Matters, class Leaf>
-  void descend(std::size_t level, int first, int count, Measure& measure, Matters& matters, Leaf& leaf) const noexcept {
+  template <class Measure, class Leaf>
+  void descend(std::size_t level, int first, int count, Measure& measure, Leaf& leaf) const noexcept {
     const Level& nodes = levels_[level];
-    Bounds bounds;
-    measure(nodes.balls(), first, count, bounds);
-    std::array<int, fan_out> order;
-    int num = 0;  // that matter, nearest first
-    for (int i = 0; i < count; ++i) {
-      const double value = bounds.values[static_cast<std::size_t>(i)];
-      if (!matters(value, bounds.others[static_cast<std::size_t>(i)])) {
-        continue;
-      }
-      int at = num++;
-      for (; at > 0; --at) {
-        const int before = order[static_cast<std::size_t>(at) - 1];
-        if (!(bounds.values[static_cast<std::size_t>(before)] > value)) {
-          break;
-        }
-        order[static_cast<std::size_t>(at)] = before;
-      }
-      order[static_cast<std::size_t>(at)] = i;
-    }
-    for (int n = 0; n < num; ++n) {
-      const auto i = static_cast<std::size_t>(order[static_cast<std::size_t>(n)]);
-      if (n > 0 && !matters(bounds.values[i], bounds.others[i])) {  // it may do so no more
-        continue;
-      }
-      const int node = first + static_cast<int>(i);
-      if (level == 0) {
+    alignas(64) Bounds bounds;
+    unsigned left = measure(nodes.balls(), nodes.boxes(), first, count, bounds);
+    if (level == 0) {
+      for (; left != 0; left &= left - 1) {
+        const int node = first + std::countr_zero(left);
         leaf(node, std::min(leaf_size, size() - node * leaf_size));
-      } else {
-        const int below = node * fan_out;
-        descend(level - 1, below, std::min(fan_out, levels_[level - 1].size - below), measure, matters, leaf);
       }
+      return;
+    }
+    while (left != 0) {
+      int least = std::countr_zero(left);
+      for (unsigned rest = left & (left - 1); rest != 0; rest &= rest - 1) {
+        const int i = std::countr_zero(rest);
+        least = bounds[static_cast<std::size_t>(i)] < bounds[static_cast<std::size_t>(least)] ? i : least;
+      }
+      left &= ~(1u << least);
+      const int below = (first + least) * fan_out;
+      descend(level - 1, below, std::min(fan_out, levels_[level - 1].size - below), measure, leaf);
     }
   }
 

@@ -36,8 +36,7 @@ struct Candidates {
   int size;
   int point[most_candidates];
   float t[most_candidates];           // where Newton's iteration begins
-  float least[2][most_candidates];    // bounds of h and of h + τ h'
-  float most[2][most_candidates];
+  float least[2][most_candidates];    // h and h + τ h' from below
 };
 
 /// An ellipsoid at a state, with the sums of its means over the points so far, lane by lane.
@@ -52,14 +51,31 @@ struct Query {
   int nearest, minded;                      // their points
   int shortest;                             // the axis of the smallest a
   bool near, approached;                    // whether a point may be within reach, or come to be
-  bool ready, begun;                        // whether what bounds and what sums need has been set
-  struct {
-    float axes[9], semi_axes[3], squared_axes[3];
-  } single;
+  bool begun;                               // whether what sums need has been set
   Candidates candidates;
 };
 
 inline constexpr int most_queries = 16;
+
+// Of every ellipsoid: link frame to principal axes by rows (9), squared semi-axes (3), semi-axes (3), and the smallest radius
+// of curvature of its surface.
+inline constexpr int squared_at = 9, semi_at = 12, roundness_at = 15, principal_numbers = 16;
+
+inline constexpr int most_leaves = 64;
+
+/// Leaves that may matter to ellipsoids of a group, in single precision, seen from its origin.
+struct Leaves {
+  int num = 0;
+  int leaf[most_leaves], count[most_leaves];   // which, and their numbers of points
+  alignas(64) float centre[3][most_leaves], half[3][most_leaves], diagonal[most_leaves];  // boxes around the points
+  float largest[most_leaves];                  // radius of a point
+  float error[most_leaves];                    // of distances to its points [m]
+  float velocity[3][most_leaves], speed[most_leaves];  // of the link's point at the centre [m/s]
+  float more[most_leaves];                     // of others against theirs
+  unsigned long long loaded;                   // leaves of which the points below are set, as bits
+  alignas(64) float position[3][most_leaves * most_points], radius[most_leaves * most_points];
+  float own[3][most_leaves * most_points];     // velocity, where points move
+};
 
 /// Ellipsoids of one link that are asked together.
 struct QueryGroup {
@@ -76,12 +92,16 @@ struct QueryGroup {
   const double* axes_T[most_queries];          // 3 × 3 by columns: link frame to principal axes
   const double* semi_axes[most_queries];       // [m]
   const LinkMotion* link;
-  const float* shapes;                         // S in the frame of the link: xx, xy, xz, yy, yz, zz; most_queries of each
+  const float* principal;                      // see above; most_queries of each number
+  float velocity[3];                           // of the link's point at the origin
+  alignas(64) float axes[9][most_queries];     // world to principal axes, by rows
+  float own_offset[3][most_queries], own_linear[3][most_queries], own_angular[3][most_queries];  // in principal axes
   double inverse_T;
   double reach, reach_ahead;                   // clearances, and h + τ h', from here on are out of reach [m]
   double window, window_ahead;                 // clearances, and h + τ h', so much above the smallest have no weight [m]
   double horizon;                              // τ [s]
   double fastest;                              // speed of any point [m/s], at most
+  Leaves leaves;
   Query queries[most_queries];
 };
 
@@ -96,11 +116,15 @@ struct MovingBall {
 /// Leaves are looked at in single precision, for every query that their points matter to; what may weigh is summed in
 /// double precision.
 struct ClearanceKernel {
-  /// Bounds of the clearances of nodes [first, first + count), and of h + τ h'; both have room for whole registers.
-  void (*measure)(const MovingBall& cluster, const Balls& nodes, int first, int count, double* bounds, double* after) noexcept;
-  /// Adds points of a leaf that may weigh to the candidates, and lowers the limits of the group. Where there is no room, the
-  /// candidates before are summed. Returns whether a limit of leaves fell, or rose to the window.
-  bool (*collect)(QueryGroup& group, const Points& points, int leaf, int count) noexcept;
+  /// Nodes [first, first + count) of which bounds of the clearances are below `near`, or those of h + τ h' below `ahead`, as
+  /// bits; and the former, with room for whole registers.
+  unsigned (*measure)(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count, double near,
+                      double ahead, double* bounds) noexcept;
+  /// To be called once a group is placed.
+  void (*begin)(QueryGroup& group) noexcept;
+  /// Adds points of the group's leaves that may weigh to the candidates, and lowers its limits. Where there is no room, the
+  /// candidates before are summed.
+  void (*collect)(QueryGroup& group, const Points& points) noexcept;
   /// Adds the candidates of query k to its sums, and forgets them.
   void (*sum)(QueryGroup& group, int k, const Points& points) noexcept;
 };

@@ -121,33 +121,43 @@ inline Singles load(const float* p) noexcept {
 
 inline void store(float* p, Singles x) noexcept { __builtin_memcpy(p, &x, sizeof x); }
 
-/// 1/x and 1/√x of positive numbers, within 1e-6: estimates of 12 bits or more, and one step of Newton's.
-inline Singles inverse(Singles x) noexcept {
+/// 1/x and 1/√x of positive numbers, within 4e-4.
+inline Singles rough_inverse(Singles x) noexcept {
 #if defined(__AVX512F__)
-  const Singles y = _mm512_maskz_rcp14_ps(0xffff, x);
+  return _mm512_maskz_rcp14_ps(0xffff, x);
 #elif defined(__AVX2__)
-  const Singles y = _mm256_rcp_ps(x);
+  return _mm256_rcp_ps(x);
 #elif defined(__SSE2__)
-  const Singles y = _mm_rcp_ps(x);
+  return _mm_rcp_ps(x);
 #else
-  const Singles y = 1.0f / x;
+  return 1.0f / x;
 #endif
-  return y * (2.0f - x * y);
 }
 
-inline Singles inverse_root(Singles x) noexcept {
+inline Singles rough_inverse_root(Singles x) noexcept {
 #if defined(__AVX512F__)
-  const Singles y = _mm512_maskz_rsqrt14_ps(0xffff, x);
+  return _mm512_maskz_rsqrt14_ps(0xffff, x);
 #elif defined(__AVX2__)
-  const Singles y = _mm256_rsqrt_ps(x);
+  return _mm256_rsqrt_ps(x);
 #elif defined(__SSE2__)
-  const Singles y = _mm_rsqrt_ps(x);
+  return _mm_rsqrt_ps(x);
 #else
   Singles y;
   for (int i = 0; i < singles; ++i) {
     y[i] = 1.0f / __builtin_sqrtf(x[i]);
   }
+  return y;
 #endif
+}
+
+/// The same within 1e-6: one step of Newton's.
+inline Singles inverse(Singles x) noexcept {
+  const Singles y = rough_inverse(x);
+  return y * (2.0f - x * y);
+}
+
+inline Singles inverse_root(Singles x) noexcept {
+  const Singles y = rough_inverse_root(x);
   return y * (1.5f - 0.5f * x * y * y);
 }
 
@@ -157,6 +167,12 @@ inline Singles root(Singles x) noexcept {
   return positive * inverse_root(positive);
 }
 inline Singles quick_root(Singles x) noexcept { return root(x); }
+
+/// √x within 4e-4, or 1e-15; of numbers below zero as well.
+inline Singles rough_root(Singles x) noexcept {
+  const Singles positive = x > 1e-30f ? x : all(1e-30f);
+  return positive * rough_inverse_root(positive);
+}
 
 /// Writes the lanes that are bits one after another; what lies between them and a full register is overwritten.
 inline void compress(float* p, Singles x, unsigned lanes) noexcept {
@@ -214,6 +230,29 @@ inline Lanes widen(const float* p) noexcept {
 inline Singles magnitude(Singles x) noexcept { return x < 0.0f ? -x : x; }
 inline Singles larger(Singles x, Singles y) noexcept { return x > y ? x : y; }
 inline Singles smaller(Singles x, Singles y) noexcept { return x < y ? x : y; }
+
+/// Halves against each other, down to one number.
+template <int size>
+inline float smallest_of(const float* values) noexcept {
+  if constexpr (size == 1) {
+    return values[0];
+  } else {
+    typedef float Half __attribute__((vector_size(2 * size)));
+    Half low, high;
+    __builtin_memcpy(&low, values, sizeof low);
+    __builtin_memcpy(&high, values + size / 2, sizeof high);
+    low = low < high ? low : high;
+    float rest[size / 2];
+    __builtin_memcpy(rest, &low, sizeof low);
+    return smallest_of<size / 2>(rest);
+  }
+}
+
+inline float smallest(Singles x) noexcept {
+  float values[singles];
+  store(values, x);
+  return smallest_of<singles>(values);
+}
 
 inline unsigned below(Singles x, Singles limit) noexcept {
 #if defined(__AVX512F__)

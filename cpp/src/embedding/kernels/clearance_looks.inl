@@ -1,0 +1,426 @@
+// Included by clearance_kernel.inl: leaves and their points in single precision, to leave out what does not matter.
+
+// Errors of single precision and of rough reciprocals: of clearances relative to distances, and of directions.
+constexpr float distance_error = 1e-3f, direction_error = 2e-3f;
+constexpr float least_height = 1e-9f, tiny = 1e-30f;  // stand for nothing, as divisors
+
+/// What does not depend on leaves, for all ellipsoids: their principal axes in the world, and how they move.
+void begin(QueryGroup& group) noexcept {
+  const LinkMotion& link = *group.link;
+  const double *W = link.angular, *o = group.origin;
+  const float w[3] = {static_cast<float>(W[0]), static_cast<float>(W[1]), static_cast<float>(W[2])};
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, l = (i + 2) % 3;
+    group.velocity[i] = static_cast<float>(link.linear[i] + W[j] * o[l] - W[l] * o[j]);
+  }
+  for (int first = 0; first < group.size; first += singles) {
+    Singles offset[3], v[3];
+    for (int i = 0; i < 3; ++i) {
+      offset[i] = load(group.offset[i] + first);
+    }
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      v[i] = group.velocity[i] + w[j] * offset[l] - w[l] * offset[j];
+    }
+    for (int i = 0; i < 3; ++i) {
+      const auto in_link = [&](int j) { return load(group.principal + (3 * i + j) * most_queries + first); };
+      Singles row[3];
+      for (int j = 0; j < 3; ++j) {
+        row[j] = in_link(0) * link.to_link[j] + in_link(1) * link.to_link[3 + j] + in_link(2) * link.to_link[6 + j];
+        store(group.axes[3 * i + j] + first, row[j]);
+      }
+      store(group.own_offset[i] + first, row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2]);
+      store(group.own_linear[i] + first, row[0] * v[0] + row[1] * v[1] + row[2] * v[2]);
+      store(group.own_angular[i] + first, row[0] * w[0] + row[1] * w[1] + row[2] * w[2]);
+    }
+  }
+}
+
+/// The numbers of one ellipsoid, in its principal axes; `axes` turn the world into them, by rows.
+struct Ellipsoid {
+  float axes[9], offset[3], linear[3], angular[3], squared[3], semi[3], extent, roundness, error;
+
+  Ellipsoid(const QueryGroup& group, int k) noexcept
+      : extent(group.extent[k]), roundness(group.principal[roundness_at * most_queries + k]) {
+    for (int i = 0; i < 9; ++i) {
+      axes[i] = group.axes[i][k];
+    }
+    for (int i = 0; i < 3; ++i) {
+      offset[i] = group.own_offset[i][k];
+      linear[i] = group.own_linear[i][k];
+      angular[i] = group.own_angular[i][k];
+      squared[i] = group.principal[(squared_at + i) * most_queries + k];
+      semi[i] = group.principal[(semi_at + i) * most_queries + k];
+    }
+    error = distance_error * (extent + __builtin_sqrtf(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]));
+  }
+};
+
+/// Places as an ellipsoid with squared semi-axes A sees them, side by side: at e in its principal axes, with w = e / (A + t).
+/// Outside t > 0 is where S = Σ A w² is 1, which Newton's iteration finds. What is said of them is true wherever that is:
+/// the plane that touches the ellipsoid where its normal is w, at p = A w/√S, bounds h from below; and as e − p is t w and
+/// √S − 1 of p, the direction to the foot differs from w by |√S − 1| |p| / h at most.
+struct Sight {
+  Singles e[3], t, inverses[3], w[3], S, flatness;  // 1 / (A + t), Σ A w² / (A + t)
+  Singles inverse_norm, height;                     // 1 / |w|; h from below, nearly, as √S is less than (1 + S) / 2
+  Singles aside;                                    // |√S − 1| |p|, at most
+  Singles tilt;                                     // |n − w/|w||, at most
+
+  /// Where nothing is known but that the clearance is negative: gradients are longer than one.
+  auto is_inside() const noexcept { return (t <= 0.0f) & (S < 1.0f); }
+
+  /// Seen from the group's origin.
+  void place(const Ellipsoid& of, Singles x, Singles y, Singles z) noexcept {
+    for (int i = 0; i < 3; ++i) {
+      e[i] = of.axes[3 * i] * x + of.axes[3 * i + 1] * y + of.axes[3 * i + 2] * z - of.offset[i];
+    }
+  }
+
+  /// t from below, nearly: the best of where Newton's iteration comes to from infinity and, along every axis, of that axis alone.
+  void begin(const Ellipsoid& of) noexcept {
+    Singles second = {}, fourth = {};  // Σ A e² and Σ A² e²
+    for (int i = 0; i < 3; ++i) {
+      const Singles share = of.squared[i] * e[i];
+      second += share * e[i];
+      fourth += share * share;
+    }
+    second = larger(second, all(tiny));
+    const Singles inverse_second = rough_inverse_root(second);
+    t = larger((second - fourth * inverse_second) * inverse_second - 1e-12f, Singles{});  // 0 at the centre
+    for (int i = 0; i < 3; ++i) {
+      t = larger(of.semi[i] * magnitude(e[i]) - of.squared[i], t);
+    }
+  }
+
+  void set_w(const Ellipsoid& of) noexcept {
+    const float* A = of.squared;
+    const Singles sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1];
+    const Singles of_all = rough_inverse(product * sums[2]), of_two = of_all * sums[2];
+    inverses[0] = of_two * sums[1];
+    inverses[1] = of_two * sums[0];
+    inverses[2] = of_all * product;
+    S = flatness = Singles{};
+    for (int i = 0; i < 3; ++i) {
+      w[i] = e[i] * inverses[i];
+      const Singles share = A[i] * w[i] * w[i];
+      S += share;
+      flatness += share * inverses[i];
+    }
+  }
+
+  /// Where Newton's step on 1/√S − 1 ends, which is concave in t: below the root, wherever it begins; inside at 0.
+  static Singles next(Singles t, Singles S, Singles flatness) noexcept {
+    return larger(t + S * (rough_root(S) - 1.0f) * rough_inverse(larger(flatness, all(tiny))), Singles{});
+  }
+
+  void measure(const Ellipsoid& of) noexcept {
+    const Singles squared_norm = larger(w[0] * w[0] + w[1] * w[1] + w[2] * w[2], all(tiny)), over = S - 1.0f;
+    inverse_norm = rough_inverse_root(squared_norm);
+    height = (t * squared_norm + 0.5f * over) * inverse_norm;
+    height = is_inside() ? all(-__builtin_inff()) : height;
+    aside = of.extent * magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f));  // 1/(1 + √S) of |S − 1|
+    tilt = smaller(aside * rough_inverse(larger(height, all(least_height))), all(2.0f)) + direction_error;
+  }
+
+  /// w·v/|w| of what is at rest in the world: v is −(linear + angular × e).
+  Singles rate(const Ellipsoid& of) const noexcept {
+    Singles sum = {};
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      sum += (of.linear[i] + (of.angular[j] * e[l] - of.angular[l] * e[j])) * w[i];
+    }
+    return -sum * inverse_norm;
+  }
+};
+
+/// Where the leaves of the group are.
+void place(QueryGroup& group, const Points& points) noexcept {
+  Leaves& leaves = group.leaves;
+  const Boxes& boxes = points.leaf_boxes;
+  for (int i = 0; i < leaves.num; ++i) {
+    const int leaf = leaves.leaf[i];
+    leaves.centre[0][i] = static_cast<float>(boxes.x[leaf] - group.origin[0]);
+    leaves.centre[1][i] = static_cast<float>(boxes.y[leaf] - group.origin[1]);
+    leaves.centre[2][i] = static_cast<float>(boxes.z[leaf] - group.origin[2]);
+    leaves.half[0][i] = static_cast<float>(boxes.half_x[leaf]);
+    leaves.half[1][i] = static_cast<float>(boxes.half_y[leaf]);
+    leaves.half[2][i] = static_cast<float>(boxes.half_z[leaf]);
+    leaves.largest[i] = static_cast<float>(boxes.radius[leaf]);
+  }
+  const double* W = group.link->angular;
+  const float w[3] = {static_cast<float>(W[0]), static_cast<float>(W[1]), static_cast<float>(W[2])};
+  const float turning = static_cast<float>(group.link->turning), fastest = static_cast<float>(group.fastest);
+  for (int i = 0; i < leaves.num; i += singles) {
+    Singles c[3], v[3], squared = {};
+    for (int axis = 0; axis < 3; ++axis) {
+      c[axis] = load(leaves.centre[axis] + i);
+      const Singles half = load(leaves.half[axis] + i);
+      squared += half * half;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      const int j = (axis + 1) % 3, l = (axis + 2) % 3;
+      v[axis] = group.velocity[axis] + w[j] * c[l] - w[l] * c[j];
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      store(leaves.velocity[axis] + i, v[axis]);
+    }
+    const Singles distance = root(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+    const Singles diagonal = root(squared), speed = root(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    store(leaves.diagonal + i, diagonal);
+    store(leaves.speed + i, speed);
+    store(leaves.more + i, turning * diagonal + fastest + direction_error * speed);
+    store(leaves.error + i, distance_error * (distance + diagonal));
+  }
+  leaves.loaded = 0;
+}
+
+/// The points of leaf i of the group.
+void load_points(QueryGroup& group, const Points& points, int i) noexcept {
+  Leaves& leaves = group.leaves;
+  const int from = leaves.leaf[i] * most_points, to = i * most_points;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int n = 0; n < most_points; ++n) {
+      leaves.position[axis][to + n] = static_cast<float>(points.position[axis][from + n] - group.origin[axis]);
+    }
+  }
+  for (int n = 0; n < most_points; ++n) {
+    leaves.radius[to + n] = static_cast<float>(points.radius[from + n]);
+  }
+  for (int axis = 0; axis < 3 && points.velocity[0] != nullptr; ++axis) {
+    for (int n = 0; n < most_points; ++n) {
+      leaves.own[axis][to + n] = static_cast<float>(points.velocity[axis][from + n]);
+    }
+  }
+  leaves.loaded |= 1ull << i;
+}
+
+using LeafBits = unsigned long long;
+
+/// The lanes that are bits; others are infinite.
+inline Singles chosen(Singles x, unsigned lanes) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_mask_blend_ps(static_cast<__mmask16>(lanes), all(__builtin_inff()), x);
+#else
+  for (int i = 0; i < singles; ++i) {
+    x[i] = (lanes >> i & 1) != 0 ? x[i] : __builtin_inff();
+  }
+  return x;
+#endif
+}
+
+/// What an ellipsoid sees of leaves: bounds from below of h of all their points, and of h + τ h'; and t near them, as
+/// t0 + gradient · e.
+struct LeafBounds {
+  alignas(64) float least[most_leaves], after[most_leaves], t0[most_leaves], gradient[3][most_leaves];
+
+  void find(const QueryGroup& group, const Ellipsoid& of, int i) noexcept {
+    const Leaves& leaves = group.leaves;
+    Sight at;
+    at.place(of, load(leaves.centre[0] + i), load(leaves.centre[1] + i), load(leaves.centre[2] + i));
+    at.begin(of);
+    at.set_w(of);
+    at.measure(of);
+    const float horizon = static_cast<float>(group.horizon);
+    const Singles diagonal = load(leaves.diagonal + i), speed = load(leaves.speed + i), more = load(leaves.more + i);
+    Singles n[3], v[3], half[3], along = {}, box = {};
+    for (int j = 0; j < 3; ++j) {
+      n[j] = (of.axes[j] * at.w[0] + of.axes[3 + j] * at.w[1] + of.axes[6 + j] * at.w[2]) * at.inverse_norm;
+      v[j] = load(leaves.velocity[j] + i);
+      half[j] = load(leaves.half[j] + i);
+      along += n[j] * v[j];
+      box += half[j] * magnitude(n[j]);
+    }
+    // h is convex: at d from the centre it is more by n·d at least. n changes by H d for a matrix H between 0 and that of a
+    // sphere as round as the ellipsoid is anywhere, κ; then −dᵀ H v is −κ (|d| |v| + d·v) / 2 at least.
+    const Singles bend = rough_inverse(of.roundness + larger(at.height - box, Singles{}));
+    const Singles share = (0.5f * horizon) * bend, across = rough_root(speed * speed - along * along);
+    Singles turning_box = {};
+    for (int j = 0; j < 3; ++j) {
+      turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]));
+    }
+    const Singles turned = share * diagonal * (across + bend * diagonal * larger(-along, Singles{}));
+    const Singles margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error) ;
+    const Singles lowest = at.height - box, stopped = horizon * (speed + more);
+    const Singles in_motion = at.height - turning_box - turned - horizon * (along + (at.tilt + at.tilt) * speed + more);
+    store(least + i, lowest - margin);
+    store(after + i, (lowest > 0.0f ? larger(in_motion, lowest - stopped) : lowest - stopped) - margin);
+    const Singles inverse_flatness = rough_inverse(larger(at.flatness, all(tiny)));
+    Singles start = at.next(at.t, at.S, at.flatness);
+    for (int j = 0; j < 3; ++j) {
+      const Singles slope = of.squared[j] * at.w[j] * at.inverses[j] * inverse_flatness;
+      start -= slope * at.e[j];
+      store(gradient[j] + i, slope);
+    }
+    store(t0 + i, start);
+  }
+
+  /// Those of the first `num` leaves that may matter.
+  LeafBits below(float near, float ahead, int num) const noexcept {
+    LeafBits bits = 0;
+    for (int i = 0; i < num; i += singles) {
+      const unsigned lanes = kernels::below(load(least + i), all(near)) | kernels::below(load(after + i), all(ahead));
+      bits |= static_cast<LeafBits>(lanes & first_lanes(num - i)) << i;
+    }
+    return bits;
+  }
+
+  /// Of some leaves the smallest by either measure.
+  LeafBits best(LeafBits leaves) const noexcept {
+    if (leaves == 0) {
+      return 0;
+    }
+    int nearest = __builtin_ctzll(leaves), ahead = nearest;
+    for (LeafBits rest = leaves & (leaves - 1); rest != 0; rest &= rest - 1) {
+      const int i = __builtin_ctzll(rest);
+      nearest = least[i] < least[nearest] ? i : nearest;
+      ahead = after[i] < after[ahead] ? i : ahead;
+    }
+    return 1ull << nearest | 1ull << ahead;
+  }
+
+  void note_missed(QueryGroup& group, int k, LeafBits seen) const noexcept {
+    const int num = group.leaves.num;
+    Singles missed = all(__builtin_inff()), missed_ahead = missed;
+    for (int i = 0; i < num; i += singles) {
+      const unsigned lanes = static_cast<unsigned>(~seen >> i) & first_lanes(num - i);
+      missed = smaller(missed, chosen(load(least + i), lanes));
+      missed_ahead = smaller(missed_ahead, chosen(load(after + i), lanes));
+    }
+    const float least_missed = smallest(missed), least_missed_ahead = smallest(missed_ahead);
+    group.missed[k] = least_missed < group.missed[k] ? least_missed : group.missed[k];
+    group.missed_ahead[k] = least_missed_ahead < group.missed_ahead[k] ? least_missed_ahead : group.missed_ahead[k];
+  }
+};
+
+/// Of points within reach, which are bits, the smallest is known to be at most that of these.
+inline void lower(bool& found, float& limit, float& limit_of_leaves, Singles most, unsigned lanes, float window) noexcept {
+  if (lanes == 0) {
+    return;
+  }
+  found = true;
+  const float end = limit - window;
+  if (lanes &= below(most, all(end)); lanes != 0) {
+    limit = smallest(chosen(most, lanes)) + window;
+  }
+  limit_of_leaves = limit;
+}
+
+/// What an ellipsoid sees of a register of a leaf's points: bounds of h and h + τ h'. Found for several registers before any
+/// is made use of: one's chain of operations is long, and the next one's runs beside it.
+struct Look {
+  int leaf, first;
+  unsigned asked;  // lanes
+  Singles t, S, flatness, least[2], most[2];
+
+  void find(const QueryGroup& group, const Ellipsoid& of, const LeafBounds& bounds, int i, int n, bool moves) noexcept {
+    const Leaves& leaves = group.leaves;
+    leaf = i, first = n;
+    asked = first_lanes(leaves.count[i] - n);
+    const int from = i * most_points + n;
+    Sight at;
+    at.place(of, load(leaves.position[0] + from), load(leaves.position[1] + from), load(leaves.position[2] + from));
+    at.t = larger(bounds.t0[i] + bounds.gradient[0][i] * at.e[0] + bounds.gradient[1][i] * at.e[1] + bounds.gradient[2][i] * at.e[2],
+                  Singles{});
+    at.set_w(of);
+    at.measure(of);
+    Singles rate = at.rate(of);
+    if (moves) {
+      const Singles own[3] = {load(leaves.own[0] + from), load(leaves.own[1] + from), load(leaves.own[2] + from)};
+      for (int j = 0; j < 3; ++j) {
+        rate += (of.axes[3 * j] * own[0] + of.axes[3 * j + 1] * own[1] + of.axes[3 * j + 2] * own[2]) * at.w[j] * at.inverse_norm;
+      }
+    }
+    const float horizon = static_cast<float>(group.horizon), error = leaves.error[i] + of.error;
+    const Singles radius = load(leaves.radius + from), slack = at.tilt * (horizon * (leaves.speed[i] + leaves.more[i]));
+    const auto inside = at.is_inside();
+    t = at.t, S = at.S, flatness = at.flatness;
+    least[0] = at.height - radius - error;
+    least[1] = least[0] + horizon * rate - slack;
+    most[0] = (inside ? Singles{} : at.height + at.aside) + error - radius;
+    most[1] = inside ? all(__builtin_inff()) : most[0] + horizon * rate + slack;
+  }
+
+  /// Adds the points that matter to the candidates.
+  void keep(QueryGroup& group, int k, const Points& points) const noexcept {
+    const unsigned kept = (below(least[0], all(group.near[k])) | below(least[1], all(group.ahead[k]))) & asked;
+    if (kept == 0) {
+      return;
+    }
+    Query& query = group.queries[k];
+    lower(query.near, group.near[k], group.near_leaf[k], most[0], below(least[0], all(static_cast<float>(group.reach))) & kept,
+          static_cast<float>(group.window));
+    lower(query.approached, group.ahead[k], group.ahead_leaf[k], most[1],
+          below(least[1], all(static_cast<float>(group.reach_ahead))) & kept,
+          static_cast<float>(group.window_ahead));
+    Candidates& candidates = query.candidates;
+    if (candidates.size + singles > most_candidates) {
+      sum_candidates(group, k, points);
+    }
+    const int to = candidates.size;
+    compress(candidates.t + to, Sight::next(t, S, flatness), kept);
+    compress(candidates.least[0] + to, least[0], kept);
+    compress(candidates.least[1] + to, least[1], kept);
+    compress(candidates.point + to, group.leaves.leaf[leaf] * most_points + first, kept);
+    candidates.size += __builtin_popcount(kept);
+  }
+};
+
+/// Looks at the points of some leaves.
+void look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen, const Points& points) noexcept {
+  Leaves& leaves = group.leaves;
+  const bool moves = points.velocity[0] != nullptr;
+  constexpr int side_by_side = 4;
+  Look looks[side_by_side];
+  while (chosen != 0) {
+    int size = 0;
+    for (; chosen != 0 && size + most_points / singles <= side_by_side; chosen &= chosen - 1) {
+      const int i = __builtin_ctzll(chosen);
+      if (!(bounds.least[i] < group.near_leaf[k] || bounds.after[i] < group.ahead_leaf[k])) {  // no more
+        continue;
+      }
+      if ((leaves.loaded >> i & 1) == 0) {
+        load_points(group, points, i);
+      }
+      for (int n = 0; n < most_points; n += singles) {
+        looks[size++].find(group, of, bounds, i, n, moves);
+      }
+    }
+    for (int i = 0; i < size; ++i) {
+      looks[i].keep(group, k, points);
+    }
+  }
+}
+
+void collect(QueryGroup& group, const Points& points) noexcept {
+  place(group, points);
+  const int num = group.leaves.num;
+  LeafBounds all_bounds[most_queries];
+  const auto is_asked = [&](int k) {
+    return group.near_leaf[k] != -__builtin_inff() || group.ahead_leaf[k] != -__builtin_inff();
+  };
+  for (int k = 0; k < group.size; ++k) {
+    if (is_asked(k)) {
+      const Ellipsoid of(group, k);
+      for (int i = 0; i < num; i += singles) {
+        all_bounds[k].find(group, of, i);
+      }
+    }
+  }
+  for (int k = 0; k < group.size; ++k) {
+    if (!is_asked(k)) {
+      continue;
+    }
+    const LeafBounds& bounds = all_bounds[k];
+    LeafBits seen = 0, left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num);
+    if (left != 0) {
+      const Ellipsoid of(group, k);
+      LeafBits next = bounds.best(left);  // what is best by either measure says most about the others
+      while (left != 0) {
+        look_at(group, k, of, bounds, next, points);
+        seen |= next;
+        left = next = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen;
+      }
+    }
+    bounds.note_missed(group, k, seen);
+  }
+}

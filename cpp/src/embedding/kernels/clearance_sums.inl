@@ -1,0 +1,430 @@
+// Included by clearance_kernel.inl: points in double precision, summed.
+
+// Stands for the centre of an ellipsoid, where the clearance has no gradient [m]; far below any size that matters.
+constexpr double centre_offset = 1e-9;
+
+// S is 1 at the foot of the perpendicular. From within the first the cube of what it is beside 1 is within the second, and
+// from there on the square is below rounding.
+constexpr double cubic_within = 2e-3, polished_within = 1e-8;
+constexpr int most_iterations = 16;
+constexpr int together = 4;  // registers
+
+/// As many of the lanes as there are, as bits.
+inline unsigned first_lanes(int count) noexcept { return count < singles ? (1u << count) - 1u : (2u << (singles - 1)) - 1u; }
+
+void rotate(const double* rows, const double* x, double* result) noexcept {
+  for (int i = 0; i < 3; ++i) {
+    result[i] = rows[3 * i] * x[0] + rows[3 * i + 1] * x[1] + rows[3 * i + 2] * x[2];
+  }
+}
+
+/// Moves the spatial vector (angular, linear) at the world origin to `centre` and into principal axes.
+void express(const Query& query, const double* centre, const double* angular, const double* linear, double* angular_E,
+             double* linear_E) noexcept {
+  const double at_centre[3] = {linear[0] + angular[1] * centre[2] - angular[2] * centre[1],
+                               linear[1] + angular[2] * centre[0] - angular[0] * centre[2],
+                               linear[2] + angular[0] * centre[1] - angular[1] * centre[0]};
+  rotate(query.axes, angular, angular_E);
+  rotate(query.axes, at_centre, linear_E);
+}
+
+/// What the sums need.
+void begin_sums(QueryGroup& group, int k) noexcept {
+  Query& query = group.queries[k];
+  const double* axes_T = group.axes_T[k];
+  const LinkMotion& link = *group.link;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {  // axes_T R_WLᵀ
+      query.axes[3 * i + j] = axes_T[i] * link.rotation[j] + axes_T[3 + i] * link.rotation[3 + j] +
+                              axes_T[6 + i] * link.rotation[6 + j];
+    }
+    query.squared_axes[i] = group.semi_axes[k][i] * group.semi_axes[k][i];
+    query.precision[i] = 1.0 / query.squared_axes[i];
+  }
+  const double* A = query.squared_axes;
+  query.shortest = A[0] <= A[1] && A[0] <= A[2] ? 0 : A[1] <= A[2] ? 1 : 2;
+  const double centre[3] = {group.centre[0][k], group.centre[1][k], group.centre[2][k]};
+  express(query, centre, link.angular, link.linear, query.angular, query.linear);
+  express(query, centre, link.bias_angular, link.bias_linear, query.bias_angular, query.bias_linear);
+  for (auto& lanes : query.lane_sums) {
+    for (double& sum : lanes) {
+      sum = 0.0;
+    }
+  }
+  query.begun = true;
+}
+
+/// Old weights are smaller by the exponential of this.
+Lanes decay(double shift, double inverse_T) noexcept {
+  return exponential(all(shift * inverse_T < 690.0 ? -shift * inverse_T : -690.0));
+}
+
+/// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where S = Σ A w² = 1.
+struct Outside {
+  Lanes t, inverses[3], w[3], shares[3], S, flatness;  // 1 / (A + t), A w², Σ A w² / (A + t)
+
+  void place(const double* A, const Lanes* e) noexcept {
+    const Lanes sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1];
+    const Lanes of_all = inverse(product * sums[2]), of_two = of_all * sums[2];
+    inverses[0] = of_two * sums[1];
+    inverses[1] = of_two * sums[0];
+    inverses[2] = of_all * product;
+    S = flatness = Lanes{};
+    for (int i = 0; i < 3; ++i) {
+      w[i] = e[i] * inverses[i];
+      shares[i] = A[i] * w[i] * w[i];
+      S += shares[i];
+      flatness += shares[i] * inverses[i];
+    }
+  }
+
+  /// Newton's step on 1/√S − 1, which is concave in t: it ends below the root, wherever it begins.
+  Lanes step() const noexcept { return S * (root(S) - 1.0) * inverse(flatness); }
+  /// The same where S is close to 1.
+  Lanes small_step(Lanes inverse_flatness) const noexcept {
+    const Lanes over = S - 1.0;
+    return S * (over * (0.5 - over * (0.375 - 0.3125 * over))) * inverse_flatness;
+  }
+
+  /// Chebyshev's step on the same where S is close to 1: of an error that is small its third power is left.
+  Lanes cubic_step() const noexcept {
+    const Lanes inverse_flatness = inverse(flatness);
+    const Lanes newton = small_step(inverse_flatness);
+    Lanes second = {};  // Σ A w² / (A + t)²
+    for (int i = 0; i < 3; ++i) {
+      second += shares[i] * inverses[i] * inverses[i];
+    }
+    const Lanes bend = second * inverse_flatness - flatness * (2.0 - S);  // 1/S is 2 − S, where S is close to 1
+    return newton * (1.0 + 1.5 * newton * bend);
+  }
+
+  /// Newton's step where S is so close to 1 that all changes in proportion to it; S and flatness are left as they were.
+  void polish() noexcept {
+    const Lanes step = 0.5 * (S - 1.0) * inverse(flatness);
+    t += step;
+    for (int i = 0; i < 3; ++i) {
+      const Lanes change = 1.0 - step * inverses[i];
+      w[i] *= change;
+      inverses[i] *= change;
+    }
+  }
+
+  /// n'·v, of points that move by v. With D = (A + t)⁻¹ it is (v·w' − (n·v)(n·w'))/|w| for w' = D (v − w t') and
+  /// t' = (w·v − t w·Dv) / (|w|² − t w·Dw), as A D is 1 − t D; along is w·v.
+  Lanes bend(const Lanes* v, Lanes along, Lanes squared_norm, Lanes inverse_norm) const noexcept {
+    Lanes v_v = {}, w_v = {}, w_w = {};
+    for (int i = 0; i < 3; ++i) {
+      const Lanes scaled = inverses[i] * v[i];
+      v_v += scaled * v[i];
+      w_v += scaled * w[i];
+      w_w += inverses[i] * w[i] * w[i];
+    }
+    const Lanes t_dot = (along - t * w_v) * inverse(squared_norm - t * w_w);
+    const Lanes share = along * inverse_norm * inverse_norm;
+    return (v_v - t_dot * w_v - share * (w_v - t_dot * w_w)) * inverse_norm;
+  }
+};
+
+/// Points inside: u = e / A, m = e·u < 1, h = (m − √m) / |u|.
+struct Inside {
+  Lanes u[3], root_m, inverse_norm, value, gradient[3];
+
+  Inside(const double* A, const Lanes* e) noexcept {
+    for (int i = 0; i < 3; ++i) {
+      u[i] = e[i] / A[i];
+    }
+    root_m = root(e[0] * u[0] + e[1] * u[1] + e[2] * u[2]);
+    inverse_norm = 1.0 / root(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    value = root_m * (root_m - 1.0) * inverse_norm;
+    for (int i = 0; i < 3; ++i) {
+      gradient[i] = ((2.0 - 1.0 / root_m) - value * inverse_norm / A[i]) * u[i] * inverse_norm;
+    }
+  }
+
+  /// vᵀ ∂²h v: h |u| = m − √m, differentiated twice.
+  Lanes bend(const double* A, const Lanes* v, Lanes rate) const noexcept {
+    Lanes m_dot = {}, m_ddot = {}, norm_dot = {}, squared = {};
+    for (int i = 0; i < 3; ++i) {
+      const Lanes u_dot = v[i] / A[i];
+      m_dot += 2.0 * u[i] * v[i];
+      m_ddot += 2.0 * u_dot * v[i];
+      norm_dot += u[i] * u_dot * inverse_norm;
+      squared += u_dot * u_dot;
+    }
+    const Lanes root_dot = 0.5 * m_dot / root_m;
+    const Lanes root_ddot = (0.5 * m_ddot - root_dot * root_dot) / root_m;
+    const Lanes norm_ddot = (squared - norm_dot * norm_dot) * inverse_norm;
+    return (m_ddot - root_ddot - 2.0 * rate * norm_dot - value * norm_ddot) * inverse_norm;
+  }
+};
+
+/// Points that are summed in double precision, and where their iteration begins, with room for whole registers.
+struct Chosen {
+  int size;
+  int point[most_candidates + singles];
+  float t[most_candidates + singles];
+
+  /// Those of the candidates of which either bound is below its limit. The errors of the bounds are larger than those of
+  /// rounding the limits.
+  Chosen(const Candidates& candidates, float limit, float limit_ahead) noexcept : size(0) {
+    const Singles limits = all(limit), limits_ahead = all(limit_ahead);
+    for (int i = 0; i < candidates.size; i += singles) {
+      const unsigned far = below(limits, load(candidates.least[0] + i)) & below(limits_ahead, load(candidates.least[1] + i));
+      const unsigned near = ~far & first_lanes(candidates.size - i);
+      compress(t + size, load(candidates.t + i), near);
+      compress(point + size, candidates.point + i, near);
+      size += __builtin_popcount(near);
+    }
+    for (int i = size; i % width != 0; ++i) {
+      t[i] = t[0];
+      point[i] = point[0];
+    }
+  }
+};
+
+/// Points in double precision, side by side; infinitely far where no more are chosen.
+struct Samples {
+  Lanes h, after, rate, g[3], moment[3];  // h + τ h', h', and ∂h with its moment about the centre, in principal axes
+  Lanes curvature;                        // h'' without what the bias of the link makes, which is linear in g and moment
+};
+
+/// How samples are found: in steps, each for several registers. The chain of operations of one is long, and the next one's
+/// runs beside it.
+class Approach {
+ public:
+  /// Where a register from `first` on lies, and Newton's iteration up to where it nearly ends.
+  void begin(const QueryGroup& group, int k, const Points& points, const Chosen& chosen, int first) noexcept {
+    const Query& query = group.queries[k];
+    const double *R = query.axes, *A = query.squared_axes, *W = query.angular;
+    const int* point = chosen.point + first;
+    out_.t = widen(chosen.t + first);
+    radius_ = gather(points.radius, point);
+    Lanes x[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      x[axis] = gather(points.position[axis], point) - group.centre[axis][k];
+    }
+    Lanes m = {};
+    for (int i = 0; i < 3; ++i) {
+      e_[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+      m += e_[i] * e_[i] * query.precision[i];
+    }
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      v_[i] = -query.linear[i] - (W[j] * e_[l] - W[l] * e_[j]);
+      twice_own_less_link_[i] = v_[i];
+    }
+    if (points.velocity[0] != nullptr) {
+      for (int axis = 0; axis < 3; ++axis) {
+        x[axis] = gather(points.velocity[axis], point);
+      }
+      for (int i = 0; i < 3; ++i) {
+        const Lanes own = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+        v_[i] += own;
+        twice_own_less_link_[i] = v_[i] + own;
+      }
+    }
+    inside_ = m < 1.0;
+    are_inside_ = below(m, all(1.0));
+    out_.t = inside_ ? Lanes{} : out_.t;
+    out_.place(A, e_);
+    Lanes step = out_.cubic_step();
+    if (__builtin_expect(are_far(cubic_within), 0)) {
+      step = magnitude(out_.S - 1.0) > cubic_within ? out_.step() : step;
+    }
+    out_.t = inside_ ? Lanes{} : larger(out_.t + step, Lanes{});
+  }
+
+  void finish(const QueryGroup& group, int k, int count, Samples& result) noexcept {
+    const Query& query = group.queries[k];
+    const double *A = query.squared_axes, *W = query.angular;
+    out_.place(A, e_);
+    for (int i = 0; i < most_iterations && __builtin_expect(are_far(polished_within), 0); ++i) {
+      const Lanes step = out_.step();
+      out_.t += inside_ ? Lanes{} : step;
+      out_.place(A, e_);
+    }
+    out_.polish();
+    const Lanes squared_norm = out_.w[0] * out_.w[0] + out_.w[1] * out_.w[1] + out_.w[2] * out_.w[2];
+    const Lanes inverse_norm = inverse_root(squared_norm);
+    Lanes h = out_.t * squared_norm * inverse_norm, *g = result.g;
+    for (int i = 0; i < 3; ++i) {
+      g[i] = out_.w[i] * inverse_norm;
+    }
+    const Lanes along = out_.w[0] * v_[0] + out_.w[1] * v_[1] + out_.w[2] * v_[2];
+    Lanes curvature = out_.bend(v_, along, squared_norm, inverse_norm);
+    result.rate = along * inverse_norm;
+    if (__builtin_expect(are_inside_ != 0, 0)) {
+      const Lanes squared = e_[0] * e_[0] + e_[1] * e_[1] + e_[2] * e_[2];
+      e_[query.shortest] = squared < 1e-300 ? all(centre_offset) : e_[query.shortest];
+      const Inside in(A, e_);
+      h = inside_ ? in.value : h;
+      for (int i = 0; i < 3; ++i) {
+        g[i] = inside_ ? in.gradient[i] : g[i];
+      }
+      result.rate = g[0] * v_[0] + g[1] * v_[1] + g[2] * v_[2];
+      curvature = inside_ ? in.bend(A, v_, result.rate) : curvature;
+    }
+    result.h = h - radius_;
+    result.after = result.h + group.horizon * result.rate;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      result.moment[i] = e_[j] * g[l] - e_[l] * g[j];
+      curvature -= g[i] * (W[j] * twice_own_less_link_[l] - W[l] * twice_own_less_link_[j]);
+    }
+    result.curvature = curvature;
+    if (count < width) {
+      const auto is_chosen = lane_numbers() < count;
+      result.h = is_chosen ? result.h : all(__builtin_inf());
+      result.after = is_chosen ? result.after : all(__builtin_inf());
+    }
+  }
+
+ private:
+  bool are_far(double within) const noexcept {
+    return (below(all(within), magnitude(out_.S - 1.0)) & ~are_inside_) != 0;
+  }
+
+  Lanes e_[3], v_[3], twice_own_less_link_[3];  // the offset in principal axes, and velocities in moving ones
+  Lanes radius_;
+  Outside out_;
+  Bits inside_;
+  unsigned are_inside_;
+};
+
+/// Lowers `least` to values below limits, of points.
+void lower(double& least, int& point, Lanes limits, Lanes values, const int* points) noexcept {
+  for (unsigned lanes = below(values, limits) & below(values, all(least)); lanes != 0; lanes &= lanes - 1) {
+    const int i = __builtin_ctz(lanes);
+    if (values[i] < least) {
+      least = values[i];
+      point = points[i];
+    }
+  }
+}
+
+/// Old sums become smaller where what they are relative to becomes so.
+void rescale(Query& query, int first, int last, double before, double now, double inverse_T) noexcept {
+  if (now < before && before < __builtin_inf()) {
+    const Lanes factor = decay(before - now, inverse_T);
+    for (int i = first; i < last; ++i) {
+      store(query.lane_sums[i], factor * load(query.lane_sums[i]));
+    }
+  }
+}
+
+/// Sums of lanes that are kept in registers while samples are gone through.
+template <int first, int last>
+class LaneSums {
+ public:
+  explicit LaneSums(Query& query) noexcept : query_(query) {
+    for (int i = first; i < last; ++i) {
+      sums_[i - first] = load(query.lane_sums[i]);
+    }
+  }
+  void add(int sum, Lanes term) noexcept { sums_[sum - first] += term; }
+  void write() const noexcept {
+    for (int i = first; i < last; ++i) {
+      store(query_.lane_sums[i], sums_[i - first]);
+    }
+  }
+
+ private:
+  Query& query_;
+  Lanes sums_[last - first];
+};
+
+/// Sums for the mean of what is within reach.
+void add_nearest(const QueryGroup& group, Query& query, const Samples* samples, int number) noexcept {
+  const double inverse_T = group.inverse_T;
+  LaneSums<0, approach> sums(query);
+  for (int n = 0; n < number; ++n) {
+    const Samples& at = samples[n];
+    const Lanes above = at.h - query.reference;
+    if (below(above, all(group.window)) == 0) {
+      continue;
+    }
+    const auto weighs = above < group.window;
+    const Lanes over = weighs ? above : Lanes{}, rate = at.rate;
+    const Lanes weight = weighs ? exponential(-inverse_T * over) : Lanes{};
+    const Lanes zeroth = -inverse_T * weight, first = weight + zeroth * over;
+    const Lanes weight_dot = zeroth * rate, weight_ddot = zeroth * (at.curvature - inverse_T * rate * rate);
+    sums.add(0, weight);
+    sums.add(1, weight_dot);
+    sums.add(2, weight_ddot);
+    sums.add(3, weight * over);
+    sums.add(4, weight_dot * over + weight * rate);
+    sums.add(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * at.curvature);
+    for (int i = 0; i < 3; ++i) {
+      sums.add(6 + i, zeroth * at.g[i]);
+      sums.add(9 + i, zeroth * at.moment[i]);
+      sums.add(12 + i, first * at.g[i]);
+      sums.add(15 + i, first * at.moment[i]);
+    }
+  }
+  sums.write();
+}
+
+/// Sums for the mean of what approaches; where nothing comes within reach, of what is nearest.
+void add_approach(const QueryGroup& group, Query& query, const Samples* samples, int number) noexcept {
+  LaneSums<approach, kernels::sums> sums(query);
+  const bool comes = query.ahead < group.reach_ahead;
+  for (int n = 0; n < number; ++n) {
+    const Samples& at = samples[n];
+    const Lanes beyond = at.after - query.ahead;
+    const Lanes after = comes ? beyond : at.h < query.reference + group.window ? beyond : all(__builtin_inf());
+    if (below(after, all(group.window_ahead)) == 0) {
+      continue;
+    }
+    const auto weighs = after < group.window_ahead;
+    const Lanes weight = weighs ? exponential(weighs ? -group.inverse_T * after : Lanes{}) : Lanes{};
+    sums.add(approach, weight);
+    sums.add(approach + 1, weight * (weighs ? at.h : Lanes{}));
+    sums.add(approach + 2, weight * at.rate);
+    sums.add(approach + 3, weight * at.curvature);
+    for (int i = 0; i < 3; ++i) {
+      sums.add(approach + 4 + i, weight * at.g[i]);
+      sums.add(approach + 7 + i, weight * at.moment[i]);
+    }
+  }
+  sums.write();
+}
+
+void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
+  Query& query = group.queries[k];
+  Candidates& candidates = query.candidates;
+  if (!query.begun) {
+    begin_sums(group, k);
+  }
+  // The limits are those of the smallest clearances and a window, as far as bounds say.
+  const float nothing = -__builtin_inff();
+  const Chosen chosen(candidates, query.near ? group.near[k] : nothing, query.approached ? group.ahead[k] : nothing);
+  candidates.size = 0;
+  Samples samples[most_candidates / width];
+  const int number = (chosen.size + width - 1) / width;
+  for (int first = 0; first < number; first += together) {
+    Approach approaches[together];
+    const int end = number < first + together ? number : first + together;
+    for (int i = first; i < end; ++i) {
+      approaches[i - first].begin(group, k, points, chosen, i * width);
+    }
+    for (int i = first; i < end; ++i) {
+      approaches[i - first].finish(group, k, chosen.size - i * width, samples[i]);
+    }
+  }
+  const double reference = query.reference, ahead = query.ahead;
+  for (int i = 0; i < number; ++i) {
+    lower(query.reference, query.nearest, all(group.reach), samples[i].h, chosen.point + i * width);
+  }
+  rescale(query, 0, approach, reference, query.reference, group.inverse_T);
+  for (int i = 0; i < number; ++i) {
+    const Lanes limits = samples[i].h < query.reference + group.window ? all(__builtin_inf()) : all(group.reach_ahead);
+    lower(query.ahead, query.minded, limits, samples[i].after, chosen.point + i * width);
+  }
+  rescale(query, approach, sums, ahead, query.ahead, group.inverse_T);
+  if (query.reference < __builtin_inf()) {
+    add_nearest(group, query, samples, number);
+  }
+  if (query.ahead < __builtin_inf()) {
+    add_approach(group, query, samples, number);
+  }
+}
