@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -178,52 +179,45 @@ class ClearanceField::Search {
     link_ = &link;
     is_placed_ = false;
     surround();
-    near_ = reach_;
-    ahead_ = horizon_.distance;
-    int num_seen = 0;  // leaves, those that there is room for first
-    visit([&](int leaf) {
-      if (num_seen < most_seen) {
-        seen_[static_cast<std::size_t>(num_seen)] = leaf;
+    // Leaves beyond the reach may weigh beside what is found within it: they are put off, as far as there is room.
+    kernels::Limits within{reach_, horizon_.distance};
+    const kernels::Limits beyond{reach_ + group_.window, horizon_.distance + group_.window_ahead};
+    int num_put_off = 0;
+    visit(within, beyond, [&](int leaf, bool is_within) {
+      if (is_within && take(leaf)) {
+        within.near = std::min<double>(reach_, largest(group_.near_leaf));
+        within.ahead = std::min<double>(horizon_.distance, largest(group_.ahead_leaf));
+      } else if (!is_within) {
+        put_off_[static_cast<std::size_t>(num_put_off)] = leaf;
+        num_put_off = std::min(num_put_off + 1, most_put_off);
       }
-      ++num_seen;
-      return true;
-    }, [&] {  // nothing lies beyond the reach that is looked at now, but farther in than that
-      near_ = std::min<double>(reach_, largest(group_.near_leaf));
-      ahead_ = std::min<double>(horizon_.distance, largest(group_.ahead_leaf));
     });
+    collect();
     if (!is_placed_) {
       return false;
     }
-    // What was left out before anything within reach was known may still weigh beside it: beyond the reach, and of leaves that
-    // were looked at.
-    const double nearest_end = largest_known(group_.near, true), ahead_end = largest_known(group_.ahead, false);
-    const bool goes_beyond = nearest_end > reach_ || ahead_end > horizon_.distance;
-    if (goes_beyond && num_seen <= most_seen) {
-      near_ = std::max(reach_, nearest_end);
-      ahead_ = std::max(horizon_.distance, ahead_end);
-      int next = 0;  // the same leaves come in the same order
-      visit([&](int leaf) {
-        const bool is_seen = next < num_seen && seen_[static_cast<std::size_t>(next)] == leaf;
-        next += is_seen;
-        return !is_seen;
-      }, [] {});
+    const bool goes_beyond = is_known_beyond(reach_, horizon_.distance);
+    const bool is_full = num_put_off == most_put_off;
+    for (int i = 0; goes_beyond && !is_full && i < num_put_off; ++i) {
+      take(put_off_[static_cast<std::size_t>(i)]);
     }
-    near_ = ahead_ = -infinity;
+    collect();
+    // So may what was missed in leaves that were looked at before.
+    kernels::Limits again{-infinity, -infinity};
     for (int k = 0; k < cluster.size; ++k) {
       kernels::Query& query = group_.queries[k];
       const double to = query.near ? group_.near[k] : -infinity, to_ahead = query.approached ? group_.ahead[k] : -infinity;
-      const bool is_missed = goes_beyond && num_seen > most_seen && (to > reach_ || to_ahead > horizon_.distance);
-      if (is_missed || group_.missed[k] < to || group_.missed_ahead[k] < to_ahead) {
+      if ((goes_beyond && is_full) || group_.missed[k] < to || group_.missed_ahead[k] < to_ahead) {
         limit(k, to, to_ahead);
         forget(query);
-        near_ = std::max(near_, to);
-        ahead_ = std::max(ahead_, to_ahead);
+        again = {std::max(again.near, to), std::max(again.ahead, to_ahead)};
       } else {  // is asked no more
         group_.near_leaf[k] = group_.ahead_leaf[k] = -std::numeric_limits<float>::infinity();
       }
     }
-    if (std::max(near_, ahead_) > -infinity) {
-      visit([](int) { return true; }, [] {});
+    if (std::max(again.near, again.ahead) > -infinity) {
+      visit(again, again, [&](int leaf, bool) { take(leaf); });
+      collect();
     }
     return true;
   }
@@ -252,7 +246,7 @@ class ClearanceField::Search {
   }
 
  private:
-  static constexpr int most_seen = 1024;
+  static constexpr int most_put_off = 1024;
 
   const Ellipsoid& ellipsoid(int k) const noexcept {
     return field_.ellipsoids_[static_cast<std::size_t>(cluster_->first + k)];
@@ -304,45 +298,52 @@ class ClearanceField::Search {
   }
 
   double largest(const float* limits) const noexcept { return *std::max_element(limits, limits + cluster_->size); }
-  /// Of those below which something is known.
-  double largest_known(const float* limits, bool near) const noexcept {
-    double most = -infinity;
+  /// Whether a limit below which something is known is beyond these.
+  bool is_known_beyond(double near, double ahead) const noexcept {
     for (int k = 0; k < cluster_->size; ++k) {
-      if (near ? group_.queries[k].near : group_.queries[k].approached) {
-        most = std::max<double>(most, limits[k]);
+      const kernels::Query& query = group_.queries[k];
+      if ((query.near && group_.near[k] > near) || (query.approached && group_.ahead[k] > ahead)) {
+        return true;
       }
     }
-    return most;
+    return false;
   }
 
-  /// Collects from the leaves that matter and are wanted, many at a time; `after` is called in between.
-  template <class Wanted, class After>
-  void visit(Wanted&& wanted, After&& after) noexcept {
-    kernels::Leaves& leaves = group_.leaves;
-    const auto collect = [&] {
-      if (!is_placed_) {
-        place();
-      }
-      kernel_.collect(group_, points_);
-      leaves.num = 0;
-      after();
-    };
+  /// Calls leaf(number, whether it is within) for the leaves that may be below `beyond`.
+  template <class Leaf>
+  void visit(const kernels::Limits& within, const kernels::Limits& beyond, Leaf&& leaf) const noexcept {
     const auto measure = [&](const Balls& balls, const Boxes& boxes, int first, int count, PointTree::Bounds& bounds) {
-      return kernel_.measure(ball_, balls, boxes, first, count, near_, ahead_, bounds.data());
+      return kernel_.measure(ball_, balls, boxes, first, count, within, beyond, bounds.data());
     };
-    tree_.visit(measure, [&](int leaf, int count) {
-      if (!wanted(leaf)) {
-        return;
-      }
-      leaves.leaf[leaves.num] = leaf;
-      leaves.count[leaves.num++] = count;
-      if (leaves.num == kernels::most_leaves) {
-        collect();
+    tree_.visit(measure, [&](int first, unsigned bits) {
+      for (unsigned left = bits & 0xffffu; left != 0; left &= left - 1) {
+        const int i = std::countr_zero(left);
+        leaf(first + i, (bits >> (i + 16) & 1) != 0);
       }
     });
-    if (leaves.num > 0) {
-      collect();
+  }
+
+  /// Leaves are looked at many at a time; returns whether they were.
+  bool take(int leaf) noexcept {
+    kernels::Leaves& leaves = group_.leaves;
+    leaves.leaf[leaves.num] = leaf;
+    leaves.count[leaves.num++] = tree_.count(leaf);
+    if (leaves.num < kernels::most_leaves) {
+      return false;
     }
+    collect();
+    return true;
+  }
+
+  void collect() noexcept {
+    if (group_.leaves.num == 0) {
+      return;
+    }
+    if (!is_placed_) {
+      place();
+    }
+    kernel_.collect(group_, points_);
+    group_.leaves.num = 0;
   }
 
   const ClearanceField& field_;
@@ -356,9 +357,8 @@ class ClearanceField::Search {
   kernels::MovingBall ball_;
   kernels::LinkMotion motion_;
   bool is_placed_ = false;
-  double near_ = 0.0, ahead_ = 0.0;  // bounds of the cluster below which nodes of the tree matter
   kernels::QueryGroup group_;
-  std::array<int, most_seen> seen_;
+  std::array<int, most_put_off> put_off_;
 };
 
 void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
@@ -391,18 +391,23 @@ bool ClearanceField::touches(const KinematicState& state, const Obstacles& obsta
       }
       return near;
     };
-    tree.visit(measure, [&](int leaf, int count) {
-      const int first = leaf * PointTree::leaf_size;
-      for (int n = first; n < first + count && !found; ++n) {
-        const Eigen::Vector3d x(tree.coordinate(0)[n], tree.coordinate(1)[n], tree.coordinate(2)[n]);
-        if (!(distance(x.x(), x.y(), x.z(), tree.radii()[n]) < 0.0)) {
-          continue;
-        }
-        const Eigen::Vector3d in_link = link.R_WL.transpose() * (x - link.p_WL);
-        for (int k = cluster.first; k < cluster.first + cluster.size; ++k) {
-          const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(k)];
-          const double within = ellipsoid.semi_axes.minCoeff() + tree.radii()[n] - depth;
-          found = found || (within > 0.0 && (in_link - ellipsoid.body.mean).squaredNorm() < within * within);
+    const auto look_at = [&](int n) {
+      const Eigen::Vector3d x(tree.coordinate(0)[n], tree.coordinate(1)[n], tree.coordinate(2)[n]);
+      if (!(distance(x.x(), x.y(), x.z(), tree.radii()[n]) < 0.0)) {
+        return;
+      }
+      const Eigen::Vector3d in_link = link.R_WL.transpose() * (x - link.p_WL);
+      for (int k = cluster.first; k < cluster.first + cluster.size; ++k) {
+        const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(k)];
+        const double within = ellipsoid.semi_axes.minCoeff() + tree.radii()[n] - depth;
+        found = found || (within > 0.0 && (in_link - ellipsoid.body.mean).squaredNorm() < within * within);
+      }
+    };
+    tree.visit(measure, [&](int first, unsigned leaves) {
+      for (; leaves != 0; leaves &= leaves - 1) {
+        const int leaf = first + std::countr_zero(leaves), begin = leaf * PointTree::leaf_size;
+        for (int n = begin; n < begin + tree.count(leaf) && !found; ++n) {
+          look_at(n);
         }
       }
     });

@@ -76,16 +76,19 @@ class PointTree {
   /// A measure of each of up to `fan_out` nodes.
   using Bounds = std::array<double, fan_out>;
 
-  /// Calls leaf(k, count) for every leaf k that matters, with its number of points, as do all nodes above it; of a node those
+  /// Calls leaves(first, bits) with every group of leaves of which some matter, as do all nodes above them; of a node those
   /// first that measure least. measure(Balls, Boxes, first, count, Bounds&) measures what is in the nodes [first, first + count),
-  /// of which arrays go on for `fan_out` from `first`, and returns those that matter as bits. No allocation.
-  template <class Measure, class Leaf>
-  void visit(Measure&& measure, Leaf&& leaf) const noexcept {
+  /// of which arrays go on for `fan_out` from `first`, and returns those that matter as bits, what leaves(...) gets; in the upper
+  /// half of the word there may be more. No allocation.
+  template <class Measure, class Leaves>
+  void visit(Measure&& measure, Leaves&& leaves) const noexcept {
     if (!levels_.empty()) {
       const std::size_t top = top_level(fan_out);
-      descend(top, 0, levels_[top].size, measure, leaf);
+      descend(top, 0, levels_[top].size, measure, leaves);
     }
   }
+  /// Number of points of a leaf.
+  int count(int leaf) const noexcept { return std::min(leaf_size, size() - leaf * leaf_size); }
 
  private:
   /// The balls and boxes of all nodes, around the same centres, with room to read `leaf_size` from any node on.
@@ -119,16 +122,14 @@ class PointTree {
   void refit() noexcept;
   void fit(std::size_t level, int node) noexcept;
 
-  template <class Measure, class Leaf>
-  void descend(std::size_t level, int first, int count, Measure& measure, Leaf& leaf) const noexcept {
+  template <class Measure, class Leaves>
+  void descend(std::size_t level, int first, int count, Measure& measure, Leaves& leaves) const noexcept {
     const Level& nodes = levels_[level];
     alignas(64) Bounds bounds;
-    unsigned left = measure(nodes.balls(), nodes.boxes(), first, count, bounds);
-    if (level == 0) {
-      for (; left != 0; left &= left - 1) {
-        const int node = first + std::countr_zero(left);
-        leaf(node, std::min(leaf_size, size() - node * leaf_size));
-      }
+    const unsigned bits = measure(nodes.balls(), nodes.boxes(), first, count, bounds);
+    unsigned left = bits & 0xffffu;
+    if (left != 0 && level == 0) {
+      leaves(first, bits);
       return;
     }
     while (left != 0) {
@@ -139,7 +140,7 @@ class PointTree {
       }
       left &= ~(1u << least);
       const int below = (first + least) * fan_out;
-      descend(level - 1, below, std::min(fan_out, levels_[level - 1].size - below), measure, leaf);
+      descend(level - 1, below, std::min(fan_out, levels_[level - 1].size - below), measure, leaves);
     }
   }
 

@@ -113,13 +113,18 @@ struct MovingBall {
   double horizon, fastest;       // as above
 };
 
+/// Clearances below the first matter, and where h + τ h' is below the second.
+struct Limits {
+  double near, ahead;
+};
+
 /// Leaves are looked at in single precision, for every query that their points matter to; what may weigh is summed in
 /// double precision.
 struct ClearanceKernel {
-  /// Nodes [first, first + count) of which bounds of the clearances are below `near`, or those of h + τ h' below `ahead`, as
-  /// bits; and the former, with room for whole registers.
-  unsigned (*measure)(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count, double near,
-                      double ahead, double* bounds) noexcept;
+  /// Nodes [first, first + count) that are below limits, as bits: in the lower half of the word below `beyond`, in the upper
+  /// half below `within`. Writes bounds of clearances, and has room for whole registers.
+  unsigned (*measure)(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
+                      const Limits& within, const Limits& beyond, double* bounds) noexcept;
   /// To be called once a group is placed.
   void (*begin)(QueryGroup& group) noexcept;
   /// Adds points of the group's leaves that may weigh to the candidates, and lowers its limits. Where there is no room, the

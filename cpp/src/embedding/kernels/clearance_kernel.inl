@@ -18,8 +18,8 @@ Values closing_speed(Values along, Values across, Values inverse_distance, Value
   return (sine < 1) & (along * inverse_distance < speed * cosine) ? turned : speed;
 }
 
-unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count, double near,
-                 double ahead, double* bounds) noexcept {
+unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
+                 const Limits& within, const Limits& beyond, double* bounds) noexcept {
   const double* w = cluster.angular;
   const double *centres[3] = {balls.x + first, balls.y + first, balls.z + first},
                *halves[3] = {boxes.half_x + first, boxes.half_y + first, boxes.half_z + first};
@@ -48,9 +48,11 @@ unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& box
                           cluster.turning * ball + cluster.fastest;
     const Lanes bound = larger(distance - radius, quick_root(squared_to_box) - cluster.radius - load(boxes.radius + first + n));
     store(bounds + n, bound);
-    bits |= (below(bound, all(near)) | below(bound - cluster.horizon * closing, all(ahead))) << n;
+    const Lanes after = bound - cluster.horizon * closing;
+    bits |= (below(bound, all(beyond.near)) | below(after, all(beyond.ahead))) << n;
+    bits |= (below(bound, all(within.near)) | below(after, all(within.ahead))) << (n + 16);
   }
-  return bits & ((1u << count) - 1u);
+  return bits & ((1u << count) - 1u) * 0x10001u;
 }
 
 }  // namespace

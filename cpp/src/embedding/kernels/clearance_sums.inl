@@ -291,16 +291,29 @@ class Approach {
   unsigned are_inside_;
 };
 
-/// Lowers `least` to values below limits, of points.
-void lower(double& least, int& point, Lanes limits, Lanes values, const int* points) noexcept {
-  for (unsigned lanes = below(values, limits) & below(values, all(least)); lanes != 0; lanes &= lanes - 1) {
-    const int i = __builtin_ctz(lanes);
-    if (values[i] < least) {
-      least = values[i];
-      point = points[i];
+/// The smallest of values in whole registers, and which.
+struct Smallest {
+  double value = __builtin_inf();
+  int at = -1;
+
+  void find(const Lanes* values, int number) noexcept {
+    Lanes least = all(__builtin_inf());
+    for (int i = 0; i < number; ++i) {
+      least = values[i] < least ? values[i] : least;
+    }
+    double lanes[width];
+    store(lanes, least);
+    for (const double lane : lanes) {
+      value = lane < value ? lane : value;
+    }
+    for (int i = 0; i < number && value < __builtin_inf(); ++i) {
+      if (const unsigned equal = ~below(all(value), values[i]) & ((1u << width) - 1u); equal != 0) {
+        at = i * width + __builtin_ctz(equal);
+        return;
+      }
     }
   }
-}
+};
 
 /// Old sums become smaller where what they are relative to becomes so.
 void rescale(Query& query, int first, int last, double before, double now, double inverse_T) noexcept {
@@ -412,13 +425,25 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
     }
   }
   const double reference = query.reference, ahead = query.ahead;
+  Lanes values[most_candidates / width];
   for (int i = 0; i < number; ++i) {
-    lower(query.reference, query.nearest, all(group.reach), samples[i].h, chosen.point + i * width);
+    values[i] = samples[i].h;
+  }
+  Smallest nearest, minded;
+  nearest.find(values, number);
+  if (nearest.value < group.reach && nearest.value < reference) {
+    query.reference = nearest.value;
+    query.nearest = chosen.point[nearest.at];
   }
   rescale(query, 0, approach, reference, query.reference, group.inverse_T);
   for (int i = 0; i < number; ++i) {
-    const Lanes limits = samples[i].h < query.reference + group.window ? all(__builtin_inf()) : all(group.reach_ahead);
-    lower(query.ahead, query.minded, limits, samples[i].after, chosen.point + i * width);
+    const auto counts = (samples[i].h < query.reference + group.window) | (samples[i].after < group.reach_ahead);
+    values[i] = counts ? samples[i].after : all(__builtin_inf());
+  }
+  minded.find(values, number);
+  if (minded.value < ahead) {
+    query.ahead = minded.value;
+    query.minded = chosen.point[minded.at];
   }
   rescale(query, approach, sums, ahead, query.ahead, group.inverse_T);
   if (query.reference < __builtin_inf()) {
