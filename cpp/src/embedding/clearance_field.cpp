@@ -43,7 +43,7 @@ kernels::LinkMotion motion_of(const KinematicState::Link& link) noexcept {
 }
 
 kernels::Points points_of(const PointTree& tree) noexcept {
-  kernels::Points points{{tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), {}, {}, {}};
+  kernels::Points points{{tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), tree.common_radius(), {}, {}, {}};
   if (tree.size() > 0) {
     points.leaf_balls = tree.leaf_balls();
     points.leaf_boxes = tree.leaf_boxes();
@@ -192,14 +192,17 @@ class ClearanceField::Search {
         num_put_off = std::min(num_put_off + 1, most_put_off);
       }
     });
-    collect();
-    if (!is_placed_) {
+    if (group_.leaves.num == 0 && !is_placed_) {
       return false;
     }
-    const bool goes_beyond = is_known_beyond(reach_, horizon_.distance);
     const bool is_full = num_put_off == most_put_off;
-    for (int i = 0; goes_beyond && !is_full && i < num_put_off; ++i) {
-      take(put_off_[static_cast<std::size_t>(i)]);
+    int next = 0;
+    while (next < num_put_off && group_.leaves.num > 0 && !take(put_off_[static_cast<std::size_t>(next++)])) {
+    }
+    collect();
+    const bool goes_beyond = is_known_beyond(reach_, horizon_.distance);
+    while (goes_beyond && !is_full && next < num_put_off) {
+      take(put_off_[static_cast<std::size_t>(next++)]);
     }
     collect();
     // So may what was missed in leaves that were looked at before.

@@ -78,6 +78,7 @@ PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radi
   if (order_.empty()) {
     return;
   }
+  common_radius_ = (radii.array() == radii[0]).all() ? radii[0] : -1.0;
   const std::size_t leaves = groups(order_.size(), leaf_size);
   for (int c = 0; c < 7; ++c) {
     columns_[static_cast<std::size_t>(c)].assign(leaves * leaf_size, c < 3 ? padding : 0.0);

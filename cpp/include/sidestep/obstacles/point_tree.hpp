@@ -33,6 +33,7 @@ class PointTree {
 
   int size() const noexcept { return static_cast<int>(order_.size()); }
   bool moves() const noexcept { return fastest_ > 0.0; }
+  double common_radius() const noexcept { return common_radius_; }  ///< [m] of all points; negative where they differ
   double fastest() const noexcept { return fastest_; }  ///< speed of any point [m/s], at most
   const std::vector<int>& order() const noexcept { return order_; }
 
@@ -187,7 +188,7 @@ class PointTree {
   std::vector<int> order_;
   std::array<std::vector<double>, 7> columns_;  // x, y, z, radius, velocity
   std::vector<Level> levels_;                   // leaves first, one node last
-  double fastest_ = 0.0;
+  double fastest_ = 0.0, common_radius_ = -1.0;
 };
 
 }  // namespace sidestep

@@ -11,6 +11,7 @@ namespace sidestep::kernels {
 struct Points {
   const double* position[3];
   const double* radius;
+  double common_radius;  // of all points; negative where they differ
   const double* velocity[3];
   Balls leaf_balls;  // hold the balls of a leaf's points
   Boxes leaf_boxes;  // hold the points themselves, around the same centres, with their largest radius

@@ -5,7 +5,7 @@ constexpr double centre_offset = 1e-9;
 
 // S is 1 at the foot of the perpendicular. From within the first the cube of what it is beside 1 is within the second, and
 // from there on the square is below rounding.
-constexpr double cubic_within = 2e-3, polished_within = 1e-8;
+constexpr double cubic_within = 5e-3, polished_within = 1e-7;
 constexpr int most_iterations = 16;
 constexpr int together = 4;  // registers
 
@@ -161,6 +161,7 @@ struct Inside {
 /// Points that are summed in double precision, and where their iteration begins, with room for whole registers.
 struct Chosen {
   int size;
+  bool are_outside;  // all of them
   int point[most_candidates + singles];
   float t[most_candidates + singles];
 
@@ -168,13 +169,16 @@ struct Chosen {
   /// rounding the limits.
   Chosen(const Candidates& candidates, float limit, float limit_ahead) noexcept : size(0) {
     const Singles limits = all(limit), limits_ahead = all(limit_ahead);
+    unsigned maybe_inside = 0;
     for (int i = 0; i < candidates.size; i += singles) {
       const unsigned far = below(limits, load(candidates.least[0] + i)) & below(limits_ahead, load(candidates.least[1] + i));
       const unsigned near = ~far & first_lanes(candidates.size - i);
       compress(t + size, load(candidates.t + i), near);
       compress(point + size, candidates.point + i, near);
       size += __builtin_popcount(near);
+      maybe_inside |= ~below(Singles{}, load(candidates.least[0] + i)) & near;
     }
+    are_outside = maybe_inside == 0;
     for (int i = size; i % width != 0; ++i) {
       t[i] = t[0];
       point[i] = point[0];
@@ -189,7 +193,8 @@ struct Samples {
 };
 
 /// How samples are found: in steps, each for several registers. The chain of operations of one is long, and the next one's
-/// runs beside it.
+/// runs beside it. `moves`: whether points move; `outside`: whether all are.
+template <bool moves, bool outside>
 class Approach {
  public:
   /// Where a register from `first` on lies, and Newton's iteration up to where it nearly ends.
@@ -198,40 +203,42 @@ class Approach {
     const double *R = query.axes, *A = query.squared_axes, *W = query.angular;
     const int* point = chosen.point + first;
     out_.t = widen(chosen.t + first);
-    radius_ = gather(points.radius, point);
+    radius_ = points.common_radius >= 0.0 ? all(points.common_radius) : gather(points.radius, point);
     Lanes x[3];
     for (int axis = 0; axis < 3; ++axis) {
       x[axis] = gather(points.position[axis], point) - group.centre[axis][k];
     }
-    Lanes m = {};
     for (int i = 0; i < 3; ++i) {
       e_[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
-      m += e_[i] * e_[i] * query.precision[i];
     }
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
       v_[i] = -query.linear[i] - (W[j] * e_[l] - W[l] * e_[j]);
-      twice_own_less_link_[i] = v_[i];
     }
-    if (points.velocity[0] != nullptr) {
+    if constexpr (moves) {
       for (int axis = 0; axis < 3; ++axis) {
         x[axis] = gather(points.velocity[axis], point);
       }
       for (int i = 0; i < 3; ++i) {
-        const Lanes own = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
-        v_[i] += own;
-        twice_own_less_link_[i] = v_[i] + own;
+        own_[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+        v_[i] += own_[i];
       }
     }
-    inside_ = m < 1.0;
-    are_inside_ = below(m, all(1.0));
-    out_.t = inside_ ? Lanes{} : out_.t;
+    if constexpr (!outside) {
+      Lanes m = {};
+      for (int i = 0; i < 3; ++i) {
+        m += e_[i] * e_[i] * query.precision[i];
+      }
+      inside_ = m < 1.0;
+      are_inside_ = below(m, all(1.0));
+      out_.t = inside_ ? Lanes{} : out_.t;
+    }
     out_.place(A, e_);
     Lanes step = out_.cubic_step();
     if (__builtin_expect(are_far(cubic_within), 0)) {
       step = magnitude(out_.S - 1.0) > cubic_within ? out_.step() : step;
     }
-    out_.t = inside_ ? Lanes{} : larger(out_.t + step, Lanes{});
+    move(step);
   }
 
   void finish(const QueryGroup& group, int k, int count, Samples& result) noexcept {
@@ -239,8 +246,7 @@ class Approach {
     const double *A = query.squared_axes, *W = query.angular;
     out_.place(A, e_);
     for (int i = 0; i < most_iterations && __builtin_expect(are_far(polished_within), 0); ++i) {
-      const Lanes step = out_.step();
-      out_.t += inside_ ? Lanes{} : step;
+      move(out_.step());
       out_.place(A, e_);
     }
     out_.polish();
@@ -253,7 +259,7 @@ class Approach {
     const Lanes along = out_.w[0] * v_[0] + out_.w[1] * v_[1] + out_.w[2] * v_[2];
     Lanes curvature = out_.bend(v_, along, squared_norm, inverse_norm);
     result.rate = along * inverse_norm;
-    if (__builtin_expect(are_inside_ != 0, 0)) {
+    if (!outside && are_inside_ != 0) {
       const Lanes squared = e_[0] * e_[0] + e_[1] * e_[1] + e_[2] * e_[2];
       e_[query.shortest] = squared < 1e-300 ? all(centre_offset) : e_[query.shortest];
       const Inside in(A, e_);
@@ -269,7 +275,7 @@ class Approach {
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
       result.moment[i] = e_[j] * g[l] - e_[l] * g[j];
-      curvature -= g[i] * (W[j] * twice_own_less_link_[l] - W[l] * twice_own_less_link_[j]);
+      curvature -= g[i] * (W[j] * (moves ? v_[l] + own_[l] : v_[l]) - W[l] * (moves ? v_[j] + own_[j] : v_[j]));
     }
     result.curvature = curvature;
     if (count < width) {
@@ -283,13 +289,35 @@ class Approach {
   bool are_far(double within) const noexcept {
     return (below(all(within), magnitude(out_.S - 1.0)) & ~are_inside_) != 0;
   }
+  void move(Lanes step) noexcept {
+    out_.t = larger(out_.t + step, Lanes{});
+    if constexpr (!outside) {
+      out_.t = inside_ ? Lanes{} : out_.t;
+    }
+  }
 
-  Lanes e_[3], v_[3], twice_own_less_link_[3];  // the offset in principal axes, and velocities in moving ones
+  Lanes e_[3], v_[3], own_[3];  // the offset in principal axes, velocities in moving ones, and those of the points
   Lanes radius_;
   Outside out_;
   Bits inside_;
-  unsigned are_inside_;
+  unsigned are_inside_ = 0;
 };
+
+/// Finds all that are chosen.
+template <bool moves, bool outside>
+void approach_all(const QueryGroup& group, int k, const Points& points, const Chosen& chosen, Samples* samples) noexcept {
+  const int number = (chosen.size + width - 1) / width;
+  for (int first = 0; first < number; first += together) {
+    Approach<moves, outside> approaches[together];
+    const int end = number < first + together ? number : first + together;
+    for (int i = first; i < end; ++i) {
+      approaches[i - first].begin(group, k, points, chosen, i * width);
+    }
+    for (int i = first; i < end; ++i) {
+      approaches[i - first].finish(group, k, chosen.size - i * width, samples[i]);
+    }
+  }
+}
 
 /// The smallest of values in whole registers, and which.
 struct Smallest {
@@ -414,16 +442,10 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
   candidates.size = 0;
   Samples samples[most_candidates / width];
   const int number = (chosen.size + width - 1) / width;
-  for (int first = 0; first < number; first += together) {
-    Approach approaches[together];
-    const int end = number < first + together ? number : first + together;
-    for (int i = first; i < end; ++i) {
-      approaches[i - first].begin(group, k, points, chosen, i * width);
-    }
-    for (int i = first; i < end; ++i) {
-      approaches[i - first].finish(group, k, chosen.size - i * width, samples[i]);
-    }
-  }
+  const bool moves = points.velocity[0] != nullptr;
+  const auto find = moves ? (chosen.are_outside ? approach_all<true, true> : approach_all<true, false>)
+                          : (chosen.are_outside ? approach_all<false, true> : approach_all<false, false>);
+  find(group, k, points, chosen, samples);
   const double reference = query.reference, ahead = query.ahead;
   Lanes values[most_candidates / width];
   for (int i = 0; i < number; ++i) {
