@@ -33,7 +33,14 @@ void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_trans
     if (is_small()) {
       matrix += J_T.transpose().lazyProduct(J_T);
     } else {
-      matrix += J_T.lazyProduct(J_T.transpose());
+      with_size(J_T.rows(), [&](auto nv) {
+        for (Eigen::Index a = 0; a < num_used_; ++a) {
+          const auto column = sized(jacobian_transposed_.col(a), nv);
+          for (Eigen::Index j = 0; j < J_T.rows(); ++j) {
+            sized(factor_.col(j), nv) += column[j] * column;
+          }
+        }
+      });
     }
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(matrix);
   }

@@ -292,17 +292,20 @@ struct LeafBounds {
   }
 };
 
-/// Of points within reach, which are bits, the smallest is known to be at most that of these.
-inline void lower(bool& found, float& limit, float& limit_of_leaves, Singles most, unsigned lanes, float window) noexcept {
-  if (lanes == 0) {
-    return;
+/// Of points within reach the smallest is known to be at most that of these, and a limit at most a window beyond.
+inline void lower(bool& found, float& limit, float& limit_of_leaves, Singles least, Singles most, unsigned lanes, double reach,
+                  double window) noexcept {
+  if (!found) {
+    if ((lanes & below(least, all(static_cast<float>(reach)))) == 0) {
+      return;
+    }
+    found = true;
+    limit_of_leaves = limit;
   }
-  found = true;
-  const float end = limit - window;
-  if (lanes &= below(most, all(end)); lanes != 0) {
-    limit = smallest(chosen(most, lanes)) + window;
+  const float beyond = static_cast<float>(window);
+  if (lanes &= below(most, all(limit - beyond)); lanes != 0) {
+    limit_of_leaves = limit = smallest(chosen(most, lanes)) + beyond;
   }
-  limit_of_leaves = limit;
 }
 
 /// What an ellipsoid sees of a register of a leaf's points: bounds of h and h + τ h'. Found for several registers before any
@@ -347,11 +350,8 @@ struct Look {
       return;
     }
     Query& query = group.queries[k];
-    lower(query.near, group.near[k], group.near_leaf[k], most[0], below(least[0], all(static_cast<float>(group.reach))) & kept,
-          static_cast<float>(group.window));
-    lower(query.approached, group.ahead[k], group.ahead_leaf[k], most[1],
-          below(least[1], all(static_cast<float>(group.reach_ahead))) & kept,
-          static_cast<float>(group.window_ahead));
+    lower(query.near, group.near[k], group.near_leaf[k], least[0], most[0], kept, group.reach, group.window);
+    lower(query.approached, group.ahead[k], group.ahead_leaf[k], least[1], most[1], kept, group.reach_ahead, group.window_ahead);
     Candidates& candidates = query.candidates;
     if (candidates.size + singles > most_candidates) {
       sum_candidates(group, k, points);
