@@ -213,15 +213,23 @@ inline Singles chosen(Singles x, unsigned lanes) noexcept {
 struct LeafBounds {
   alignas(64) float least[most_leaves], after[most_leaves], t0[most_leaves], gradient[3][most_leaves];
 
-  void find(const QueryGroup& group, const Ellipsoid& of, int i) noexcept {
+  void find(const QueryGroup& group, const Ellipsoid& of, int k, int i) noexcept {
     const Leaves& leaves = group.leaves;
     Sight at;
     at.place(of, load(leaves.centre[0] + i), load(leaves.centre[1] + i), load(leaves.centre[2] + i));
+    // Balls around both say enough of many.
+    const Singles margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error), diagonal = load(leaves.diagonal + i);
+    const Singles apart = rough_root(at.e[0] * at.e[0] + at.e[1] * at.e[1] + at.e[2] * at.e[2]) * 0.9995f - of.extent - diagonal - margin;
+    const float horizon = static_cast<float>(group.horizon);
+    const Singles speed = load(leaves.speed + i), more = load(leaves.more + i), stopped = horizon * (speed + more);
+    if (((kernels::below(apart, all(group.near[k])) | kernels::below(apart - stopped, all(group.ahead[k]))) & first_lanes(leaves.num - i)) == 0) {
+      store(least + i, apart);
+      store(after + i, apart - stopped);
+      return;
+    }
     at.begin(of);
     at.set_w(of);
     at.measure(of);
-    const float horizon = static_cast<float>(group.horizon);
-    const Singles diagonal = load(leaves.diagonal + i), speed = load(leaves.speed + i), more = load(leaves.more + i);
     Singles n[3], v[3], half[3], along = {}, box = {};
     for (int j = 0; j < 3; ++j) {
       n[j] = (of.axes[j] * at.w[0] + of.axes[3 + j] * at.w[1] + of.axes[6 + j] * at.w[2]) * at.inverse_norm;
@@ -239,8 +247,7 @@ struct LeafBounds {
       turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]));
     }
     const Singles turned = share * diagonal * (across + bend * diagonal * larger(-along, Singles{}));
-    const Singles margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error) ;
-    const Singles lowest = at.height - box, stopped = horizon * (speed + more);
+    const Singles lowest = at.height - box;
     const Singles in_motion = at.height - turning_box - turned - horizon * (along + (at.tilt + at.tilt) * speed + more);
     store(least + i, lowest - margin);
     store(after + i, (lowest > 0.0f ? larger(in_motion, lowest - stopped) : lowest - stopped) - margin);
@@ -402,7 +409,7 @@ void collect(QueryGroup& group, const Points& points) noexcept {
     if (is_asked(k)) {
       const Ellipsoid of(group, k);
       for (int i = 0; i < num; i += singles) {
-        all_bounds[k].find(group, of, i);
+        all_bounds[k].find(group, of, k, i);
       }
     }
   }
