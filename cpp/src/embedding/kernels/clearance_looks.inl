@@ -1,7 +1,7 @@
 // Included by clearance_kernel.inl: leaves and their points in single precision, to leave out what does not matter.
 
 // Errors of single precision and of rough reciprocals: of clearances relative to distances, and of directions.
-constexpr float distance_error = 1e-3f, direction_error = 2e-3f;
+constexpr float distance_error = 3.0f * rough_error, direction_error = 6.0f * rough_error;
 constexpr float least_height = 1e-9f, tiny = 1e-30f;  // stand for nothing, as divisors
 
 /// What does not depend on leaves, for all ellipsoids: their principal axes in the world, and how they move.
@@ -63,7 +63,7 @@ struct Ellipsoid {
 struct Sight {
   Singles e[3], t, inverses[3], w[3], S, flatness;  // 1 / (A + t), Σ A w² / (A + t)
   Singles inverse_norm, height;                     // 1 / |w|; h from below, nearly, as √S is less than (1 + S) / 2
-  Singles aside;                                    // |√S − 1| |p|, at most
+  Singles above;                                    // h − height, at most
   Singles tilt;                                     // |n − w/|w||, at most
 
   /// Where nothing is known but that the clearance is negative: gradients are longer than one.
@@ -118,8 +118,11 @@ struct Sight {
     inverse_norm = rough_inverse_root(squared_norm);
     height = (t * squared_norm + 0.5f * over) * inverse_norm;
     height = is_inside() ? all(-__builtin_inff()) : height;
-    aside = of.extent * magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f));  // 1/(1 + √S) of |S − 1|
-    tilt = smaller(aside * rough_inverse(larger(height, all(least_height))), all(2.0f)) + direction_error;
+    // |√S − 1|, at most, which is |S − 1| / (1 + √S). So much of p lies aside of the normal; and as much, squared, is what
+    // √S is less than (1 + S) / 2 by.
+    const Singles share = magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f));
+    tilt = smaller(of.extent * share * rough_inverse(larger(height, all(least_height))), all(2.0f)) + direction_error;
+    above = 0.5f * share * (of.extent * tilt + share * inverse_norm);
   }
 
   /// w·v/|w| of what is at rest in the world: v is −(linear + angular × e).
@@ -219,7 +222,7 @@ struct LeafBounds {
     at.place(of, load(leaves.centre[0] + i), load(leaves.centre[1] + i), load(leaves.centre[2] + i));
     // Balls around both say enough of many.
     const Singles margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error), diagonal = load(leaves.diagonal + i);
-    const Singles apart = rough_root(at.e[0] * at.e[0] + at.e[1] * at.e[1] + at.e[2] * at.e[2]) * 0.9995f - of.extent - diagonal - margin;
+    const Singles apart = rough_root(at.e[0] * at.e[0] + at.e[1] * at.e[1] + at.e[2] * at.e[2]) * (1.0f - rough_error) - of.extent - diagonal - margin;
     const float horizon = static_cast<float>(group.horizon);
     const Singles speed = load(leaves.speed + i), more = load(leaves.more + i), stopped = horizon * (speed + more);
     if (((kernels::below(apart, all(group.near[k])) | kernels::below(apart - stopped, all(group.ahead[k]))) & first_lanes(leaves.num - i)) == 0) {
@@ -346,7 +349,7 @@ struct Look {
     t = at.t, S = at.S, flatness = at.flatness;
     least[0] = at.height - radius - error;
     least[1] = least[0] + horizon * rate - slack;
-    most[0] = (inside ? Singles{} : at.height + at.aside) + error - radius;
+    most[0] = (inside ? Singles{} : at.height + at.above) + error - radius;
     most[1] = inside ? all(__builtin_inff()) : most[0] + horizon * rate + slack;
   }
 

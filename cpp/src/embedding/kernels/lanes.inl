@@ -121,7 +121,12 @@ inline Singles load(const float* p) noexcept {
 
 inline void store(float* p, Singles x) noexcept { __builtin_memcpy(p, &x, sizeof x); }
 
-/// 1/x and 1/√x of positive numbers, within 4e-4.
+/// 1/x and 1/√x of positive numbers, within this share of them: 2⁻¹⁴ or 3 · 2⁻¹³.
+#if defined(__AVX512F__)
+inline constexpr float rough_error = 6.2e-5f;
+#else
+inline constexpr float rough_error = 3.7e-4f;
+#endif
 inline Singles rough_inverse(Singles x) noexcept {
 #if defined(__AVX512F__)
   return _mm512_maskz_rcp14_ps(0xffff, x);
@@ -168,7 +173,7 @@ inline Singles root(Singles x) noexcept {
 }
 inline Singles quick_root(Singles x) noexcept { return root(x); }
 
-/// √x within 4e-4, or 1e-15; of numbers below zero as well.
+/// √x within `rough_error`, or 1e-15; of numbers below zero as well.
 inline Singles rough_root(Singles x) noexcept {
   const Singles positive = x > 1e-30f ? x : all(1e-30f);
   return positive * rough_inverse_root(positive);
