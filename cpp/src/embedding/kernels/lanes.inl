@@ -90,6 +90,23 @@ inline Lanes quick_root(Lanes x) noexcept {
 #endif
 }
 
+/// √x and 1/√x within 2⁻¹⁴ of them, or 1e-150; the root also of numbers below zero.
+inline Lanes rough_inverse_root(Lanes x) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_maskz_rsqrt14_pd(0xff, x);
+#else
+  return 1.0 / root(x);
+#endif
+}
+inline Lanes rough_root(Lanes x) noexcept {
+#if defined(__AVX512F__)
+  const Lanes positive = larger(x, all(1e-300));
+  return positive * rough_inverse_root(positive);
+#else
+  return root(larger(x, Lanes{}));
+#endif
+}
+
 /// Lane i is bit i.
 inline unsigned below(Lanes x, Lanes limit) noexcept {
 #if defined(__AVX512F__)
@@ -171,7 +188,6 @@ inline Singles root(Singles x) noexcept {
   const Singles positive = x > 1e-30f ? x : all(1e-30f);
   return positive * inverse_root(positive);
 }
-inline Singles quick_root(Singles x) noexcept { return root(x); }
 
 /// √x within `rough_error`, or 1e-15; of numbers below zero as well.
 inline Singles rough_root(Singles x) noexcept {
