@@ -184,7 +184,7 @@ class ClearanceField::Search {
     const kernels::Limits beyond{reach_ + group_.window, horizon_.distance + group_.window_ahead};
     int num_put_off = 0;
     visit(within, beyond, [&](int leaf, bool is_within) {
-      if (is_within && take(leaf)) {
+      if (is_within && take(leaf, beyond)) {
         within.near = std::min<double>(reach_, largest(group_.near_leaf));
         within.ahead = std::min<double>(horizon_.distance, largest(group_.ahead_leaf));
       } else if (!is_within) {
@@ -192,17 +192,17 @@ class ClearanceField::Search {
         num_put_off = std::min(num_put_off + 1, most_put_off);
       }
     });
-    if (group_.leaves.num == 0 && !is_placed_) {
+    if (!is_waiting() && !is_placed_) {
       return false;
     }
     const bool is_full = num_put_off == most_put_off;
     int next = 0;
-    while (next < num_put_off && group_.leaves.num > 0 && !take(put_off_[static_cast<std::size_t>(next++)])) {
+    while (next < num_put_off && is_waiting() && !take(put_off_[static_cast<std::size_t>(next++)], beyond)) {
     }
     collect();
     const bool goes_beyond = is_known_beyond(reach_, horizon_.distance);
     while (goes_beyond && !is_full && next < num_put_off) {
-      take(put_off_[static_cast<std::size_t>(next++)]);
+      take(put_off_[static_cast<std::size_t>(next++)], beyond);
     }
     collect();
     // So may what was missed in leaves that were looked at before.
@@ -219,7 +219,7 @@ class ClearanceField::Search {
       }
     }
     if (std::max(again.near, again.ahead) > -infinity) {
-      visit(again, again, [&](int leaf, bool) { take(leaf); });
+      visit(again, again, [&](int leaf, bool) { take(leaf, again); });
       collect();
     }
     return true;
@@ -326,27 +326,46 @@ class ClearanceField::Search {
     });
   }
 
-  /// Leaves are looked at many at a time; returns whether they were.
-  bool take(int leaf) noexcept {
+  /// Leaves are looked at many at a time; returns whether they were. Of those wider than the cluster and what is within reach
+  /// of it only points are taken that may be below the limits.
+  bool take(int leaf, const kernels::Limits& limits) noexcept {
     kernels::Leaves& leaves = group_.leaves;
-    leaves.leaf[leaves.num] = leaf;
-    leaves.count[leaves.num++] = tree_.count(leaf);
-    if (leaves.num < kernels::most_leaves) {
+    kernels::LoosePoints& loose = group_.loose;
+    const int count = tree_.count(leaf), first = leaf * PointTree::leaf_size;
+    if (points_.leaf_balls.radius[leaf] > cluster_->radius + std::max(reach_, 0.0)) {
+      unsigned left = kernel_.measure_points(ball_, points_, first, count, limits, limits) & 0xffffu;
+      for (; left != 0; left &= left - 1) {
+        const int n = first + std::countr_zero(left), to = loose.num++;
+        loose.point[to] = n;
+        loose.radius[to] = static_cast<float>(points_.radius[n]);
+        for (int axis = 0; axis < 3; ++axis) {
+          loose.position[axis][to] = static_cast<float>(points_.position[axis][n] - ball_.centre[axis]);
+          loose.own[axis][to] = points_.velocity[0] != nullptr ? static_cast<float>(points_.velocity[axis][n]) : 0.0f;
+        }
+      }
+    } else {
+      leaves.leaf[leaves.num] = leaf;
+      leaves.count[leaves.num++] = count;
+    }
+    if (leaves.num < kernels::most_leaves && loose.num <= kernels::most_loose - PointTree::leaf_size) {
       return false;
     }
     collect();
     return true;
   }
 
+  /// Whether anything was taken that has not been looked at.
+  bool is_waiting() const noexcept { return group_.leaves.num > 0 || group_.loose.num > 0; }
+
   void collect() noexcept {
-    if (group_.leaves.num == 0) {
+    if (!is_waiting()) {
       return;
     }
     if (!is_placed_) {
       place();
     }
     kernel_.collect(group_, points_);
-    group_.leaves.num = 0;
+    group_.leaves.num = group_.loose.num = 0;
   }
 
   const ClearanceField& field_;

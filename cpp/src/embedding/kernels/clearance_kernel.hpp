@@ -63,6 +63,8 @@ inline constexpr int most_queries = 16;
 inline constexpr int squared_at = 9, semi_at = 12, roundness_at = 15, principal_numbers = 16;
 
 inline constexpr int most_leaves = 64;
+// Columns of their points are not 4 KiB apart, where loads wait for stores to other columns.
+inline constexpr int points_apart = most_leaves * most_points + 5 * most_points;
 
 /// Leaves that may matter to ellipsoids of a group, in single precision, seen from its origin.
 struct Leaves {
@@ -74,8 +76,18 @@ struct Leaves {
   float velocity[3][most_leaves], speed[most_leaves];  // of the link's point at the centre [m/s]
   float more[most_leaves];                     // of others against theirs
   unsigned long long loaded;                   // leaves of which the points below are set, as bits
-  alignas(64) float position[3][most_leaves * most_points], radius[most_leaves * most_points];
-  float own[3][most_leaves * most_points];     // velocity, where points move
+  alignas(64) float position[3][points_apart], radius[points_apart];
+  float own[3][points_apart];                  // velocity, where points move
+};
+
+inline constexpr int most_loose = 256;
+
+/// Points of leaves so wide that all of one says little of a point, in single precision, seen from the origin of a group.
+struct LoosePoints {
+  int num = 0;
+  int point[most_loose];
+  alignas(64) float position[3][most_loose], radius[most_loose];
+  float own[3][most_loose];                    // velocity, where points move
 };
 
 /// Ellipsoids of one link that are asked together.
@@ -103,6 +115,7 @@ struct QueryGroup {
   double horizon;                              // τ [s]
   double fastest;                              // speed of any point [m/s], at most
   Leaves leaves;
+  LoosePoints loose;
   Query queries[most_queries];
 };
 
@@ -126,9 +139,12 @@ struct ClearanceKernel {
   /// half below `within`. Writes bounds of clearances, and has room for whole registers.
   unsigned (*measure)(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
                       const Limits& within, const Limits& beyond, double* bounds) noexcept;
+  /// The same of `count` points from `first` on.
+  unsigned (*measure_points)(const MovingBall& cluster, const Points& points, int first, int count, const Limits& within,
+                             const Limits& beyond) noexcept;
   /// To be called once a group is placed.
   void (*begin)(QueryGroup& group) noexcept;
-  /// Adds points of the group's leaves that may weigh to the candidates, and lowers its limits. Where there is no room, the
+  /// Adds points of the group's leaves, and its loose points, that may weigh to the candidates, and lowers its limits. Where there is no room, the
   /// candidates before are summed.
   void (*collect)(QueryGroup& group, const Points& points) noexcept;
   /// Adds the candidates of query k to its sums, and forgets them.

@@ -1,5 +1,5 @@
 // Included by one file per instruction set, after clearance_kernel.hpp and <immintrin.h> where there is one. Defines
-// measure, begin, collect and sum_candidates in an anonymous namespace.
+// measure, measure_points, begin, collect and sum_candidates in an anonymous namespace.
 
 namespace sidestep::kernels {
 namespace {
@@ -21,37 +21,67 @@ Lanes closing_speed(Lanes along, Lanes across, Lanes inverse_distance, Lanes rad
   return (sine < 1.0) & (along * inverse_distance < speed * cosine) ? turned : speed;
 }
 
-unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
-                 const Limits& within, const Limits& beyond, double* bounds) noexcept {
-  const double* w = cluster.angular;
-  const double *centres[3] = {balls.x + first, balls.y + first, balls.z + first},
-               *halves[3] = {boxes.half_x + first, boxes.half_y + first, boxes.half_z + first};
-  unsigned bits = 0;
-  for (int n = 0; n < count; n += width) {
-    const Lanes at[3] = {load(centres[0] + n), load(centres[1] + n), load(centres[2] + n)};
-    const Lanes ball = load(balls.radius + first + n), radius = cluster.radius + ball;
-    Lanes x[3], v[3], squared = {}, squared_to_box = {}, along = {}, squared_speed = {};
+/// What is known of balls around places: the distance of a place, and how fast the cluster closes in, at most.
+struct Measured {
+  Lanes x[3], distance, closing;
+
+  Measured(const MovingBall& cluster, const Lanes* at, Lanes ball) noexcept {
+    const double* w = cluster.angular;
+    const Lanes radius = cluster.radius + ball;
+    Lanes squared = {}, along = {}, squared_speed = {};
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
       x[i] = at[i] - cluster.centre[i];
-      v[i] = cluster.linear[i] + w[j] * at[l] - w[l] * at[j];
+      const Lanes v = cluster.linear[i] + w[j] * at[l] - w[l] * at[j];
       squared += x[i] * x[i];
-      along += x[i] * v[i];
-      squared_speed += v[i] * v[i];
-      const Lanes to_box = larger(magnitude(x[i]) - load(halves[i] + n), Lanes{});
+      along += x[i] * v;
+      squared_speed += v * v;
+    }
+    const Lanes inverse_distance = rough_inverse_root(larger(squared, all(1e-300)));
+    distance = squared * inverse_distance;
+    const Lanes across = rough_root(squared * squared_speed - along * along), speed = rough_root(squared_speed);
+    closing = closing_speed(along, across, inverse_distance, radius, speed) + 4.0 * measure_error * speed +
+              cluster.turning * ball + cluster.fastest;
+  }
+
+  /// As bits, see ClearanceKernel::measure.
+  unsigned below(const MovingBall& cluster, Lanes bound, const Limits& within, const Limits& beyond) const noexcept {
+    const Lanes after = bound - cluster.horizon * closing;
+    return (kernels::below(bound, all(beyond.near)) | kernels::below(after, all(beyond.ahead))) |
+           (kernels::below(bound, all(within.near)) | kernels::below(after, all(within.ahead))) << 16;
+  }
+};
+
+unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
+                 const Limits& within, const Limits& beyond, double* bounds) noexcept {
+  unsigned bits = 0;
+  for (int n = 0; n < count; n += width) {
+    const int from = first + n;
+    const Lanes at[3] = {load(balls.x + from), load(balls.y + from), load(balls.z + from)}, ball = load(balls.radius + from);
+    const Lanes half[3] = {load(boxes.half_x + from), load(boxes.half_y + from), load(boxes.half_z + from)};
+    const Measured measured(cluster, at, ball);
+    Lanes squared_to_box = {};
+    for (int i = 0; i < 3; ++i) {
+      const Lanes to_box = larger(magnitude(measured.x[i]) - half[i], Lanes{});
       squared_to_box += to_box * to_box;
     }
-    const Lanes inverse_distance = rough_inverse_root(larger(squared, all(1e-300))), distance = squared * inverse_distance;
-    const Lanes across = rough_root(squared * squared_speed - along * along);
-    const Lanes speed = rough_root(squared_speed);
-    const Lanes closing = closing_speed(along, across, inverse_distance, radius, speed) + 4.0 * measure_error * speed +
-                          cluster.turning * ball + cluster.fastest;
-    const Lanes to_ball = distance - ball, to_box = rough_root(squared_to_box) - load(boxes.radius + first + n);
-    const Lanes bound = larger(to_ball, to_box) - cluster.radius - measure_error * distance;
+    const Lanes to_ball = measured.distance - ball, to_box = rough_root(squared_to_box) - load(boxes.radius + from);
+    const Lanes bound = larger(to_ball, to_box) - cluster.radius - measure_error * measured.distance;
     store(bounds + n, bound);
-    const Lanes after = bound - cluster.horizon * closing;
-    bits |= (below(bound, all(beyond.near)) | below(after, all(beyond.ahead))) << n;
-    bits |= (below(bound, all(within.near)) | below(after, all(within.ahead))) << (n + 16);
+    bits |= measured.below(cluster, bound, within, beyond) << n;
+  }
+  return bits & ((1u << count) - 1u) * 0x10001u;
+}
+
+unsigned measure_points(const MovingBall& cluster, const Points& points, int first, int count, const Limits& within,
+                        const Limits& beyond) noexcept {
+  unsigned bits = 0;
+  for (int n = 0; n < count; n += width) {
+    const int from = first + n;
+    const Lanes at[3] = {load(points.position[0] + from), load(points.position[1] + from), load(points.position[2] + from)};
+    const Lanes ball = load(points.radius + from);
+    const Measured measured(cluster, at, ball);
+    bits |= measured.below(cluster, measured.distance * (1.0 - measure_error) - ball - cluster.radius, within, beyond) << n;
   }
   return bits & ((1u << count) - 1u) * 0x10001u;
 }

@@ -8,7 +8,7 @@
 
 namespace sidestep::kernels {
 
-ClearanceKernel clearance_kernel_avx2() noexcept { return {measure, begin, collect, sum_candidates}; }
+ClearanceKernel clearance_kernel_avx2() noexcept { return {measure, measure_points, begin, collect, sum_candidates}; }
 
 }  // namespace sidestep::kernels
 #endif

@@ -9,6 +9,6 @@
 
 namespace sidestep::kernels {
 
-ClearanceKernel clearance_kernel_baseline() noexcept { return {measure, begin, collect, sum_candidates}; }
+ClearanceKernel clearance_kernel_baseline() noexcept { return {measure, measure_points, begin, collect, sum_candidates}; }
 
 }  // namespace sidestep::kernels

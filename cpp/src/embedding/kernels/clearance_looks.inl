@@ -2,6 +2,7 @@
 
 // Errors of single precision and of rough reciprocals: of clearances relative to distances, and of directions.
 constexpr float distance_error = 3.0f * rough_error, direction_error = 6.0f * rough_error;
+constexpr int loose_steps = 2;  // of Newton's iteration, from where nothing is known
 constexpr float least_height = 1e-9f, tiny = 1e-30f;  // stand for nothing, as divisors
 
 /// What does not depend on leaves, for all ellipsoids: their principal axes in the world, and how they move.
@@ -53,6 +54,13 @@ struct Ellipsoid {
       semi[i] = group.principal[(semi_at + i) * most_queries + k];
     }
     error = distance_error * (extent + __builtin_sqrtf(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]));
+  }
+
+  /// Vectors of the world in principal axes.
+  void turn(const float* x, const float* y, const float* z, Singles* result) const noexcept {
+    for (int i = 0; i < 3; ++i) {
+      result[i] = axes[3 * i] * load(x) + axes[3 * i + 1] * load(y) + axes[3 * i + 2] * load(z);
+    }
   }
 };
 
@@ -136,6 +144,8 @@ struct Sight {
   }
 };
 
+using LeafBits = unsigned long long;
+
 /// Where the leaves of the group are.
 void place(QueryGroup& group, const Points& points) noexcept {
   Leaves& leaves = group.leaves;
@@ -196,8 +206,6 @@ void load_points(QueryGroup& group, const Points& points, int i) noexcept {
   }
   leaves.loaded |= 1ull << i;
 }
-
-using LeafBits = unsigned long long;
 
 /// The lanes that are bits; others are infinite.
 inline Singles chosen(Singles x, unsigned lanes) noexcept {
@@ -318,39 +326,80 @@ inline void lower(bool& found, float& limit, float& limit_of_leaves, Singles lea
   }
 }
 
-/// What an ellipsoid sees of a register of a leaf's points: bounds of h and h + τ h'. Found for several registers before any
-/// is made use of: one's chain of operations is long, and the next one's runs beside it.
+/// Places by balls around ellipsoid and centre, with what moves by `own` in principal axes.
+struct FarSight {
+  Singles apart, closing, speed, error;  // distance, less the ball; how fast it closes in and moves, at most
+
+  FarSight(const Ellipsoid& of, const Singles* e, const Singles* own) noexcept {
+    Singles squared = {}, squared_speed = {}, along = {};
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      const Singles v = own[i] - of.linear[i] - (of.angular[j] * e[l] - of.angular[l] * e[j]);
+      squared += e[i] * e[i];
+      squared_speed += v * v;
+      along -= e[i] * v;
+    }
+    const Singles inverse_distance = rough_inverse_root(larger(squared, all(tiny))), distance = squared * inverse_distance;
+    speed = (1.0f + rough_error) * rough_root(squared_speed);
+    error = distance_error * (distance + of.extent);
+    apart = distance - of.extent;
+    // As Horizon::closing_speed, with an angle that is rather too large.
+    const Singles sine = (1.0f + distance_error) * of.extent * inverse_distance, cosine = rough_root(1.0f - sine * sine);
+    const Singles across = rough_root(squared * squared_speed - along * along);
+    const Singles turned = (along * cosine + across * sine) * inverse_distance + 2.0f * direction_error * speed;
+    closing = (sine < 1.0f) & (along * inverse_distance < speed * cosine) ? smaller(turned, speed) : speed;
+  }
+};
+
+/// What an ellipsoid sees of a register of points: bounds of h and h + τ h'. Found for several registers before any is made use
+/// of: one's chain of operations is long, and the next one's runs beside it.
 struct Look {
-  int leaf, first;
   unsigned asked;  // lanes
+  int first;       // point; negative: of loose ones, from −1 − first on
   Singles t, S, flatness, least[2], most[2];
 
+  /// Of points of leaf i of the group, from n on.
   void find(const QueryGroup& group, const Ellipsoid& of, const LeafBounds& bounds, int i, int n, bool moves) noexcept {
     const Leaves& leaves = group.leaves;
-    leaf = i, first = n;
-    asked = first_lanes(leaves.count[i] - n);
     const int from = i * most_points + n;
+    first = leaves.leaf[i] * most_points + n;
+    asked = first_lanes(leaves.count[i] - n);
     Sight at;
     at.place(of, load(leaves.position[0] + from), load(leaves.position[1] + from), load(leaves.position[2] + from));
     at.t = larger(bounds.t0[i] + bounds.gradient[0][i] * at.e[0] + bounds.gradient[1][i] * at.e[1] + bounds.gradient[2][i] * at.e[2],
                   Singles{});
-    at.set_w(of);
-    at.measure(of);
-    Singles rate = at.rate(of);
+    Singles own[3] = {};
     if (moves) {
-      const Singles own[3] = {load(leaves.own[0] + from), load(leaves.own[1] + from), load(leaves.own[2] + from)};
-      for (int j = 0; j < 3; ++j) {
-        rate += (of.axes[3 * j] * own[0] + of.axes[3 * j + 1] * own[1] + of.axes[3 * j + 2] * own[2]) * at.w[j] * at.inverse_norm;
-      }
+      of.turn(leaves.own[0] + from, leaves.own[1] + from, leaves.own[2] + from, own);
     }
-    const float horizon = static_cast<float>(group.horizon), error = leaves.error[i] + of.error;
-    const Singles radius = load(leaves.radius + from), slack = at.tilt * (horizon * (leaves.speed[i] + leaves.more[i]));
-    const auto inside = at.is_inside();
-    t = at.t, S = at.S, flatness = at.flatness;
-    least[0] = at.height - radius - error;
-    least[1] = least[0] + horizon * rate - slack;
-    most[0] = (inside ? Singles{} : at.height + at.above) + error - radius;
-    most[1] = inside ? all(__builtin_inff()) : most[0] + horizon * rate + slack;
+    bound(group, of, at, load(leaves.radius + from), own, all(leaves.speed[i] + leaves.more[i]), all(leaves.error[i] + of.error));
+  }
+
+  /// Of loose points, from n on. Returns whether any may matter.
+  bool find_loose(const QueryGroup& group, const Ellipsoid& of, int k, int n, bool moves) noexcept {
+    const LoosePoints& loose = group.loose;
+    first = -1 - n;
+    Sight at;
+    at.place(of, load(loose.position[0] + n), load(loose.position[1] + n), load(loose.position[2] + n));
+    const Singles radius = load(loose.radius + n);
+    Singles own[3] = {};
+    if (moves) {
+      of.turn(loose.own[0] + n, loose.own[1] + n, loose.own[2] + n, own);
+    }
+    const FarSight far(of, at.e, own);
+    const Singles apart = far.apart - radius - far.error;
+    asked = (below(apart, all(group.near[k])) |
+             below(apart - static_cast<float>(group.horizon) * far.closing, all(group.ahead[k]))) & first_lanes(loose.num - n);
+    if (asked == 0) {
+      return false;
+    }
+    at.begin(of);
+    for (int step = 0; step < loose_steps; ++step) {
+      at.set_w(of);
+      at.t = Sight::next(at.t, at.S, at.flatness);
+    }
+    bound(group, of, at, radius, own, far.speed, far.error);
+    return true;
   }
 
   /// Adds the points that matter to the candidates.
@@ -370,8 +419,28 @@ struct Look {
     compress(candidates.t + to, Sight::next(t, S, flatness), kept);
     compress(candidates.least[0] + to, least[0], kept);
     compress(candidates.least[1] + to, least[1], kept);
-    compress(candidates.point + to, group.leaves.leaf[leaf] * most_points + first, kept);
+    if (first >= 0) {
+      compress(candidates.point + to, first, kept);
+    } else {
+      compress(candidates.point + to, group.loose.point - 1 - first, kept);
+    }
     candidates.size += __builtin_popcount(kept);
+  }
+
+ private:
+  void bound(const QueryGroup& group, const Ellipsoid& of, Sight& at, Singles radius, const Singles* own, Singles speed,
+             Singles error) noexcept {
+    at.set_w(of);
+    at.measure(of);
+    const float horizon = static_cast<float>(group.horizon);
+    const Singles rate = at.rate(of) + (own[0] * at.w[0] + own[1] * at.w[1] + own[2] * at.w[2]) * at.inverse_norm;
+    const Singles slack = horizon * at.tilt * speed;
+    const auto inside = at.is_inside();
+    t = at.t, S = at.S, flatness = at.flatness;
+    least[0] = at.height - radius - error;
+    least[1] = least[0] + horizon * rate - slack;
+    most[0] = (inside ? Singles{} : at.height + at.above) + error - radius;
+    most[1] = inside ? all(__builtin_inff()) : most[0] + horizon * rate + slack;
   }
 };
 
@@ -401,35 +470,39 @@ void look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bo
   }
 }
 
+/// Looks at the loose points.
+void look_at_loose(QueryGroup& group, int k, const Ellipsoid& of, const Points& points) noexcept {
+  const bool moves = points.velocity[0] != nullptr;
+  for (int n = 0; n < group.loose.num; n += singles) {
+    Look look;
+    if (look.find_loose(group, of, k, n, moves)) {
+      look.keep(group, k, points);
+    }
+  }
+}
+
 void collect(QueryGroup& group, const Points& points) noexcept {
   place(group, points);
   const int num = group.leaves.num;
-  LeafBounds all_bounds[most_queries];
-  const auto is_asked = [&](int k) {
-    return group.near_leaf[k] != -__builtin_inff() || group.ahead_leaf[k] != -__builtin_inff();
-  };
   for (int k = 0; k < group.size; ++k) {
-    if (is_asked(k)) {
-      const Ellipsoid of(group, k);
-      for (int i = 0; i < num; i += singles) {
-        all_bounds[k].find(group, of, k, i);
-      }
-    }
-  }
-  for (int k = 0; k < group.size; ++k) {
-    if (!is_asked(k)) {
+    if (group.near_leaf[k] == -__builtin_inff() && group.ahead_leaf[k] == -__builtin_inff()) {
       continue;
     }
-    const LeafBounds& bounds = all_bounds[k];
+    const Ellipsoid of(group, k);
+    look_at_loose(group, k, of, points);
+    if (num == 0) {
+      continue;
+    }
+    LeafBounds bounds;
+    for (int i = 0; i < num; i += singles) {
+      bounds.find(group, of, k, i);
+    }
     LeafBits seen = 0, left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num);
-    if (left != 0) {
-      const Ellipsoid of(group, k);
-      LeafBits next = bounds.best(left);  // what is best by either measure says most about the others
-      while (left != 0) {
-        look_at(group, k, of, bounds, next, points);
-        seen |= next;
-        left = next = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen;
-      }
+    LeafBits next = bounds.best(left);  // what is best by either measure says most about the others
+    while (left != 0) {
+      look_at(group, k, of, bounds, next, points);
+      seen |= next;
+      left = next = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen;
     }
     bounds.note_missed(group, k, seen);
   }
