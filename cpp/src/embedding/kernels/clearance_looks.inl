@@ -2,6 +2,7 @@
 
 // Errors of single precision and of rough reciprocals: of clearances relative to distances, and of directions.
 constexpr float distance_error = 3.0f * rough_error, direction_error = 6.0f * rough_error;
+constexpr float most_turn = 0.6f;  // up to where t is near what it is at the centre of a leaf, and as it changes there
 constexpr int loose_steps = 2;  // of Newton's iteration, from where nothing is known
 constexpr float least_height = 1e-9f, tiny = 1e-30f;  // stand for nothing, as divisors
 
@@ -160,6 +161,20 @@ void place(QueryGroup& group, const Points& points) noexcept {
     leaves.half[2][i] = static_cast<float>(boxes.half_z[leaf]);
     leaves.largest[i] = static_cast<float>(boxes.radius[leaf]);
   }
+  // Registers are filled up: what was there may be denormal, of which an operation costs a hundred others.
+  for (int i = leaves.num; i % singles != 0; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      leaves.centre[axis][i] = leaves.half[axis][i] = 0.0f;
+    }
+    leaves.largest[i] = 0.0f;
+  }
+  LoosePoints& loose = group.loose;
+  for (int n = loose.num; n % singles != 0; ++n) {
+    for (int axis = 0; axis < 3; ++axis) {
+      loose.position[axis][n] = loose.own[axis][n] = 0.0f;
+    }
+    loose.radius[n] = 0.0f;
+  }
   const double* W = group.link->angular;
   const float w[3] = {static_cast<float>(W[0]), static_cast<float>(W[1]), static_cast<float>(W[2])};
   const float turning = static_cast<float>(group.link->turning), fastest = static_cast<float>(group.fastest);
@@ -223,6 +238,7 @@ inline Singles chosen(Singles x, unsigned lanes) noexcept {
 /// t0 + gradient · e.
 struct LeafBounds {
   alignas(64) float least[most_leaves], after[most_leaves], t0[most_leaves], gradient[3][most_leaves];
+  float turn[most_leaves];  // of directions within the leaf
 
   void find(const QueryGroup& group, const Ellipsoid& of, int k, int i) noexcept {
     const Leaves& leaves = group.leaves;
@@ -270,6 +286,7 @@ struct LeafBounds {
       store(gradient[j] + i, slope);
     }
     store(t0 + i, start);
+    store(turn + i, bend * diagonal);
   }
 
   /// Those of the first `num` leaves that may matter.
@@ -368,6 +385,10 @@ struct Look {
     at.place(of, load(leaves.position[0] + from), load(leaves.position[1] + from), load(leaves.position[2] + from));
     at.t = larger(bounds.t0[i] + bounds.gradient[0][i] * at.e[0] + bounds.gradient[1][i] * at.e[1] + bounds.gradient[2][i] * at.e[2],
                   Singles{});
+    if (bounds.turn[i] > most_turn) {
+      at.set_w(of);
+      at.t = Sight::next(at.t, at.S, at.flatness);
+    }
     Singles own[3] = {};
     if (moves) {
       of.turn(leaves.own[0] + from, leaves.own[1] + from, leaves.own[2] + from, own);
