@@ -299,20 +299,6 @@ struct LeafBounds {
     return bits;
   }
 
-  /// Of some leaves the smallest by either measure.
-  LeafBits best(LeafBits leaves) const noexcept {
-    if (leaves == 0) {
-      return 0;
-    }
-    int nearest = __builtin_ctzll(leaves), ahead = nearest;
-    for (LeafBits rest = leaves & (leaves - 1); rest != 0; rest &= rest - 1) {
-      const int i = __builtin_ctzll(rest);
-      nearest = least[i] < least[nearest] ? i : nearest;
-      ahead = after[i] < after[ahead] ? i : ahead;
-    }
-    return 1ull << nearest | 1ull << ahead;
-  }
-
   void note_missed(QueryGroup& group, int k, LeafBits seen) const noexcept {
     const int num = group.leaves.num;
     Singles missed = all(__builtin_inff()), missed_ahead = missed;
@@ -518,12 +504,9 @@ void collect(QueryGroup& group, const Points& points) noexcept {
     for (int i = 0; i < num; i += singles) {
       bounds.find(group, of, k, i);
     }
-    LeafBits seen = 0, left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num);
-    LeafBits next = bounds.best(left);  // what is best by either measure says most about the others
-    while (left != 0) {
-      look_at(group, k, of, bounds, next, points);
-      seen |= next;
-      left = next = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen;
+    LeafBits seen = 0;
+    for (LeafBits left; (left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen) != 0; seen |= left) {
+      look_at(group, k, of, bounds, left, points);
     }
     bounds.note_missed(group, k, seen);
   }
