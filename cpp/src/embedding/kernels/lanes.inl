@@ -37,8 +37,26 @@ inline Lanes root(Lanes x) noexcept {
 #endif
 }
 
-inline Lanes magnitude(Lanes x) noexcept { return x < 0.0 ? -x : x; }
-inline Lanes larger(Lanes x, Lanes y) noexcept { return x > y ? x : y; }
+// One instruction each, which compilers make two or three of the plain forms: y where one is not a number.
+inline Lanes larger(Lanes x, Lanes y) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_maskz_max_pd(0xff, x, y);
+#elif defined(__AVX2__)
+  return _mm256_max_pd(x, y);
+#elif defined(__SSE2__)
+  return _mm_max_pd(x, y);
+#else
+  return x > y ? x : y;
+#endif
+}
+
+inline Lanes magnitude(Lanes x) noexcept {
+  Bits bits;
+  __builtin_memcpy(&bits, &x, sizeof bits);
+  bits &= 0x7fffffffffffffffLL;
+  __builtin_memcpy(&x, &bits, sizeof x);
+  return x;
+}
 
 /// from[index[0]], from[index[1]], …
 inline Lanes gather(const double* from, const int* index) noexcept {
@@ -138,6 +156,39 @@ inline Singles load(const float* p) noexcept {
 
 inline void store(float* p, Singles x) noexcept { __builtin_memcpy(p, &x, sizeof x); }
 
+inline Singles larger(Singles x, Singles y) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_maskz_max_ps(0xffff, x, y);
+#elif defined(__AVX2__)
+  return _mm256_max_ps(x, y);
+#elif defined(__SSE2__)
+  return _mm_max_ps(x, y);
+#else
+  return x > y ? x : y;
+#endif
+}
+
+inline Singles smaller(Singles x, Singles y) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_maskz_min_ps(0xffff, x, y);
+#elif defined(__AVX2__)
+  return _mm256_min_ps(x, y);
+#elif defined(__SSE2__)
+  return _mm_min_ps(x, y);
+#else
+  return x < y ? x : y;
+#endif
+}
+
+inline Singles magnitude(Singles x) noexcept {
+  typedef int Bits __attribute__((vector_size(4 * singles)));
+  Bits bits;
+  __builtin_memcpy(&bits, &x, sizeof bits);
+  bits &= 0x7fffffff;
+  __builtin_memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
 /// 1/x and 1/√x of positive numbers, within this share of them: 2⁻¹⁴ or 3 · 2⁻¹³.
 #if defined(__AVX512F__)
 inline constexpr float rough_error = 6.2e-5f;
@@ -185,13 +236,13 @@ inline Singles inverse_root(Singles x) noexcept {
 
 /// √x within 1e-6, or 1e-15; of numbers below zero as well.
 inline Singles root(Singles x) noexcept {
-  const Singles positive = x > 1e-30f ? x : all(1e-30f);
+  const Singles positive = larger(x, all(1e-30f));
   return positive * inverse_root(positive);
 }
 
 /// √x within `rough_error`, or 1e-15; of numbers below zero as well.
 inline Singles rough_root(Singles x) noexcept {
-  const Singles positive = x > 1e-30f ? x : all(1e-30f);
+  const Singles positive = larger(x, all(1e-30f));
   return positive * rough_inverse_root(positive);
 }
 
@@ -248,9 +299,6 @@ inline Lanes widen(const float* p) noexcept {
   return __builtin_convertvector(x, Lanes);
 }
 
-inline Singles magnitude(Singles x) noexcept { return x < 0.0f ? -x : x; }
-inline Singles larger(Singles x, Singles y) noexcept { return x > y ? x : y; }
-inline Singles smaller(Singles x, Singles y) noexcept { return x < y ? x : y; }
 
 /// Halves against each other, down to one number.
 template <int size>
