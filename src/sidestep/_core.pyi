@@ -289,11 +289,12 @@ class ClearanceBarrier(Embedding):
     and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between
     neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More
     costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What
-    approaches is seen from as far as the arm needs to stop. The body must be calibrated (Body.cover); raises
-    ValueError that names what is wrong.
+    approaches is seen from as far as the arm needs to stop. window [temperatures]: points that are farther than
+    the nearest by more do not count, each of which would change the mean by window exp(-window) temperature at most,
+    2e-7 m; fewer cost less. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, reach: float = 0.0, window: float = 12.0) -> None: ...
 
     @property
     def activation(self) -> float: ...

@@ -56,11 +56,17 @@ kernels::Points points_of(const PointTree& tree) noexcept {
 
 static_assert(PointTree::leaf_size == kernels::most_points);
 
-void forget(kernels::Query& query) noexcept {
+/// Begins again, with what is known of the smallest.
+void restart(kernels::Query& query) noexcept {
+  query.begun = query.stale = false;
+  query.candidates.size = 0;
+}
+
+void reset(kernels::Query& query) noexcept {
   query.reference = query.ahead = infinity;
   query.nearest = query.minded = 0;
-  query.begun = false;
-  query.candidates.size = 0;
+  query.near = query.approached = false;
+  restart(query);
 }
 
 /// The means of a query's points, with wrenches about the world origin.
@@ -205,20 +211,28 @@ class ClearanceField::Search {
       take(put_off_[static_cast<std::size_t>(next++)], beyond);
     }
     collect();
-    // So may what was missed in leaves that were looked at before.
-    kernels::Limits again{-infinity, -infinity};
-    for (int k = 0; k < cluster.size; ++k) {
-      kernels::Query& query = group_.queries[k];
-      const double to = query.near ? group_.near[k] : -infinity, to_ahead = query.approached ? group_.ahead[k] : -infinity;
-      if ((goes_beyond && is_full) || group_.missed[k] < to || group_.missed_ahead[k] < to_ahead) {
-        limit(k, to, to_ahead);
-        forget(query);
-        again = {std::max(again.near, to), std::max(again.ahead, to_ahead)};
-      } else {  // is asked no more
-        group_.near_leaf[k] = group_.ahead_leaf[k] = -std::numeric_limits<float>::infinity();
+    // So may what was missed in leaves that were looked at before; and sums that were begun, for want of room, may hold what
+    // lies too far above what was found later.
+    bool is_missing = goes_beyond && is_full;
+    for (int pass = 0; pass < most_passes; ++pass, is_missing = false) {
+      kernels::Limits again{-infinity, -infinity};
+      for (int k = 0; k < cluster.size; ++k) {
+        kernels::Query& query = group_.queries[k];
+        if (query.begun) {
+          kernel_.sum(group_, k, points_);
+        }
+        const double to = query.near ? group_.near[k] : -infinity, to_ahead = query.approached ? group_.ahead[k] : -infinity;
+        if (is_missing || query.stale || group_.missed[k] < to || group_.missed_ahead[k] < to_ahead) {
+          limit(k, to, to_ahead);
+          restart(query);
+          again = {std::max(again.near, to), std::max(again.ahead, to_ahead)};
+        } else {  // is asked no more
+          limit_leaves(k, -infinity, -infinity);
+        }
       }
-    }
-    if (std::max(again.near, again.ahead) > -infinity) {
+      if (!(std::max(again.near, again.ahead) > -infinity)) {
+        break;
+      }
       visit(again, again, [&](int leaf, bool) { take(leaf, again); });
       collect();
     }
@@ -249,7 +263,7 @@ class ClearanceField::Search {
   }
 
  private:
-  static constexpr int most_put_off = 1024;
+  static constexpr int most_put_off = 1024, most_passes = 3;
 
   const Ellipsoid& ellipsoid(int k) const noexcept {
     return field_.ellipsoids_[static_cast<std::size_t>(cluster_->first + k)];
@@ -266,9 +280,14 @@ class ClearanceField::Search {
   }
 
   void limit(int k, double to, double to_ahead) noexcept {
-    group_.near[k] = group_.near_leaf[k] = static_cast<float>(to);
-    group_.ahead[k] = group_.ahead_leaf[k] = static_cast<float>(to_ahead);
+    group_.near[k] = static_cast<float>(to);
+    group_.ahead[k] = static_cast<float>(to_ahead);
+    limit_leaves(k, to, to_ahead);
     group_.missed[k] = group_.missed_ahead[k] = std::numeric_limits<float>::infinity();
+  }
+  void limit_leaves(int k, double to, double to_ahead) noexcept {
+    group_.near_leaf[k] = static_cast<float>(to);
+    group_.ahead_leaf[k] = static_cast<float>(to_ahead);
   }
 
   void place() noexcept {
@@ -289,9 +308,7 @@ class ClearanceField::Search {
       limit(k, reach_, horizon_.distance);
       group_.near[k] += static_cast<float>(group_.window);
       group_.ahead[k] += static_cast<float>(group_.window_ahead);
-      kernels::Query& query = group_.queries[k];
-      query.near = query.approached = false;
-      forget(query);
+      reset(group_.queries[k]);
     }
     for (int k = cluster_->size; k < kernels::most_queries; ++k) {  // registers are filled up
       group_.offset[0][k] = group_.offset[1][k] = group_.offset[2][k] = group_.extent[k] = 0.0f;

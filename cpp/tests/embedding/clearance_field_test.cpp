@@ -311,6 +311,43 @@ BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
   use(before);
 }
 
+// A plane that touches a flat ellipsoid says little of what is deep inside, where clearances are lower; of leaves that lie
+// across its surface as well.
+BOOST_AUTO_TEST_CASE(clouds_that_an_ellipsoid_is_deep_in) {
+  const InstructionSet before = instruction_set();
+  const Robot robot = test::serial_arm(test::arm_limits(2));
+  const std::string link = robot.frames().back().name;
+  const Eigen::Matrix3d S = Eigen::Vector3d(0.0225, 0.0004, 0.0025).asDiagonal();
+  const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {S}, Eigen::VectorXd::Ones(1));
+  for (const InstructionSet set : instruction_sets()) {
+    BOOST_TEST_CONTEXT(name(set)) {
+      use(set);
+      Random random(8);
+      for (int trial = 0; trial < 20; ++trial) {
+        KinematicState state(robot);
+        state.update(robot, random.vector(2), random.vector(2));
+        const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
+        const int num = trial % 4 < 2 ? 1500 : 300;
+        const double side = random.uniform(0.05, 0.2);
+        const Eigen::Vector3d at = 0.15 * random.vector(3);
+        Eigen::Matrix3Xd points(3, num), velocities(3, num);
+        for (int n = 0; n < num; ++n) {
+          // Along the longest axis clearances are lowest by far.
+          const bool along = n % 2 == 0 && trial % 4 < 2;
+          points.col(n) = X * (along ? Eigen::Vector3d(random.uniform(-0.2, 0.2), random.uniform(-1e-4, 1e-4), 0.0)
+                                     : Eigen::Vector3d(at + side * random.vector(3)));
+          velocities.col(n) = 0.1 * random.vector(3);
+        }
+        const Eigen::VectorXd radii = Eigen::VectorXd::Constant(num, trial % 2 == 0 ? 0.0 : 0.01);
+        const Obstacles moving(points, radii, velocities);
+        compare(robot, body, state, moving, 0.1, 0.1);
+        compare(robot, body, state, moving.frozen(), 0.1, 0.2);
+      }
+    }
+  }
+  use(before);
+}
+
 BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
   // There the iteration begins at its end, where S is 1 but for rounding. A foot that stays on an axis a of curvature
   // radius b²/a bends the distance h by v²/(b²/a + h) for a speed v across.

@@ -53,6 +53,7 @@ struct Query {
   int shortest;                             // the axis of the smallest a
   bool near, approached;                    // whether a point may be within reach, or come to be
   bool begun;                               // whether what sums need has been set
+  bool stale;                               // whether sums hold points beyond the windows above what is smallest by now
   Candidates candidates;
 };
 

@@ -46,7 +46,7 @@ struct Measured {
 
   /// As bits, see ClearanceKernel::measure.
   unsigned below(const MovingBall& cluster, Lanes bound, const Limits& within, const Limits& beyond) const noexcept {
-    const Lanes after = bound - cluster.horizon * closing;
+    const Lanes after = bound > 0.0 ? bound - cluster.horizon * closing : all(-__builtin_inf());  // inside nothing is known
     return (kernels::below(bound, all(beyond.near)) | kernels::below(after, all(beyond.ahead))) |
            (kernels::below(bound, all(within.near)) | kernels::below(after, all(within.ahead))) << 16;
   }

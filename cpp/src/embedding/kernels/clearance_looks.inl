@@ -75,9 +75,6 @@ struct Sight {
   Singles above;                                    // h − height, at most
   Singles tilt;                                     // |n − w/|w||, at most
 
-  /// Where nothing is known but that the clearance is negative: gradients are longer than one.
-  auto is_inside() const noexcept { return (t <= 0.0f) & (S < 1.0f); }
-
   /// Seen from the group's origin.
   void place(const Ellipsoid& of, Singles x, Singles y, Singles z) noexcept {
     for (int i = 0; i < 3; ++i) {
@@ -126,7 +123,6 @@ struct Sight {
     const Singles squared_norm = larger(w[0] * w[0] + w[1] * w[1] + w[2] * w[2], all(tiny)), over = S - 1.0f;
     inverse_norm = rough_inverse_root(squared_norm);
     height = (t * squared_norm + 0.5f * over) * inverse_norm;
-    height = is_inside() ? all(-__builtin_inff()) : height;
     // |√S − 1|, at most, which is |S − 1| / (1 + √S). So much of p lies aside of the normal; and as much, squared, is what
     // √S is less than (1 + S) / 2 by.
     const Singles share = magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f));
@@ -249,9 +245,11 @@ struct LeafBounds {
     const Singles apart = rough_root(at.e[0] * at.e[0] + at.e[1] * at.e[1] + at.e[2] * at.e[2]) * (1.0f - rough_error) - of.extent - diagonal - margin;
     const float horizon = static_cast<float>(group.horizon);
     const Singles speed = load(leaves.speed + i), more = load(leaves.more + i), stopped = horizon * (speed + more);
-    if (((kernels::below(apart, all(group.near[k])) | kernels::below(apart - stopped, all(group.ahead[k]))) & first_lanes(leaves.num - i)) == 0) {
+    const Singles apart_after = apart > 0.0f ? apart - stopped : all(-__builtin_inff());  // inside gradients are longer than one
+    if (((kernels::below(apart, all(group.near[k])) | kernels::below(apart_after, all(group.ahead[k]))) &
+         first_lanes(leaves.num - i)) == 0) {
       store(least + i, apart);
-      store(after + i, apart - stopped);
+      store(after + i, apart_after);
       return;
     }
     at.begin(of);
@@ -276,8 +274,9 @@ struct LeafBounds {
     const Singles turned = share * diagonal * (across + bend * diagonal * larger(-along, Singles{}));
     const Singles lowest = at.height - box;
     const Singles in_motion = at.height - turning_box - turned - horizon * (along + (at.tilt + at.tilt) * speed + more);
-    store(least + i, lowest - margin);
-    store(after + i, (lowest > 0.0f ? larger(in_motion, lowest - stopped) : lowest - stopped) - margin);
+    const auto outside = lowest > margin;
+    store(least + i, outside ? lowest - margin : apart);
+    store(after + i, outside ? larger(in_motion, lowest - stopped) - margin : all(-__builtin_inff()));
     const Singles inverse_flatness = rough_inverse(larger(at.flatness, all(tiny)));
     Singles start = at.next(at.t, at.S, at.flatness);
     for (int j = 0; j < 3; ++j) {
@@ -395,8 +394,8 @@ struct Look {
     }
     const FarSight far(of, at.e, own);
     const Singles apart = far.apart - radius - far.error;
-    asked = (below(apart, all(group.near[k])) |
-             below(apart - static_cast<float>(group.horizon) * far.closing, all(group.ahead[k]))) & first_lanes(loose.num - n);
+    const Singles after = apart > 0.0f ? apart - static_cast<float>(group.horizon) * far.closing : all(-__builtin_inff());
+    asked = (below(apart, all(group.near[k])) | below(after, all(group.ahead[k]))) & first_lanes(loose.num - n);
     if (asked == 0) {
       return false;
     }
@@ -442,12 +441,12 @@ struct Look {
     const float horizon = static_cast<float>(group.horizon);
     const Singles rate = at.rate(of) + (own[0] * at.w[0] + own[1] * at.w[1] + own[2] * at.w[2]) * at.inverse_norm;
     const Singles slack = horizon * at.tilt * speed;
-    const auto inside = at.is_inside();
+    const auto maybe_inside = at.height <= error;  // where no plane separates, clearances are lower than that
     t = at.t, S = at.S, flatness = at.flatness;
-    least[0] = at.height - radius - error;
+    least[0] = maybe_inside ? all(-__builtin_inff()) : at.height - radius - error;
     least[1] = least[0] + horizon * rate - slack;
-    most[0] = (inside ? Singles{} : at.height + at.above) + error - radius;
-    most[1] = inside ? all(__builtin_inff()) : most[0] + horizon * rate + slack;
+    most[0] = larger(at.height + at.above, Singles{}) + error - radius;
+    most[1] = maybe_inside ? all(__builtin_inff()) : most[0] + horizon * rate + slack;
   }
 };
 

@@ -343,12 +343,27 @@ struct Smallest {
   }
 };
 
-/// Old sums become smaller where what they are relative to becomes so.
+/// Weights of old sums become smaller where what they are relative to does.
 void rescale(Query& query, int first, int last, double before, double now, double inverse_T) noexcept {
   if (now < before && before < __builtin_inf()) {
     const Lanes factor = decay(before - now, inverse_T);
     for (int i = first; i < last; ++i) {
       store(query.lane_sums[i], factor * load(query.lane_sums[i]));
+    }
+  }
+}
+
+/// And what lies above it lies higher above: Σ w (h − reference), its derivatives and its gradient.
+void refer(Query& query, double before, double now) noexcept {
+  if (now < before && before < __builtin_inf()) {
+    const auto raise = [&](int sum, int by) {
+      store(query.lane_sums[sum], load(query.lane_sums[sum]) + (before - now) * load(query.lane_sums[by]));
+    };
+    for (int i = 0; i < 3; ++i) {
+      raise(3 + i, i);
+    }
+    for (int i = 0; i < 6; ++i) {
+      raise(12 + i, 6 + i);
     }
   }
 }
@@ -433,7 +448,8 @@ void add_approach(const QueryGroup& group, Query& query, const Samples* samples,
 void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
   Query& query = group.queries[k];
   Candidates& candidates = query.candidates;
-  if (!query.begun) {
+  const bool had_sums = query.begun;
+  if (!had_sums) {
     begin_sums(group, k);
   }
   // The limits are those of the smallest clearances and a window, as far as bounds say.
@@ -458,6 +474,7 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
     query.nearest = chosen.point[nearest.at];
   }
   rescale(query, 0, approach, reference, query.reference, group.inverse_T);
+  refer(query, reference, query.reference);
   for (int i = 0; i < number; ++i) {
     const auto counts = (samples[i].h < query.reference + group.window) | (samples[i].after < group.reach_ahead);
     values[i] = counts ? samples[i].after : all(__builtin_inf());
@@ -468,6 +485,7 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
     query.minded = chosen.point[minded.at];
   }
   rescale(query, approach, sums, ahead, query.ahead, group.inverse_T);
+  query.stale |= had_sums && (query.reference < reference || query.ahead < ahead);
   if (query.reference < __builtin_inf()) {
     add_nearest(group, query, samples, number);
   }
