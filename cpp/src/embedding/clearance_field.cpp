@@ -143,6 +143,7 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
   for (int first = 0; first < size();) {
     const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
     static_assert(Cluster::most == kernels::most_queries);
+    static_assert(decltype(Cluster::principal)::ColsAtCompileTime == kernels::principal_numbers);
     Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0, decltype(Cluster::principal)::Ones()};
     while (first + cluster.size < size() && cluster.size < Cluster::most &&
            at(first + cluster.size).body.joint == at(first).body.joint) {
@@ -194,16 +195,18 @@ class ClearanceField::Search {
         within.near = std::min<double>(reach_, largest(group_.near_leaf));
         within.ahead = std::min<double>(horizon_.distance, largest(group_.ahead_leaf));
       } else if (!is_within) {
-        put_off_[static_cast<std::size_t>(num_put_off)] = leaf;
-        num_put_off = std::min(num_put_off + 1, most_put_off);
+        if (num_put_off < most_put_off) {
+          put_off_[static_cast<std::size_t>(num_put_off)] = leaf;
+        }
+        ++num_put_off;
       }
     });
     if (!is_waiting() && !is_placed_) {
       return false;
     }
-    const bool is_full = num_put_off == most_put_off;
+    const bool is_full = num_put_off > most_put_off;
     int next = 0;
-    while (next < num_put_off && is_waiting() && !take(put_off_[static_cast<std::size_t>(next++)], beyond)) {
+    while (next < num_put_off && !is_full && is_waiting() && !take(put_off_[static_cast<std::size_t>(next++)], beyond)) {
     }
     collect();
     const bool goes_beyond = is_known_beyond(reach_, horizon_.distance);

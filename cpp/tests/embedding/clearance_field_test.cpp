@@ -348,6 +348,37 @@ BOOST_AUTO_TEST_CASE(clouds_that_an_ellipsoid_is_deep_in) {
   use(before);
 }
 
+// More than there is room for, before a point within reach is found beside which they weigh.
+BOOST_AUTO_TEST_CASE(walls_just_beyond_the_reach_count_beside_what_is_within) {
+  const InstructionSet before = instruction_set();
+  const Robot robot = test::serial_arm(test::arm_limits(1));
+  const std::string link = robot.frames().back().name;
+  const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {0.01 * Eigen::Matrix3d::Identity()},
+                  Eigen::VectorXd::Ones(1));
+  KinematicState state(robot);
+  state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1));
+  const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
+  constexpr double reach = 0.05;
+  for (const InstructionSet set : instruction_sets()) {
+    BOOST_TEST_CONTEXT(name(set)) {
+      use(set);
+      Random random(9);
+      for (const int num : {100, 1000, 3000}) {
+        Eigen::Matrix3Xd points(3, num);
+        for (int n = 0; n < num; ++n) {
+          const double h = n == num / 2 ? reach - 10.0 * temperature : reach + random.uniform(1e-5, 2.0 * temperature);
+          points.col(n) = X * ((0.1 + h) * Eigen::Vector3d(1.0, 0.4 * random.uniform(-1.0, 1.0), 0.4).normalized());
+        }
+        const Obstacles wall(points, Eigen::VectorXd::Zero(num), Eigen::Matrix3Xd::Zero(3, num));
+        for (const double horizon : {0.0, 0.05}) {
+          compare(robot, body, state, wall, reach, horizon);
+        }
+      }
+    }
+  }
+  use(before);
+}
+
 BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
   // There the iteration begins at its end, where S is 1 but for rounding. A foot that stays on an axis a of curvature
   // radius b²/a bends the distance h by v²/(b²/a + h) for a speed v across.

@@ -24,10 +24,11 @@ namespace sidestep {
 ///
 /// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
 /// depend on how densely a surface is sampled, of those within a window above the nearest; and to what approaches (see
-/// approach_mean.hpp). Points that do not matter are left out in groups, by h ≥ |e| − a − r with a the longest semi-axis and by
-/// h ≥ |e| − √(eᵀ S e) / |e| − r with e the shortest way to a box around them, and then one by one, by h in single precision
-/// less its errors. What is left is taken side by side in double precision, with
-/// the widest registers of the machine.
+/// approach_mean.hpp). What does not matter is left out in steps, by bounds from below: nodes of the tree over the points by
+/// balls and boxes around them and by a ball around the ellipsoids of a link; leaves, for every ellipsoid, by the plane that
+/// touches it where it is nearest to the middle of a leaf, beyond which all of the leaf's box is h ≥ n·y − √(nᵀ S n); and
+/// points by the same plane of their own, with a direction and so a rate that is known as well as n is. All this is done in
+/// single precision, many side by side. What is left is summed in double precision, with the widest registers of the machine.
 class ClearanceField {
  public:
   /// Points that are farther than the nearest by `window` temperatures do not count: each would weigh less than e^−window and

@@ -30,7 +30,7 @@ struct LinkMotion {
 inline constexpr int approach = 18, sums = 28;
 
 inline constexpr int most_points = 16;        // of a leaf
-inline constexpr int most_candidates = 256;
+inline constexpr int most_candidates = 512;
 
 /// Points that may weigh in the means of an ellipsoid, with what single precision says of them.
 struct Candidates {
@@ -145,8 +145,8 @@ struct ClearanceKernel {
                              const Limits& beyond) noexcept;
   /// To be called once a group is placed.
   void (*begin)(QueryGroup& group) noexcept;
-  /// Adds points of the group's leaves, and its loose points, that may weigh to the candidates, and lowers its limits. Where there is no room, the
-  /// candidates before are summed.
+  /// Adds points of the group's leaves, and its loose points, that may weigh to the candidates, and lowers its limits. Where
+  /// there is no room, the candidates before are summed.
   void (*collect)(QueryGroup& group, const Points& points) noexcept;
   /// Adds the candidates of query k to its sums, and forgets them.
   void (*sum)(QueryGroup& group, int k, const Points& points) noexcept;

@@ -125,7 +125,7 @@ struct Sight {
     height = (t * squared_norm + 0.5f * over) * inverse_norm;
     // |√S − 1|, at most, which is |S − 1| / (1 + √S). So much of p lies aside of the normal; and as much, squared, is what
     // √S is less than (1 + S) / 2 by.
-    const Singles share = magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f));
+    const Singles share = magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f)) + 2.0f * rough_error;
     tilt = smaller(of.extent * share * rough_inverse(larger(height, all(least_height))), all(2.0f)) + direction_error;
     above = 0.5f * share * (of.extent * tilt + share * inverse_norm);
   }
@@ -266,7 +266,7 @@ struct LeafBounds {
     // h is convex: at d from the centre it is more by n·d at least. n changes by H d for a matrix H between 0 and that of a
     // sphere as round as the ellipsoid is anywhere, κ; then −dᵀ H v is −κ (|d| |v| + d·v) / 2 at least.
     const Singles bend = rough_inverse(of.roundness + larger(at.height - box, Singles{}));
-    const Singles share = (0.5f * horizon) * bend, across = rough_root(speed * speed - along * along);
+    const Singles share = (0.5f * horizon) * bend, across = rough_root((1.0f + 2.0f * direction_error) * speed * speed - along * along);
     Singles turning_box = {};
     for (int j = 0; j < 3; ++j) {
       turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]));
@@ -347,7 +347,7 @@ struct FarSight {
     apart = distance - of.extent;
     // As Horizon::closing_speed, with an angle that is rather too large.
     const Singles sine = (1.0f + distance_error) * of.extent * inverse_distance, cosine = rough_root(1.0f - sine * sine);
-    const Singles across = rough_root(squared * squared_speed - along * along);
+    const Singles across = rough_root((1.0f + 1e-6f) * squared * squared_speed - along * along);
     const Singles turned = (along * cosine + across * sine) * inverse_distance + 2.0f * direction_error * speed;
     closing = (sine < 1.0f) & (along * inverse_distance < speed * cosine) ? smaller(turned, speed) : speed;
   }
@@ -450,12 +450,13 @@ struct Look {
   }
 };
 
-/// Looks at the points of some leaves.
-void look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen, const Points& points) noexcept {
+/// Looks at the points of some leaves, and returns at which: at others no more.
+LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen, const Points& points) noexcept {
   Leaves& leaves = group.leaves;
   const bool moves = points.velocity[0] != nullptr;
   constexpr int side_by_side = 4;
   Look looks[side_by_side];
+  LeafBits seen = 0;
   while (chosen != 0) {
     int size = 0;
     for (; chosen != 0 && size + most_points / singles <= side_by_side; chosen &= chosen - 1) {
@@ -463,10 +464,11 @@ void look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bo
       if (!(bounds.least[i] < group.near_leaf[k] || bounds.after[i] < group.ahead_leaf[k])) {  // no more
         continue;
       }
+      seen |= 1ull << i;
       if ((leaves.loaded >> i & 1) == 0) {
         load_points(group, points, i);
       }
-      for (int n = 0; n < most_points; n += singles) {
+      for (int n = 0; n < leaves.count[i]; n += singles) {
         looks[size++].find(group, of, bounds, i, n, moves);
       }
     }
@@ -474,6 +476,7 @@ void look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bo
       looks[i].keep(group, k, points);
     }
   }
+  return seen;
 }
 
 /// Looks at the loose points.
@@ -504,8 +507,8 @@ void collect(QueryGroup& group, const Points& points) noexcept {
       bounds.find(group, of, k, i);
     }
     LeafBits seen = 0;
-    for (LeafBits left; (left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen) != 0; seen |= left) {
-      look_at(group, k, of, bounds, left, points);
+    while (const LeafBits left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen) {
+      seen |= look_at(group, k, of, bounds, left, points);
     }
     bounds.note_missed(group, k, seen);
   }

@@ -452,8 +452,20 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
   if (!had_sums) {
     begin_sums(group, k);
   }
-  // The limits are those of the smallest clearances and a window, as far as bounds say.
+  // The limits are those of the smallest clearances and a window, as far as bounds say. Before any is known within reach, what
+  // is left out is noted.
   const float nothing = -__builtin_inff();
+  const auto note = [&candidates](int which, float& missed) {
+    for (int i = 0; i < candidates.size; ++i) {
+      missed = candidates.least[which][i] < missed ? candidates.least[which][i] : missed;
+    }
+  };
+  if (!query.near) {
+    note(0, group.missed[k]);
+  }
+  if (!query.approached) {
+    note(1, group.missed_ahead[k]);
+  }
   const Chosen chosen(candidates, query.near ? group.near[k] : nothing, query.approached ? group.ahead[k] : nothing);
   candidates.size = 0;
   Samples samples[most_candidates / width];
