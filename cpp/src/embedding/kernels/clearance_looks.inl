@@ -242,7 +242,8 @@ struct LeafBounds {
     at.place(of, load(leaves.centre[0] + i), load(leaves.centre[1] + i), load(leaves.centre[2] + i));
     // Balls around both say enough of many.
     const Singles margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error), diagonal = load(leaves.diagonal + i);
-    const Singles apart = rough_root(at.e[0] * at.e[0] + at.e[1] * at.e[1] + at.e[2] * at.e[2]) * (1.0f - rough_error) - of.extent - diagonal - margin;
+    const Singles distance = rough_root(at.e[0] * at.e[0] + at.e[1] * at.e[1] + at.e[2] * at.e[2]);
+    const Singles apart = distance * (1.0f - rough_error) - of.extent - diagonal - margin;
     const float horizon = static_cast<float>(group.horizon);
     const Singles speed = load(leaves.speed + i), more = load(leaves.more + i), stopped = horizon * (speed + more);
     const Singles apart_after = apart > 0.0f ? apart - stopped : all(-__builtin_inff());  // inside gradients are longer than one
@@ -266,7 +267,8 @@ struct LeafBounds {
     // h is convex: at d from the centre it is more by n·d at least. n changes by H d for a matrix H between 0 and that of a
     // sphere as round as the ellipsoid is anywhere, κ; then −dᵀ H v is −κ (|d| |v| + d·v) / 2 at least.
     const Singles bend = rough_inverse(of.roundness + larger(at.height - box, Singles{}));
-    const Singles share = (0.5f * horizon) * bend, across = rough_root((1.0f + 2.0f * direction_error) * speed * speed - along * along);
+    const Singles share = (0.5f * horizon) * bend;
+    const Singles across = rough_root((1.0f + 2.0f * direction_error) * speed * speed - along * along);
     Singles turning_box = {};
     for (int j = 0; j < 3; ++j) {
       turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]));
@@ -368,8 +370,11 @@ struct Look {
     asked = first_lanes(leaves.count[i] - n);
     Sight at;
     at.place(of, load(leaves.position[0] + from), load(leaves.position[1] + from), load(leaves.position[2] + from));
-    at.t = larger(bounds.t0[i] + bounds.gradient[0][i] * at.e[0] + bounds.gradient[1][i] * at.e[1] + bounds.gradient[2][i] * at.e[2],
-                  Singles{});
+    Singles t_near = all(bounds.t0[i]);
+    for (int j = 0; j < 3; ++j) {
+      t_near += bounds.gradient[j][i] * at.e[j];
+    }
+    at.t = larger(t_near, Singles{});
     if (bounds.turn[i] > most_turn) {
       at.set_w(of);
       at.t = Sight::next(at.t, at.S, at.flatness);
@@ -451,7 +456,8 @@ struct Look {
 };
 
 /// Looks at the points of some leaves, and returns at which: at others no more.
-LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen, const Points& points) noexcept {
+LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen,
+                 const Points& points) noexcept {
   Leaves& leaves = group.leaves;
   const bool moves = points.velocity[0] != nullptr;
   constexpr int side_by_side = 4;
