@@ -110,6 +110,50 @@ def test_derivatives(name: str, kind: str) -> None:
     assert seen > NUM_STATES // 4  # the states do exercise the barrier
 
 
+def distances(shape: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Of points outside an ellipsoid, by halving the interval of the multiplier t (docs/theory, 5.1)."""
+    squared, axes = np.linalg.eigh(shape)
+    e = offsets @ axes
+    low, high = np.zeros(len(e)), np.full(len(e), 10.0)
+    for _ in range(80):
+        t = 0.5 * (low + high)
+        beyond = (squared * (e / (squared + t[:, None])) ** 2).sum(axis=1) > 1.0
+        low, high = np.where(beyond, t, low), np.where(beyond, high, t)
+    return low * np.linalg.norm(e / (squared + low[:, None]), axis=1)
+
+
+def test_clearances_above_a_dense_wall_are_the_mean_over_all_points() -> None:
+    """Hundreds of points weigh for one ellipsoid; sums over more than there was room for were wrong by centimetres."""
+    robot = ss.Robot.named("panda")
+    body = covering(robot, 0)
+    rng = np.random.default_rng(4)
+    points = np.column_stack([rng.uniform(-0.7, 0.7, (60_000, 2)), rng.normal(0.1, 0.001, 60_000)])
+    window, temperature, activation = 12.0, 0.002, 0.1
+    barrier = ss.ClearanceBarrier(robot, body, activation=activation, temperature=temperature)
+    obstacles = ss.Obstacles(points)
+    compared = crowded = 0
+    for _ in range(20):
+        q = robot.random_configuration(rng)
+        e = barrier.evaluate(q, rng.normal(size=q.size), obstacles)
+        for found, k in zip(e.clearances, barrier.components, strict=True):
+            if not found < activation:
+                continue
+            X = robot.pose(q, body.links[k])
+            offsets = (points - X[:3, 3]) @ X[:3, :3] - body.means[k]
+            shape, away = body.covariances[k] * body.levels[k], np.linalg.norm(offsets, axis=1)
+            longest = np.sqrt(np.linalg.eigvalsh(shape)[-1])
+            h = distances(shape, offsets[away < away.min() + longest + window * temperature])
+            near = h[h < h.min() + window * temperature]
+            weights = np.exp(-(near - near.min()) / temperature)
+            mean = (weights @ near) / weights.sum()
+            if near.min() > 0.0 and mean < activation - 1e-6:  # beyond what approaches is told
+                assert found == pytest.approx(mean, abs=1e-12)
+                compared += 1
+                crowded += len(near) > 512
+    assert compared > 20
+    assert crowded > 5
+
+
 @pytest.mark.parametrize("window", [6.0, 12.0])
 def test_points_beyond_the_window_hardly_matter(window: float) -> None:
     robot = ss.Robot.named("panda")
