@@ -42,7 +42,6 @@ class ClearanceField {
   /// [m] is not positive and finite, or the window not within 1 to 600.
   ClearanceField(const Robot& robot, const Body& body, double temperature = 0.002, double window = default_window);
 
-  double window() const noexcept { return window_; }
   int size() const noexcept { return static_cast<int>(ellipsoids_.size()); }
 
   /// Writes the clearances below `reach` [m] at a state into `out`, which the caller has cleared, and what approaches: of

@@ -223,12 +223,7 @@ inline Singles rough_inverse_root(Singles x) noexcept {
 #endif
 }
 
-/// The same within 1e-6: one step of Newton's.
-inline Singles inverse(Singles x) noexcept {
-  const Singles y = rough_inverse(x);
-  return y * (2.0f - x * y);
-}
-
+/// 1/√x within 1e-6: one step of Newton's.
 inline Singles inverse_root(Singles x) noexcept {
   const Singles y = rough_inverse_root(x);
   return y * (1.5f - 0.5f * x * y * y);
