@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <exception>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
+
+#include "sidestep/dynamical_system/step_block.hpp"
 
 namespace sidestep {
 namespace {
@@ -58,6 +61,36 @@ void share(Eigen::Index num, int threads, Work&& work) {
   }
 }
 
+/// Copies states [first, first + num) of column `from`, and the last of them for what is left of the block.
+void copy(const Eigen::MatrixXd& from, Eigen::Index column, Eigen::Index first, Eigen::Index num, BlockRow& to) {
+  const double* const states = from.data() + column * from.rows() + first;
+  if (num == block_states) {
+    std::memcpy(to.of, states, sizeof to.of);
+    return;
+  }
+  for (Eigen::Index i = 0; i < block_states; ++i) {
+    to.of[i] = states[std::min(i, num - 1)];
+  }
+}
+
+/// The states from `first` on, as many as a block holds.
+void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
+              const Eigen::MatrixXd& goals, const Obstacles& obstacles, BatchEvaluation& result) {
+  const Eigen::Index num = std::min<Eigen::Index>(block_states, q.rows() - first);
+  for (Eigen::Index j = 0; j < q.cols(); ++j) {
+    const auto row = static_cast<std::size_t>(j);
+    copy(q, j, first, num, block.q[row]);
+    copy(v, j, first, num, block.v[row]);
+    copy(goals, j, first, num, block.goal[row]);
+  }
+  block.update(obstacles);
+  for (Eigen::Index j = 0; j < q.cols(); ++j) {
+    std::copy_n(block.acceleration[static_cast<std::size_t>(j)].of, num, &result.accelerations(first, j));
+  }
+  std::copy_n(block.value.of, num, &result.values(first, 0));
+  std::copy_n(block.statuses.begin(), num, result.statuses.begin() + first);
+}
+
 }  // namespace
 
 BatchEvaluation evaluate_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
@@ -66,6 +99,15 @@ BatchEvaluation evaluate_batch(const GeometricSystem& system, const Eigen::Matri
   BatchEvaluation result{Eigen::MatrixXd(q.rows(), q.cols()),
                          Eigen::MatrixXd(q.rows(), system.num_embedding_coordinates()),
                          std::vector<StepStatus>(static_cast<std::size_t>(q.rows()))};
+  if (StepBlock::takes(system)) {
+    share((q.rows() + block_states - 1) / block_states, threads, [&](auto&& next) {
+      StepBlock block(system);
+      for (Eigen::Index k = next(); k * block_states < q.rows(); k = next()) {
+        evaluate(block, k * block_states, q, v, goals, obstacles, result);
+      }
+    });
+    return result;
+  }
   share(q.rows(), threads, [&](auto&& next) {
     GeometricSystem::Workspace workspace(system);
     for (Eigen::Index k = next(); k < q.rows(); k = next()) {

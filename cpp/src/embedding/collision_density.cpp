@@ -24,6 +24,23 @@ kernels::AddDensity add_density() noexcept {
   return kernels::add_density_baseline;
 }
 
+kernels::AddDensityBlock add_density_block() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  switch (instruction_set()) {
+    case InstructionSet::avx512: return kernels::add_density_block_avx512;
+    case InstructionSet::avx2: return kernels::add_density_block_avx2;
+    case InstructionSet::baseline: break;
+  }
+#endif
+  return kernels::add_density_block_baseline;
+}
+
+kernels::DensityPoints points_of(const Obstacles& obstacles, bool average) noexcept {
+  return {static_cast<int>(obstacles.size()), average ? 1.0 / static_cast<double>(obstacles.size()) : 1.0,
+          obstacles.points().data(), obstacles.radii().data(),
+          obstacles.tree().moves() ? obstacles.velocities().data() : nullptr};
+}
+
 void set(double (&rows)[3][kernels::most_lanes], int lane, const Eigen::Vector3d& v) {
   for (int i = 0; i < 3; ++i) {
     rows[i][lane] = v[i];
@@ -102,10 +119,7 @@ void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
   if (obstacles.size() == 0) {
     return;
   }
-  const kernels::DensityPoints points{static_cast<int>(obstacles.size()),
-                                      average_ ? 1.0 / static_cast<double>(obstacles.size()) : 1.0,
-                                      obstacles.points().data(), obstacles.radii().data(),
-                                      obstacles.tree().moves() ? obstacles.velocities().data() : nullptr};
+  const kernels::DensityPoints points = points_of(obstacles, average_);
   const kernels::AddDensity add = add_density();
   kernels::DensitySums sums;
   std::fill(std::begin(sums.value), std::end(sums.value), 0.0);
@@ -127,6 +141,16 @@ void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
   gradient.finish();
   out.values[0] += sum(sums.value);
   out.curvatures[0] += sum(sums.curvature);
+}
+
+void CollisionDensity::add_block(EmbeddingBlock& out, const KinematicBlock& states,
+                                 const Obstacles& obstacles) const noexcept {
+  if (obstacles.size() == 0) {
+    return;
+  }
+  add_density_block()(gaussians_->blocks.data(), static_cast<int>(gaussians_->blocks.size()),
+                      {states.parents().data(), states.coordinates().data()}, states.links(),
+                      points_of(obstacles, average_), {out.value.of, out.curvature.of, out.gradient.front().of});
 }
 
 void CollisionDensity::lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,

@@ -7,6 +7,9 @@ bool Embedding::touches(const KinematicState& /*state*/, const Obstacles& /*obst
   return false;
 }
 
+void Embedding::add_block(EmbeddingBlock& /*out*/, const KinematicBlock& /*states*/,
+                          const Obstacles& /*obstacles*/) const noexcept {}
+
 CoordinateLabel Embedding::label(int /*k*/) const { return {}; }
 
 std::shared_ptr<const Embedding> Embedding::relaxed_at(const Eigen::VectorXd& /*goal*/,

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "kernels/most_lanes.hpp"
+#include "../kinematics/kernels/most_lanes.hpp"
 
 namespace sidestep {
 namespace {

@@ -132,6 +132,7 @@ class GeometricSystem {
   const std::vector<CoordinateLabel>& labels() const noexcept { return labels_; }
   const Robot& robot() const noexcept { return robot_; }
   const GeometricSystemSettings& settings() const noexcept { return settings_; }
+  const std::vector<std::shared_ptr<const Embedding>>& embeddings() const noexcept { return embeddings_; }
   int num_embedding_coordinates() const noexcept { return num_embedding_coordinates_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "most_lanes.hpp"
+#include "../../kinematics/kernels/most_lanes.hpp"
 #include "sidestep/obstacles/balls.hpp"
 
 // The inner loop of ClearanceField, once per instruction set. Plain arrays only: a translation unit compiled for a newer

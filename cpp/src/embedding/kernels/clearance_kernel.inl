@@ -4,7 +4,7 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "lanes.inl"
+#include "../../kinematics/kernels/lanes.inl"
 
 #include "clearance_sums.inl"
 

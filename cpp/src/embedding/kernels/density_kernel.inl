@@ -6,35 +6,29 @@
 namespace sidestep::kernels {
 namespace {
 
-#include "lanes.inl"
+#include "../../kinematics/kernels/lanes.inl"
+#include "../../kinematics/kernels/vectors.inl"
 
 constexpr double inverse_two_pi_cubed = 1.0 / 248.05021344239853;  // 1/(2π)³
 constexpr double least_exponent = -700.0;  // below it a density is no normal number: taken as zero
 
-/// A vector of each lane.
-struct Vectors {
-  Lanes x, y, z;
+/// Gaussians of a block side by side, from one on.
+struct SideBySide {
+  const GaussianBlock& gaussians;
+  int first;
 
-  Vectors operator+(const Vectors& o) const noexcept { return {x + o.x, y + o.y, z + o.z}; }
-  Vectors operator-(const Vectors& o) const noexcept { return {x - o.x, y - o.y, z - o.z}; }
-  Lanes dot(const Vectors& o) const noexcept { return x * o.x + y * o.y + z * o.z; }
+  Lanes operator()(const double (&row)[most_lanes]) const noexcept { return load(row + first); }
 };
 
-inline Vectors cross(const Vectors& a, const Vectors& b) noexcept {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+/// One of them in every lane.
+struct InEveryLane {
+  const GaussianBlock& gaussians;
+  int which;
 
-inline Vectors all(const double* v) noexcept { return {all(v[0]), all(v[1]), all(v[2])}; }
+  Lanes operator()(const double (&row)[most_lanes]) const noexcept { return all(row[which]); }
+};
 
-inline Vectors load(const double (&rows)[3][most_lanes], int first) noexcept {
-  return {load(rows[0] + first), load(rows[1] + first), load(rows[2] + first)};
-}
-
-inline void store(double (&rows)[3][most_lanes], int first, const Vectors& v) noexcept {
-  store(rows[0] + first, v.x);
-  store(rows[1] + first, v.y);
-  store(rows[2] + first, v.z);
-}
+inline void store(double (&rows)[3][most_lanes], int first, const Vectors& v) noexcept { store_rows(rows[0] + first, v); }
 
 #if defined(__AVX2__)
 /// Two numbers of every other link.
@@ -97,6 +91,17 @@ struct Links {
         bias_angular(gather(links, bias_at)),
         bias_linear(gather(links, bias_at + 3)) {}
 
+  /// The same link in as many states as there are lanes, from rows of KinematicBlock.
+  explicit Links(const double* rows) noexcept
+      : rotation{at(rows, 0), at(rows, 3), at(rows, 6)},
+        position(at(rows, position_at)),
+        angular(at(rows, velocity_at)),
+        linear(at(rows, velocity_at + 3)),
+        bias_angular(at(rows, bias_at)),
+        bias_linear(at(rows, bias_at + 3)) {}
+
+  static Vectors at(const double* rows, int number) noexcept { return load_rows(rows + number * most_lanes); }
+
   Vectors from_world(const Vectors& v) const noexcept {
     return {rotation[0].dot(v), rotation[1].dot(v), rotation[2].dot(v)};
   }
@@ -111,23 +116,25 @@ struct Links {
 struct Peak {
   Lanes xx, yy, zz, xy, xz, yz, scale;
 
-  Peak(const GaussianBlock& g, int first, double radius) noexcept {
+  template <class Gaussians>
+  Peak(const Gaussians& lanes, double radius) noexcept {
+    const GaussianBlock& g = lanes.gaussians;
     if (!(radius > 0.0)) {
-      const auto entry = [&](int i) noexcept { return load(g.precision[i] + first); };
+      const auto entry = [&](int i) noexcept { return lanes(g.precision[i]); };
       xx = entry(0), yy = entry(1), zz = entry(2), xy = entry(3), xz = entry(4), yz = entry(5);
-      scale = load(g.scale + first);
+      scale = lanes(g.scale);
       return;
     }
     Lanes inverse[3];
     for (int i = 0; i < 3; ++i) {
-      inverse[i] = 1.0 / (load(g.variances[i] + first) + radius * radius);
+      inverse[i] = 1.0 / (lanes(g.variances[i]) + radius * radius);
     }
     const auto entry = [&](int i) noexcept {
-      return inverse[0] * load(g.projections[0][i] + first) + inverse[1] * load(g.projections[1][i] + first) +
-             inverse[2] * load(g.projections[2][i] + first);
+      return inverse[0] * lanes(g.projections[0][i]) + inverse[1] * lanes(g.projections[1][i]) +
+             inverse[2] * lanes(g.projections[2][i]);
     };
     xx = entry(0), yy = entry(1), zz = entry(2), xy = entry(3), xz = entry(4), yz = entry(5);
-    scale = load(g.weight + first) * root(inverse[0] * inverse[1] * inverse[2] * inverse_two_pi_cubed);
+    scale = lanes(g.weight) * root(inverse[0] * inverse[1] * inverse[2] * inverse_two_pi_cubed);
   }
 
   Vectors operator*(const Vectors& v) const noexcept {
@@ -143,8 +150,8 @@ struct Seen {
   Lanes exponent, scale;      // of the density
   Lanes slope, bend;          // eᵀ P ẏ and ẏᵀ P ẏ
 
-  void place(const Links& link, const Vectors& mean, const GaussianBlock& gaussians, int first, const DensityPoints& points,
-             int n) noexcept {
+  template <class Gaussians>
+  void place(const Links& link, const Vectors& mean, const Gaussians& gaussians, const DensityPoints& points, int n) noexcept {
     // The point seen from the link: y and ẏ there.
     x = all(points.positions + 3 * n);
     const Vectors motion = link.linear + cross(link.angular, x);
@@ -156,7 +163,7 @@ struct Seen {
     }
     const Vectors e = link.from_world(x - link.position) - mean, y_dot = link.from_world(slip);
     drag = link.bias_linear + cross(link.bias_angular, x) + cross(link.angular, twice_own_less_motion);
-    const Peak peak(gaussians, first, points.radii[n]);
+    const Peak peak(gaussians, points.radii[n]);
     t = peak * e;
     exponent = -0.5 * e.dot(t);
     scale = points.weight * peak.scale;
@@ -172,19 +179,21 @@ struct Seen {
 
 constexpr int together = 4;  // points
 
-void add_density(const GaussianBlock& gaussians, const double* const* numbers, const DensityPoints& points,
-                 DensitySums& sums) noexcept {
-  for (int first = 0; first < gaussians.num; first += width) {
-    const Links link(numbers + first);
-    const Vectors mean = load(gaussians.mean, first);
-    Lanes value = load(sums.value + first), curvature = load(sums.curvature + first);
-    Vectors force = {}, moment = {};
+/// What Gaussians and points add up to, lane by lane.
+struct Added {
+  Lanes value = {}, curvature = {};
+  Vectors force = {}, moment = {};  // the wrench about the world origin
+
+  template <class Gaussians>
+  void add(const Links& link, const Gaussians& gaussians, const DensityPoints& points) noexcept {
+    const GaussianBlock& g = gaussians.gaussians;
+    const Vectors mean{gaussians(g.mean[0]), gaussians(g.mean[1]), gaussians(g.mean[2])};
     for (int start = 0; start < points.num; start += together) {
       const int number = points.num - start < together ? points.num - start : together;
       Seen seen[together];
       Lanes densities[together];
       for (int i = 0; i < number; ++i) {
-        seen[i].place(link, mean, gaussians, first, points, start + i);
+        seen[i].place(link, mean, gaussians, points, start + i);
       }
       for (int i = 0; i < number; ++i) {
         densities[i] = seen[i].density();
@@ -193,17 +202,77 @@ void add_density(const GaussianBlock& gaussians, const double* const* numbers, c
         const Seen& at = seen[i];
         const Lanes density = densities[i];
         // δψ = f · (δv + δω × x − δx): the wrench (x × f, f) about the world origin.
-        const Vectors f = link.to_world({density * at.t.x, density * at.t.y, density * at.t.z});
+        const Vectors f = link.to_world(at.t * density);
         value += density;
         curvature += density * (at.slope * at.slope - at.bend) + f.dot(at.drag);
-        force = force + f;
-        moment = moment + cross(at.x, f);
+        force += f;
+        moment += cross(at.x, f);
       }
     }
-    store(sums.value + first, value);
-    store(sums.curvature + first, curvature);
-    store(sums.force, first, force);
-    store(sums.moment, first, moment);
+  }
+};
+
+void add_density(const GaussianBlock& gaussians, const double* const* numbers, const DensityPoints& points,
+                 DensitySums& sums) noexcept {
+  for (int first = 0; first < gaussians.num; first += width) {
+    Added added{load(sums.value + first), load(sums.curvature + first)};
+    added.add(Links(numbers + first), SideBySide{gaussians, first}, points);
+    store(sums.value + first, added.value);
+    store(sums.curvature + first, added.curvature);
+    store(sums.force, first, added.force);
+    store(sums.moment, first, added.moment);
+  }
+}
+
+/// Takes wrenches on links, of the last joint first, down to the base and adds what joints feel of them.
+class Descent {
+ public:
+  Descent(const JointTree& joints, const double* links, double* gradient) noexcept
+      : joints_(joints), links_(links), gradient_(gradient) {}
+
+  void add(int joint, const Vectors& force, const Vectors& moment) noexcept {
+    go_down_to(joint);
+    if (joint_ != joint) {  // on another branch, or the first
+      go_down_to(-1);
+      joint_ = joint;
+      force_ = moment_ = Vectors{};
+    }
+    force_ += force;
+    moment_ += moment;
+  }
+  void finish() noexcept { go_down_to(-1); }
+
+ private:
+  void go_down_to(int joint) noexcept {
+    for (; joint_ > joint; joint_ = joints_.parents[joint_]) {
+      const double* const link = links_ + joint_ * link_numbers * most_lanes;
+      double* const sum = gradient_ + joints_.coordinates[joint_] * most_lanes;
+      store(sum, load(sum) + Links::at(link, screw_at).dot(moment_) + Links::at(link, screw_at + 3).dot(force_));
+    }
+  }
+
+  const JointTree& joints_;
+  const double* links_;
+  double* gradient_;
+  int joint_ = -1;
+  Vectors force_ = {}, moment_ = {};
+};
+
+void add_density_block(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
+                       const DensityPoints& points, const DensityRows& rows) noexcept {
+  for (int first = 0; first < most_lanes; first += width) {
+    Added total{load(rows.value + first), load(rows.curvature + first)};
+    Descent gradient(joints, links + first, rows.gradient + first);
+    for (const GaussianBlock* block = blocks; block != blocks + num; ++block) {
+      for (int i = 0; i < block->num; ++i) {
+        total.force = total.moment = Vectors{};
+        total.add(Links(links + first + block->joints[i] * link_numbers * most_lanes), InEveryLane{*block, i}, points);
+        gradient.add(block->joints[i], total.force, total.moment);
+      }
+    }
+    gradient.finish();
+    store(rows.value + first, total.value);
+    store(rows.curvature + first, total.curvature);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "link_numbers.hpp"
+#include "most_lanes.hpp"
 
 // The loop over joints of KinematicState, once per instruction set. Plain arrays only: a translation unit compiled for
 // a newer instruction set must not emit code that others share, such as Eigen's inline functions.
@@ -29,5 +30,13 @@ void update_links_baseline(const JointModel* joints, int num, const double* q, c
                            int stride) noexcept;
 void update_links_avx2(const JointModel* joints, int num, const double* q, const double* v, double* links,
                        int stride) noexcept;
+
+/// The same for `most_lanes` states side by side: where one state has a number, q, v and links, which are without gaps, have a
+/// row of one for each.
+using UpdateLinkBlock = void (*)(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
+
+void update_link_block_baseline(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
+void update_link_block_avx2(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
+void update_link_block_avx512(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
 
 }  // namespace sidestep::kernels

@@ -50,6 +50,18 @@ inline Lanes larger(Lanes x, Lanes y) noexcept {
 #endif
 }
 
+inline Lanes smaller(Lanes x, Lanes y) noexcept {
+#if defined(__AVX512F__)
+  return _mm512_maskz_min_pd(0xff, x, y);
+#elif defined(__AVX2__)
+  return _mm256_min_pd(x, y);
+#elif defined(__SSE2__)
+  return _mm_min_pd(x, y);
+#else
+  return x < y ? x : y;
+#endif
+}
+
 inline Lanes magnitude(Lanes x) noexcept {
   Bits bits;
   __builtin_memcpy(&bits, &x, sizeof bits);
