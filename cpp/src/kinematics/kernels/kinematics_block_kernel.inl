@@ -9,36 +9,42 @@ namespace {
 
 #include "link_motion.inl"
 
-Link<Vectors> base() noexcept {
-  Link<Vectors> link = {};
-  link.rotation[0].x = link.rotation[1].y = link.rotation[2].z = all(1.0);
-  return link;
-}
-
 /// Where number i of a link at the first state is.
 template <class Number>
 Number* row(Number* link, int i) noexcept {
   return link + i * most_lanes;
 }
 
-Link<Vectors> read(const double* link) noexcept {
-  return {{load_rows(row(link, 0)), load_rows(row(link, 3)), load_rows(row(link, 6))},
-          load_rows(row(link, position_at)),
-          {load_rows(row(link, velocity_at)), load_rows(row(link, velocity_at + 3))},
-          {load_rows(row(link, bias_at)), load_rows(row(link, bias_at + 3))}};
+/// Of the base, where `link` is null.
+Pose<Vectors> read_pose(const double* link) noexcept {
+  if (link == nullptr) {
+    Pose<Vectors> pose = {};
+    pose.rotation[0].x = pose.rotation[1].y = pose.rotation[2].z = all(1.0);
+    return pose;
+  }
+  return {{load_rows(row(link, 0)), load_rows(row(link, 3)), load_rows(row(link, 6))}, load_rows(row(link, position_at))};
 }
 
-void write(const Link<Vectors>& link, const Motion<Vectors>& screw, double* numbers) noexcept {
-  for (int i = 0; i < 3; ++i) {
-    store_rows(row(numbers, 3 * i), link.rotation[i]);
+Motion<Vectors> read_motion(const double* rows) noexcept { return {load_rows(rows), load_rows(row(rows, 3))}; }
+
+Rates<Vectors> read_rates(const double* link) noexcept {
+  if (link == nullptr) {
+    const Motion<Vectors> none = {};
+    return {none, none};
   }
-  store_rows(row(numbers, position_at), link.position);
-  store_rows(row(numbers, screw_at), screw.angular);
-  store_rows(row(numbers, screw_at + 3), screw.linear);
-  store_rows(row(numbers, velocity_at), link.velocity.angular);
-  store_rows(row(numbers, velocity_at + 3), link.velocity.linear);
-  store_rows(row(numbers, bias_at), link.bias.angular);
-  store_rows(row(numbers, bias_at + 3), link.bias.linear);
+  return {read_motion(row(link, velocity_at)), read_motion(row(link, bias_at))};
+}
+
+void write(const Pose<Vectors>& pose, double* link) noexcept {
+  for (int i = 0; i < 3; ++i) {
+    store_rows(row(link, 3 * i), pose.rotation[i]);
+  }
+  store_rows(row(link, position_at), pose.position);
+}
+
+void write(const Motion<Vectors>& motion, double* rows) noexcept {
+  store_rows(rows, motion.angular);
+  store_rows(row(rows, 3), motion.linear);
 }
 
 Turn<Lanes> turn_of(const JointModel& joint, Lanes position) noexcept {
@@ -56,12 +62,11 @@ Turn<Lanes> turn_of(const JointModel& joint, Lanes position) noexcept {
 
 /// As many states as a register holds, from the first of the rows on.
 void update_some(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept {
-  Link<Vectors> link = base();  // of the joint before, then of this one
   for (int i = 0; i < num; ++i) {
     const JointModel& joint = joints[i];
-    if (joint.parent != i - 1) {
-      link = joint.parent < 0 ? base() : read(links + joint.parent * link_numbers * most_lanes);
-    }
+    double* const link = row(links, i * link_numbers);
+    // From memory, although it was computed just now: registers hold half of it.
+    const double* const parent = joint.parent < 0 ? nullptr : row(links, joint.parent * link_numbers);
     const Lanes position = load(row(q, joint.coordinate)) * joint.multiplier + joint.offset;
     const Turn<Lanes> by = turn_of(joint, position);
     Lanes turned_x[3], turned_y[3];
@@ -69,8 +74,14 @@ void update_some(const JointModel* joints, int num, const double* q, const doubl
       turned_x[k] = by.cosine * joint.x[k] + by.sine * joint.y[k];
       turned_y[k] = by.cosine * joint.y[k] - by.sine * joint.x[k];
     }
-    const Motion<Vectors> screw = follow(link, joint, turned_x, turned_y, position, load(row(v, joint.coordinate)));
-    write(link, screw, links + i * link_numbers * most_lanes);
+    Pose<Vectors> pose = read_pose(parent);
+    const Motion<Vectors> screw = follow(pose, joint, turned_x, turned_y, position);
+    write(pose, link);
+    write(screw, row(link, screw_at));
+    Rates<Vectors> rates = read_rates(parent);
+    follow(rates, screw, load(row(v, joint.coordinate)));
+    write(rates.velocity, row(link, velocity_at));
+    write(rates.bias, row(link, bias_at));
   }
 }
 

@@ -37,33 +37,38 @@ inline Vector sum_of_crosses(Vector a, Vector b, Vector c, Vector d) noexcept {
 
 #include "link_motion.inl"
 
-Link<Vector> base() noexcept {
-  return {{Vector{1.0}, Vector{0.0, 1.0}, Vector{0.0, 0.0, 1.0}}, Vector{}, {Vector{}, Vector{}}, {Vector{}, Vector{}}};
+struct Link {
+  Pose<Vector> pose;
+  Rates<Vector> rates;
+};
+
+Link base() noexcept {
+  return {{{Vector{1.0}, Vector{0.0, 1.0}, Vector{0.0, 0.0, 1.0}}, Vector{}}, {{Vector{}, Vector{}}, {Vector{}, Vector{}}}};
 }
 
-Link<Vector> read(const double* numbers) noexcept {
-  Link<Vector> link;
+Link read(const double* numbers) noexcept {
+  Link link;
   for (int i = 0; i < 3; ++i) {
-    link.rotation[i] = load_three(numbers + 3 * i);
+    link.pose.rotation[i] = load_three(numbers + 3 * i);
   }
-  link.position = load_three(numbers + position_at);
-  link.velocity = {load_three(numbers + velocity_at), load_three(numbers + velocity_at + 3)};
-  link.bias = {load_three(numbers + bias_at), load_three(numbers + bias_at + 3)};
+  link.pose.position = load_three(numbers + position_at);
+  link.rates.velocity = {load_three(numbers + velocity_at), load_three(numbers + velocity_at + 3)};
+  link.rates.bias = {load_three(numbers + bias_at), load_three(numbers + bias_at + 3)};
   return link;
 }
 
 /// In the order of memory: the fourth number of every vector is overwritten by the next, that of the last goes nowhere.
-void write(const Link<Vector>& link, const Motion<Vector>& screw, double* numbers) noexcept {
+void write(const Link& link, const Motion<Vector>& screw, double* numbers) noexcept {
   for (int i = 0; i < 3; ++i) {
-    store(numbers + 3 * i, link.rotation[i]);
+    store(numbers + 3 * i, link.pose.rotation[i]);
   }
-  store(numbers + position_at, link.position);
+  store(numbers + position_at, link.pose.position);
   store(numbers + screw_at, screw.angular);
   store(numbers + screw_at + 3, screw.linear);
-  store(numbers + velocity_at, link.velocity.angular);
-  store(numbers + velocity_at + 3, link.velocity.linear);
-  store(numbers + bias_at, link.bias.angular);
-  store(numbers + bias_at + 3, link.bias.linear);
+  store(numbers + velocity_at, link.rates.velocity.angular);
+  store(numbers + velocity_at + 3, link.rates.velocity.linear);
+  store(numbers + bias_at, link.rates.bias.angular);
+  store(numbers + bias_at + 3, link.rates.bias.linear);
 }
 
 inline double position(const JointModel& joint, const double* q) noexcept {
@@ -102,7 +107,7 @@ void turn_joints(const JointModel* joints, int num, const double* q, double* lin
 void update_links(const JointModel* joints, int num, const double* q, const double* v, double* links,
                   int stride) noexcept {
   turn_joints(joints, num, q, links, stride);
-  Link<Vector> link = base();  // of the joint before, then of this one
+  Link link = base();  // of the joint before, then of this one
   for (int i = 0; i < num; ++i) {
     const JointModel& joint = joints[i];
     double* const numbers = links + i * stride;
@@ -110,7 +115,8 @@ void update_links(const JointModel* joints, int num, const double* q, const doub
       link = joint.parent < 0 ? base() : read(links + joint.parent * stride);
     }
     const Motion<Vector> screw =
-        follow(link, joint, numbers + turned_x, numbers + turned_y, position(joint, q), v[joint.coordinate]);
+        follow(link.pose, joint, numbers + turned_x, numbers + turned_y, position(joint, q));
+    follow(link.rates, screw, v[joint.coordinate]);
     write(link, screw, numbers);
   }
 }

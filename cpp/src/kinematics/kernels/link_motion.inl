@@ -47,10 +47,9 @@ struct Motion {
 };
 
 template <class Vector>
-struct Link {
+struct Pose {
   Vector rotation[3];  // columns
   Vector position;
-  Motion<Vector> velocity, bias;
 
   template <class Number>
   Vector rotated(const Number* v) const noexcept {
@@ -58,10 +57,16 @@ struct Link {
   }
 };
 
-/// From a joint's parent to its child; returns the joint's screw. `x` and `y`: the joint's, turned, in the parent's frame.
+template <class Vector>
+struct Rates {
+  Motion<Vector> velocity, bias;
+};
+
+/// From a joint's parent to its child; returns the joint's screw. `turned_x`, `turned_y`: the joint's x and y, turned, in the
+/// parent's frame.
 template <class Vector, class Number>
-inline Motion<Vector> follow(Link<Vector>& link, const JointModel& joint, const Number* turned_x, const Number* turned_y,
-                             Number position, Number velocity) noexcept {
+inline Motion<Vector> follow(Pose<Vector>& link, const JointModel& joint, const Number* turned_x, const Number* turned_y,
+                             Number position) noexcept {
   link.position += link.rotated(joint.translation);
   const Vector axis = link.rotated(joint.axis);
   const Vector x = link.rotated(turned_x), y = link.rotated(turned_y);
@@ -75,16 +80,20 @@ inline Motion<Vector> follow(Link<Vector>& link, const JointModel& joint, const 
     }
   }
   const Vector direction = axis * joint.multiplier;
-  Motion<Vector> screw{direction, cross(link.position, direction)};
   if (joint.slides) {
     link.position += axis * position;
-    screw = {Vector{}, direction};
+    return {Vector{}, direction};
   }
+  return {direction, cross(link.position, direction)};
+}
+
+/// The same for the rates of a joint that moves by `velocity`.
+template <class Vector, class Number>
+inline void follow(Rates<Vector>& link, const Motion<Vector>& screw, Number velocity) noexcept {
   const Motion<Vector> own{screw.angular * velocity, screw.linear * velocity};
   link.velocity.angular += own.angular;
   link.velocity.linear += own.linear;
   // V × (S q̇), the motion cross product, at the world origin.
   link.bias.angular += cross(link.velocity.angular, own.angular);
   link.bias.linear += sum_of_crosses(link.velocity.angular, own.linear, link.velocity.linear, own.angular);
-  return screw;
 }
