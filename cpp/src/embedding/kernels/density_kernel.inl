@@ -78,39 +78,55 @@ inline Vectors gather(const double* const* links, int at) noexcept {
 #endif
 }
 
-/// The links of the lanes, from their numbers (see link_numbers.hpp).
-struct Links {
-  Vectors rotation[3];  // columns
-  Vectors position, angular, linear, bias_angular, bias_linear;
+/// The links of the lanes, from their numbers (see link_numbers.hpp), gathered once.
+class GatheredLinks {
+ public:
+  explicit GatheredLinks(const double* const* links) noexcept
+      : rotation_{gather(links, 0), gather(links, 3), gather(links, 6)},
+        position_(gather(links, position_at)),
+        velocity_{gather(links, velocity_at), gather(links, velocity_at + 3)},
+        bias_{gather(links, bias_at), gather(links, bias_at + 3)} {}
 
-  explicit Links(const double* const* links) noexcept
-      : rotation{gather(links, 0), gather(links, 3), gather(links, 6)},
-        position(gather(links, position_at)),
-        angular(gather(links, velocity_at)),
-        linear(gather(links, velocity_at + 3)),
-        bias_angular(gather(links, bias_at)),
-        bias_linear(gather(links, bias_at + 3)) {}
+  const Vectors& rotation(int column) const noexcept { return rotation_[column]; }
+  const Vectors& position() const noexcept { return position_; }
+  const Vectors& angular() const noexcept { return velocity_[0]; }
+  const Vectors& linear() const noexcept { return velocity_[1]; }
+  const Vectors& bias_angular() const noexcept { return bias_[0]; }
+  const Vectors& bias_linear() const noexcept { return bias_[1]; }
 
-  /// The same link in as many states as there are lanes, from rows of KinematicBlock.
-  explicit Links(const double* rows) noexcept
-      : rotation{at(rows, 0), at(rows, 3), at(rows, 6)},
-        position(at(rows, position_at)),
-        angular(at(rows, velocity_at)),
-        linear(at(rows, velocity_at + 3)),
-        bias_angular(at(rows, bias_at)),
-        bias_linear(at(rows, bias_at + 3)) {}
-
-  static Vectors at(const double* rows, int number) noexcept { return load_rows(rows + number * most_lanes); }
-
-  Vectors from_world(const Vectors& v) const noexcept {
-    return {rotation[0].dot(v), rotation[1].dot(v), rotation[2].dot(v)};
-  }
-  Vectors to_world(const Vectors& v) const noexcept {
-    return {rotation[0].x * v.x + rotation[1].x * v.y + rotation[2].x * v.z,
-            rotation[0].y * v.x + rotation[1].y * v.y + rotation[2].y * v.z,
-            rotation[0].z * v.x + rotation[1].z * v.y + rotation[2].z * v.z};
-  }
+ private:
+  Vectors rotation_[3], position_, velocity_[2], bias_[2];
 };
+
+/// The same link in as many states as there are lanes, from rows of KinematicBlock, which are read where they are needed.
+class LinkRows {
+ public:
+  explicit LinkRows(const double* rows) noexcept : rows_(rows) {}
+
+  Vectors rotation(int column) const noexcept { return at(3 * column); }
+  Vectors position() const noexcept { return at(position_at); }
+  Vectors screw_angular() const noexcept { return at(screw_at); }
+  Vectors screw_linear() const noexcept { return at(screw_at + 3); }
+  Vectors angular() const noexcept { return at(velocity_at); }
+  Vectors linear() const noexcept { return at(velocity_at + 3); }
+  Vectors bias_angular() const noexcept { return at(bias_at); }
+  Vectors bias_linear() const noexcept { return at(bias_at + 3); }
+
+ private:
+  Vectors at(int number) const noexcept { return load_rows(rows_ + number * most_lanes); }
+
+  const double* rows_;
+};
+
+template <class Links>
+Vectors from_world(const Links& link, const Vectors& v) noexcept {
+  return {link.rotation(0).dot(v), link.rotation(1).dot(v), link.rotation(2).dot(v)};
+}
+
+template <class Links>
+Vectors to_world(const Links& link, const Vectors& v) noexcept {
+  return link.rotation(0) * v.x + link.rotation(1) * v.y + link.rotation(2) * v.z;
+}
 
 /// scale · exp(−½ eᵀ P e).
 struct Peak {
@@ -150,19 +166,19 @@ struct Seen {
   Lanes exponent, scale;      // of the density
   Lanes slope, bend;          // eᵀ P ẏ and ẏᵀ P ẏ
 
-  template <class Gaussians>
+  template <class Links, class Gaussians>
   void place(const Links& link, const Vectors& mean, const Gaussians& gaussians, const DensityPoints& points, int n) noexcept {
     // The point seen from the link: y and ẏ there.
     x = all(points.positions + 3 * n);
-    const Vectors motion = link.linear + cross(link.angular, x);
+    const Vectors motion = link.linear() + cross(link.angular(), x);
     Vectors slip = Vectors{} - motion, twice_own_less_motion = slip;
     if (points.velocities != nullptr) {
       const Vectors own = all(points.velocities + 3 * n);
       slip = slip + own;
       twice_own_less_motion = slip + own;
     }
-    const Vectors e = link.from_world(x - link.position) - mean, y_dot = link.from_world(slip);
-    drag = link.bias_linear + cross(link.bias_angular, x) + cross(link.angular, twice_own_less_motion);
+    const Vectors e = from_world(link, x - link.position()) - mean, y_dot = from_world(link, slip);
+    drag = link.bias_linear() + cross(link.bias_angular(), x) + cross(link.angular(), twice_own_less_motion);
     const Peak peak(gaussians, points.radii[n]);
     t = peak * e;
     exponent = -0.5 * e.dot(t);
@@ -177,19 +193,18 @@ struct Seen {
   }
 };
 
-constexpr int together = 4;  // points
-
 /// What Gaussians and points add up to, lane by lane.
 struct Added {
   Lanes value = {}, curvature = {};
   Vectors force = {}, moment = {};  // the wrench about the world origin
 
-  template <class Gaussians>
+  /// `together`: points at a time.
+  template <int together, class Links, class Gaussians>
   void add(const Links& link, const Gaussians& gaussians, const DensityPoints& points) noexcept {
     const GaussianBlock& g = gaussians.gaussians;
     const Vectors mean{gaussians(g.mean[0]), gaussians(g.mean[1]), gaussians(g.mean[2])};
     for (int start = 0; start < points.num; start += together) {
-      const int number = points.num - start < together ? points.num - start : together;
+      const int number = together > 1 && points.num - start < together ? points.num - start : together;
       Seen seen[together];
       Lanes densities[together];
       for (int i = 0; i < number; ++i) {
@@ -202,7 +217,7 @@ struct Added {
         const Seen& at = seen[i];
         const Lanes density = densities[i];
         // δψ = f · (δv + δω × x − δx): the wrench (x × f, f) about the world origin.
-        const Vectors f = link.to_world(at.t * density);
+        const Vectors f = to_world(link, at.t * density);
         value += density;
         curvature += density * (at.slope * at.slope - at.bend) + f.dot(at.drag);
         force += f;
@@ -216,7 +231,7 @@ void add_density(const GaussianBlock& gaussians, const double* const* numbers, c
                  DensitySums& sums) noexcept {
   for (int first = 0; first < gaussians.num; first += width) {
     Added added{load(sums.value + first), load(sums.curvature + first)};
-    added.add(Links(numbers + first), SideBySide{gaussians, first}, points);
+    added.add<4>(GatheredLinks(numbers + first), SideBySide{gaussians, first}, points);
     store(sums.value + first, added.value);
     store(sums.curvature + first, added.curvature);
     store(sums.force, first, added.force);
@@ -245,9 +260,9 @@ class Descent {
  private:
   void go_down_to(int joint) noexcept {
     for (; joint_ > joint; joint_ = joints_.parents[joint_]) {
-      const double* const link = links_ + joint_ * link_numbers * most_lanes;
+      const LinkRows link(links_ + joint_ * link_numbers * most_lanes);
       double* const sum = gradient_ + joints_.coordinates[joint_] * most_lanes;
-      store(sum, load(sum) + Links::at(link, screw_at).dot(moment_) + Links::at(link, screw_at + 3).dot(force_));
+      store(sum, load(sum) + link.screw_angular().dot(moment_) + link.screw_linear().dot(force_));
     }
   }
 
@@ -266,7 +281,7 @@ void add_density_block(const GaussianBlock* blocks, int num, const JointTree& jo
     for (const GaussianBlock* block = blocks; block != blocks + num; ++block) {
       for (int i = 0; i < block->num; ++i) {
         total.force = total.moment = Vectors{};
-        total.add(Links(links + first + block->joints[i] * link_numbers * most_lanes), InEveryLane{*block, i}, points);
+        total.add<1>(LinkRows(links + first + block->joints[i] * link_numbers * most_lanes), InEveryLane{*block, i}, points);
         gradient.add(block->joints[i], total.force, total.moment);
       }
     }
