@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "rollout_rows.hpp"
 #include "sidestep/dynamical_system/step_block.hpp"
 
 namespace sidestep {
@@ -61,6 +62,18 @@ void share(Eigen::Index num, int threads, Work&& work) {
   }
 }
 
+/// Runs work(block, first) on every thread, where `first` is that of every block of states.
+template <class Work>
+void share_blocks(const GeometricSystem& system, Eigen::Index num, int threads, Work&& work) {
+  const Eigen::Index blocks = (num + block_states - 1) / block_states;
+  share(blocks, threads, [&](auto&& next) {
+    StepBlock block(system);
+    for (Eigen::Index k = next(); k < blocks; k = next()) {
+      work(block, k * block_states);
+    }
+  });
+}
+
 /// Copies states [first, first + num) of column `from`, and the last of them for what is left of the block.
 void copy(const Eigen::MatrixXd& from, Eigen::Index column, Eigen::Index first, Eigen::Index num, BlockRow& to) {
   const double* const states = from.data() + column * from.rows() + first;
@@ -73,9 +86,9 @@ void copy(const Eigen::MatrixXd& from, Eigen::Index column, Eigen::Index first, 
   }
 }
 
-/// The states from `first` on, as many as a block holds.
-void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-              const Eigen::MatrixXd& goals, const Obstacles& obstacles, BatchEvaluation& result) {
+/// Fills a block with the states from `first` on and returns how many there are.
+Eigen::Index load(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
+                  const Eigen::MatrixXd& goals) {
   const Eigen::Index num = std::min<Eigen::Index>(block_states, q.rows() - first);
   for (Eigen::Index j = 0; j < q.cols(); ++j) {
     const auto row = static_cast<std::size_t>(j);
@@ -83,12 +96,47 @@ void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, co
     copy(v, j, first, num, block.v[row]);
     copy(goals, j, first, num, block.goal[row]);
   }
+  return num;
+}
+
+/// The states from `first` on, as many as a block holds.
+void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
+              const Eigen::MatrixXd& goals, const Obstacles& obstacles, BatchEvaluation& result) {
+  const Eigen::Index num = load(block, first, q, v, goals);
   block.update(obstacles);
   for (Eigen::Index j = 0; j < q.cols(); ++j) {
     std::copy_n(block.acceleration[static_cast<std::size_t>(j)].of, num, &result.accelerations(first, j));
   }
   std::copy_n(block.value.of, num, &result.values(first, 0));
   std::copy_n(block.statuses.begin(), num, result.statuses.begin() + first);
+}
+
+/// Motions [first, first + num) of `result`, side by side.
+void roll_out(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
+              const Eigen::MatrixXd& goals, Obstacles obstacles, const RolloutSettings& settings, const Rollout& empty,
+              std::vector<Rollout>& result) {
+  const Eigen::Index num = load(block, first, q, v, goals);
+  const auto motions = result.begin() + first;
+  std::fill_n(motions, num, empty);
+  using Numbers = Eigen::Array<double, block_states, 1>;
+  for (Eigen::Index k = 0; k <= settings.steps; ++k) {
+    block.update(obstacles);
+    for (Eigen::Index i = 0; i < num; ++i) {
+      Rollout& motion = motions[i];
+      StepBlock::get(block.q, static_cast<int>(i), motion.q.row(k));
+      StepBlock::get(block.v, static_cast<int>(i), motion.v.row(k));
+      StepBlock::get(block.acceleration, static_cast<int>(i), motion.acceleration.row(k));
+      motion.values(k, 0) = block.value.of[i];
+      motion.switch_weights.row(k).setConstant(block.switch_weight.of[i]);
+      motion.statuses.push_back(block.statuses[static_cast<std::size_t>(i)]);
+    }
+    for (std::size_t j = 0; j < block.q.size(); ++j) {
+      Eigen::Map<Numbers> position(block.q[j].of), velocity(block.v[j].of);
+      const Eigen::Map<Numbers> acceleration(block.acceleration[j].of);
+      hold(settings.integrator, settings.period, acceleration, position, velocity);
+    }
+    obstacles.advance(settings.period);
+  }
 }
 
 }  // namespace
@@ -100,11 +148,8 @@ BatchEvaluation evaluate_batch(const GeometricSystem& system, const Eigen::Matri
                          Eigen::MatrixXd(q.rows(), system.num_embedding_coordinates()),
                          std::vector<StepStatus>(static_cast<std::size_t>(q.rows()))};
   if (StepBlock::takes(system)) {
-    share((q.rows() + block_states - 1) / block_states, threads, [&](auto&& next) {
-      StepBlock block(system);
-      for (Eigen::Index k = next(); k * block_states < q.rows(); k = next()) {
-        evaluate(block, k * block_states, q, v, goals, obstacles, result);
-      }
+    share_blocks(system, q.rows(), threads, [&](StepBlock& block, Eigen::Index first) {
+      evaluate(block, first, q, v, goals, obstacles, result);
     });
     return result;
   }
@@ -133,6 +178,14 @@ std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::M
     throw std::invalid_argument("batch: an escape or evasion belongs to one motion; give none");
   }
   std::vector<Rollout> result(static_cast<std::size_t>(q.rows()));
+  if (StepBlock::takes(system) && !settings.filter && !settings.time_steps &&
+      settings.integrator != Integrator::runge_kutta_4) {
+    const Rollout empty = make_rollout(system, settings);
+    share_blocks(system, q.rows(), threads, [&](StepBlock& block, Eigen::Index first) {
+      roll_out(block, first, q, v, goals, obstacles, settings, empty, result);
+    });
+    return result;
+  }
   share(q.rows(), threads, [&](auto&& next) {
     for (Eigen::Index k = next(); k < q.rows(); k = next()) {
       result[static_cast<std::size_t>(k)] =

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "rollout_rows.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -70,6 +72,29 @@ void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w,
 
 }  // namespace
 
+Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& settings) {
+  if (!(settings.period > 0.0) || !std::isfinite(settings.period)) {
+    throw std::invalid_argument("period is " + std::to_string(settings.period) + " s, must be positive and finite");
+  }
+  if (settings.steps < 1) {
+    throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at least 1");
+  }
+  const Eigen::Index rows = settings.steps + 1;
+  const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, system.robot().num_coordinates());
+  Rollout result{Eigen::VectorXd::LinSpaced(rows, 0.0, settings.period * settings.steps),
+                 of_joints,
+                 of_joints,
+                 of_joints,
+                 Eigen::MatrixXd::Zero(rows, system.num_embedding_coordinates()),
+                 of_joints,
+                 {},
+                 Eigen::VectorXd(settings.time_steps ? rows : 0),
+                 {},
+                 Eigen::VectorXd::Zero(settings.filter ? rows : 0)};
+  result.statuses.reserve(static_cast<std::size_t>(rows));
+  return result;
+}
+
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, const Eigen::VectorXd& start_velocity,
                 Goal goal, Obstacles obstacles, const RolloutSettings& settings) {
   const int nv = system.robot().num_coordinates();
@@ -78,12 +103,8 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     check_size(joint->position, "goal", nv);
   }
-  if (!(settings.period > 0.0) || !std::isfinite(settings.period)) {
-    throw std::invalid_argument("period is " + std::to_string(settings.period) + " s, must be positive and finite");
-  }
-  if (settings.steps < 1) {
-    throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at least 1");
-  }
+  Rollout result = make_rollout(system, settings);
+  const Eigen::Index rows = result.time.size();
   const double dt = settings.period;
   std::optional<AccelerationFilter> filter = settings.filter;
   if (filter) {
@@ -98,19 +119,6 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
       throw std::invalid_argument("an evasion needs a filter, which keeps its flights off obstacles");
     }
   }
-  const Eigen::Index rows = settings.steps + 1;
-  const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, nv);
-  Rollout result{Eigen::VectorXd::LinSpaced(rows, 0.0, dt * settings.steps),
-                 of_joints,
-                 of_joints,
-                 of_joints,
-                 Eigen::MatrixXd::Zero(rows, system.num_embedding_coordinates()),
-                 of_joints,
-                 {},
-                 Eigen::VectorXd(settings.time_steps ? rows : 0),
-                 {},
-                 Eigen::VectorXd::Zero(filter ? rows : 0)};
-  result.statuses.reserve(static_cast<std::size_t>(rows));
   constexpr double no_potential = std::numeric_limits<double>::quiet_NaN();  // before the first step
   TorqueSolution filtered(nv);
   GeometricSystem::Workspace w(system);
@@ -163,22 +171,12 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
       result.switch_weights.row(k) = w.switch_weights;
     }
     result.statuses.push_back(status);
-    switch (settings.integrator) {
-      case Integrator::semi_implicit_euler:
-        v += dt * a;
-        q += dt * v;
-        obstacles.advance(dt);
-        advance(goal, dt);
-        break;
-      case Integrator::second_order:
-        q += dt * v + 0.5 * dt * dt * a;
-        v += dt * a;
-        obstacles.advance(dt);
-        advance(goal, dt);
-        break;
-      case Integrator::runge_kutta_4:
-        runge_kutta_4(system, w, goal, obstacles, dt, a, q, v);
-        break;
+    if (settings.integrator == Integrator::runge_kutta_4) {
+      runge_kutta_4(system, w, goal, obstacles, dt, a, q, v);
+    } else {
+      hold(settings.integrator, dt, a, q, v);
+      obstacles.advance(dt);
+      advance(goal, dt);
     }
   }
   return result;

@@ -118,6 +118,50 @@ BOOST_AUTO_TEST_CASE(a_batch_is_the_same_wherever_a_state_stands_in_it) {
   BOOST_TEST(evaluate_batch(system, q.topRows(0), v.topRows(0), goals.topRows(0), obstacles, 1).statuses.empty());
 }
 
+BOOST_AUTO_TEST_CASE(motions_side_by_side_are_those_of_each) {
+  Random random(34);
+  constexpr int num = 11, steps = 200;
+  for (const Integrator integrator : {Integrator::semi_implicit_euler, Integrator::second_order, Integrator::runge_kutta_4}) {
+    const Robot robot = test::random_tree(random, 6);
+    const int nv = robot.num_coordinates();
+    const GeometricSystem system(robot, {std::make_shared<CollisionDensity>(robot, test::random_body(random, robot))},
+                                 all_settings(random, nv).front());
+    const Obstacles obstacles = test::random_obstacles(random, 3);
+    Eigen::MatrixXd q = 0.5 * random.matrix(num, nv), v = random.matrix(num, nv), goals = 0.5 * random.matrix(num, nv);
+    goals(9, 0) = 5.0;  // outside the limits: it brakes
+    v(10, 0) = std::numeric_limits<double>::quiet_NaN();
+    RolloutSettings settings;
+    settings.steps = steps;
+    settings.integrator = integrator;
+    const std::vector<Rollout> motions = rollout_batch(system, q, v, goals, obstacles, settings, 2);
+    BOOST_TEST_REQUIRE(motions.size() == static_cast<std::size_t>(num));
+    for (int k = 0; k < num; ++k) {
+      const Rollout& found = motions[static_cast<std::size_t>(k)];
+      const Rollout alone = rollout(system, q.row(k).transpose(), v.row(k).transpose(),
+                                    Eigen::VectorXd(goals.row(k).transpose()), obstacles, settings);
+      BOOST_TEST((found.statuses == alone.statuses));
+      BOOST_TEST((found.time == alone.time));
+      if (k == 10) {
+        BOOST_TEST(found.values.array().isNaN().all());
+        BOOST_TEST((found.acceleration == alone.acceleration));
+        continue;
+      }
+      // Rounding of every step, which 200 of them amplify.
+      constexpr double amplified = 1e-9;
+      BOOST_TEST((found.q - alone.q).cwiseAbs().maxCoeff() < amplified);
+      BOOST_TEST((found.v - alone.v).cwiseAbs().maxCoeff() < amplified * (1.0 + alone.v.cwiseAbs().maxCoeff()));
+      BOOST_TEST((found.acceleration - alone.acceleration).cwiseAbs().maxCoeff() <
+                 amplified * (1.0 + alone.acceleration.cwiseAbs().maxCoeff()));
+      BOOST_TEST((found.values.array().isNaN() == alone.values.array().isNaN()).all());
+      BOOST_TEST((found.switch_weights.array().isNaN() == alone.switch_weights.array().isNaN()).all());
+      if (k != 9) {
+        BOOST_TEST((found.values - alone.values).cwiseAbs().maxCoeff() < amplified * (1.0 + alone.values.maxCoeff()));
+        BOOST_TEST((found.switch_weights == alone.switch_weights));
+      }
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(systems_that_need_more_than_a_number_are_not_taken) {
   Random random(33);
   const Robot robot = test::random_tree(random, 4);

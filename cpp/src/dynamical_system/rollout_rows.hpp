@@ -1,0 +1,22 @@
+#pragma once
+
+#include "sidestep/dynamical_system/rollout.hpp"
+
+namespace sidestep {
+
+/// A rollout with all its rows, which are still to be written. Throws as `rollout` does on the period and the steps.
+Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& settings);
+
+/// (q, v) after `dt` of one acceleration, by an integrator that holds it.
+template <class Numbers>
+void hold(Integrator integrator, double dt, const Numbers& a, Numbers& q, Numbers& v) {
+  if (integrator == Integrator::second_order) {
+    q += dt * v + 0.5 * dt * dt * a;
+    v += dt * a;
+  } else {
+    v += dt * a;
+    q += dt * v;
+  }
+}
+
+}  // namespace sidestep
