@@ -113,11 +113,11 @@ void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, co
 
 /// Motions [first, first + num) of `result`, side by side.
 void roll_out(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-              const Eigen::MatrixXd& goals, Obstacles obstacles, const RolloutSettings& settings, const Rollout& empty,
+              const Eigen::MatrixXd& goals, Obstacles obstacles, const RolloutSettings& settings,
               std::vector<Rollout>& result) {
   const Eigen::Index num = load(block, first, q, v, goals);
   const auto motions = result.begin() + first;
-  std::fill_n(motions, num, empty);
+  std::generate_n(motions, num, [&] { return make_rollout(block.system(), settings); });
   using Numbers = Eigen::Array<double, block_states, 1>;
   for (Eigen::Index k = 0; k <= settings.steps; ++k) {
     block.update(obstacles);
@@ -180,9 +180,8 @@ std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::M
   std::vector<Rollout> result(static_cast<std::size_t>(q.rows()));
   if (StepBlock::takes(system) && !settings.filter && !settings.time_steps &&
       settings.integrator != Integrator::runge_kutta_4) {
-    const Rollout empty = make_rollout(system, settings);
     share_blocks(system, q.rows(), threads, [&](StepBlock& block, Eigen::Index first) {
-      roll_out(block, first, q, v, goals, obstacles, settings, empty, result);
+      roll_out(block, first, q, v, goals, obstacles, settings, result);
     });
     return result;
   }

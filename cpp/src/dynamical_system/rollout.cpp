@@ -79,14 +79,13 @@ Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& setti
   if (settings.steps < 1) {
     throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at least 1");
   }
-  const Eigen::Index rows = settings.steps + 1;
-  const Eigen::MatrixXd of_joints = Eigen::MatrixXd::Zero(rows, system.robot().num_coordinates());
+  const Eigen::Index rows = settings.steps + 1, nv = system.robot().num_coordinates();
   Rollout result{Eigen::VectorXd::LinSpaced(rows, 0.0, settings.period * settings.steps),
-                 of_joints,
-                 of_joints,
-                 of_joints,
-                 Eigen::MatrixXd::Zero(rows, system.num_embedding_coordinates()),
-                 of_joints,
+                 Eigen::MatrixXd(rows, nv),
+                 Eigen::MatrixXd(rows, nv),
+                 Eigen::MatrixXd(rows, nv),
+                 Eigen::MatrixXd(rows, system.num_embedding_coordinates()),
+                 Eigen::MatrixXd(rows, nv),
                  {},
                  Eigen::VectorXd(settings.time_steps ? rows : 0),
                  {},

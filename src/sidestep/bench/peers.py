@@ -26,6 +26,7 @@ from sidestep._core import (
     evaluate_batch,
     instruction_set,
     rollout,
+    rollout_batch,
 )
 from sidestep.barriers import Barriers
 from sidestep.bench import peers_jax
@@ -48,6 +49,7 @@ STIFFNESS, DAMPING = 0.5, 1.5  # the thesis's
 BALLS = 10
 MOTION = 1_000  # steps; the states that every way is asked at
 BATCH = 100  # states of them in one call
+MOTIONS, MOTION_STEPS = 64, 100  # side by side, on one thread
 FEWEST = 3  # calls of a way, however long they take
 WARM_UP = 10  # calls that do not count, if they take less than a tenth of the time
 
@@ -165,6 +167,22 @@ def _in_cpp(
     return np.concatenate(times)
 
 
+def _side_by_side(
+    system: GeometricSystem, states: States, goal: Array, obstacles: Obstacles, seconds: float
+) -> Array:
+    """Microseconds of each step of motions that begin at states all along one, all of a call's by one clock."""
+    starts = states[:: len(states) // MOTIONS][:MOTIONS]
+    q, v = (np.array([state[k] for state in starts]) for k in range(2))
+    goals = np.tile(goal, (MOTIONS, 1))
+    times: list[float] = []
+    end = time.perf_counter() + seconds
+    while not times or time.perf_counter() < end:
+        begin = time.perf_counter()
+        rollout_batch(system, q, v, goals, obstacles, steps=MOTION_STEPS, threads=1)
+        times.append(1e6 * (time.perf_counter() - begin) / (MOTIONS * (MOTION_STEPS + 1)))
+    return np.array(times)
+
+
 def _in_batches(
     system: GeometricSystem, states: States, goal: Array, obstacles: Obstacles, seconds: float, size: int
 ) -> Array:
@@ -206,6 +224,11 @@ def _table(settings: PeerSettings) -> tuple[States, list[_Way]]:
             "Sidestep, C++",
             f"{work}, around each step of a motion",
             measured=lambda: _in_cpp(system, start, goal, obstacles, settings.seconds),
+        ),
+        _Way(
+            "Sidestep, C++, side by side",
+            f"{work}, integration and records of {MOTIONS} motions of {MOTION_STEPS} steps, one thread",
+            measured=lambda: _side_by_side(system, states, goal, obstacles, settings.seconds),
         ),
         _Way(
             "Sidestep, Python",

@@ -30,6 +30,8 @@ class StepBlock {
   BlockRow value, switch_weight;                   ///< ψ and s; NaN where the step fell back
   std::array<StepStatus, block_states> statuses{};
 
+  const GeometricSystem& system() const noexcept { return system_; }
+
   /// One step at each state. No allocation.
   void update(const Obstacles& obstacles) noexcept;
 
