@@ -135,6 +135,9 @@ void bind_loop(nb::module_& m) {
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goals"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("threads") = 0,
       "One step at each of N states q, v (N, nv) towards goals (N, nv), on several threads (0: one per processor).\n"
+      "A system with one embedding coordinate that is no clearance (CollisionDensity, JointLimitPotential, their Sum), with\n"
+      "neither distance switch nor speed regulator nor one-sided pull, takes eight states side by side: as single steps within\n"
+      "rounding (1e-12 relative), in a third of the time.\n"
       "Raises ValueError on wrong shapes.");
   m.def(
       "rollout_batch",
@@ -159,7 +162,8 @@ void bind_loop(nb::module_& m) {
               "integrator: Integrator | str = 'semi_implicit_euler', filter: AccelerationFilter | None = None, "
               "threads: int = 0) -> list[Rollout]"),
       "The motions from N states q, v (N, nv) towards goals (N, nv) as `rollout` gives them, on several threads\n"
-      "(0: one per processor). Raises ValueError on wrong shapes.");
+      "(0: one per processor). Those that `evaluate_batch` would take side by side are, without a filter and but for\n"
+      "runge_kutta_4: each step is then that of `rollout` within rounding. Raises ValueError on wrong shapes.");
 }
 
 }  // namespace sidestep::python

@@ -1486,13 +1486,17 @@ class BatchEvaluation:
 def evaluate_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, threads: int = 0) -> BatchEvaluation:
     """
     One step at each of N states q, v (N, nv) towards goals (N, nv), on several threads (0: one per processor).
+    A system with one embedding coordinate that is no clearance (CollisionDensity, JointLimitPotential, their Sum), with
+    neither distance switch nor speed regulator nor one-sided pull, takes eight states side by side: as single steps within
+    rounding (1e-12 relative), in a third of the time.
     Raises ValueError on wrong shapes.
     """
 
 def rollout_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', filter: AccelerationFilter | None = None, threads: int = 0) -> list[Rollout]:
     """
     The motions from N states q, v (N, nv) towards goals (N, nv) as `rollout` gives them, on several threads
-    (0: one per processor). Raises ValueError on wrong shapes.
+    (0: one per processor). Those that `evaluate_batch` would take side by side are, without a filter and but for
+    runge_kutta_4: each step is then that of `rollout` within rounding. Raises ValueError on wrong shapes.
     """
 
 class PlanStatus(enum.Enum):

@@ -14,13 +14,15 @@ struct BatchEvaluation {
   std::vector<StepStatus> statuses;  ///< (N)
 };
 
-/// The step of the system at states q, v (N, nv) towards goals (N, nv), on `threads` threads (0: one per processor).
+/// The step of the system at states q, v (N, nv) towards goals (N, nv), on `threads` threads (0: one per processor). Where
+/// StepBlock takes the system, states are taken side by side: as single steps within rounding, wherever they stand.
 /// Throws std::invalid_argument on sizes or a negative number of threads.
 BatchEvaluation evaluate_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
                                const Eigen::MatrixXd& goals, const Obstacles& obstacles, int threads = 0);
 
 /// The motions from q, v (N, nv) towards goals (N, nv), on `threads` threads (0: one per processor); each as `rollout`
-/// gives it, whatever the number of threads. Throws std::invalid_argument as `rollout` does, on sizes, on a negative
+/// gives it, whatever the number of threads: exactly, or, where StepBlock takes the system, within rounding of every step. With
+/// a filter, with steps timed and with runge_kutta_4 motions are not taken side by side. Throws std::invalid_argument as `rollout` does, on sizes, on a negative
 /// number of threads, and if the settings hold an escape, which belongs to one motion.
 std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
                                    const Eigen::MatrixXd& goals, const Obstacles& obstacles,
