@@ -142,11 +142,11 @@ ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temp
   }
   for (int first = 0; first < size();) {
     const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
+    const auto link = [&](int k) -> const std::string& { return body.links[static_cast<std::size_t>(component(k))]; };
     static_assert(Cluster::most == kernels::most_queries);
     static_assert(decltype(Cluster::principal)::ColsAtCompileTime == kernels::principal_numbers);
     Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0, decltype(Cluster::principal)::Ones()};
-    while (first + cluster.size < size() && cluster.size < Cluster::most &&
-           at(first + cluster.size).body.joint == at(first).body.joint) {
+    while (first + cluster.size < size() && cluster.size < Cluster::most && link(first + cluster.size) == link(first)) {
       cluster.centre += at(first + cluster.size++).body.mean;
     }
     cluster.centre /= cluster.size;

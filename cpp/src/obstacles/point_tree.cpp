@@ -15,7 +15,8 @@ struct Item {
   int index;
 };
 
-/// Halves boxes across their longest side until no more than this is left: points of one register lie together.
+/// Points are halved across the axis along which they spread most until no more than this is left: those of one register
+/// lie together. Where surfaces meet, halving by the variance leaves smaller boxes than halving the longest side.
 constexpr std::ptrdiff_t smallest_group = 4;
 static_assert(PointTree::leaf_size % smallest_group == 0);
 
@@ -32,13 +33,15 @@ void cut(std::vector<Item>::iterator begin, std::vector<Item>::iterator end) {
   if (end - begin <= smallest_group) {
     return;
   }
-  Eigen::Vector3d low = begin->point, high = low;
+  const Eigen::Vector3d origin = begin->point;  // near: squares cancel little
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), sum_of_squares = sum;
   for (auto item = begin; item != end; ++item) {
-    low = low.cwiseMin(item->point);
-    high = high.cwiseMax(item->point);
+    const Eigen::Vector3d offset = item->point - origin;
+    sum += offset;
+    sum_of_squares += offset.cwiseAbs2();
   }
   Eigen::Index axis;
-  (high - low).maxCoeff(&axis);
+  (sum_of_squares - sum.cwiseAbs2() / static_cast<double>(end - begin)).maxCoeff(&axis);
   const auto middle = begin + first_part(end - begin);
   std::nth_element(begin, middle, end, [axis](const Item& a, const Item& b) {
     return a.point[axis] < b.point[axis] || (a.point[axis] == b.point[axis] && a.index < b.index);

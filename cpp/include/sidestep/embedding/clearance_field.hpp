@@ -63,7 +63,7 @@ class ClearanceField {
     Eigen::Matrix3d axes_T;     // rotates into the principal axes
     Eigen::Vector3d semi_axes;  // along them [m]
   };
-  /// Consecutive ellipsoids of one joint, with a ball around them in the frame of its child.
+  /// Consecutive ellipsoids of one link, with a ball around them in the frame of its child.
   struct Cluster {
     static constexpr int most = 16;
 

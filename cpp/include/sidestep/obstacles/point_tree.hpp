@@ -13,8 +13,8 @@ namespace sidestep {
 
 /// Points under a hierarchy of bounding balls and boxes, so that a query looks at those near it only.
 ///
-/// The points are sorted by halving boxes across their longest side and kept as structure of arrays, padded to whole
-/// leaves: point n of the tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive points, a node `fan_out` consecutive nodes
+/// The points are sorted by halving them across the axis along which they spread most, and kept as structure of arrays,
+/// padded to whole leaves: point n of the tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive points, a node `fan_out` consecutive nodes
 /// below it; there are no pointers. Building sorts and allocates and belongs outside the control loop; moving the points
 /// refits the balls in place.
 class PointTree {

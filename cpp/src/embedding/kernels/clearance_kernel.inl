@@ -13,17 +13,11 @@ namespace {
 // Of roots, and so of distances and speeds relative to the larger ones that they come from: twice 2⁻¹⁴ and more.
 constexpr double measure_error = 2e-4;
 
-/// As Horizon::closing_speed: the angle of n to x is within that of the ball, asin(radius/|x|). `across` is |x × v|. The angle is
-/// rather too large: where it is nearly a right one, its cosine feels small errors.
-Lanes closing_speed(Lanes along, Lanes across, Lanes inverse_distance, Lanes radius, Lanes speed) noexcept {
-  const Lanes sine = (1.0 + measure_error) * radius * inverse_distance, cosine = rough_root(1.0 - sine * sine);
-  const Lanes turned = (along * cosine + across * sine) * inverse_distance;
-  return (sine < 1.0) & (along * inverse_distance < speed * cosine) ? turned : speed;
-}
-
-/// What is known of balls around places: the distance of a place, and how fast the cluster closes in, at most.
+/// What is known of balls around places: the distance of a place, how fast the cluster moves against what is there, at most,
+/// and h + τ h', at least. A way z between the balls that turns from x by θ is longer than the shortest by |x| (|x| − r) / (2 r)
+/// sin²θ, with r for both radii; along and across x the cluster moves by −z' there, of which z closes in by cos θ and sin θ.
 struct Measured {
-  Lanes x[3], distance, closing;
+  Lanes x[3], distance, fastest, room;
 
   Measured(const MovingBall& cluster, const Lanes* at, Lanes ball) noexcept {
     const double* w = cluster.angular;
@@ -40,13 +34,20 @@ struct Measured {
     const Lanes inverse_distance = rough_inverse_root(larger(squared, all(1e-300)));
     distance = squared * inverse_distance;
     const Lanes across = rough_root(squared * squared_speed - along * along), speed = rough_root(squared_speed);
-    closing = closing_speed(along, across, inverse_distance, radius, speed) + 4.0 * measure_error * speed +
-              cluster.turning * ball + cluster.fastest;
+    const Lanes more = 4.0 * measure_error * speed + cluster.turning * ball + cluster.fastest;
+    fastest = speed + more;
+    const Lanes apart = (1.0 - measure_error) * distance - radius, towards = along * inverse_distance;
+    const Lanes aside = cluster.horizon * across * inverse_distance;
+    const Lanes growth = distance * apart * (0.5 - measure_error) * inverse(radius) + cluster.horizon * smaller(towards, Lanes{});
+    room = (apart > 0.0) & (growth > 0.0)
+               ? apart - cluster.horizon * (towards + more) - (0.25 + measure_error) * aside * aside * inverse(growth)
+               : all(-__builtin_inf());
   }
 
   /// As bits, see ClearanceKernel::measure.
   unsigned below(const MovingBall& cluster, Lanes bound, const Limits& within, const Limits& beyond) const noexcept {
-    const Lanes after = bound > 0.0 ? bound - cluster.horizon * closing : all(-__builtin_inf());  // inside nothing is known
+    // Inside nothing is known.
+    const Lanes after = bound > 0.0 ? larger(bound - cluster.horizon * fastest, room) : all(-__builtin_inf());
     return (kernels::below(bound, all(beyond.near)) | kernels::below(after, all(beyond.ahead))) |
            (kernels::below(bound, all(within.near)) | kernels::below(after, all(within.ahead))) << 16;
   }

@@ -40,21 +40,28 @@ void begin(QueryGroup& group) noexcept {
 
 /// The numbers of one ellipsoid, in its principal axes; `axes` turn the world into them, by rows.
 struct Ellipsoid {
-  float axes[9], offset[3], linear[3], angular[3], squared[3], semi[3], extent, roundness, error;
+  Singles axes[9], offset[3], linear[3], angular[3], squared[3], semi[3], extent, roundness;
+  Singles swirl[3];  // angular × A w, of which this is what products of w have: so w·v needs no e
+  float error;
 
   Ellipsoid(const QueryGroup& group, int k) noexcept
-      : extent(group.extent[k]), roundness(group.principal[roundness_at * most_queries + k]) {
+      : extent(all(group.extent[k])), roundness(all(group.principal[roundness_at * most_queries + k])) {
     for (int i = 0; i < 9; ++i) {
-      axes[i] = group.axes[i][k];
+      axes[i] = all(group.axes[i][k]);
+    }
+    float squared_offset = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+      offset[i] = all(group.own_offset[i][k]);
+      linear[i] = all(group.own_linear[i][k]);
+      angular[i] = all(group.own_angular[i][k]);
+      squared[i] = all(group.principal[(squared_at + i) * most_queries + k]);
+      semi[i] = all(group.principal[(semi_at + i) * most_queries + k]);
+      squared_offset += group.own_offset[i][k] * group.own_offset[i][k];
     }
     for (int i = 0; i < 3; ++i) {
-      offset[i] = group.own_offset[i][k];
-      linear[i] = group.own_linear[i][k];
-      angular[i] = group.own_angular[i][k];
-      squared[i] = group.principal[(squared_at + i) * most_queries + k];
-      semi[i] = group.principal[(semi_at + i) * most_queries + k];
+      swirl[i] = angular[i] * (squared[(i + 1) % 3] - squared[(i + 2) % 3]);
     }
-    error = distance_error * (extent + __builtin_sqrtf(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]));
+    error = distance_error * (group.extent[k] + __builtin_sqrtf(squared_offset));
   }
 
   /// Vectors of the world in principal axes.
@@ -70,7 +77,7 @@ struct Ellipsoid {
 /// the plane that touches the ellipsoid where its normal is w, at p = A w/√S, bounds h from below; and as e − p is t w and
 /// √S − 1 of p, the direction to the foot differs from w by |√S − 1| |p| / h at most.
 struct Sight {
-  Singles e[3], t, inverses[3], w[3], S, flatness;  // 1 / (A + t), Σ A w² / (A + t)
+  Singles e[3], t, inverses[3], w[3], squared_norm, S, flatness;  // 1 / (A + t), |w|², Σ A w² / (A + t)
   Singles inverse_norm, height;                     // 1 / |w|; h from below, nearly, as √S is less than (1 + S) / 2
   Singles above;                                    // h − height, at most
   Singles tilt;                                     // |n − w/|w||, at most
@@ -99,16 +106,12 @@ struct Sight {
   }
 
   void set_w(const Ellipsoid& of) noexcept {
-    const float* A = of.squared;
-    const Singles sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1];
-    const Singles of_all = rough_inverse(product * sums[2]), of_two = of_all * sums[2];
-    inverses[0] = of_two * sums[1];
-    inverses[1] = of_two * sums[0];
-    inverses[2] = of_all * product;
-    S = flatness = Singles{};
+    S = flatness = squared_norm = Singles{};
     for (int i = 0; i < 3; ++i) {
+      inverses[i] = rough_inverse(of.squared[i] + t);
       w[i] = e[i] * inverses[i];
-      const Singles share = A[i] * w[i] * w[i];
+      const Singles squared = w[i] * w[i], share = of.squared[i] * squared;
+      squared_norm += squared;
       S += share;
       flatness += share * inverses[i];
     }
@@ -120,8 +123,8 @@ struct Sight {
   }
 
   void measure(const Ellipsoid& of) noexcept {
-    const Singles squared_norm = larger(w[0] * w[0] + w[1] * w[1] + w[2] * w[2], all(tiny)), over = S - 1.0f;
-    inverse_norm = rough_inverse_root(squared_norm);
+    const Singles over = S - 1.0f;
+    inverse_norm = rough_inverse_root(larger(squared_norm, all(tiny)));
     height = (t * squared_norm + 0.5f * over) * inverse_norm;
     // |√S − 1|, at most, which is |S − 1| / (1 + √S). So much of p lies aside of the normal; and as much, squared, is what
     // √S is less than (1 + S) / 2 by.
@@ -130,14 +133,11 @@ struct Sight {
     above = 0.5f * share * (of.extent * tilt + share * inverse_norm);
   }
 
-  /// w·v/|w| of what is at rest in the world: v is −(linear + angular × e).
+  /// w·v/|w| of what is at rest in the world: v is −(linear + angular × e), and angular × t w is nothing to w.
   Singles rate(const Ellipsoid& of) const noexcept {
-    Singles sum = {};
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, l = (i + 2) % 3;
-      sum += (of.linear[i] + (of.angular[j] * e[l] - of.angular[l] * e[j])) * w[i];
-    }
-    return -sum * inverse_norm;
+    return -(w[0] * (of.linear[0] + of.swirl[2] * w[1]) + w[1] * (of.linear[1] + of.swirl[0] * w[2]) +
+             w[2] * (of.linear[2] + of.swirl[1] * w[0])) *
+           inverse_norm;
   }
 };
 
@@ -247,8 +247,11 @@ struct LeafBounds {
     const float horizon = static_cast<float>(group.horizon);
     const Singles speed = load(leaves.speed + i), more = load(leaves.more + i), stopped = horizon * (speed + more);
     const Singles apart_after = apart > 0.0f ? apart - stopped : all(-__builtin_inff());  // inside gradients are longer than one
-    if (((kernels::below(apart, all(group.near[k])) | kernels::below(apart_after, all(group.ahead[k]))) &
-         first_lanes(leaves.num - i)) == 0) {
+    const auto may_matter = [&](Singles h, Singles h_after) {
+      return ((kernels::below(h, all(group.near[k])) | kernels::below(h_after, all(group.ahead[k]))) &
+              first_lanes(leaves.num - i)) != 0;
+    };
+    if (!may_matter(apart, apart_after)) {
       store(least + i, apart);
       store(after + i, apart_after);
       return;
@@ -271,14 +274,22 @@ struct LeafBounds {
     const Singles across = rough_root((1.0f + 2.0f * direction_error) * speed * speed - along * along);
     Singles turning_box = {};
     for (int j = 0; j < 3; ++j) {
-      turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]));
+      const int l = (j + 1) % 3, m = (j + 2) % 3;
+      const Singles swept = n[l] * static_cast<float>(group.link->angular[m]) - n[m] * static_cast<float>(group.link->angular[l]);
+      turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]) - horizon * swept);
     }
+    // What points beside the centre have of the link's turn is in `turning_box` as n has it at the centre.
+    const Singles swirl = static_cast<float>(group.link->turning) * diagonal;
+    const Singles rest = more - swirl + swirl * smaller(bend * diagonal + at.tilt, all(2.0f));
     const Singles turned = share * diagonal * (across + bend * diagonal * larger(-along, Singles{}));
     const Singles lowest = at.height - box;
-    const Singles in_motion = at.height - turning_box - turned - horizon * (along + (at.tilt + at.tilt) * speed + more);
+    const Singles in_motion = at.height - turning_box - turned - horizon * (along + (at.tilt + at.tilt) * speed + rest);
     const auto outside = lowest > margin;
     store(least + i, outside ? lowest - margin : apart);
     store(after + i, outside ? larger(in_motion, lowest - stopped) - margin : all(-__builtin_inff()));
+    if (!may_matter(load(least + i), load(after + i))) {
+      return;
+    }
     const Singles inverse_flatness = rough_inverse(larger(at.flatness, all(tiny)));
     Singles start = at.next(at.t, at.S, at.flatness);
     for (int j = 0; j < 3; ++j) {
@@ -362,8 +373,9 @@ struct Look {
   int first;       // point; negative: of loose ones, from −1 − first on
   Singles t, S, flatness, least[2], most[2];
 
-  /// Of points of leaf i of the group, from n on.
-  void find(const QueryGroup& group, const Ellipsoid& of, const LeafBounds& bounds, int i, int n, bool moves) noexcept {
+  /// Of points of leaf i of the group, from n on. `moves`: whether points do.
+  template <bool moves>
+  void find(const QueryGroup& group, const Ellipsoid& of, const LeafBounds& bounds, int i, int n) noexcept {
     const Leaves& leaves = group.leaves;
     const int from = i * most_points + n;
     first = leaves.leaf[i] * most_points + n;
@@ -380,21 +392,22 @@ struct Look {
       at.t = Sight::next(at.t, at.S, at.flatness);
     }
     Singles own[3] = {};
-    if (moves) {
+    if constexpr (moves) {
       of.turn(leaves.own[0] + from, leaves.own[1] + from, leaves.own[2] + from, own);
     }
-    bound(group, of, at, load(leaves.radius + from), own, all(leaves.speed[i] + leaves.more[i]), all(leaves.error[i] + of.error));
+    bound<moves>(group, of, at, load(leaves.radius + from), own, all(leaves.speed[i] + leaves.more[i]), all(leaves.error[i] + of.error));
   }
 
   /// Of loose points, from n on. Returns whether any may matter.
-  bool find_loose(const QueryGroup& group, const Ellipsoid& of, int k, int n, bool moves) noexcept {
+  template <bool moves>
+  bool find_loose(const QueryGroup& group, const Ellipsoid& of, int k, int n) noexcept {
     const LoosePoints& loose = group.loose;
     first = -1 - n;
     Sight at;
     at.place(of, load(loose.position[0] + n), load(loose.position[1] + n), load(loose.position[2] + n));
     const Singles radius = load(loose.radius + n);
     Singles own[3] = {};
-    if (moves) {
+    if constexpr (moves) {
       of.turn(loose.own[0] + n, loose.own[1] + n, loose.own[2] + n, own);
     }
     const FarSight far(of, at.e, own);
@@ -409,7 +422,7 @@ struct Look {
       at.set_w(of);
       at.t = Sight::next(at.t, at.S, at.flatness);
     }
-    bound(group, of, at, radius, own, far.speed, far.error);
+    bound<moves>(group, of, at, radius, own, far.speed, far.error);
     return true;
   }
 
@@ -439,13 +452,17 @@ struct Look {
   }
 
  private:
+  template <bool moves>
   void bound(const QueryGroup& group, const Ellipsoid& of, Sight& at, Singles radius, const Singles* own, Singles speed,
              Singles error) noexcept {
     at.set_w(of);
     at.measure(of);
     const float horizon = static_cast<float>(group.horizon);
-    const Singles rate = at.rate(of) + (own[0] * at.w[0] + own[1] * at.w[1] + own[2] * at.w[2]) * at.inverse_norm;
-    const Singles slack = horizon * at.tilt * speed;
+    Singles rate = at.rate(of);
+    if constexpr (moves) {
+      rate += (own[0] * at.w[0] + own[1] * at.w[1] + own[2] * at.w[2]) * at.inverse_norm;
+    }
+    const Singles slack = horizon * (at.tilt * speed + static_cast<float>(group.link->turning) * error);
     const auto maybe_inside = at.height <= error;  // where no plane separates, clearances are lower than that
     t = at.t, S = at.S, flatness = at.flatness;
     least[0] = maybe_inside ? all(-__builtin_inff()) : at.height - radius - error;
@@ -456,10 +473,10 @@ struct Look {
 };
 
 /// Looks at the points of some leaves, and returns at which: at others no more.
+template <bool moves>
 LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen,
                  const Points& points) noexcept {
   Leaves& leaves = group.leaves;
-  const bool moves = points.velocity[0] != nullptr;
   constexpr int side_by_side = 4;
   Look looks[side_by_side];
   LeafBits seen = 0;
@@ -475,7 +492,7 @@ LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds
         load_points(group, points, i);
       }
       for (int n = 0; n < leaves.count[i]; n += singles) {
-        looks[size++].find(group, of, bounds, i, n, moves);
+        looks[size++].find<moves>(group, of, bounds, i, n);
       }
     }
     for (int i = 0; i < size; ++i) {
@@ -486,25 +503,25 @@ LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds
 }
 
 /// Looks at the loose points.
+template <bool moves>
 void look_at_loose(QueryGroup& group, int k, const Ellipsoid& of, const Points& points) noexcept {
-  const bool moves = points.velocity[0] != nullptr;
   for (int n = 0; n < group.loose.num; n += singles) {
     Look look;
-    if (look.find_loose(group, of, k, n, moves)) {
+    if (look.find_loose<moves>(group, of, k, n)) {
       look.keep(group, k, points);
     }
   }
 }
 
-void collect(QueryGroup& group, const Points& points) noexcept {
-  place(group, points);
+template <bool moves>
+void collect_all(QueryGroup& group, const Points& points) noexcept {
   const int num = group.leaves.num;
   for (int k = 0; k < group.size; ++k) {
     if (group.near_leaf[k] == -__builtin_inff() && group.ahead_leaf[k] == -__builtin_inff()) {
       continue;
     }
     const Ellipsoid of(group, k);
-    look_at_loose(group, k, of, points);
+    look_at_loose<moves>(group, k, of, points);
     if (num == 0) {
       continue;
     }
@@ -514,8 +531,13 @@ void collect(QueryGroup& group, const Points& points) noexcept {
     }
     LeafBits seen = 0;
     while (const LeafBits left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen) {
-      seen |= look_at(group, k, of, bounds, left, points);
+      seen |= look_at<moves>(group, k, of, bounds, left, points);
     }
     bounds.note_missed(group, k, seen);
   }
+}
+
+void collect(QueryGroup& group, const Points& points) noexcept {
+  place(group, points);
+  points.velocity[0] != nullptr ? collect_all<true>(group, points) : collect_all<false>(group, points);
 }

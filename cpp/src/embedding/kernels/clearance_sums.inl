@@ -62,10 +62,13 @@ Lanes decay(double shift, double inverse_T) noexcept {
 /// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where S = Σ A w² = 1.
 struct Outside {
   Lanes t, inverses[3], w[3], shares[3], S, flatness;  // 1 / (A + t), A w², Σ A w² / (A + t)
+  Lanes inverse_flatness;                              // once polished; as it was before
 
+  /// `last`: to rounding; else within 1e-8, which is enough for a step.
+  template <bool last>
   void place(const double* A, const Lanes* e) noexcept {
-    const Lanes sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1];
-    const Lanes of_all = inverse(product * sums[2]), of_two = of_all * sums[2];
+    const Lanes sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1], of_sums = product * sums[2];
+    const Lanes of_all = last ? inverse(of_sums) : quick_inverse(of_sums), of_two = of_all * sums[2];
     inverses[0] = of_two * sums[1];
     inverses[1] = of_two * sums[0];
     inverses[2] = of_all * product;
@@ -79,28 +82,29 @@ struct Outside {
   }
 
   /// Newton's step on 1/√S − 1, which is concave in t: it ends below the root, wherever it begins.
-  Lanes step() const noexcept { return S * (root(S) - 1.0) * inverse(flatness); }
+  Lanes step() const noexcept { return S * (root(S) - 1.0) * quick_inverse(flatness); }
   /// The same where S is close to 1.
-  Lanes small_step(Lanes inverse_flatness) const noexcept {
+  Lanes small_step(Lanes per_flatness) const noexcept {
     const Lanes over = S - 1.0;
-    return S * (over * (0.5 - over * (0.375 - 0.3125 * over))) * inverse_flatness;
+    return S * (over * (0.5 - over * (0.375 - 0.3125 * over))) * per_flatness;
   }
 
   /// Chebyshev's step on the same where S is close to 1: of an error that is small its third power is left.
   Lanes cubic_step() const noexcept {
-    const Lanes inverse_flatness = inverse(flatness);
-    const Lanes newton = small_step(inverse_flatness);
+    const Lanes per_flatness = quick_inverse(flatness);
+    const Lanes newton = small_step(per_flatness);
     Lanes second = {};  // Σ A w² / (A + t)²
     for (int i = 0; i < 3; ++i) {
       second += shares[i] * inverses[i] * inverses[i];
     }
-    const Lanes bend = second * inverse_flatness - flatness * (2.0 - S);  // 1/S is 2 − S, where S is close to 1
+    const Lanes bend = second * per_flatness - flatness * (2.0 - S);  // 1/S is 2 − S, where S is close to 1
     return newton * (1.0 + 1.5 * newton * bend);
   }
 
   /// Newton's step where S is so close to 1 that all changes in proportion to it; S and flatness are left as they were.
   void polish() noexcept {
-    const Lanes step = 0.5 * (S - 1.0) * inverse(flatness);
+    inverse_flatness = quick_inverse(flatness);
+    const Lanes step = 0.5 * (S - 1.0) * inverse_flatness;
     t += step;
     for (int i = 0; i < 3; ++i) {
       const Lanes change = 1.0 - step * inverses[i];
@@ -110,7 +114,7 @@ struct Outside {
   }
 
   /// n'·v, of points that move by v. With D = (A + t)⁻¹ it is (v·w' − (n·v)(n·w'))/|w| for w' = D (v − w t') and
-  /// t' = (w·v − t w·Dv) / (|w|² − t w·Dw), as A D is 1 − t D; along is w·v.
+  /// t' = (w·v − t w·Dv) / (|w|² − t w·Dw), as A D is 1 − t D; along is w·v. The divisor is the flatness, polished.
   Lanes bend(const Lanes* v, Lanes along, Lanes squared_norm, Lanes inverse_norm) const noexcept {
     Lanes v_v = {}, w_v = {}, w_w = {};
     for (int i = 0; i < 3; ++i) {
@@ -119,7 +123,7 @@ struct Outside {
       w_v += scaled * w[i];
       w_w += inverses[i] * w[i] * w[i];
     }
-    const Lanes t_dot = (along - t * w_v) * inverse(squared_norm - t * w_w);
+    const Lanes t_dot = (along - t * w_v) * nearer_inverse(squared_norm - t * w_w, inverse_flatness);
     const Lanes share = along * inverse_norm * inverse_norm;
     return (v_v - t_dot * w_v - share * (w_v - t_dot * w_w)) * inverse_norm;
   }
@@ -233,7 +237,7 @@ class Approach {
       are_inside_ = below(m, all(1.0));
       out_.t = inside_ ? Lanes{} : out_.t;
     }
-    out_.place(A, e_);
+    out_.place<false>(A, e_);
     Lanes step = out_.cubic_step();
     if (__builtin_expect(are_far(cubic_within), 0)) {
       step = magnitude(out_.S - 1.0) > cubic_within ? out_.step() : step;
@@ -244,10 +248,10 @@ class Approach {
   void finish(const QueryGroup& group, int k, int count, Samples& result) noexcept {
     const Query& query = group.queries[k];
     const double *A = query.squared_axes, *W = query.angular;
-    out_.place(A, e_);
+    out_.place<true>(A, e_);
     for (int i = 0; i < most_iterations && __builtin_expect(are_far(polished_within), 0); ++i) {
       move(out_.step());
-      out_.place(A, e_);
+      out_.place<true>(A, e_);
     }
     out_.polish();
     const Lanes squared_norm = out_.w[0] * out_.w[0] + out_.w[1] * out_.w[1] + out_.w[2] * out_.w[2];
