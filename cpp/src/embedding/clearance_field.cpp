@@ -187,13 +187,13 @@ class ClearanceField::Search {
     is_placed_ = false;
     surround();
     // Leaves beyond the reach may weigh beside what is found within it: they are put off, as far as there is room.
-    kernels::Limits within{reach_, horizon_.distance};
-    const kernels::Limits beyond{reach_ + group_.window, horizon_.distance + group_.window_ahead};
+    kernels::Limits within = limits(reach_, horizon_.distance);
+    const kernels::Limits beyond = limits(reach_ + group_.window, horizon_.distance + group_.window_ahead);
     int num_put_off = 0;
     visit(within, beyond, [&](int leaf, bool is_within) {
       if (is_within && take(leaf, beyond)) {
-        within.near = std::min<double>(reach_, largest(group_.near_leaf));
-        within.ahead = std::min<double>(horizon_.distance, largest(group_.ahead_leaf));
+        within = limits(std::min<double>(reach_, largest(group_.near_leaf)),
+                        std::min<double>(horizon_.distance, largest(group_.ahead_leaf)));
       } else if (!is_within) {
         if (num_put_off < most_put_off) {
           put_off_[static_cast<std::size_t>(num_put_off)] = leaf;
@@ -218,7 +218,7 @@ class ClearanceField::Search {
     // lies too far above what was found later.
     bool is_missing = goes_beyond && is_full;
     for (int pass = 0; pass < most_passes; ++pass, is_missing = false) {
-      kernels::Limits again{-infinity, -infinity};
+      kernels::Limits again = limits(-infinity, -infinity);
       for (int k = 0; k < cluster.size; ++k) {
         kernels::Query& query = group_.queries[k];
         if (query.begun) {
@@ -228,7 +228,7 @@ class ClearanceField::Search {
         if (is_missing || query.stale || group_.missed[k] < to || group_.missed_ahead[k] < to_ahead) {
           limit(k, to, to_ahead);
           restart(query);
-          again = {std::max(again.near, to), std::max(again.ahead, to_ahead)};
+          again = limits(std::max<double>(again.near, to), std::max<double>(again.ahead, to_ahead));
         } else {  // is asked no more
           limit_leaves(k, -infinity, -infinity);
         }
@@ -273,15 +273,20 @@ class ClearanceField::Search {
   }
 
   void surround() noexcept {
-    copy(link_->p_WL + link_->R_WL * cluster_->centre, ball_.centre);
-    ball_.radius = cluster_->radius;
-    copy(link_->velocity.linear, ball_.linear);
-    copy(link_->velocity.angular, ball_.angular);
-    ball_.turning = link_->velocity.angular.norm();
-    ball_.horizon = horizon_.time;
-    ball_.fastest = tree_.fastest();
+    const Eigen::Vector3d centre = link_->p_WL + link_->R_WL * cluster_->centre;
+    const Eigen::Vector3d& angular = link_->velocity.angular;
+    copy(centre, ball_.centre);
+    ball_.radius = static_cast<float>(cluster_->radius);
+    Eigen::Vector3f::Map(ball_.velocity) = (link_->velocity.linear + angular.cross(centre)).cast<float>();
+    Eigen::Vector3f::Map(ball_.angular) = angular.cast<float>();
+    ball_.turning = static_cast<float>(angular.norm());
+    ball_.horizon = static_cast<float>(horizon_.time);
+    ball_.fastest = static_cast<float>(tree_.fastest());
   }
 
+  static kernels::Limits limits(double near, double ahead) noexcept {
+    return {static_cast<float>(near), static_cast<float>(ahead)};
+  }
   void limit(int k, double to, double to_ahead) noexcept {
     group_.near[k] = static_cast<float>(to);
     group_.ahead[k] = static_cast<float>(to_ahead);
@@ -428,8 +433,9 @@ bool ClearanceField::touches(const KinematicState& state, const Obstacles& obsta
       unsigned near = 0;
       for (int i = 0; i < count && !found; ++i) {
         const int n = first + i;
-        bounds[static_cast<std::size_t>(i)] = distance(balls.x[n], balls.y[n], balls.z[n], balls.radius[n]);
-        near |= (bounds[static_cast<std::size_t>(i)] < 0.0 ? 1u : 0u) << i;
+        const double bound = distance(balls.x[n], balls.y[n], balls.z[n], balls.radius[n]);
+        bounds[static_cast<std::size_t>(i)] = static_cast<float>(bound);
+        near |= (bound < 0.0 ? 1u : 0u) << i;
       }
       return near;
     };

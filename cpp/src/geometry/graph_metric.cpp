@@ -3,11 +3,28 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "kernels/gram_kernel.hpp"
+#include "sidestep/kinematics/instruction_set.hpp"
+
 namespace sidestep {
+namespace {
+
+kernels::AddGram add_gram() noexcept {
+#if defined(SIDESTEP_X86_KERNELS)
+  switch (instruction_set()) {
+    case InstructionSet::avx512: return kernels::add_gram_avx512;
+    case InstructionSet::avx2: return kernels::add_gram_avx2;
+    case InstructionSet::baseline: break;
+  }
+#endif
+  return kernels::add_gram_baseline;
+}
+
+}  // namespace
 
 GraphMetric::GraphMetric(int nv, int m)
     : used_(static_cast<std::size_t>(m), 0),
-      jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m)),
+      jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m + (kernels::gram_room + nv - 1) / nv)),
       factor_(Eigen::MatrixXd::Zero(nv, nv)),
       along_(Eigen::VectorXd::Zero(m)) {}
 
@@ -33,14 +50,8 @@ void GraphMetric::update(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_trans
     if (is_small()) {
       matrix += J_T.transpose().lazyProduct(J_T);
     } else {
-      with_size(J_T.rows(), [&](auto nv) {
-        for (Eigen::Index a = 0; a < num_used_; ++a) {
-          const auto column = sized(jacobian_transposed_.col(a), nv);
-          for (Eigen::Index j = 0; j < J_T.rows(); ++j) {
-            sized(factor_.col(j), nv) += column[j] * column;
-          }
-        }
-      });
+      add_gram()(J_T.data(), static_cast<int>(num_used_), static_cast<int>(size), matrix.data(),
+                 static_cast<int>(matrix.outerStride()));
     }
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(matrix);
   }

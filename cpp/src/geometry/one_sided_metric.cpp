@@ -1,5 +1,7 @@
 #include "sidestep/geometry/one_sided_metric.hpp"
 
+#include "sidestep/kinematics/vectors.hpp"
+
 namespace sidestep {
 namespace {
 
@@ -20,25 +22,31 @@ OneSidedMetric::OneSidedMetric(int nv, int m)
 void OneSidedMetric::solve_in_place(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed,
                                     Eigen::Ref<Eigen::VectorXd> x) noexcept {
   Eigen::Index used = 0;
-  for (Eigen::Index k = 0; k < jacobian_transposed.cols(); ++k) {
-    if ((jacobian_transposed.col(k).array() != 0.0).any()) {
-      columns_.col(used) = jacobian_transposed.col(k);
-      in_set_[static_cast<std::size_t>(used++)] = 0;
+  with_size(jacobian_transposed.rows(), [&](auto nv) {
+    for (Eigen::Index k = 0; k < jacobian_transposed.cols(); ++k) {
+      const auto column = sized(jacobian_transposed.data() + k * jacobian_transposed.outerStride(), nv);
+      if (column.cwiseAbs().sum() != 0.0) {
+        sized(columns_.col(used), nv) = column;
+        in_set_[static_cast<std::size_t>(used++)] = 0;
+      }
     }
-  }
+  });
   resisting_.leftCols(used).setZero();
   start_ = x;
   for (int pass = 0; pass < most_passes; ++pass) {
     bool changed = false;
-    for (Eigen::Index k = 0; k < used; ++k) {
-      char& in_set = in_set_[static_cast<std::size_t>(k)];
-      const bool resists = columns_.col(k).dot(x) > 0.0 || (in_set != 0 && pass >= newton_passes);
-      if (resists != (in_set != 0)) {
-        in_set = resists ? 1 : 0;
-        resisting_.col(k) = in_set * columns_.col(k);
-        changed = true;
+    with_size(x.size(), [&](auto nv) {
+      for (Eigen::Index k = 0; k < used; ++k) {
+        const auto column = sized(columns_.col(k), nv);
+        char& in_set = in_set_[static_cast<std::size_t>(k)];
+        const bool resists = column.dot(sized(x, nv)) > 0.0 || (in_set != 0 && pass >= newton_passes);
+        if (resists != (in_set != 0)) {
+          in_set = resists ? 1 : 0;
+          sized(resisting_.col(k), nv) = in_set * column;
+          changed = true;
+        }
       }
-    }
+    });
     if (!changed) {
       return;
     }

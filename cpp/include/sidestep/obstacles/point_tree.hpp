@@ -20,7 +20,7 @@ namespace sidestep {
 class PointTree {
  public:
   static constexpr int leaf_size = 16;
-  static constexpr int fan_out = 8;
+  static constexpr int fan_out = 16;
 
   /// Holds the balls of all points below.
   struct Ball {
@@ -75,7 +75,7 @@ class PointTree {
   void freeze() noexcept;
 
   /// A measure of each of up to `fan_out` nodes.
-  using Bounds = std::array<double, fan_out>;
+  using Bounds = std::array<float, fan_out>;
 
   /// Calls leaves(first, bits) with every group of leaves of which some matter, as do all nodes above them; of a node those
   /// first that measure least. measure(Balls, Boxes, first, count, Bounds&) measures what is in the nodes [first, first + count),

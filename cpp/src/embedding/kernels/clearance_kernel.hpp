@@ -122,15 +122,16 @@ struct QueryGroup {
 
 /// A ball around ellipsoids of a link.
 struct MovingBall {
-  double centre[3], radius;
-  double linear[3], angular[3];  // velocity at the world origin
-  double turning;                // |angular|
-  double horizon, fastest;       // as above
+  double centre[3];
+  float radius;
+  float velocity[3], angular[3];  // of the link's point at the centre
+  float turning;                  // |angular|
+  float horizon, fastest;         // as above
 };
 
 /// Clearances below the first matter, and where h + τ h' is below the second.
 struct Limits {
-  double near, ahead;
+  float near, ahead;
 };
 
 /// Leaves are looked at in single precision, for every query that their points matter to; what may weigh is summed in
@@ -139,7 +140,7 @@ struct ClearanceKernel {
   /// Nodes [first, first + count) that are below limits, as bits: in the lower half of the word below `beyond`, in the upper
   /// half below `within`. Writes bounds of clearances, and has room for whole registers.
   unsigned (*measure)(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
-                      const Limits& within, const Limits& beyond, double* bounds) noexcept;
+                      const Limits& within, const Limits& beyond, float* bounds) noexcept;
   /// The same of `count` points from `first` on.
   unsigned (*measure_points)(const MovingBall& cluster, const Points& points, int first, int count, const Limits& within,
                              const Limits& beyond) noexcept;

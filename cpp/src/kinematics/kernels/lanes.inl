@@ -310,6 +310,26 @@ inline Lanes lane_numbers() noexcept {
   return x;
 }
 
+/// Doubles from an array, less one that is taken off before they become singles.
+inline Singles narrow(const double* p, double less = 0.0) noexcept {
+  const Lanes low = load(p) - less, high = load(p + width) - less;
+#if defined(__AVX512F__)
+  const auto single = [](Lanes x) { return _mm512_maskz_cvtpd_ps(0xff, x); };
+  return _mm512_maskz_insertf32x8(0xffff, _mm512_maskz_insertf32x8(0xffff, Singles{}, single(low), 0), single(high), 1);
+#elif defined(__AVX2__)
+  return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(low)), _mm256_cvtpd_ps(high), 1);
+#elif defined(__SSE2__)
+  return _mm_movelh_ps(_mm_cvtpd_ps(low), _mm_cvtpd_ps(high));
+#else
+  Singles x;
+  for (int i = 0; i < width; ++i) {
+    x[i] = static_cast<float>(low[i]);
+    x[width + i] = static_cast<float>(high[i]);
+  }
+  return x;
+#endif
+}
+
 inline Lanes widen(const float* p) noexcept {
   typedef float Halves __attribute__((vector_size(4 * width)));
   Halves x;

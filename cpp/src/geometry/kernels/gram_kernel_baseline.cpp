@@ -1,0 +1,16 @@
+// For every processor of the architecture.
+#include "gram_kernel.hpp"
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#include "gram_kernel.inl"
+
+namespace sidestep::kernels {
+
+void add_gram_baseline(const double* columns, int num, int rows, double* matrix, int stride) noexcept {
+  add_gram(columns, num, rows, matrix, stride);
+}
+
+}  // namespace sidestep::kernels
