@@ -30,9 +30,26 @@ def test_measures_every_row(document: dict[str, list[dict[str, object]]]) -> Non
     for row in rows:
         assert row["steps"] >= 20
         assert 0.0 < row["median_us"] <= row["p99_us"] <= row["p99.9_us"] <= row["max_us"]
+        if row["interruptions"] == 0:
+            assert row["undisturbed_max_us"] == row["max_us"]
+        elif row["undisturbed_max_us"] is not None:
+            assert row["undisturbed_max_us"] <= row["max_us"]
     assert [row["joints"] for row in rows[:6:2]] == [2, 3, 7]
     assert {row["points"] for row in rows[6:]} == {5}
     json.dumps(document, allow_nan=False)
+
+
+def test_motions_during_which_the_core_was_taken_away_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    row = next(step_module._rows(StepSettings(steps=30, points=(5,))))
+    q, warm_up = row.robot.neutral, [1e-6] * 3
+    durations = iter([warm_up, [2e-6] * 10, [9e-3] * 10, [3e-6] * 10])
+    monkeypatch.setattr(step_module._Row, "_from_cpp", lambda *_: (q, np.array(next(durations))))
+    counts = iter([0, 0, 0, 2, 2, 2, 2])
+    monkeypatch.setattr(step_module, "interruptions", lambda: next(counts))
+    times = row.measure(StepSettings(steps=30, points=(5,)))
+    assert times["interruptions"] == 2
+    assert times["undisturbed_max_us"] == pytest.approx(3.0)
+    assert times["max_us"] == pytest.approx(9000.0)
 
 
 def test_the_dense_kernel_is_related_to_the_peak_of_the_same_run(

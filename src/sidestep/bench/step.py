@@ -12,6 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+try:
+    import resource
+except ImportError:  # not on Windows
+    resource = None  # type: ignore[assignment]
+
 import sidestep
 from sidestep._core import (
     AccelerationFilter,
@@ -73,6 +78,10 @@ def run_step_bench(
     the call and the reading of its result. An arm with a covering body starts and is drawn to where it has 3 cm of
     clearance to points and to itself (and 0.03 rad to joint limits); only where no such place is found, as among
     many points all around it, to the best of what was drawn.
+
+    A step is as long as the clock says, whatever else the machine did meanwhile: `max_us`. `interruptions` says how
+    often the system gave the core to another program, and `undisturbed_max_us` is the longest step of the motions
+    during which it did not; null where the system does not tell.
     """
     rows = list(_rows(settings))
     results = []
@@ -149,6 +158,13 @@ def compare_steps(before: dict[str, Any], after: dict[str, Any]) -> list[dict[st
     ]
 
 
+def interruptions() -> int | None:
+    """How often the core was taken away from this thread so far; None where the system does not tell."""
+    if resource is None or not hasattr(resource, "RUSAGE_THREAD"):
+        return None
+    return resource.getrusage(resource.RUSAGE_THREAD).ru_nivcsw
+
+
 def cpu_model() -> str:
     """Model name of the processor, from the kernel."""
     try:
@@ -178,13 +194,19 @@ class _Row:
 
     def measure(self, settings: StepSettings) -> dict[str, Any]:
         times, total, end = StepTimes(), 0.0, time.perf_counter() + settings.seconds
+        interrupted, undisturbed = 0, 0.0
         rng = np.random.default_rng(settings.seed)
         q = self._goal(rng)
         run = self._from_python if self.python else self._from_cpp
         steps = min(MOTION, settings.steps)
         run(q, self._goal(rng), max(1, round(WARM_UP * steps)))
         while times.total < settings.steps and (times.total == 0 or time.perf_counter() < end):
-            q, seconds = run(q, self._goal(rng), steps)
+            goal, before = self._goal(rng), interruptions()
+            q, seconds = run(q, goal, steps)
+            after = interruptions()
+            if before is not None and after is not None:
+                interrupted += after - before
+                undisturbed = max(undisturbed, float(seconds.max()) if after == before else 0.0)
             times.add(seconds)
             total += float(seconds.sum())
         return {
@@ -197,6 +219,8 @@ class _Row:
             "filter": self.filter is not None,
             "steps": times.total,
             **{f"{name}_us": value for name, value in times.microseconds().items()},
+            "undisturbed_max_us": round(1e6 * undisturbed, 3) if undisturbed > 0.0 else None,
+            "interruptions": interrupted if interruptions() is not None else None,
             "steps_per_s": times.total / total,
         }
 

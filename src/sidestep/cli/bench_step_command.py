@@ -26,7 +26,8 @@ def step(
     """Times one control step: Table 6.1 of the thesis, and the whole arm among clouds of points.
 
     Every row on one core, from C++ (around each step of a motion) and from Python. Motions go between places with
-    3 cm of clearance, as far as there are any. The filter holds limits and clearances by a quadratic program. Last, the
+    3 cm of clearance, as far as there are any. The filter holds limits and clearances by a quadratic program.
+    Undisturbed is the longest step of the motions during which the system gave the core to no other program. Last, the
     kernel that leaves no point out, as a share of what a core does that only multiplies and adds.
     """
     from rich import box
@@ -46,10 +47,12 @@ def step(
         )
     table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {document['instruction_set']}")
     table.add_column("one step [us]", no_wrap=True)
-    for name in ("", "median", "p95", "p99", "p99.9", "max", "steps/s"):
+    for name in ("", "median", "p95", "p99", "p99.9", "max", "undisturbed", "steps/s"):
         table.add_column(name, justify="right")
     for row in document["results"]:
         times = [f"{row[f'{name}_us']:.2f}" for name in ("median", "p95", "p99", "p99.9", "max")]
+        undisturbed = row["undisturbed_max_us"]
+        times.append("-" if undisturbed is None else f"{undisturbed:.2f}")
         table.add_row(row["name"], row["language"], *times, f"{row['steps_per_s']:,.0f}")
     terminal.print(table)
     dense = document["dense"]

@@ -66,7 +66,8 @@ struct Outside {
 
   /// `last`: to rounding; else within 1e-8, which is enough for a step.
   template <bool last>
-  void place(const double* A, const Lanes* e) noexcept {
+  void place(const double* A, const Lanes* e, Lanes at) noexcept {
+    t = at;
     const Lanes sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1], of_sums = product * sums[2];
     const Lanes of_all = last ? inverse(of_sums) : quick_inverse(of_sums), of_two = of_all * sums[2];
     inverses[0] = of_two * sums[1];
@@ -206,7 +207,7 @@ class Approach {
     const Query& query = group.queries[k];
     const double *R = query.axes, *A = query.squared_axes, *W = query.angular;
     const int* point = chosen.point + first;
-    out_.t = widen(chosen.t + first);
+    t_ = widen(chosen.t + first);
     radius_ = points.common_radius >= 0.0 ? all(points.common_radius) : gather(points.radius, point);
     Lanes x[3];
     for (int axis = 0; axis < 3; ++axis) {
@@ -235,12 +236,13 @@ class Approach {
       }
       inside_ = m < 1.0;
       are_inside_ = below(m, all(1.0));
-      out_.t = inside_ ? Lanes{} : out_.t;
+      t_ = inside_ ? Lanes{} : t_;
     }
-    out_.place<false>(A, e_);
-    Lanes step = out_.cubic_step();
-    if (__builtin_expect(are_far(cubic_within), 0)) {
-      step = magnitude(out_.S - 1.0) > cubic_within ? out_.step() : step;
+    Outside out;
+    out.place<false>(A, e_, t_);
+    Lanes step = out.cubic_step();
+    if (__builtin_expect(are_far(out.S, cubic_within), 0)) {
+      step = magnitude(out.S - 1.0) > cubic_within ? out.step() : step;
     }
     move(step);
   }
@@ -248,20 +250,21 @@ class Approach {
   void finish(const QueryGroup& group, int k, int count, Samples& result) noexcept {
     const Query& query = group.queries[k];
     const double *A = query.squared_axes, *W = query.angular;
-    out_.place<true>(A, e_);
-    for (int i = 0; i < most_iterations && __builtin_expect(are_far(polished_within), 0); ++i) {
-      move(out_.step());
-      out_.place<true>(A, e_);
+    Outside out;
+    out.place<true>(A, e_, t_);
+    for (int i = 0; i < most_iterations && __builtin_expect(are_far(out.S, polished_within), 0); ++i) {
+      move(out.step());
+      out.place<true>(A, e_, t_);
     }
-    out_.polish();
-    const Lanes squared_norm = out_.w[0] * out_.w[0] + out_.w[1] * out_.w[1] + out_.w[2] * out_.w[2];
+    out.polish();
+    const Lanes squared_norm = out.w[0] * out.w[0] + out.w[1] * out.w[1] + out.w[2] * out.w[2];
     const Lanes inverse_norm = inverse_root(squared_norm);
-    Lanes h = out_.t * squared_norm * inverse_norm, *g = result.g;
+    Lanes h = out.t * squared_norm * inverse_norm, *g = result.g;
     for (int i = 0; i < 3; ++i) {
-      g[i] = out_.w[i] * inverse_norm;
+      g[i] = out.w[i] * inverse_norm;
     }
-    const Lanes along = out_.w[0] * v_[0] + out_.w[1] * v_[1] + out_.w[2] * v_[2];
-    Lanes curvature = out_.bend(v_, along, squared_norm, inverse_norm);
+    const Lanes along = out.w[0] * v_[0] + out.w[1] * v_[1] + out.w[2] * v_[2];
+    Lanes curvature = out.bend(v_, along, squared_norm, inverse_norm);
     result.rate = along * inverse_norm;
     if (!outside && are_inside_ != 0) {
       const Lanes squared = e_[0] * e_[0] + e_[1] * e_[1] + e_[2] * e_[2];
@@ -290,19 +293,18 @@ class Approach {
   }
 
  private:
-  bool are_far(double within) const noexcept {
-    return (below(all(within), magnitude(out_.S - 1.0)) & ~are_inside_) != 0;
+  bool are_far(Lanes S, double within) const noexcept {
+    return (below(all(within), magnitude(S - 1.0)) & ~are_inside_) != 0;
   }
   void move(Lanes step) noexcept {
-    out_.t = larger(out_.t + step, Lanes{});
+    t_ = larger(t_ + step, Lanes{});
     if constexpr (!outside) {
-      out_.t = inside_ ? Lanes{} : out_.t;
+      t_ = inside_ ? Lanes{} : t_;
     }
   }
 
   Lanes e_[3], v_[3], own_[3];  // the offset in principal axes, velocities in moving ones, and those of the points
-  Lanes radius_;
-  Outside out_;
+  Lanes radius_, t_;
   Bits inside_;
   unsigned are_inside_ = 0;
 };
