@@ -202,18 +202,14 @@ void place(QueryGroup& group, const Points& points) noexcept {
 void load_points(QueryGroup& group, const Points& points, int i) noexcept {
   Leaves& leaves = group.leaves;
   const int from = leaves.leaf[i] * most_points, to = i * most_points;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int n = 0; n < most_points; ++n) {
-      leaves.position[axis][to + n] = static_cast<float>(points.position[axis][from + n] - group.origin[axis]);
+  for (int n = 0; n < most_points; n += singles) {
+    for (int axis = 0; axis < 3; ++axis) {
+      store(leaves.position[axis] + to + n, narrow(points.position[axis] + from + n, group.origin[axis]));
+      if (points.velocity[0] != nullptr) {
+        store(leaves.own[axis] + to + n, narrow(points.velocity[axis] + from + n));
+      }
     }
-  }
-  for (int n = 0; n < most_points; ++n) {
-    leaves.radius[to + n] = static_cast<float>(points.radius[from + n]);
-  }
-  for (int axis = 0; axis < 3 && points.velocity[0] != nullptr; ++axis) {
-    for (int n = 0; n < most_points; ++n) {
-      leaves.own[axis][to + n] = static_cast<float>(points.velocity[axis][from + n]);
-    }
+    store(leaves.radius + to + n, narrow(points.radius + from + n));
   }
   leaves.loaded |= 1ull << i;
 }
