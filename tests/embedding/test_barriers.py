@@ -154,6 +154,25 @@ def test_clearances_above_a_dense_wall_are_the_mean_over_all_points() -> None:
     assert crowded > 5
 
 
+def test_a_point_beyond_single_precision_hides_none_that_is_near() -> None:
+    """Cameras mark what they do not see by the largest number; squares of it overflow in bounds of its node."""
+    robot = ss.Robot.named("panda")
+    barrier = ss.ClearanceBarrier(robot, covering(robot, 0), activation=0.1)
+    rng = np.random.default_rng(6)
+    wall = np.column_stack([rng.uniform(-0.7, 0.7, (2000, 2)), np.full(2000, 0.1)])
+    largest = float(np.finfo(np.float32).max)
+    marked = ss.Obstacles(np.vstack([wall, [[largest, 0.0, 0.0], [0.0, -1e25, 0.0]]]))
+    seen = 0
+    for _ in range(20):
+        q = robot.random_configuration(rng)
+        for v in (np.zeros(q.size), rng.normal(size=q.size)):
+            found = barrier.evaluate(q, v, marked).clearances
+            expected = barrier.evaluate(q, v, ss.Obstacles(wall)).clearances
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-13)  # the order of sums
+            seen += int((expected < 0.1).sum())
+    assert seen > 20
+
+
 @pytest.mark.parametrize("window", [6.0, 12.0])
 def test_points_beyond_the_window_hardly_matter(window: float) -> None:
     robot = ss.Robot.named("panda")

@@ -154,6 +154,11 @@ def test_flat_space() -> None:
     assert not ss.christoffel_symbols(np.zeros((1, 3)), np.zeros((1, 3, 3))).any()
 
 
+def test_no_joints() -> None:
+    assert ss.metric_matrix(np.zeros((3, 0))).shape == (0, 0)
+    assert ss.geodesic_acceleration(np.zeros((3, 0)), np.zeros(3)).shape == (0,)
+
+
 def test_shapes_are_checked() -> None:
     with pytest.raises(ValueError, match=r"jacobian must have shape \(m, nv\)"):
         ss.metric_matrix(np.zeros(3))

@@ -24,7 +24,7 @@ kernels::AddGram add_gram() noexcept {
 
 GraphMetric::GraphMetric(int nv, int m)
     : used_(static_cast<std::size_t>(m), 0),
-      jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m + (kernels::gram_room + nv - 1) / nv)),
+      jacobian_transposed_(Eigen::MatrixXd::Zero(nv, m + (nv > 0 ? (kernels::gram_room + nv - 1) / nv : 0))),
       factor_(Eigen::MatrixXd::Zero(nv, nv)),
       along_(Eigen::VectorXd::Zero(m)) {}
 

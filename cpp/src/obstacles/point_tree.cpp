@@ -40,8 +40,10 @@ void cut(std::vector<Item>::iterator begin, std::vector<Item>::iterator end) {
     sum += offset;
     sum_of_squares += offset.cwiseAbs2();
   }
-  Eigen::Index axis;
-  (sum_of_squares - sum.cwiseAbs2() / static_cast<double>(end - begin)).maxCoeff(&axis);
+  // The first axis of those that are as good but for rounding, which depends on the order of points and on the machine.
+  const Eigen::Vector3d spread = sum_of_squares - sum.cwiseAbs2() / static_cast<double>(end - begin);
+  const double enough = (1.0 - 1e-9) * spread.maxCoeff();
+  const Eigen::Index axis = spread[0] >= enough ? 0 : spread[1] >= enough ? 1 : 2;
   const auto middle = begin + first_part(end - begin);
   std::nth_element(begin, middle, end, [axis](const Item& a, const Item& b) {
     return a.point[axis] < b.point[axis] || (a.point[axis] == b.point[axis] && a.index < b.index);

@@ -27,8 +27,8 @@ def step(
 
     Every row on one core, from C++ (around each step of a motion) and from Python. Motions go between places with
     3 cm of clearance, as far as there are any. The filter holds limits and clearances by a quadratic program.
-    Undisturbed is the longest step of the motions during which the system gave the core to no other program. Last, the
-    kernel that leaves no point out, as a share of what a core does that only multiplies and adds.
+    Kept is the longest step of the motions during which the core was kept: given to no other program. Last, the kernel
+    that leaves no point out, as a share of what a core does that only multiplies and adds.
     """
     from rich import box
     from rich.table import Table
@@ -46,13 +46,12 @@ def step(
             settings, progress=lambda done, in_all, name: status.update(f"{done + 1} of {in_all}: {name}")
         )
     table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {document['instruction_set']}")
-    table.add_column("one step [us]", no_wrap=True)
-    for name in ("", "median", "p95", "p99", "p99.9", "max", "undisturbed", "steps/s"):
-        table.add_column(name, justify="right")
+    table.add_column("one step [us]", min_width=18)  # narrow terminals wrap the names, never a number
+    for name in ("", "median", "p95", "p99", "p99.9", "max", "kept", "steps/s"):
+        table.add_column(name, justify="right", no_wrap=True)
     for row in document["results"]:
-        times = [f"{row[f'{name}_us']:.2f}" for name in ("median", "p95", "p99", "p99.9", "max")]
-        undisturbed = row["undisturbed_max_us"]
-        times.append("-" if undisturbed is None else f"{undisturbed:.2f}")
+        names = ("median", "p95", "p99", "p99.9", "max", "undisturbed_max")
+        times = [_microseconds(row[f"{name}_us"]) for name in names]
         table.add_row(row["name"], row["language"], *times, f"{row['steps_per_s']:,.0f}")
     terminal.print(table)
     dense = document["dense"]
@@ -63,6 +62,12 @@ def step(
     )
     if json is not None:
         write_json(document, json)
+
+
+def _microseconds(value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if value < 100.0 else f"{value:,.0f}"
 
 
 def compare(

@@ -21,6 +21,7 @@ class PointTree {
  public:
   static constexpr int leaf_size = 16;
   static constexpr int fan_out = 16;
+  static_assert(fan_out == leaf_size);  // one measurement holds as many nodes as points, as bits of half a word
 
   /// Holds the balls of all points below.
   struct Ball {
@@ -92,7 +93,7 @@ class PointTree {
   int count(int leaf) const noexcept { return std::min(leaf_size, size() - leaf * leaf_size); }
 
  private:
-  /// The balls and boxes of all nodes, around the same centres, with room to read `leaf_size` from any node on.
+  /// The balls and boxes of all nodes, around the same centres, with room to read whole groups of `fan_out` nodes.
   struct Level {
     int size;
     std::array<std::vector<double>, 3> centre, half;  // of the boxes of the points

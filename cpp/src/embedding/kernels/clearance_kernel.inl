@@ -58,6 +58,9 @@ struct Measured {
   }
 };
 
+/// Where squares overflow, as beyond 1e19 m, nothing is known: what is near may be in the same node.
+Singles known(Singles bound) noexcept { return larger(bound, all(-__builtin_inff())); }
+
 unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
                  const Limits& within, const Limits& beyond, float* bounds) noexcept {
   unsigned bits = 0;
@@ -74,7 +77,7 @@ unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& box
       squared_to_box += to_box * to_box;
     }
     const Singles to_ball = measured.distance - ball, to_box = rough_root(squared_to_box) - narrow(boxes.radius + from);
-    const Singles bound = larger(to_ball, to_box) - cluster.radius - measure_error * measured.distance;
+    const Singles bound = known(larger(to_ball, to_box) - cluster.radius - measure_error * measured.distance);
     store(bounds + n, bound);
     bits |= measured.below(cluster, bound, within, beyond) << n;
   }
@@ -90,7 +93,8 @@ unsigned measure_points(const MovingBall& cluster, const Points& points, int fir
                                narrow(points.position[2] + from, cluster.centre[2])};
     const Singles ball = narrow(points.radius + from);
     const Measured measured(cluster, offset, ball);
-    bits |= measured.below(cluster, measured.distance * (1.0f - measure_error) - ball - cluster.radius, within, beyond) << n;
+    const Singles bound = known(measured.distance * (1.0f - measure_error) - ball - cluster.radius);
+    bits |= measured.below(cluster, bound, within, beyond) << n;
   }
   return bits & ((1u << count) - 1u) * 0x10001u;
 }
