@@ -248,6 +248,41 @@ BOOST_AUTO_TEST_CASE(points_far_away_do_not_blur_those_nearby) {
   use(before);
 }
 
+// Cameras mark what they do not see by the largest number, of which squares overflow in bounds of its node.
+BOOST_AUTO_TEST_CASE(points_beyond_single_precision_hide_none_nearby) {
+  const InstructionSet before = instruction_set();
+  for (const InstructionSet set : instruction_sets()) {
+    BOOST_TEST_CONTEXT(name(set)) {
+      use(set);
+      Random random(11);
+      int near = 0;
+      for (int trial = 0; trial < 20; ++trial) {
+        const Robot robot = test::random_tree(random, 5);
+        const ClearanceField field(robot, calibrated(test::random_body(random, robot), random));
+        KinematicState state(robot);
+        state.update(robot, random.vector(robot.num_coordinates()), random.vector(robot.num_coordinates()));
+        const Obstacles nearby = test::random_obstacles(random, 15);
+        Eigen::Matrix3Xd points(3, 16), velocities(3, 16);
+        points << nearby.points(), Eigen::Vector3d(3.4e38, 0.0, 0.0);
+        velocities << nearby.velocities(), Eigen::Vector3d::Zero();
+        Eigen::VectorXd radii(16);
+        radii << nearby.radii(), 0.0;
+        Clearances found(robot.num_coordinates(), field.size()), expected = found;
+        found.clear(), expected.clear();
+        field.evaluate(state, Obstacles(points, radii, velocities), 0.3, {}, found.view(0, field.size()));
+        field.evaluate(state, nearby, 0.3, {}, expected.view(0, field.size()));
+        for (int k = 0; k < field.size(); ++k) {
+          near += expected.nearest[k] >= 0 ? 1 : 0;
+          BOOST_TEST(found.nearest[k] == expected.nearest[k]);
+          BOOST_TEST((found.values[k] == expected.values[k] || std::abs(found.values[k] - expected.values[k]) < 1e-13));
+        }
+      }
+      BOOST_TEST(near > 20);
+    }
+  }
+  use(before);
+}
+
 // Inside, gradients are longer than one: a point may close faster than any bound of a distance says, beside one that is
 // deeper by more than the window.
 BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {
