@@ -17,7 +17,7 @@ constexpr float measure_error = 3.0f * rough_error;
 /// cluster and ball that turns from x by θ is longer than the shortest by |x| (|x| − r) / (2 r) sin²θ, with r for both radii; of the
 /// cluster's speed there it has the part along x by cos θ and the part across x by sin θ.
 struct Measured {
-  Singles x[3], distance, fastest, room;  // room: of h + τ h'; fastest: −h', at most
+  Singles distance, fastest, room;  // room: of h + τ h'; fastest: −h', at most
 
   /// Places at offsets from the cluster's centre.
   Measured(const MovingBall& cluster, const Singles* offset, Singles ball) noexcept {
@@ -27,10 +27,9 @@ struct Measured {
     Singles squared = {}, along = {}, squared_speed = {};
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
-      x[i] = offset[i];
       const Singles v = cluster.velocity[i] + (w[j] * offset[l] - w[l] * offset[j]);
-      squared += x[i] * x[i];
-      along += x[i] * v;
+      squared += offset[i] * offset[i];
+      along += offset[i] * v;
       squared_speed += v * v;
     }
     const Singles inverse_distance = rough_inverse_root(larger(squared, all(tiny)));
@@ -73,7 +72,7 @@ unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& box
     const Measured measured(cluster, offset, ball);
     Singles squared_to_box = {};
     for (int i = 0; i < 3; ++i) {
-      const Singles to_box = larger(magnitude(measured.x[i]) - half[i], Singles{});
+      const Singles to_box = larger(magnitude(offset[i]) - half[i], Singles{});
       squared_to_box += to_box * to_box;
     }
     const Singles to_ball = measured.distance - ball, to_box = rough_root(squared_to_box) - narrow(boxes.radius + from);

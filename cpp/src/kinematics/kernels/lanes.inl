@@ -70,7 +70,7 @@ inline Lanes magnitude(Lanes x) noexcept {
   return x;
 }
 
-/// from[index[0]], from[index[1]], … one by one: processors take longer for their instruction that does it at once.
+/// from[index[0]], from[index[1]], … one by one: the instruction that does it at once takes longer, on Zen 4.
 inline Lanes gather(const double* from, const int* index) noexcept {
 #if defined(__AVX512F__)
   return Lanes{from[index[0]], from[index[1]], from[index[2]], from[index[3]],
