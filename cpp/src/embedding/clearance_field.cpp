@@ -72,19 +72,27 @@ void reset(kernels::Query& query) noexcept {
 /// The means of a query's points, with wrenches about the world origin.
 class Means {
  public:
-  Means(const kernels::Query& query, const Eigen::Vector3d& centre) noexcept : query_(query), centre_(centre) {
+  Means(const kernels::Query& query, const Eigen::Vector3d& centre, double inverse_T) noexcept
+      : query_(query), centre_(centre), inverse_T_(inverse_T) {
     for (int i = 0; i < kernels::sums; ++i) {
       sums_[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
     }
-    sums_[2] -= of_bias(6);
-    sums_[5] -= of_bias(12);
+    const double* A = query.squared_axes;
+    const Eigen::Array3d per_twist(A[1] - A[2], A[2] - A[0], A[0] - A[1]);
+    for (const int first : {of_weights, of_heights, kernels::approach + 4}) {
+      Eigen::Array3d::Map(sums_ + first + 3) *= per_twist;
+    }
+    sums_[2] -= of_bias(of_weights);
+    sums_[6] -= of_bias(of_heights);
     sums_[kernels::approach + 3] -= of_bias(kernels::approach + 4);
   }
 
+  /// With w' = −w h'/T.
   ClearanceSample nearest() const noexcept {
-    const double* s = sums_;
-    ClearanceSample mean = BoltzmannMean::Sums{s[0], s[1], s[2], s[3], s[4], s[5]}.mean();
-    mean.gradient = wrench((gradient(12) - mean.value * gradient(6)) / s[0]);
+    const double *s = sums_, k = inverse_T_;
+    ClearanceSample mean = BoltzmannMean::Sums{s[0], -k * s[1], k * (k * s[3] - s[2]), s[4], s[1] - k * s[5],
+                                               s[2] - k * (2.0 * s[3] + s[6] - k * s[7])}.mean();
+    mean.gradient = wrench(((1.0 + k * mean.value) * gradient(of_weights) - k * gradient(of_heights)) / s[0]);
     mean.value += query_.reference;
     return mean;
   }
@@ -96,6 +104,7 @@ class Means {
 
  private:
   using Vector6 = Eigen::Matrix<double, 6, 1>;
+  static constexpr int of_weights = 8, of_heights = 14;  // of force and moment
 
   Vector6 gradient(int first) const noexcept { return Vector6::Map(sums_ + first); }
   /// What the bias of the link makes of sums of h'', from those of the gradient.
@@ -111,6 +120,7 @@ class Means {
 
   const kernels::Query& query_;
   Eigen::Vector3d centre_;
+  double inverse_T_;
   double sums_[kernels::sums];
 };
 
@@ -252,7 +262,7 @@ class ClearanceField::Search {
     if (!(std::min(query.reference, query.ahead) < infinity)) {
       return;
     }
-    const Means means(query, {group_.centre[0][k], group_.centre[1][k], group_.centre[2][k]});
+    const Means means(query, {group_.centre[0][k], group_.centre[1][k], group_.centre[2][k]}, group_.inverse_T);
     const Eigen::Index at = cluster_->first + k;
     const int joint = ellipsoid(k).body.joint;
     const ClearanceSample approach = means.approach();

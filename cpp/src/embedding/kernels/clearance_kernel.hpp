@@ -25,9 +25,9 @@ struct LinkMotion {
   float to_link[9];    // R_LW, by rows
 };
 
-// Of the Boltzmann mean s0, ṡ0, s̈0, s1, ṡ1, s̈1 and two gradients of force and moment; from `approach` on, of the
-// mean of what approaches: the weight, h, h', h'' and a gradient.
-inline constexpr int approach = 18, sums = 28;
+// Of the Boltzmann mean: w, w h', w h'' and w h'²; the same with w (h − reference) in place of w; ∂h and its twists (see
+// Samples) with either. From `approach` on, of the mean of what approaches: w, w h, w h', w h'', and w ∂h and its twists.
+inline constexpr int approach = 20, sums = 30;
 
 inline constexpr int most_points = 16;        // of a leaf
 inline constexpr int most_candidates = 512;

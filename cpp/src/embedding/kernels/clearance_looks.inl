@@ -64,6 +64,13 @@ struct Ellipsoid {
     error = distance_error * (group.extent[k] + __builtin_sqrtf(squared_offset));
   }
 
+  /// Places seen from the group's origin, in principal axes.
+  void place(Singles x, Singles y, Singles z, Singles* e) const noexcept {
+    for (int i = 0; i < 3; ++i) {
+      e[i] = axes[3 * i] * x + axes[3 * i + 1] * y + axes[3 * i + 2] * z - offset[i];
+    }
+  }
+
   /// Vectors of the world in principal axes.
   void turn(const float* x, const float* y, const float* z, Singles* result) const noexcept {
     for (int i = 0; i < 3; ++i) {
@@ -72,41 +79,32 @@ struct Ellipsoid {
   }
 };
 
+/// t of places at e from below, nearly: the best of where Newton's iteration comes to from infinity and, along every axis,
+/// of that axis alone. `second` is Σ A e².
+inline Singles first_t(const Ellipsoid& of, const Singles* e, Singles second) noexcept {
+  Singles fourth = {};  // Σ A² e²
+  for (int i = 0; i < 3; ++i) {
+    const Singles share = of.squared[i] * e[i];
+    fourth += share * share;
+  }
+  second = larger(second, all(tiny));
+  const Singles inverse_second = rough_inverse_root(second);
+  Singles t = larger((second - fourth * inverse_second) * inverse_second - 1e-12f, Singles{});  // 0 at the centre
+  for (int i = 0; i < 3; ++i) {
+    t = larger(of.semi[i] * magnitude(e[i]) - of.squared[i], t);
+  }
+  return t;
+}
+
 /// Places as an ellipsoid with squared semi-axes A sees them, side by side: at e in its principal axes, with w = e / (A + t).
-/// Outside t > 0 is where S = Σ A w² is 1, which Newton's iteration finds. What is said of them is true wherever that is:
-/// the plane that touches the ellipsoid where its normal is w, at p = A w/√S, bounds h from below; and as e − p is t w and
-/// √S − 1 of p, the direction to the foot differs from w by |√S − 1| |p| / h at most.
+/// Outside t > 0 is where S = Σ A w² is 1, which Newton's iteration finds.
 struct Sight {
-  Singles e[3], t, inverses[3], w[3], squared_norm, S, flatness;  // 1 / (A + t), |w|², Σ A w² / (A + t)
-  Singles inverse_norm, height;                     // 1 / |w|; h from below, nearly, as √S is less than (1 + S) / 2
-  Singles above;                                    // h − height, at most
-  Singles tilt;                                     // |n − w/|w||, at most
+  Singles t, w[3], squared_norm, S, flatness;  // |w|², Σ A w² / (A + t)
 
-  /// Seen from the group's origin.
-  void place(const Ellipsoid& of, Singles x, Singles y, Singles z) noexcept {
-    for (int i = 0; i < 3; ++i) {
-      e[i] = of.axes[3 * i] * x + of.axes[3 * i + 1] * y + of.axes[3 * i + 2] * z - of.offset[i];
-    }
-  }
-
-  /// t from below, nearly: the best of where Newton's iteration comes to from infinity and, along every axis, of that axis alone.
-  void begin(const Ellipsoid& of) noexcept {
-    Singles second = {}, fourth = {};  // Σ A e² and Σ A² e²
-    for (int i = 0; i < 3; ++i) {
-      const Singles share = of.squared[i] * e[i];
-      second += share * e[i];
-      fourth += share * share;
-    }
-    second = larger(second, all(tiny));
-    const Singles inverse_second = rough_inverse_root(second);
-    t = larger((second - fourth * inverse_second) * inverse_second - 1e-12f, Singles{});  // 0 at the centre
-    for (int i = 0; i < 3; ++i) {
-      t = larger(of.semi[i] * magnitude(e[i]) - of.squared[i], t);
-    }
-  }
-
-  void set_w(const Ellipsoid& of) noexcept {
-    S = flatness = squared_norm = Singles{};
+  Sight() = default;
+  /// Also writes 1 / (A + t).
+  Sight(const Ellipsoid& of, const Singles* e, Singles at, Singles* inverses) noexcept
+      : t(at), squared_norm{}, S{}, flatness{} {
     for (int i = 0; i < 3; ++i) {
       inverses[i] = rough_inverse(of.squared[i] + t);
       w[i] = e[i] * inverses[i];
@@ -118,14 +116,22 @@ struct Sight {
   }
 
   /// Where Newton's step on 1/√S − 1 ends, which is concave in t: below the root, wherever it begins; inside at 0.
-  static Singles next(Singles t, Singles S, Singles flatness) noexcept {
+  Singles next() const noexcept {
     return larger(t + S * (rough_root(S) - 1.0f) * rough_inverse(larger(flatness, all(tiny))), Singles{});
   }
+};
 
-  void measure(const Ellipsoid& of) noexcept {
-    const Singles over = S - 1.0f;
-    inverse_norm = rough_inverse_root(larger(squared_norm, all(tiny)));
-    height = (t * squared_norm + 0.5f * over) * inverse_norm;
+/// What is true of places whatever t is: the plane that touches the ellipsoid where its normal is w, at p = A w/√S, bounds h
+/// from below; and as e − p is t w and √S − 1 of p, the direction to the foot differs from w by |√S − 1| |p| / h at most.
+struct TangentPlane {
+  Singles inverse_norm, height;  // 1 / |w|; h from below, nearly, as √S is less than (1 + S) / 2
+  Singles above;                 // h − height, at most
+  Singles tilt;                  // |n − w/|w||, at most
+
+  TangentPlane(const Ellipsoid& of, const Sight& at) noexcept {
+    const Singles over = at.S - 1.0f;
+    inverse_norm = rough_inverse_root(larger(at.squared_norm, all(tiny)));
+    height = (at.t * at.squared_norm + 0.5f * over) * inverse_norm;
     // |√S − 1|, at most, which is |S − 1| / (1 + √S). So much of p lies aside of the normal; and as much, squared, is what
     // √S is less than (1 + S) / 2 by.
     const Singles share = magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f)) + 2.0f * rough_error;
@@ -134,7 +140,7 @@ struct Sight {
   }
 
   /// w·v/|w| of what is at rest in the world: v is −(linear + angular × e), and angular × t w is nothing to w.
-  Singles rate(const Ellipsoid& of) const noexcept {
+  Singles rate(const Ellipsoid& of, const Singles* w) const noexcept {
     return -(w[0] * (of.linear[0] + of.swirl[2] * w[1]) + w[1] * (of.linear[1] + of.swirl[0] * w[2]) +
              w[2] * (of.linear[2] + of.swirl[1] * w[0])) *
            inverse_norm;
@@ -227,82 +233,41 @@ inline Singles chosen(Singles x, unsigned lanes) noexcept {
 }
 
 /// What an ellipsoid sees of leaves: bounds from below of h of all their points, and of h + τ h'; and t near them, as
-/// t0 + gradient · e.
+/// t0 + gradient · e. In steps, each for several registers: the chain of operations of one is long, and the next one's runs
+/// beside it.
 struct LeafBounds {
   alignas(64) float least[most_leaves], after[most_leaves], t0[most_leaves], gradient[3][most_leaves];
   float turn[most_leaves];  // of directions within the leaf
 
-  void find(const QueryGroup& group, const Ellipsoid& of, int k, int i) noexcept {
-    const Leaves& leaves = group.leaves;
-    Sight at;
-    at.place(of, load(leaves.centre[0] + i), load(leaves.centre[1] + i), load(leaves.centre[2] + i));
-    // Balls around both say enough of many.
-    const Singles margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error), diagonal = load(leaves.diagonal + i);
-    const Singles distance = rough_root(at.e[0] * at.e[0] + at.e[1] * at.e[1] + at.e[2] * at.e[2]);
-    const Singles apart = distance * (1.0f - rough_error) - of.extent - diagonal - margin;
-    const float horizon = static_cast<float>(group.horizon);
-    const Singles speed = load(leaves.speed + i), more = load(leaves.more + i), stopped = horizon * (speed + more);
-    const Singles apart_after = apart > 0.0f ? apart - stopped : all(-__builtin_inff());  // inside gradients are longer than one
-    const auto may_matter = [&](Singles h, Singles h_after) {
-      return ((kernels::below(h, all(group.near[k])) | kernels::below(h_after, all(group.ahead[k]))) &
-              first_lanes(leaves.num - i)) != 0;
+  LeafBounds(const QueryGroup& group, const Ellipsoid& of, int k) noexcept {
+    const int num = group.leaves.num;
+    const auto may_matter = [&](int first) {
+      return below(group.near[k], group.ahead[k], first, num < first + singles ? num : first + singles) != 0;
     };
-    if (!may_matter(apart, apart_after)) {
-      store(least + i, apart);
-      store(after + i, apart_after);
-      return;
+    Centres centres[most_leaves / singles];
+    int size = 0;
+    for (int first = 0; first < num; first += singles) {
+      Centres& at = centres[size];
+      separate(group, of, first, at);
+      if (may_matter(first)) {
+        at.sight = Sight(of, at.e, first_t(of, at.e, at.second), at.inverses);
+        ++size;
+      }
     }
-    at.begin(of);
-    at.set_w(of);
-    at.measure(of);
-    Singles n[3], v[3], half[3], along = {}, box = {};
-    for (int j = 0; j < 3; ++j) {
-      n[j] = (of.axes[j] * at.w[0] + of.axes[3 + j] * at.w[1] + of.axes[6 + j] * at.w[2]) * at.inverse_norm;
-      v[j] = load(leaves.velocity[j] + i);
-      half[j] = load(leaves.half[j] + i);
-      along += n[j] * v[j];
-      box += half[j] * magnitude(n[j]);
+    for (int n = 0; n < size; ++n) {
+      bound(group, of, centres[n]);
+      if (may_matter(centres[n].first)) {
+        extrapolate(of, centres[n]);
+      }
     }
-    // h is convex: at d from the centre it is more by n·d at least. n changes by H d for a matrix H between 0 and that of a
-    // sphere as round as the ellipsoid is anywhere, κ; then −dᵀ H v is −κ (|d| |v| + d·v) / 2 at least.
-    const Singles bend = rough_inverse(of.roundness + larger(at.height - box, Singles{}));
-    const Singles share = (0.5f * horizon) * bend;
-    const Singles across = rough_root((1.0f + 2.0f * direction_error) * speed * speed - along * along);
-    Singles turning_box = {};
-    for (int j = 0; j < 3; ++j) {
-      const int l = (j + 1) % 3, m = (j + 2) % 3;
-      const Singles swept = n[l] * static_cast<float>(group.link->angular[m]) - n[m] * static_cast<float>(group.link->angular[l]);
-      turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]) - horizon * swept);
-    }
-    // What points beside the centre have of the link's turn is in `turning_box` as n has it at the centre.
-    const Singles swirl = static_cast<float>(group.link->turning) * diagonal;
-    const Singles rest = more - swirl + swirl * smaller(bend * diagonal + at.tilt, all(2.0f));
-    const Singles turned = share * diagonal * (across + bend * diagonal * larger(-along, Singles{}));
-    const Singles lowest = at.height - box;
-    const Singles in_motion = at.height - turning_box - turned - horizon * (along + (at.tilt + at.tilt) * speed + rest);
-    const auto outside = lowest > margin;
-    store(least + i, outside ? lowest - margin : apart);
-    store(after + i, outside ? larger(in_motion, lowest - stopped) - margin : all(-__builtin_inff()));
-    if (!may_matter(load(least + i), load(after + i))) {
-      return;
-    }
-    const Singles inverse_flatness = rough_inverse(larger(at.flatness, all(tiny)));
-    Singles start = at.next(at.t, at.S, at.flatness);
-    for (int j = 0; j < 3; ++j) {
-      const Singles slope = of.squared[j] * at.w[j] * at.inverses[j] * inverse_flatness;
-      start -= slope * at.e[j];
-      store(gradient[j] + i, slope);
-    }
-    store(t0 + i, start);
-    store(turn + i, bend * diagonal);
   }
 
-  /// Those of the first `num` leaves that may matter.
-  LeafBits below(float near, float ahead, int num) const noexcept {
+  /// Those of the leaves [first, last) that may matter.
+  LeafBits below(float near, float ahead, int first, int last) const noexcept {
     LeafBits bits = 0;
-    for (int i = 0; i < num; i += singles) {
+    for (int i = first; i < last; i += singles) {
       const unsigned lanes = kernels::below(load(least + i), all(near)) | kernels::below(load(after + i), all(ahead));
-      bits |= static_cast<LeafBits>(lanes & first_lanes(num - i)) << i;
+      bits |= static_cast<LeafBits>(lanes & first_lanes(last - i)) << i;
     }
     return bits;
   }
@@ -318,6 +283,87 @@ struct LeafBounds {
     const float least_missed = smallest(missed), least_missed_ahead = smallest(missed_ahead);
     group.missed[k] = least_missed < group.missed[k] ? least_missed : group.missed[k];
     group.missed_ahead[k] = least_missed_ahead < group.missed_ahead[k] ? least_missed_ahead : group.missed_ahead[k];
+  }
+
+ private:
+  /// Of a register of leaves.
+  struct Centres {
+    int first;
+    Singles e[3], second, inverses[3];  // Σ A e², 1 / (A + t)
+    Singles apart, margin, stopped;     // h from below, error and largest radius, and how far points come nearer
+    Sight sight;
+  };
+
+  /// The plane across the way from centre to centre says enough of many: towards it an ellipsoid reaches √(Σ A e²)/|e|.
+  void separate(const QueryGroup& group, const Ellipsoid& of, int i, Centres& at) noexcept {
+    const Leaves& leaves = group.leaves;
+    at.first = i;
+    of.place(load(leaves.centre[0] + i), load(leaves.centre[1] + i), load(leaves.centre[2] + i), at.e);
+    Singles squared = {};
+    at.second = Singles{};
+    for (int j = 0; j < 3; ++j) {
+      const Singles square = at.e[j] * at.e[j];
+      squared += square;
+      at.second += of.squared[j] * square;
+    }
+    at.margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error);
+    at.stopped = static_cast<float>(group.horizon) * (load(leaves.speed + i) + load(leaves.more + i));
+    at.apart = (squared - rough_root(at.second)) * rough_inverse_root(larger(squared, all(tiny))) -
+               (load(leaves.diagonal + i) + at.margin);
+    store(least + i, at.apart);
+    // Inside gradients are longer than one.
+    store(after + i, at.apart > 0.0f ? at.apart - at.stopped : all(-__builtin_inff()));
+  }
+
+  void bound(const QueryGroup& group, const Ellipsoid& of, const Centres& at) noexcept {
+    const Leaves& leaves = group.leaves;
+    const int i = at.first;
+    const float horizon = static_cast<float>(group.horizon);
+    const Singles speed = load(leaves.speed + i), more = load(leaves.more + i), diagonal = load(leaves.diagonal + i);
+    const TangentPlane plane(of, at.sight);
+    const Singles* w = at.sight.w;
+    Singles n[3], v[3], half[3], along = {}, box = {};
+    for (int j = 0; j < 3; ++j) {
+      n[j] = (of.axes[j] * w[0] + of.axes[3 + j] * w[1] + of.axes[6 + j] * w[2]) * plane.inverse_norm;
+      v[j] = load(leaves.velocity[j] + i);
+      half[j] = load(leaves.half[j] + i);
+      along += n[j] * v[j];
+      box += half[j] * magnitude(n[j]);
+    }
+    // h is convex: at d from the centre it is more by n·d at least. n changes by H d for a matrix H between 0 and that of a
+    // sphere as round as the ellipsoid is anywhere, κ; then −dᵀ H v is −κ (|d| |v| + d·v) / 2 at least.
+    const Singles lowest = plane.height - box;
+    const Singles bend = rough_inverse(of.roundness + larger(lowest, Singles{}));
+    const Singles share = (0.5f * horizon) * bend;
+    const Singles across = rough_root((1.0f + 2.0f * direction_error) * speed * speed - along * along);
+    Singles turning_box = {};
+    for (int j = 0; j < 3; ++j) {
+      const int l = (j + 1) % 3, m = (j + 2) % 3;
+      const Singles swept = n[l] * static_cast<float>(group.link->angular[m]) - n[m] * static_cast<float>(group.link->angular[l]);
+      turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]) - horizon * swept);
+    }
+    // What points beside the centre have of the link's turn is in `turning_box` as n has it at the centre.
+    const Singles swirl = static_cast<float>(group.link->turning) * diagonal;
+    const Singles rest = more - swirl + swirl * smaller(bend * diagonal + plane.tilt, all(2.0f));
+    const Singles turned = share * diagonal * (across + bend * diagonal * larger(-along, Singles{}));
+    const Singles in_motion = plane.height - turning_box - turned - horizon * (along + (plane.tilt + plane.tilt) * speed + rest);
+    const auto outside = lowest > at.margin;
+    store(least + i, outside ? lowest - at.margin : at.apart);
+    store(after + i, outside ? larger(in_motion, lowest - at.stopped) - at.margin : all(-__builtin_inff()));
+    store(turn + i, bend * diagonal);
+  }
+
+  /// t of points.
+  void extrapolate(const Ellipsoid& of, const Centres& at) noexcept {
+    const Sight& sight = at.sight;
+    const Singles inverse_flatness = rough_inverse(larger(sight.flatness, all(tiny)));
+    Singles start = sight.next();
+    for (int j = 0; j < 3; ++j) {
+      const Singles slope = of.squared[j] * sight.w[j] * at.inverses[j] * inverse_flatness;
+      start -= slope * at.e[j];
+      store(gradient[j] + at.first, slope);
+    }
+    store(t0 + at.first, start);
   }
 };
 
@@ -362,36 +408,42 @@ struct FarSight {
   }
 };
 
-/// What an ellipsoid sees of a register of points: bounds of h and h + τ h'. Found for several registers before any is made use
-/// of: one's chain of operations is long, and the next one's runs beside it.
+/// What an ellipsoid sees of a register of points: bounds of h and h + τ h'. Found in steps, each for several registers, as
+/// those of leaves are.
 struct Look {
   unsigned asked;  // lanes
   int first;       // point; negative: of loose ones, from −1 − first on
-  Singles t, S, flatness, least[2], most[2];
+  Sight sight;
+  Singles least[2], most[2];
 
-  /// Of points of leaf i of the group, from n on. `moves`: whether points do.
-  template <bool moves>
-  void find(const QueryGroup& group, const Ellipsoid& of, const LeafBounds& bounds, int i, int n) noexcept {
-    const Leaves& leaves = group.leaves;
-    const int from = i * most_points + n;
+  /// Of points of leaf i of the group, from n on.
+  void begin(const Leaves& leaves, const Ellipsoid& of, const LeafBounds& bounds, int i, int n) noexcept {
+    leaf_ = i;
+    at_ = i * most_points + n;
     first = leaves.leaf[i] * most_points + n;
     asked = first_lanes(leaves.count[i] - n);
-    Sight at;
-    at.place(of, load(leaves.position[0] + from), load(leaves.position[1] + from), load(leaves.position[2] + from));
-    Singles t_near = all(bounds.t0[i]);
+    Singles e[3], inverses[3], t = all(bounds.t0[i]);
+    of.place(load(leaves.position[0] + at_), load(leaves.position[1] + at_), load(leaves.position[2] + at_), e);
     for (int j = 0; j < 3; ++j) {
-      t_near += bounds.gradient[j][i] * at.e[j];
+      t += bounds.gradient[j][i] * e[j];
     }
-    at.t = larger(t_near, Singles{});
+    t = larger(t, Singles{});
     if (bounds.turn[i] > most_turn) {
-      at.set_w(of);
-      at.t = Sight::next(at.t, at.S, at.flatness);
+      t = Sight(of, e, t, inverses).next();
     }
+    sight = Sight(of, e, t, inverses);
+  }
+
+  /// `moves`: whether points do.
+  template <bool moves>
+  void finish(const QueryGroup& group, const Ellipsoid& of) noexcept {
+    const Leaves& leaves = group.leaves;
     Singles own[3] = {};
     if constexpr (moves) {
-      of.turn(leaves.own[0] + from, leaves.own[1] + from, leaves.own[2] + from, own);
+      of.turn(leaves.own[0] + at_, leaves.own[1] + at_, leaves.own[2] + at_, own);
     }
-    bound<moves>(group, of, at, load(leaves.radius + from), own, all(leaves.speed[i] + leaves.more[i]), all(leaves.error[i] + of.error));
+    bound<moves>(group, of, load(leaves.radius + at_), own, all(leaves.speed[leaf_] + leaves.more[leaf_]),
+                 all(leaves.error[leaf_] + of.error));
   }
 
   /// Of loose points, from n on. Returns whether any may matter.
@@ -399,26 +451,29 @@ struct Look {
   bool find_loose(const QueryGroup& group, const Ellipsoid& of, int k, int n) noexcept {
     const LoosePoints& loose = group.loose;
     first = -1 - n;
-    Sight at;
-    at.place(of, load(loose.position[0] + n), load(loose.position[1] + n), load(loose.position[2] + n));
+    Singles e[3], inverses[3];
+    of.place(load(loose.position[0] + n), load(loose.position[1] + n), load(loose.position[2] + n), e);
     const Singles radius = load(loose.radius + n);
     Singles own[3] = {};
     if constexpr (moves) {
       of.turn(loose.own[0] + n, loose.own[1] + n, loose.own[2] + n, own);
     }
-    const FarSight far(of, at.e, own);
+    const FarSight far(of, e, own);
     const Singles apart = far.apart - radius - far.error;
     const Singles after = apart > 0.0f ? apart - static_cast<float>(group.horizon) * far.closing : all(-__builtin_inff());
     asked = (below(apart, all(group.near[k])) | below(after, all(group.ahead[k]))) & first_lanes(loose.num - n);
     if (asked == 0) {
       return false;
     }
-    at.begin(of);
-    for (int step = 0; step < loose_steps; ++step) {
-      at.set_w(of);
-      at.t = Sight::next(at.t, at.S, at.flatness);
+    Singles second = {};
+    for (int j = 0; j < 3; ++j) {
+      second += of.squared[j] * (e[j] * e[j]);
     }
-    bound<moves>(group, of, at, radius, own, far.speed, far.error);
+    sight = Sight(of, e, first_t(of, e, second), inverses);
+    for (int step = 0; step < loose_steps; ++step) {
+      sight = Sight(of, e, sight.next(), inverses);
+    }
+    bound<moves>(group, of, radius, own, far.speed, far.error);
     return true;
   }
 
@@ -436,7 +491,7 @@ struct Look {
       sum_candidates(group, k, points);
     }
     const int to = candidates.size;
-    compress(candidates.t + to, Sight::next(t, S, flatness), kept);
+    compress(candidates.t + to, sight.next(), kept);
     compress(candidates.least[0] + to, least[0], kept);
     compress(candidates.least[1] + to, least[1], kept);
     if (first >= 0) {
@@ -449,23 +504,24 @@ struct Look {
 
  private:
   template <bool moves>
-  void bound(const QueryGroup& group, const Ellipsoid& of, Sight& at, Singles radius, const Singles* own, Singles speed,
+  void bound(const QueryGroup& group, const Ellipsoid& of, Singles radius, const Singles* own, Singles speed,
              Singles error) noexcept {
-    at.set_w(of);
-    at.measure(of);
+    const TangentPlane plane(of, sight);
+    const Singles* w = sight.w;
     const float horizon = static_cast<float>(group.horizon);
-    Singles rate = at.rate(of);
+    Singles rate = plane.rate(of, w);
     if constexpr (moves) {
-      rate += (own[0] * at.w[0] + own[1] * at.w[1] + own[2] * at.w[2]) * at.inverse_norm;
+      rate += (own[0] * w[0] + own[1] * w[1] + own[2] * w[2]) * plane.inverse_norm;
     }
-    const Singles slack = horizon * (at.tilt * speed + static_cast<float>(group.link->turning) * error);
-    const auto maybe_inside = at.height <= error;  // where no plane separates, clearances are lower than that
-    t = at.t, S = at.S, flatness = at.flatness;
-    least[0] = maybe_inside ? all(-__builtin_inff()) : at.height - radius - error;
+    const Singles slack = horizon * (plane.tilt * speed + static_cast<float>(group.link->turning) * error);
+    const auto maybe_inside = plane.height <= error;  // where no plane separates, clearances are lower than that
+    least[0] = maybe_inside ? all(-__builtin_inff()) : plane.height - radius - error;
     least[1] = least[0] + horizon * rate - slack;
-    most[0] = larger(at.height + at.above, Singles{}) + error - radius;
+    most[0] = larger(plane.height + plane.above, Singles{}) + error - radius;
     most[1] = maybe_inside ? all(__builtin_inff()) : most[0] + horizon * rate + slack;
   }
+
+  int leaf_, at_;  // of the group
 };
 
 /// Looks at the points of some leaves, and returns at which: at others no more.
@@ -473,12 +529,12 @@ template <bool moves>
 LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen,
                  const Points& points) noexcept {
   Leaves& leaves = group.leaves;
-  constexpr int side_by_side = 4;
+  constexpr int registers = most_points / singles, side_by_side = registers > 6 ? registers : 6;
   Look looks[side_by_side];
   LeafBits seen = 0;
   while (chosen != 0) {
     int size = 0;
-    for (; chosen != 0 && size + most_points / singles <= side_by_side; chosen &= chosen - 1) {
+    for (; chosen != 0 && size + registers <= side_by_side; chosen &= chosen - 1) {
       const int i = __builtin_ctzll(chosen);
       if (!(bounds.least[i] < group.near_leaf[k] || bounds.after[i] < group.ahead_leaf[k])) {  // no more
         continue;
@@ -488,8 +544,11 @@ LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds
         load_points(group, points, i);
       }
       for (int n = 0; n < leaves.count[i]; n += singles) {
-        looks[size++].find<moves>(group, of, bounds, i, n);
+        looks[size++].begin(leaves, of, bounds, i, n);
       }
+    }
+    for (int i = 0; i < size; ++i) {
+      looks[i].finish<moves>(group, of);
     }
     for (int i = 0; i < size; ++i) {
       looks[i].keep(group, k, points);
@@ -521,12 +580,9 @@ void collect_all(QueryGroup& group, const Points& points) noexcept {
     if (num == 0) {
       continue;
     }
-    LeafBounds bounds;
-    for (int i = 0; i < num; i += singles) {
-      bounds.find(group, of, k, i);
-    }
+    const LeafBounds bounds(group, of, k);
     LeafBits seen = 0;
-    while (const LeafBits left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], num) & ~seen) {
+    while (const LeafBits left = bounds.below(group.near_leaf[k], group.ahead_leaf[k], 0, num) & ~seen) {
       seen |= look_at<moves>(group, k, of, bounds, left, points);
     }
     bounds.note_missed(group, k, seen);

@@ -59,60 +59,11 @@ Lanes decay(double shift, double inverse_T) noexcept {
   return exponential(all(shift * inverse_T < 690.0 ? -shift * inverse_T : -690.0));
 }
 
-/// Points outside an ellipsoid with squared semi-axes A, seen from it: w = e / (A + t) with t > 0 where S = Σ A w² = 1.
-struct Outside {
-  Lanes t, inverses[3], w[3], shares[3], S, flatness;  // 1 / (A + t), A w², Σ A w² / (A + t)
-  Lanes inverse_flatness;                              // once polished; as it was before
-
-  /// `last`: to rounding; else within 1e-8, which is enough for a step.
-  template <bool last>
-  void place(const double* A, const Lanes* e, Lanes at) noexcept {
-    t = at;
-    const Lanes sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1], of_sums = product * sums[2];
-    const Lanes of_all = last ? inverse(of_sums) : quick_inverse(of_sums), of_two = of_all * sums[2];
-    inverses[0] = of_two * sums[1];
-    inverses[1] = of_two * sums[0];
-    inverses[2] = of_all * product;
-    S = flatness = Lanes{};
-    for (int i = 0; i < 3; ++i) {
-      w[i] = e[i] * inverses[i];
-      shares[i] = A[i] * w[i] * w[i];
-      S += shares[i];
-      flatness += shares[i] * inverses[i];
-    }
-  }
-
-  /// Newton's step on 1/√S − 1, which is concave in t: it ends below the root, wherever it begins.
-  Lanes step() const noexcept { return S * (root(S) - 1.0) * quick_inverse(flatness); }
-  /// The same where S is close to 1.
-  Lanes small_step(Lanes per_flatness) const noexcept {
-    const Lanes over = S - 1.0;
-    return S * (over * (0.5 - over * (0.375 - 0.3125 * over))) * per_flatness;
-  }
-
-  /// Chebyshev's step on the same where S is close to 1: of an error that is small its third power is left.
-  Lanes cubic_step() const noexcept {
-    const Lanes per_flatness = quick_inverse(flatness);
-    const Lanes newton = small_step(per_flatness);
-    Lanes second = {};  // Σ A w² / (A + t)²
-    for (int i = 0; i < 3; ++i) {
-      second += shares[i] * inverses[i] * inverses[i];
-    }
-    const Lanes bend = second * per_flatness - flatness * (2.0 - S);  // 1/S is 2 − S, where S is close to 1
-    return newton * (1.0 + 1.5 * newton * bend);
-  }
-
-  /// Newton's step where S is so close to 1 that all changes in proportion to it; S and flatness are left as they were.
-  void polish() noexcept {
-    inverse_flatness = quick_inverse(flatness);
-    const Lanes step = 0.5 * (S - 1.0) * inverse_flatness;
-    t += step;
-    for (int i = 0; i < 3; ++i) {
-      const Lanes change = 1.0 - step * inverses[i];
-      w[i] *= change;
-      inverses[i] *= change;
-    }
-  }
+/// Where points outside an ellipsoid with squared semi-axes A are seen from it: w = e / (A + t) with t > 0 where
+/// S = Σ A w² = 1.
+struct Foot {
+  Lanes t, inverses[3], w[3];  // 1 / (A + t)
+  Lanes inverse_flatness;      // 1 / Σ A w² / (A + t), nearly
 
   /// n'·v, of points that move by v. With D = (A + t)⁻¹ it is (v·w' − (n·v)(n·w'))/|w| for w' = D (v − w t') and
   /// t' = (w·v − t w·Dv) / (|w|² − t w·Dw), as A D is 1 − t D; along is w·v. The divisor is the flatness, polished.
@@ -130,6 +81,65 @@ struct Outside {
   }
 };
 
+/// The same on the way there.
+struct Outside {
+  Lanes t, inverses[3], w[3];    // 1 / (A + t)
+  Lanes S, shares[3], flatness;  // A w² / (A + t) and their sum
+
+  /// `last`: to rounding; else within 1e-8, which is enough for a step.
+  template <bool last>
+  void place(const double* A, const Lanes* e, Lanes at) noexcept {
+    t = at;
+    const Lanes sums[3] = {A[0] + t, A[1] + t, A[2] + t}, product = sums[0] * sums[1], of_sums = product * sums[2];
+    const Lanes of_all = last ? inverse(of_sums) : quick_inverse(of_sums), of_two = of_all * sums[2];
+    inverses[0] = of_two * sums[1];
+    inverses[1] = of_two * sums[0];
+    inverses[2] = of_all * product;
+    S = flatness = Lanes{};
+    for (int i = 0; i < 3; ++i) {
+      w[i] = e[i] * inverses[i];
+      const Lanes of_S = A[i] * w[i] * w[i];
+      S += of_S;
+      shares[i] = of_S * inverses[i];
+      flatness += shares[i];
+    }
+  }
+
+  /// Newton's step on 1/√S − 1, which is concave in t: it ends below the root, wherever it begins.
+  Lanes step() const noexcept { return S * (root(S) - 1.0) * quick_inverse(flatness); }
+  /// The same where S is close to 1.
+  Lanes small_step(Lanes per_flatness) const noexcept {
+    const Lanes over = S - 1.0;
+    return S * (over * (0.5 - over * (0.375 - 0.3125 * over))) * per_flatness;
+  }
+
+  /// Chebyshev's step on the same where S is close to 1: of an error that is small its third power is left.
+  Lanes cubic_step() const noexcept {
+    const Lanes per_flatness = quick_inverse(flatness);
+    const Lanes newton = small_step(per_flatness);
+    Lanes second = {};  // Σ A w² / (A + t)²
+    for (int i = 0; i < 3; ++i) {
+      second += shares[i] * inverses[i];
+    }
+    const Lanes bend = second * per_flatness - flatness * (2.0 - S);  // 1/S is 2 − S, where S is close to 1
+    return newton * (1.0 + 1.5 * newton * bend);
+  }
+
+  /// Newton's step where S is so close to 1 that all changes in proportion to it.
+  Foot foot() const noexcept {
+    Foot at;
+    at.inverse_flatness = quick_inverse(flatness);
+    const Lanes step = 0.5 * (S - 1.0) * at.inverse_flatness;
+    at.t = t + step;
+    for (int i = 0; i < 3; ++i) {
+      const Lanes change = 1.0 - step * inverses[i];
+      at.w[i] = w[i] * change;
+      at.inverses[i] = inverses[i] * change;
+    }
+    return at;
+  }
+};
+
 /// Points inside: u = e / A, m = e·u < 1, h = (m − √m) / |u|.
 struct Inside {
   Lanes u[3], root_m, inverse_norm, value, gradient[3];
@@ -144,6 +154,13 @@ struct Inside {
     for (int i = 0; i < 3; ++i) {
       gradient[i] = ((2.0 - 1.0 / root_m) - value * inverse_norm / A[i]) * u[i] * inverse_norm;
     }
+  }
+
+  /// As e is A u, and the gradient along i is u_i times a part that all axes have and h / (|u|² A_i).
+  Lanes twist(const double* A, int i) const noexcept {
+    const int j = (i + 1) % 3, l = (i + 2) % 3;
+    const Lanes common = (2.0 - 1.0 / root_m) * inverse_norm, own = value * inverse_norm * inverse_norm;
+    return u[j] * u[l] * (common - own * (1.0 / A[j] + 1.0 / A[l]));
   }
 
   /// vᵀ ∂²h v: h |u| = m − √m, differentiated twice.
@@ -193,8 +210,9 @@ struct Chosen {
 
 /// Points in double precision, side by side; infinitely far where no more are chosen.
 struct Samples {
-  Lanes h, after, rate, g[3], moment[3];  // h + τ h', h', and ∂h with its moment about the centre, in principal axes
-  Lanes curvature;                        // h'' without what the bias of the link makes, which is linear in g and moment
+  Lanes h, after, rate, g[3];  // h + τ h', h', and ∂h in principal axes
+  Lanes twist[3];              // its moment about the centre, (A_j − A_l) times which it is along axis i, in cyclic order
+  Lanes curvature;             // h'' without what the bias of the link makes, which is linear in ∂h and its moment
 };
 
 /// How samples are found: in steps, each for several registers. The chain of operations of one is long, and the next one's
@@ -247,24 +265,32 @@ class Approach {
     move(step);
   }
 
-  void finish(const QueryGroup& group, int k, int count, Samples& result) noexcept {
-    const Query& query = group.queries[k];
-    const double *A = query.squared_axes, *W = query.angular;
+  void settle(const QueryGroup& group, int k) noexcept {
+    const double* A = group.queries[k].squared_axes;
     Outside out;
     out.place<true>(A, e_, t_);
     for (int i = 0; i < most_iterations && __builtin_expect(are_far(out.S, polished_within), 0); ++i) {
       move(out.step());
       out.place<true>(A, e_, t_);
     }
-    out.polish();
-    const Lanes squared_norm = out.w[0] * out.w[0] + out.w[1] * out.w[1] + out.w[2] * out.w[2];
+    foot_ = out.foot();
+  }
+
+  void finish(const QueryGroup& group, int k, int count, Samples& result) noexcept {
+    const Query& query = group.queries[k];
+    const double *A = query.squared_axes, *W = query.angular;
+    const Lanes* w = foot_.w;
+    const Lanes squared_norm = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
     const Lanes inverse_norm = inverse_root(squared_norm);
-    Lanes h = out.t * squared_norm * inverse_norm, *g = result.g;
+    Lanes h = foot_.t * squared_norm * inverse_norm, *g = result.g;
     for (int i = 0; i < 3; ++i) {
-      g[i] = out.w[i] * inverse_norm;
+      g[i] = w[i] * inverse_norm;
     }
-    const Lanes along = out.w[0] * v_[0] + out.w[1] * v_[1] + out.w[2] * v_[2];
-    Lanes curvature = out.bend(v_, along, squared_norm, inverse_norm);
+    for (int i = 0; i < 3; ++i) {
+      result.twist[i] = w[(i + 1) % 3] * g[(i + 2) % 3];  // as e is (A + t) w
+    }
+    const Lanes along = w[0] * v_[0] + w[1] * v_[1] + w[2] * v_[2];
+    Lanes curvature = foot_.bend(v_, along, squared_norm, inverse_norm);
     result.rate = along * inverse_norm;
     if (!outside && are_inside_ != 0) {
       const Lanes squared = e_[0] * e_[0] + e_[1] * e_[1] + e_[2] * e_[2];
@@ -273,6 +299,7 @@ class Approach {
       h = inside_ ? in.value : h;
       for (int i = 0; i < 3; ++i) {
         g[i] = inside_ ? in.gradient[i] : g[i];
+        result.twist[i] = inside_ ? in.twist(A, i) : result.twist[i];
       }
       result.rate = g[0] * v_[0] + g[1] * v_[1] + g[2] * v_[2];
       curvature = inside_ ? in.bend(A, v_, result.rate) : curvature;
@@ -281,7 +308,6 @@ class Approach {
     result.after = result.h + group.horizon * result.rate;
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, l = (i + 2) % 3;
-      result.moment[i] = e_[j] * g[l] - e_[l] * g[j];
       curvature -= g[i] * (W[j] * (moves ? v_[l] + own_[l] : v_[l]) - W[l] * (moves ? v_[j] + own_[j] : v_[j]));
     }
     result.curvature = curvature;
@@ -305,6 +331,7 @@ class Approach {
 
   Lanes e_[3], v_[3], own_[3];  // the offset in principal axes, velocities in moving ones, and those of the points
   Lanes radius_, t_;
+  Foot foot_;
   Bits inside_;
   unsigned are_inside_ = 0;
 };
@@ -318,6 +345,9 @@ void approach_all(const QueryGroup& group, int k, const Points& points, const Ch
     const int end = number < first + together ? number : first + together;
     for (int i = first; i < end; ++i) {
       approaches[i - first].begin(group, k, points, chosen, i * width);
+    }
+    for (int i = first; i < end; ++i) {
+      approaches[i - first].settle(group, k);
     }
     for (int i = first; i < end; ++i) {
       approaches[i - first].finish(group, k, chosen.size - i * width, samples[i]);
@@ -359,17 +389,17 @@ void rescale(Query& query, int first, int last, double before, double now, doubl
   }
 }
 
-/// And what lies above it lies higher above: Σ w (h − reference), its derivatives and its gradient.
+/// And what lies above it lies higher above: sums of w (h − reference).
 void refer(Query& query, double before, double now) noexcept {
   if (now < before && before < __builtin_inf()) {
     const auto raise = [&](int sum, int by) {
       store(query.lane_sums[sum], load(query.lane_sums[sum]) + (before - now) * load(query.lane_sums[by]));
     };
-    for (int i = 0; i < 3; ++i) {
-      raise(3 + i, i);
+    for (int i = 0; i < 4; ++i) {
+      raise(4 + i, i);
     }
     for (int i = 0; i < 6; ++i) {
-      raise(12 + i, 6 + i);
+      raise(14 + i, 8 + i);
     }
   }
 }
@@ -408,19 +438,20 @@ void add_nearest(const QueryGroup& group, Query& query, const Samples* samples, 
     const auto weighs = above < group.window;
     const Lanes over = weighs ? above : Lanes{}, rate = at.rate;
     const Lanes weight = weighs ? exponential(-inverse_T * over) : Lanes{};
-    const Lanes zeroth = -inverse_T * weight, first = weight + zeroth * over;
-    const Lanes weight_dot = zeroth * rate, weight_ddot = zeroth * (at.curvature - inverse_T * rate * rate);
+    const Lanes weight_rate = weight * rate, weight_over = weight * over, over_rate = weight_over * rate;
     sums.add(0, weight);
-    sums.add(1, weight_dot);
-    sums.add(2, weight_ddot);
-    sums.add(3, weight * over);
-    sums.add(4, weight_dot * over + weight * rate);
-    sums.add(5, weight_ddot * over + 2.0 * weight_dot * rate + weight * at.curvature);
+    sums.add(1, weight_rate);
+    sums.add(2, weight * at.curvature);
+    sums.add(3, weight_rate * rate);
+    sums.add(4, weight_over);
+    sums.add(5, over_rate);
+    sums.add(6, weight_over * at.curvature);
+    sums.add(7, over_rate * rate);
     for (int i = 0; i < 3; ++i) {
-      sums.add(6 + i, zeroth * at.g[i]);
-      sums.add(9 + i, zeroth * at.moment[i]);
-      sums.add(12 + i, first * at.g[i]);
-      sums.add(15 + i, first * at.moment[i]);
+      sums.add(8 + i, weight * at.g[i]);
+      sums.add(11 + i, weight * at.twist[i]);
+      sums.add(14 + i, weight_over * at.g[i]);
+      sums.add(17 + i, weight_over * at.twist[i]);
     }
   }
   sums.write();
@@ -445,7 +476,7 @@ void add_approach(const QueryGroup& group, Query& query, const Samples* samples,
     sums.add(approach + 3, weight * at.curvature);
     for (int i = 0; i < 3; ++i) {
       sums.add(approach + 4 + i, weight * at.g[i]);
-      sums.add(approach + 7 + i, weight * at.moment[i]);
+      sums.add(approach + 7 + i, weight * at.twist[i]);
     }
   }
   sums.write();
