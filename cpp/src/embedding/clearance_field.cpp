@@ -92,14 +92,15 @@ class Means {
     const double *s = sums_, k = inverse_T_;
     ClearanceSample mean = BoltzmannMean::Sums{s[0], -k * s[1], k * (k * s[3] - s[2]), s[4], s[1] - k * s[5],
                                                s[2] - k * (2.0 * s[3] + s[6] - k * s[7])}.mean();
-    mean.gradient = wrench(((1.0 + k * mean.value) * gradient(of_weights) - k * gradient(of_heights)) / s[0]);
+    mean.gradient = wrench(((1.0 + k * mean.value) * gradient(of_weights) - k * gradient(of_heights)) * (1.0 / s[0]));
     mean.value += query_.reference;
     return mean;
   }
 
   ClearanceSample approach() const noexcept {
     const double* s = sums_ + kernels::approach;
-    return {s[1] / s[0], s[2] / s[0], s[3] / s[0], wrench(gradient(kernels::approach + 4) / s[0])};
+    const double share = 1.0 / s[0];
+    return {s[1] * share, s[2] * share, s[3] * share, wrench(gradient(kernels::approach + 4) * share)};
   }
 
  private:
@@ -253,7 +254,7 @@ class ClearanceField::Search {
   }
 
   /// Writes the means of ellipsoid k of the cluster.
-  void write(int k, const KinematicState& state, ClearanceView out) noexcept {
+  void write(int k, const KinematicState& state, ClearanceView& out) noexcept {
     const kernels::Query& query = group_.queries[k];
     if (!query.near && !query.approached) {
       return;
@@ -269,13 +270,34 @@ class ClearanceField::Search {
     const ClearanceSample nearest = query.reference < infinity ? means.nearest() : approach;
     const bool within = query.reference < infinity && nearest.value < reach_;
     if (within || query.ahead < horizon_.distance) {
-      sidestep::write(within ? nearest : approach, state, joint, -1, at, out);
-      sidestep::write(approach, state, joint, -1, at, out.approach);
+      write(within ? nearest : approach, approach, state, joint, at, out);
       out.nearest[at] = tree_.order()[static_cast<std::size_t>(within ? query.nearest : query.minded)];
     }
   }
 
  private:
+  /// Both gradients on one way down to the base.
+  static void write(const ClearanceSample& nearest, const ClearanceSample& approach, const KinematicState& state, int joint,
+                    Eigen::Index at, ClearanceView& out) noexcept {
+    const auto begin = [at](const ClearanceSample& from, ClearanceStateView& to) {
+      to.values[at] = from.value;
+      to.rates[at] = from.rate;
+      to.curvatures[at] = from.curvature;
+      to.gradients.col(at).setZero();
+      return to.gradients.col(at).data();
+    };
+    double *gradient = begin(nearest, out), *gradient_of_approach = begin(approach, out.approach);
+    Vector6d wrench, wrench_of_approach;
+    wrench << nearest.gradient.first.angular, nearest.gradient.first.linear;
+    wrench_of_approach << approach.gradient.first.angular, approach.gradient.first.linear;
+    for (int j = joint; j >= 0; j = state.link(j).parent) {
+      const KinematicState::Link& link = state.link(j);
+      const Eigen::Map<const Vector6d> screw(link.screw_numbers());
+      gradient[link.coordinate] += screw.dot(wrench);
+      gradient_of_approach[link.coordinate] += screw.dot(wrench_of_approach);
+    }
+  }
+
   static constexpr int most_put_off = 1024, most_passes = 3;
 
   const Ellipsoid& ellipsoid(int k) const noexcept {

@@ -22,8 +22,8 @@ class BoltzmannMean {
 
     /// The mean, less the reference, and without its gradient.
     ClearanceSample mean() const noexcept {
-      const double above = s1 / s0, rate = (s1_dot - above * s0_dot) / s0;
-      return {above, rate, (s1_ddot - 2.0 * rate * s0_dot - above * s0_ddot) / s0, {}};
+      const double share = 1.0 / s0, above = s1 * share, rate = (s1_dot - above * s0_dot) * share;
+      return {above, rate, (s1_ddot - 2.0 * rate * s0_dot - above * s0_ddot) * share, {}};
     }
   };
 
