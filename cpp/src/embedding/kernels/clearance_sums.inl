@@ -107,22 +107,16 @@ struct Outside {
 
   /// Newton's step on 1/√S − 1, which is concave in t: it ends below the root, wherever it begins.
   Lanes step() const noexcept { return S * (root(S) - 1.0) * quick_inverse(flatness); }
-  /// The same where S is close to 1.
-  Lanes small_step(Lanes per_flatness) const noexcept {
-    const Lanes over = S - 1.0;
-    return S * (over * (0.5 - over * (0.375 - 0.3125 * over))) * per_flatness;
-  }
 
-  /// Chebyshev's step on the same where S is close to 1: of an error that is small its third power is left.
+  /// Chebyshev's step on S − 1: of an error that is small its third power is left.
   Lanes cubic_step() const noexcept {
     const Lanes per_flatness = quick_inverse(flatness);
-    const Lanes newton = small_step(per_flatness);
+    const Lanes newton = 0.5 * (S - 1.0) * per_flatness;
     Lanes second = {};  // Σ A w² / (A + t)²
     for (int i = 0; i < 3; ++i) {
       second += shares[i] * inverses[i];
     }
-    const Lanes bend = second * per_flatness - flatness * (2.0 - S);  // 1/S is 2 − S, where S is close to 1
-    return newton * (1.0 + 1.5 * newton * bend);
+    return newton * (1.0 + 1.5 * newton * second * per_flatness);
   }
 
   /// Newton's step where S is so close to 1 that all changes in proportion to it.
