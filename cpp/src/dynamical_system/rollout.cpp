@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -46,14 +47,34 @@ void check_leader(const std::string& name, int num_coordinates, int nv, const Ro
   }
 }
 
+/// Obstacles that move from where they were at the start. Those at rest are not copied.
+class ObstaclesInMotion {
+ public:
+  explicit ObstaclesInMotion(const Obstacles& start) : start_(start) {
+    if (start.tree().moves()) {
+      moved_ = start;
+    }
+  }
+  const Obstacles& now() const noexcept { return moved_ ? *moved_ : start_; }
+  void advance(double duration) noexcept {
+    if (moved_) {
+      moved_->advance(duration);
+    }
+  }
+
+ private:
+  const Obstacles& start_;
+  std::optional<Obstacles> moved_;
+};
+
 /// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t + dt.
 /// A stage that falls back brakes; the status that is recorded is that of the step's own state.
 void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, Goal& goal,
-                   Obstacles& obstacles, double dt, const Eigen::VectorXd& a1, Eigen::VectorXd& q,
+                   ObstaclesInMotion& obstacles, double dt, const Eigen::VectorXd& a1, Eigen::VectorXd& q,
                    Eigen::VectorXd& v) {
   const double half = 0.5 * dt;
   const auto stage = [&](const Eigen::VectorXd& stage_q, const Eigen::VectorXd& stage_v) -> Eigen::VectorXd {
-    static_cast<void>(system.acceleration(stage_q, stage_v, goal, obstacles, w));
+    static_cast<void>(system.acceleration(stage_q, stage_v, goal, obstacles.now(), w));
     return w.acceleration;
   };
   obstacles.advance(half);
@@ -95,7 +116,7 @@ Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& setti
 }
 
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, const Eigen::VectorXd& start_velocity,
-                Goal goal, Obstacles obstacles, const RolloutSettings& settings) {
+                Goal goal, const Obstacles& start_obstacles, const RolloutSettings& settings) {
   const int nv = system.robot().num_coordinates();
   check_size(start, "q", nv);
   check_size(start_velocity, "v", nv);
@@ -121,6 +142,7 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   constexpr double no_potential = std::numeric_limits<double>::quiet_NaN();  // before the first step
   TorqueSolution filtered(nv);
   GeometricSystem::Workspace w(system);
+  ObstaclesInMotion obstacles(start_obstacles);
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
   const Flight* flight = nullptr;
@@ -130,7 +152,7 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
     const bool known = k > 0 && flight == nullptr;  // how far the goal itself was, as seen from a way to it
     const bool leads = k < settings.steps;          // the last row is the first of the rollout that goes on from here
     if (leads && settings.evasion != nullptr) {
-      flight = settings.evasion->pursue(goal, q, v, obstacles, dt);
+      flight = settings.evasion->pursue(goal, q, v, obstacles.now(), dt);
       followed = &goal;
       if (flight != nullptr) {
         refuge = JointGoal(flight->refuge());
@@ -141,7 +163,7 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
     if (leads && settings.escape != nullptr && flight == nullptr) {
       followed = &settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt);
     }
-    const StepStatus status = system.acceleration(q, v, *followed, obstacles, w);
+    const StepStatus status = system.acceleration(q, v, *followed, obstacles.now(), w);
     Eigen::VectorXd a = w.acceleration;
     if (flight != nullptr && !is_fallback(status)) {
       a = flight->acceleration(q, v, dt);

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
@@ -50,10 +49,10 @@ struct Rollout {
 /// Integrates the system from (q, v), obstacles and goal moving at their velocities.
 /// Throws std::invalid_argument on sizes, or a period or number of steps that is not positive.
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                Goal goal, Obstacles obstacles, const RolloutSettings& settings);
+                Goal goal, const Obstacles& obstacles, const RolloutSettings& settings);
 inline Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                       const Eigen::VectorXd& goal, Obstacles obstacles, const RolloutSettings& settings) {
-  return rollout(system, q, v, Goal(JointGoal(goal)), std::move(obstacles), settings);
+                       const Eigen::VectorXd& goal, const Obstacles& obstacles, const RolloutSettings& settings) {
+  return rollout(system, q, v, Goal(JointGoal(goal)), obstacles, settings);
 }
 
 }  // namespace sidestep
