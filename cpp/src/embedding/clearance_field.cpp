@@ -104,16 +104,15 @@ class Means {
   }
 
  private:
-  using Vector6 = Eigen::Matrix<double, 6, 1>;
   static constexpr int of_weights = 8, of_heights = 14;  // of force and moment
 
-  Vector6 gradient(int first) const noexcept { return Vector6::Map(sums_ + first); }
+  Vector6d gradient(int first) const noexcept { return Vector6d::Map(sums_ + first); }
   /// What the bias of the link makes of sums of h'', from those of the gradient.
   double of_bias(int first) const noexcept {
     return Eigen::Vector3d::Map(query_.bias_linear).dot(gradient(first).head<3>()) +
            Eigen::Vector3d::Map(query_.bias_angular).dot(gradient(first).tail<3>());
   }
-  WrenchPair wrench(const Vector6& gradient) const noexcept {
+  WrenchPair wrench(const Vector6d& gradient) const noexcept {
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query_.axes);
     const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
     return {{centre_.cross(force) - axes.transpose() * gradient.tail<3>(), force}, {}};

@@ -466,6 +466,41 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
   use(before);
 }
 
+// Without a look ahead nothing else asks for what lies deep inside: a large ball at the surface is found first, and along the
+// longest axis clearances are much lower than at its depth.
+BOOST_AUTO_TEST_CASE(balls_at_the_surface_hide_no_points_deep_inside) {
+  const InstructionSet before = instruction_set();
+  const Robot robot = test::serial_arm(test::arm_limits(1));
+  const std::string link = robot.frames().back().name;
+  const Eigen::Matrix3d S = Eigen::Vector3d(0.04, 0.0025, 0.0025).asDiagonal();
+  const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {S}, Eigen::VectorXd::Ones(1));
+  const ClearanceField field(robot, body, temperature);
+  KinematicState state(robot);
+  state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
+  const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
+  // A leaf deep inside, and one so wide that its points are looked at first, one of them the ball.
+  Eigen::Matrix3Xd points(3, 32);
+  Eigen::VectorXd radii = Eigen::VectorXd::Zero(32);
+  for (int n = 0; n < 16; ++n) {
+    points.col(n) = X * Eigen::Vector3d(n < 8 ? 0.01 : -0.01, 0.0, 1e-4);
+    points.col(16 + n) = X * Eigen::Vector3d(5.0 + n, 0.0, 0.0);
+  }
+  points.col(16) = X * Eigen::Vector3d(0.02, 0.05 * std::sqrt(0.99), 0.0);
+  radii[16] = 0.1;
+  const double m = 0.01 * 0.01 / 0.04 + 1e-8 / 0.0025;
+  const double deep = (m - std::sqrt(m)) / std::hypot(0.01 / 0.04, 1e-4 / 0.0025);
+  for (const InstructionSet set : instruction_sets()) {
+    BOOST_TEST_CONTEXT(name(set)) {
+      use(set);
+      Clearances found(1, 1);
+      field.evaluate(state, Obstacles(points, radii, Eigen::Matrix3Xd::Zero(3, 32)), 0.1, {}, found.view(0, 1));
+      BOOST_TEST(std::abs(found.values[0] - deep) < 1e-9);
+      BOOST_TEST(found.nearest[0] < 16);
+    }
+  }
+  use(before);
+}
+
 BOOST_AUTO_TEST_CASE(unknown_instruction_sets_are_refused) {
   // No processor has all three of two architectures; on one that has, there is nothing to refuse.
   const std::vector<InstructionSet> sets = instruction_sets();

@@ -294,7 +294,8 @@ struct LeafBounds {
     Sight sight;
   };
 
-  /// The plane across the way from centre to centre says enough of many: towards it an ellipsoid reaches √(Σ A e²)/|e|.
+  /// The plane across the way from centre to centre says enough of many: towards it an ellipsoid reaches √(Σ A e²)/|e|. Of
+  /// points that may be inside it says nothing.
   void separate(const QueryGroup& group, const Ellipsoid& of, int i, Centres& at) noexcept {
     const Leaves& leaves = group.leaves;
     at.first = i;
@@ -308,11 +309,11 @@ struct LeafBounds {
     }
     at.margin = load(leaves.largest + i) + (load(leaves.error + i) + of.error);
     at.stopped = static_cast<float>(group.horizon) * (load(leaves.speed + i) + load(leaves.more + i));
-    at.apart = (squared - rough_root(at.second)) * rough_inverse_root(larger(squared, all(tiny))) -
-               (load(leaves.diagonal + i) + at.margin);
+    const Singles apart = (squared - rough_root(at.second)) * rough_inverse_root(larger(squared, all(tiny))) -
+                          (load(leaves.diagonal + i) + at.margin);
+    at.apart = apart > 0.0f ? apart : all(-__builtin_inff());
     store(least + i, at.apart);
-    // Inside gradients are longer than one.
-    store(after + i, at.apart > 0.0f ? at.apart - at.stopped : all(-__builtin_inff()));
+    store(after + i, at.apart - at.stopped);
   }
 
   void bound(const QueryGroup& group, const Ellipsoid& of, const Centres& at) noexcept {
@@ -529,7 +530,7 @@ template <bool moves>
 LeafBits look_at(QueryGroup& group, int k, const Ellipsoid& of, const LeafBounds& bounds, LeafBits chosen,
                  const Points& points) noexcept {
   Leaves& leaves = group.leaves;
-  constexpr int registers = most_points / singles, side_by_side = registers > 6 ? registers : 6;
+  constexpr int registers = most_points / singles, side_by_side = 6;
   Look looks[side_by_side];
   LeafBits seen = 0;
   while (chosen != 0) {

@@ -3,8 +3,8 @@
 // Stands for the centre of an ellipsoid, where the clearance has no gradient [m]; far below any size that matters.
 constexpr double centre_offset = 1e-9;
 
-// S is 1 at the foot of the perpendicular. From within the first the cube of what it is beside 1 is within the second, and
-// from there on the square is below rounding.
+// S is 1 at the foot of the perpendicular. From within the first a step that leaves the third power ends within the second
+// of nearly round ellipsoids, and from there on the square is below rounding.
 constexpr double cubic_within = 5e-3, polished_within = 1e-7;
 constexpr int most_iterations = 16;
 constexpr int together = 4;  // registers
@@ -150,7 +150,7 @@ struct Inside {
     }
   }
 
-  /// As e is A u, and the gradient along i is u_i times a part that all axes have and h / (|u|² A_i).
+  /// As e is A u, and the gradient along i is u_i times what all axes have in common less h / (|u|² A_i).
   Lanes twist(const double* A, int i) const noexcept {
     const int j = (i + 1) % 3, l = (i + 2) % 3;
     const Lanes common = (2.0 - 1.0 / root_m) * inverse_norm, own = value * inverse_norm * inverse_norm;
