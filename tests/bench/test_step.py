@@ -52,6 +52,18 @@ def test_motions_during_which_the_core_was_taken_away_are_told_apart(monkeypatch
     assert times["max_us"] == pytest.approx(9000.0)
 
 
+def test_a_machine_that_holds_a_loop_up_is_told() -> None:
+    readings = iter([0, 1_000, 500_000, 3_500_000, 4_600_000, 10_000_000])
+    idle = step_module.held_up(0.01, lambda: next(readings))
+    assert idle == {"seconds": pytest.approx(0.01), "longest_us": pytest.approx(5_400.0), "above_1ms": 3}
+
+
+def test_the_machine_is_held_up_beside_the_rows(document: dict[str, dict[str, float]]) -> None:
+    longest = max(row["steps"] / row["steps_per_s"] for row in document["results"])
+    assert longest <= document["idle"]["seconds"] < longest + 1.0
+    assert 0.0 < document["idle"]["longest_us"] <= 1e6 * document["idle"]["seconds"]
+
+
 def test_the_dense_kernel_is_related_to_the_peak_of_the_same_run(
     document: dict[str, dict[str, float]],
 ) -> None:

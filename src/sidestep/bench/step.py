@@ -42,6 +42,7 @@ CLEARANCE = 0.03  # [m] of goals from every point, of the covering body
 TRIES = 30  # goals that are drawn before the best of them is taken
 DENSE_POINTS = 1_000  # of the kernel that leaves nothing out
 DENSE_CALLS = 20  # fewest
+LONG = 1_000_000  # [ns] between two readings of the clock
 WARM_UP = 0.1  # share of the steps that run before those that count
 
 
@@ -81,7 +82,8 @@ def run_step_bench(
 
     A step is as long as the clock says, whatever else the machine did meanwhile: `max_us`. `interruptions` says how
     often the system gave the core to another program, and `undisturbed_max_us` is the longest step of the motions
-    during which it did not; null where the system does not tell.
+    during which it did not; null where the system does not tell. What a virtual machine or the firmware takes, no
+    system tells: `idle` says how long a loop is held up that only reads the clock, see `held_up`.
     """
     rows = list(_rows(settings))
     results = []
@@ -98,6 +100,7 @@ def run_step_bench(
         "steps": settings.steps,
         "seconds": settings.seconds,
         "results": results,
+        "idle": held_up(max(row["steps"] / row["steps_per_s"] for row in results)),
         "dense": _dense_kernel(settings),
     }
 
@@ -163,6 +166,21 @@ def interruptions() -> int | None:
     if resource is None or not hasattr(resource, "RUSAGE_THREAD"):
         return None
     return resource.getrusage(resource.RUSAGE_THREAD).ru_nivcsw
+
+
+def held_up(seconds: float, clock: Callable[[], int] = time.perf_counter_ns) -> dict[str, float]:
+    """Reads the clock [ns] over and over, and returns the longest time between two readings [us] and how many were
+    longer than 1 ms: what any program on this machine has to expect."""
+    longest, above, start = 0, 0, clock()
+    last, end = start, start + round(1e9 * seconds)
+    while last < end:
+        now = clock()
+        if now - last > longest:
+            longest = now - last
+        if now - last > LONG:
+            above += 1
+        last = now
+    return {"seconds": 1e-9 * (last - start), "longest_us": 1e-3 * longest, "above_1ms": above}
 
 
 def cpu_model() -> str:

@@ -60,6 +60,11 @@ def step(
         f"{1e-9 * dense['operations_per_s']:.1f} Gflop/s, {dense['share_of_peak']:.0%} of the "
         f"{1e-9 * dense['multiply_add_per_s']:.1f} that a core does which only multiplies and adds."
     )
+    idle = document["idle"]
+    terminal.print(
+        f"A loop that only reads the clock is held up for {1e-3 * idle['longest_us']:.2f} ms at most in "
+        f"{idle['seconds']:.1f} s, {idle['above_1ms']} times for more than 1 ms: so is any step on this machine."
+    )
     if json is not None:
         write_json(document, json)
 
