@@ -113,14 +113,15 @@ void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, co
 
 /// Motions [first, first + num) of `result`, side by side.
 void roll_out(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-              const Eigen::MatrixXd& goals, Obstacles obstacles, const RolloutSettings& settings,
+              const Eigen::MatrixXd& goals, const Obstacles& start_obstacles, const RolloutSettings& settings,
               std::vector<Rollout>& result) {
   const Eigen::Index num = load(block, first, q, v, goals);
+  ObstaclesInMotion obstacles(start_obstacles);
   const auto motions = result.begin() + first;
   std::generate_n(motions, num, [&] { return make_rollout(block.system(), settings); });
   using Numbers = Eigen::Array<double, block_states, 1>;
   for (Eigen::Index k = 0; k <= settings.steps; ++k) {
-    block.update(obstacles);
+    block.update(obstacles.now());
     for (Eigen::Index i = 0; i < num; ++i) {
       Rollout& motion = motions[i];
       StepBlock::get(block.q, static_cast<int>(i), motion.q.row(k));

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -46,26 +45,6 @@ void check_leader(const std::string& name, int num_coordinates, int nv, const Ro
     throw std::invalid_argument("an " + name + " holds its goal for a period: use semi_implicit_euler or second_order");
   }
 }
-
-/// Obstacles that move from where they were at the start. Those at rest are not copied.
-class ObstaclesInMotion {
- public:
-  explicit ObstaclesInMotion(const Obstacles& start) : start_(start) {
-    if (start.tree().moves()) {
-      moved_ = start;
-    }
-  }
-  const Obstacles& now() const noexcept { return moved_ ? *moved_ : start_; }
-  void advance(double duration) noexcept {
-    if (moved_) {
-      moved_->advance(duration);
-    }
-  }
-
- private:
-  const Obstacles& start_;
-  std::optional<Obstacles> moved_;
-};
 
 /// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t + dt.
 /// A stage that falls back brakes; the status that is recorded is that of the step's own state.

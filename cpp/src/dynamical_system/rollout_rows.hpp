@@ -1,11 +1,33 @@
 #pragma once
 
+#include <optional>
+
 #include "sidestep/dynamical_system/rollout.hpp"
 
 namespace sidestep {
 
 /// A rollout with all its rows, which are still to be written. Throws as `rollout` does on the period and the steps.
 Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& settings);
+
+/// Obstacles that move from where they were at the start. Those at rest are not copied.
+class ObstaclesInMotion {
+ public:
+  explicit ObstaclesInMotion(const Obstacles& start) : start_(start) {
+    if (start.tree().moves()) {
+      moved_ = start;
+    }
+  }
+  const Obstacles& now() const noexcept { return moved_ ? *moved_ : start_; }
+  void advance(double duration) noexcept {
+    if (moved_) {
+      moved_->advance(duration);
+    }
+  }
+
+ private:
+  const Obstacles& start_;
+  std::optional<Obstacles> moved_;
+};
 
 /// (q, v) after `dt` of one acceleration, by an integrator that holds it.
 template <class Numbers>
