@@ -4,9 +4,9 @@
 #include <limits>
 #include <variant>
 
+#include "../kinematics/kernels/in_use.hpp"
 #include "kernels/step_kernel.hpp"
 #include "sidestep/embedding/embedding.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
@@ -28,14 +28,7 @@ struct Weight {
 };
 
 kernels::TakeSteps take_steps() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::take_steps_avx512;
-    case InstructionSet::avx2: return kernels::take_steps_avx2;
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::take_steps_baseline;
+  return SIDESTEP_KERNEL_IN_USE(kernels::take_steps);
 }
 
 }  // namespace

@@ -9,23 +9,16 @@
 #include <stdexcept>
 #include <string>
 
+#include "../kinematics/kernels/in_use.hpp"
 #include "../settings.hpp"
 #include "kernels/clearance_kernel.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
 
 kernels::ClearanceKernel clearance_kernel() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::clearance_kernel_avx512();
-    case InstructionSet::avx2: return kernels::clearance_kernel_avx2();
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::clearance_kernel_baseline();
+  return SIDESTEP_KERNEL_IN_USE(kernels::clearance_kernel)();
 }
 
 void copy(const Eigen::Vector3d& from, double* to) noexcept { Eigen::Vector3d::Map(to) = from; }
@@ -264,39 +257,16 @@ class ClearanceField::Search {
     }
     const Means means(query, {group_.centre[0][k], group_.centre[1][k], group_.centre[2][k]}, group_.inverse_T);
     const Eigen::Index at = cluster_->first + k;
-    const int joint = ellipsoid(k).body.joint;
     const ClearanceSample approach = means.approach();
     const ClearanceSample nearest = query.reference < infinity ? means.nearest() : approach;
     const bool within = query.reference < infinity && nearest.value < reach_;
     if (within || query.ahead < horizon_.distance) {
-      write(within ? nearest : approach, approach, state, joint, at, out);
+      sidestep::write(within ? nearest : approach, approach, state, ellipsoid(k).body.joint, at, out);
       out.nearest[at] = tree_.order()[static_cast<std::size_t>(within ? query.nearest : query.minded)];
     }
   }
 
  private:
-  /// Both gradients on one way down to the base.
-  static void write(const ClearanceSample& nearest, const ClearanceSample& approach, const KinematicState& state, int joint,
-                    Eigen::Index at, ClearanceView& out) noexcept {
-    const auto begin = [at](const ClearanceSample& from, ClearanceStateView& to) {
-      to.values[at] = from.value;
-      to.rates[at] = from.rate;
-      to.curvatures[at] = from.curvature;
-      to.gradients.col(at).setZero();
-      return to.gradients.col(at).data();
-    };
-    double *gradient = begin(nearest, out), *gradient_of_approach = begin(approach, out.approach);
-    Vector6d wrench, wrench_of_approach;
-    wrench << nearest.gradient.first.angular, nearest.gradient.first.linear;
-    wrench_of_approach << approach.gradient.first.angular, approach.gradient.first.linear;
-    for (int j = joint; j >= 0; j = state.link(j).parent) {
-      const KinematicState::Link& link = state.link(j);
-      const Eigen::Map<const Vector6d> screw(link.screw_numbers());
-      gradient[link.coordinate] += screw.dot(wrench);
-      gradient_of_approach[link.coordinate] += screw.dot(wrench_of_approach);
-    }
-  }
-
   static constexpr int most_put_off = 1024, most_passes = 3;
 
   const Ellipsoid& ellipsoid(int k) const noexcept {

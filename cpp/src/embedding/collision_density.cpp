@@ -7,32 +7,18 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "../kinematics/kernels/in_use.hpp"
 #include "kernels/density_kernel.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
 
 kernels::AddDensity add_density() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::add_density_avx512;
-    case InstructionSet::avx2: return kernels::add_density_avx2;
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::add_density_baseline;
+  return SIDESTEP_KERNEL_IN_USE(kernels::add_density);
 }
 
 kernels::AddDensityBlock add_density_block() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::add_density_block_avx512;
-    case InstructionSet::avx2: return kernels::add_density_block_avx2;
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::add_density_block_baseline;
+  return SIDESTEP_KERNEL_IN_USE(kernels::add_density_block);
 }
 
 kernels::DensityPoints points_of(const Obstacles& obstacles, bool average) noexcept {

@@ -1,20 +1,13 @@
 #include "sidestep/embedding/ellipsoid_gap.hpp"
 
+#include "../kinematics/kernels/in_use.hpp"
 #include "kernels/gap_kernel.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
 
 kernels::GapKernel gap_kernel() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::gap_kernel_avx512();
-    case InstructionSet::avx2: return kernels::gap_kernel_avx2();
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::gap_kernel_baseline();
+  return SIDESTEP_KERNEL_IN_USE(kernels::gap_kernel)();
 }
 
 template <int capacity>

@@ -3,21 +3,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "../kinematics/kernels/in_use.hpp"
 #include "kernels/gram_kernel.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
 
 kernels::AddGram add_gram() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::add_gram_avx512;
-    case InstructionSet::avx2: return kernels::add_gram_avx2;
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::add_gram_baseline;
+  return SIDESTEP_KERNEL_IN_USE(kernels::add_gram);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include "sidestep/kinematics/kinematic_block.hpp"
 
 #include "joint_models.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
+#include "kernels/in_use.hpp"
 
 namespace sidestep {
 namespace {
@@ -9,14 +9,7 @@ namespace {
 static_assert(block_states == kernels::most_lanes);
 
 kernels::UpdateLinkBlock update_link_block() noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::update_link_block_avx512;
-    case InstructionSet::avx2: return kernels::update_link_block_avx2;
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::update_link_block_baseline;
+  return SIDESTEP_KERNEL_IN_USE(kernels::update_link_block);
 }
 
 }  // namespace

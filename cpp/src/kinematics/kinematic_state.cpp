@@ -98,12 +98,7 @@ Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state
 
 void accumulate_generalised_force(const KinematicState& state, int joint, const SpatialForce& wrench,
                                   Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept {
-  Vector6d both;
-  both << wrench.angular, wrench.linear;
-  for (int j = joint; j >= 0; j = state.link(j).parent) {
-    const KinematicState::Link& link = state.link(j);
-    generalised_force[link.coordinate] += Eigen::Map<const Vector6d>(link.screw_numbers()).dot(both);
-  }
+  accumulate_generalised_forces<1>(state, joint, {wrench}, {generalised_force.data()});
 }
 
 }  // namespace sidestep

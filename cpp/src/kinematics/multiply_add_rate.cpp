@@ -4,8 +4,8 @@
 #include <chrono>
 
 #include "../settings.hpp"
+#include "kernels/in_use.hpp"
 #include "kernels/multiply_add_kernel.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
 
 namespace sidestep {
 namespace {
@@ -13,14 +13,7 @@ namespace {
 constexpr long rounds = 10'000;  // of a run: some hundred microseconds
 
 int multiply_add(double& result) noexcept {
-#if defined(SIDESTEP_X86_KERNELS)
-  switch (instruction_set()) {
-    case InstructionSet::avx512: return kernels::multiply_add_avx512(rounds, result);
-    case InstructionSet::avx2: return kernels::multiply_add_avx2(rounds, result);
-    case InstructionSet::baseline: break;
-  }
-#endif
-  return kernels::multiply_add_baseline(rounds, result);
+  return SIDESTEP_KERNEL_IN_USE(kernels::multiply_add)(rounds, result);
 }
 
 }  // namespace

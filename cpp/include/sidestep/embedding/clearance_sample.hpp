@@ -31,4 +31,8 @@ struct ClearanceSample {
 void write(const ClearanceSample& sample, const KinematicState& state, int first_joint, int second_joint,
            Eigen::Index k, ClearanceStateView& out) noexcept;
 
+/// The same of a sample, and of what approaches, with wrenches on the link of one joint.
+void write(const ClearanceSample& sample, const ClearanceSample& approach, const KinematicState& state, int joint, Eigen::Index k,
+           ClearanceView& out) noexcept;
+
 }  // namespace sidestep

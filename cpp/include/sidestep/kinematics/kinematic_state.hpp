@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -77,6 +79,22 @@ Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state
 /// Projects a wrench on link `joint` to the joint coordinates: generalised_force += J_jointᵀ wrench.
 void accumulate_generalised_force(const KinematicState& state, int joint, const SpatialForce& wrench,
                                   Eigen::Ref<Eigen::VectorXd> generalised_force) noexcept;
+
+/// The same for wrenches on one link, each to a force of its own (nv): they go down to the base together.
+template <std::size_t num>
+void accumulate_generalised_forces(const KinematicState& state, int joint, const std::array<SpatialForce, num>& wrenches,
+                                   const std::array<double*, num>& generalised_forces) noexcept {
+  std::array<Vector6d, num> both;
+  for (std::size_t n = 0; n < num; ++n) {
+    both[n] << wrenches[n].angular, wrenches[n].linear;
+  }
+  for (int j = joint; j >= 0; j = state.link(j).parent) {
+    const KinematicState::Link& link = state.link(j);
+    for (std::size_t n = 0; n < num; ++n) {
+      generalised_forces[n][link.coordinate] += Eigen::Map<const Vector6d>(link.screw_numbers()).dot(both[n]);
+    }
+  }
+}
 
 /// The same for wrenches on many links, from the last joint to the first: those of a chain go down to the base together.
 class GeneralisedForce {
