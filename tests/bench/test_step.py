@@ -62,6 +62,7 @@ def test_the_machine_is_held_up_beside_the_rows(document: dict[str, dict[str, fl
     longest = max(row["steps"] / row["steps_per_s"] for row in document["results"])
     assert longest <= document["idle"]["seconds"] < longest + 1.0
     assert 0.0 < document["idle"]["longest_us"] <= 1e6 * document["idle"]["seconds"]
+    assert (document["idle"]["above_1ms"] > 0) == (document["idle"]["longest_us"] > 1_000.0)
 
 
 def test_the_dense_kernel_is_related_to_the_peak_of_the_same_run(

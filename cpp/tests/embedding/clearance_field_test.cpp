@@ -10,6 +10,7 @@
 
 #include "sidestep/embedding/boltzmann_mean.hpp"
 #include "sidestep/kinematics/instruction_set.hpp"
+#include "support/every_instruction_set.hpp"
 #include "support/numbers.hpp"
 #include "support/random_scene.hpp"
 #include "support/serial_arm.hpp"
@@ -162,10 +163,8 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
-  const InstructionSet before = instruction_set();
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       Random random(3);
       for (const int num_points : {1, 7, 16, 17, 150, 1500}) {
         for (int trial = 0; trial < (num_points < 100 ? 5 : 1); ++trial) {
@@ -187,7 +186,6 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_plain_sum) {
       }
     }
   }
-  use(before);
 }
 
 BOOST_AUTO_TEST_CASE(what_touches_is_found_by_balls_inside) {
@@ -223,10 +221,8 @@ BOOST_AUTO_TEST_CASE(what_touches_is_found_by_balls_inside) {
 
 // One leaf holds what is near and what is far away, as where a camera sees through a window.
 BOOST_AUTO_TEST_CASE(points_far_away_do_not_blur_those_nearby) {
-  const InstructionSet before = instruction_set();
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       Random random(4);
       for (const double far : {1e3, 1e5, 1e7}) {
         for (int trial = 0; trial < 5; ++trial) {
@@ -245,15 +241,12 @@ BOOST_AUTO_TEST_CASE(points_far_away_do_not_blur_those_nearby) {
       }
     }
   }
-  use(before);
 }
 
 // Cameras mark what they do not see by the largest number, of which squares overflow in bounds of its node.
 BOOST_AUTO_TEST_CASE(points_beyond_single_precision_hide_none_nearby) {
-  const InstructionSet before = instruction_set();
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       Random random(11);
       int near = 0;
       for (int trial = 0; trial < 20; ++trial) {
@@ -280,7 +273,6 @@ BOOST_AUTO_TEST_CASE(points_beyond_single_precision_hide_none_nearby) {
       BOOST_TEST(near > 20);
     }
   }
-  use(before);
 }
 
 // Inside, gradients are longer than one: a point may close faster than any bound of a distance says, beside one that is
@@ -299,10 +291,8 @@ BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {
   points.col(0) << 0.06, 0.008, 0.0;
   points.col(8) << 0.005, 1e-9, 0.0;
   const Obstacles obstacles(points, Eigen::VectorXd::Zero(9), Eigen::Matrix3Xd::Zero(3, 9));
-  const InstructionSet before = instruction_set();
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       compare(robot, body, state, obstacles, 0.1, 0.25);
       const ClearanceField field(robot, body, temperature);
       Clearances found(1, 1);
@@ -311,13 +301,11 @@ BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {
       BOOST_TEST(found.approach.values[0] > found.values[0] + 0.08);
     }
   }
-  use(before);
 }
 
 BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
   // Of eleven points that recede and one beyond the window that comes closer than they will be, but not within reach of the
   // horizon: the nearest is what is left to be minded.
-  const InstructionSet before = instruction_set();
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;
   const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {0.01 * Eigen::Matrix3d::Identity()},
@@ -334,8 +322,8 @@ BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
     points.col(n) = X.translation() + (0.1 + (n == 11 ? beyond : h)) * away;
     velocities.col(n) = (n == 11 ? -0.5 : 1.0) * away;
   }
-  for (const InstructionSet set : instruction_sets()) {
-    use(set);
+  for (const InstructionSet set : test::EveryInstructionSet()) {
+    BOOST_TEST_INFO_SCOPE(name(set));
     Clearances found(1, 1);
     field.evaluate(state, Obstacles(points, Eigen::VectorXd::Zero(12), velocities), 0.08, {tau, 0.06}, found.view(0, 1));
     BOOST_TEST(std::abs(found.values[0] - h) < 1e-9);
@@ -343,20 +331,17 @@ BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
     BOOST_TEST(std::abs(found.approach.rates[0] - 1.0) < 1e-9);
     BOOST_TEST(std::isfinite(found.approach.curvatures[0]));
   }
-  use(before);
 }
 
 // A plane that touches a flat ellipsoid says little of what is deep inside, where clearances are lower; of leaves that lie
 // across its surface as well.
 BOOST_AUTO_TEST_CASE(clouds_that_an_ellipsoid_is_deep_in) {
-  const InstructionSet before = instruction_set();
   const Robot robot = test::serial_arm(test::arm_limits(2));
   const std::string link = robot.frames().back().name;
   const Eigen::Matrix3d S = Eigen::Vector3d(0.0225, 0.0004, 0.0025).asDiagonal();
   const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {S}, Eigen::VectorXd::Ones(1));
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       Random random(8);
       for (int trial = 0; trial < 20; ++trial) {
         KinematicState state(robot);
@@ -380,12 +365,10 @@ BOOST_AUTO_TEST_CASE(clouds_that_an_ellipsoid_is_deep_in) {
       }
     }
   }
-  use(before);
 }
 
 // More than there is room for, before a point within reach is found beside which they weigh.
 BOOST_AUTO_TEST_CASE(walls_just_beyond_the_reach_count_beside_what_is_within) {
-  const InstructionSet before = instruction_set();
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;
   const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {0.01 * Eigen::Matrix3d::Identity()},
@@ -394,9 +377,8 @@ BOOST_AUTO_TEST_CASE(walls_just_beyond_the_reach_count_beside_what_is_within) {
   state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1));
   const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
   constexpr double reach = 0.05;
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       Random random(9);
       for (const int num : {100, 1000, 3000}) {
         Eigen::Matrix3Xd points(3, num);
@@ -411,17 +393,15 @@ BOOST_AUTO_TEST_CASE(walls_just_beyond_the_reach_count_beside_what_is_within) {
       }
     }
   }
-  use(before);
 }
 
 BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
   // There the iteration begins at its end, where S is 1 but for rounding. A foot that stays on an axis a of curvature
   // radius b²/a bends the distance h by v²/(b²/a + h) for a speed v across.
-  const InstructionSet before = instruction_set();
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;
-  for (const InstructionSet set : instruction_sets()) {
-    use(set);
+  for (const InstructionSet set : test::EveryInstructionSet()) {
+    BOOST_TEST_INFO_SCOPE(name(set));
     Random random(4);
     for (int trial = 0; trial < 200; ++trial) {
       const double a = random.uniform(0.05, 0.3), b = random.uniform(0.03, 0.3), h = random.uniform(0.01, 0.3), v = 0.7;
@@ -438,11 +418,9 @@ BOOST_AUTO_TEST_CASE(points_on_an_axis_are_outside) {
       BOOST_TEST(std::abs(found.curvatures[0] - v * v / (b * b / a + h)) < 1e-9);
     }
   }
-  use(before);
 }
 
 BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
-  const InstructionSet before = instruction_set();
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;
   const Eigen::Matrix3d S = Eigen::Vector3d(0.04, 0.01, 0.02).asDiagonal();
@@ -452,8 +430,8 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
   KinematicState state(robot);
   state.update(robot, Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
   const Eigen::Isometry3d X = frame_pose(robot, state, robot.frame_index(link));
-  for (const InstructionSet set : instruction_sets()) {
-    use(set);
+  for (const InstructionSet set : test::EveryInstructionSet()) {
+    BOOST_TEST_INFO_SCOPE(name(set));
     for (const double offset : {0.0, 1e-300, 1e-30, 1e-15, 1e-9}) {
       const Eigen::Matrix3Xd at = X * Eigen::Vector3d(0.0, offset, 0.0);
       Clearances found(1, 1);
@@ -463,13 +441,11 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
       BOOST_TEST(found.nearest[0] == 0);
     }
   }
-  use(before);
 }
 
 // Without a look ahead nothing else asks for what lies deep inside: a large ball at the surface is found first, and along the
 // longest axis clearances are much lower than at its depth.
 BOOST_AUTO_TEST_CASE(balls_at_the_surface_hide_no_points_deep_inside) {
-  const InstructionSet before = instruction_set();
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;
   const Eigen::Matrix3d S = Eigen::Vector3d(0.04, 0.0025, 0.0025).asDiagonal();
@@ -489,16 +465,14 @@ BOOST_AUTO_TEST_CASE(balls_at_the_surface_hide_no_points_deep_inside) {
   radii[16] = 0.1;
   const double m = 0.01 * 0.01 / 0.04 + 1e-8 / 0.0025;
   const double deep = (m - std::sqrt(m)) / std::hypot(0.01 / 0.04, 1e-4 / 0.0025);
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       Clearances found(1, 1);
       field.evaluate(state, Obstacles(points, radii, Eigen::Matrix3Xd::Zero(3, 32)), 0.1, {}, found.view(0, 1));
       BOOST_TEST(std::abs(found.values[0] - deep) < 1e-9);
       BOOST_TEST(found.nearest[0] < 16);
     }
   }
-  use(before);
 }
 
 BOOST_AUTO_TEST_CASE(unknown_instruction_sets_are_refused) {

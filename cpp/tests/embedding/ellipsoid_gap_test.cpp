@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sidestep/kinematics/instruction_set.hpp"
+#include "support/every_instruction_set.hpp"
 #include "support/random_scene.hpp"
 
 using namespace sidestep;
@@ -99,9 +100,8 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_finds_the_same_in_any_company) {
     gaps.add(Eigen::Vector3d::Zero(), S_a, d, S_b);
     alone.push_back(ellipsoid_gap(d, S_a, S_b));
   }
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       gaps.solve();
       for (int k = 0; k < gaps.size(); ++k) {
         // Normals differ by the accuracy at which the iteration ends, 1e-12, over the curvature; the same code not at all.
@@ -109,14 +109,12 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_finds_the_same_in_any_company) {
       }
     }
   }
-  use(before);
 }
 
 BOOST_AUTO_TEST_CASE(bounds_are_those_of_the_line_of_centres) {
-  const InstructionSet before = instruction_set();
   Random random(5);
-  for (const InstructionSet set : instruction_sets()) {
-    use(set);
+  for (const InstructionSet set : test::EveryInstructionSet()) {
+    BOOST_TEST_INFO_SCOPE(name(set));
     for (int trial = 0; trial < 100; ++trial) {
       const Eigen::Matrix3d R = test::random_pose(random, 0.0).linear(), S_b = shape(random, 0.01, 0.2);
       const Eigen::Vector3d b = random.uniform(0.0, 0.6) * random.vector(3).normalized();
@@ -141,5 +139,4 @@ BOOST_AUTO_TEST_CASE(bounds_are_those_of_the_line_of_centres) {
       }
     }
   }
-  use(before);
 }

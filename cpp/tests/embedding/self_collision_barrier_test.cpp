@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sidestep/kinematics/instruction_set.hpp"
+#include "support/every_instruction_set.hpp"
 #include "support/numbers.hpp"
 #include "support/random_scene.hpp"
 
@@ -74,12 +75,11 @@ double mean(const std::vector<double>& values, const std::vector<double>& by) {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(is_the_mean_over_all_pairs) {
-  const InstructionSet before = instruction_set();
   Random random(1);
   constexpr double activation = 0.1, reach = 0.3, step = 1e-6;
   int within = 0, apart = 0, approaching = 0;
-  for (const InstructionSet set : instruction_sets()) {
-    use(set);
+  for (const InstructionSet set : test::EveryInstructionSet()) {
+    BOOST_TEST_INFO_SCOPE(name(set));
     for (int trial = 0; trial < 100; ++trial) {
       const Robot robot = test::random_tree(random, 3);
       // More than are bounded at once of the first, and more pairs than are listed at once.
@@ -115,7 +115,6 @@ BOOST_AUTO_TEST_CASE(is_the_mean_over_all_pairs) {
       }
     }
   }
-  use(before);
   BOOST_TEST(within > 100);
   BOOST_TEST(apart > 50);
   BOOST_TEST(approaching > 20);

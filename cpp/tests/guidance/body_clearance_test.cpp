@@ -9,6 +9,7 @@
 #include "sidestep/kinematics/instruction_set.hpp"
 #include "sidestep/embedding/self_collision_barrier.hpp"
 #include "support/allocations.hpp"
+#include "support/every_instruction_set.hpp"
 #include "support/random_scene.hpp"
 
 using namespace sidestep;
@@ -90,8 +91,8 @@ BOOST_AUTO_TEST_CASE(agrees_with_the_barriers_clearances) {
 
 BOOST_AUTO_TEST_CASE(clearances_of_points_are_distances_from_ellipsoids) {
   Random random(6);
-  for (const InstructionSet set : instruction_sets()) {
-    use(set);
+  for (const InstructionSet set : test::EveryInstructionSet()) {
+    BOOST_TEST_INFO_SCOPE(name(set));
     for (int trial = 0; trial < 100; ++trial) {
       const Robot robot = test::random_tree(random, 2);
       Body body = calibrated(random, robot, 1.0);

@@ -8,6 +8,7 @@
 #include "sidestep/kinematics/instruction_set.hpp"
 #include "sidestep/kinematics/kinematic_state.hpp"
 #include "support/allocations.hpp"
+#include "support/every_instruction_set.hpp"
 #include "support/random_scene.hpp"
 
 using namespace sidestep;
@@ -21,10 +22,8 @@ constexpr int rows = 31;     // that it has rows for
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(states_side_by_side_have_the_numbers_of_each) {
-  const InstructionSet before = instruction_set();
-  for (const InstructionSet set : instruction_sets()) {
+  for (const InstructionSet set : test::EveryInstructionSet()) {
     BOOST_TEST_CONTEXT(name(set)) {
-      use(set);
       Random random(21);
       for (int trial = 0; trial < 50; ++trial) {
         const Robot robot = test::random_tree(random, random.integer(1, 9));
@@ -57,5 +56,4 @@ BOOST_AUTO_TEST_CASE(states_side_by_side_have_the_numbers_of_each) {
       }
     }
   }
-  use(before);
 }
