@@ -259,6 +259,7 @@ class Approach {
     move(step);
   }
 
+  /// To where it ends.
   void settle(const QueryGroup& group, int k) noexcept {
     const double* A = group.queries[k].squared_axes;
     Outside out;
@@ -270,6 +271,7 @@ class Approach {
     foot_ = out.foot();
   }
 
+  /// What is summed of it; `count`: of points from this register on.
   void finish(const QueryGroup& group, int k, int count, Samples& result) noexcept {
     const Query& query = group.queries[k];
     const double *A = query.squared_axes, *W = query.angular;
