@@ -144,9 +144,9 @@ void bind_step(nb::module_& m) {
       .value("goal_out_of_reach", StepStatus::goal_out_of_reach, "They hold, but the frame cannot be where the goal is.")
       .value("inside_barrier", StepStatus::inside_barrier,
              "They hold, with a push out: a clearance is below its barrier's floor.")
-      .value("goal_outside_limits", StepStatus::goal_outside_limits, "Fallback: the goal is outside the limits.")
+      .value("goal_outside_limits", StepStatus::goal_outside_limits, "The goal is outside the limits: no pull.")
       .value("invalid_state", StepStatus::invalid_state, "Fallback: q or v is not finite.")
-      .value("invalid_goal", StepStatus::invalid_goal, "Fallback: the goal is not finite, or of another robot.")
+      .value("invalid_goal", StepStatus::invalid_goal, "The goal is not finite, or of another robot: no pull.")
       .value("not_finite", StepStatus::not_finite, "Fallback: the equations gave a value that is not finite.");
   m.def("is_fallback", &is_fallback, nb::arg("status"),
         "Whether the acceleration is the fallback: a damped stop within the acceleration limits.");

@@ -162,8 +162,8 @@ def test_the_callers_obstacles_stay_where_they_are() -> None:
 
 def test_a_fallback_brakes_and_is_reported_in_every_row() -> None:
     _, density, obstacles, q, v = wide_scene("fr3")
-    motion = ss.rollout(ss.GeometricSystem([density]), q, v, np.full(7, np.nan), obstacles, steps=1000)
-    assert set(motion.statuses) == {ss.StepStatus.invalid_goal}
+    motion = ss.rollout(ss.GeometricSystem([density]), np.full(7, np.nan), v, q, obstacles, steps=1000)
+    assert set(motion.statuses) == {ss.StepStatus.invalid_state}
     # v decays with 10/s for a second
     np.testing.assert_allclose(motion.v[-1], v * (1 - 10 * 1e-3) ** 1000, rtol=1e-9)
     # what the equations would have said is not known in these rows

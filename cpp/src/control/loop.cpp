@@ -29,8 +29,8 @@ LoopStatus Loop::step(ConstVectorRef q, ConstVectorRef v,
     return {StepStatus::invalid_state, controller_.solve(q, v, workspace_.acceleration, mass_matrix, bias, solution_)};
   }
   const StepStatus status = system_->acceleration(q, v, goal, obstacles, workspace_);
-  // After a fallback the clearances are not of this step.
-  const Clearances* clearances = is_fallback(status) ? nullptr : &workspace_.clearances;
+  // Where the state is unusable nothing was measured.
+  const Clearances* clearances = status == StepStatus::invalid_state ? nullptr : &workspace_.clearances;
   return {status,
           controller_.solve(q, v, workspace_.acceleration, mass_matrix, bias, clearances, solution_)};
 }

@@ -109,7 +109,8 @@ std::string Diagnosis::describe(const CoordinateLabel& label) const {
 Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
   Diagnosis d;
   d.speed = w.state_.v().norm();
-  if (is_fallback(w.status_)) {
+  const bool has_goal = w.status_ != StepStatus::invalid_goal && w.status_ != StepStatus::goal_outside_limits;
+  if (is_fallback(w.status_) || !has_goal) {
     return d;
   }
   d.joint_error = w.pull.joint_error;

@@ -162,7 +162,7 @@ double Evasion::obstacle_clearance() const noexcept {
 
 double Evasion::advance(Motion& motion, Stepper& stepper) {
   const double period = stepper.period;
-  bool sees, brakes = false;
+  bool sees;
   Eigen::VectorXd wanted;
   if (motion.flight) {
     sees = system_->embed(motion.q, motion.v, motion.obstacles, workspace_);
@@ -170,13 +170,12 @@ double Evasion::advance(Motion& motion, Stepper& stepper) {
     motion.flight->advance(period);
   } else {
     const StepStatus status = system_->acceleration(motion.q, motion.v, motion.goal, motion.obstacles, workspace_);
-    sees = status != StepStatus::invalid_state && status != StepStatus::not_finite;
-    brakes = is_fallback(status);  // without clearances, as a loop then does
+    sees = !is_fallback(status);
     wanted = workspace_.acceleration;
   }
   ++stepper.steps;
   const double clearance = sees ? obstacle_clearance() : -infinity;
-  const Clearances* clearances = brakes ? nullptr : &workspace_.clearances;
+  const Clearances* clearances = sees ? &workspace_.clearances : nullptr;
   static_cast<void>(stepper.filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
   motion.v += period * filtered_.acceleration;
   motion.q += period * motion.v;

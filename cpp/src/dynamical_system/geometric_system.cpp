@@ -145,14 +145,12 @@ StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v,
     return fall_back(StepStatus::invalid_state, v, w);
   }
   const GoalFault fault = check(goal, robot_);
-  if (fault == GoalFault::invalid) {
-    return fall_back(StepStatus::invalid_goal, v, w);
-  }
-  if (fault == GoalFault::outside_limits) {
-    return fall_back(StepStatus::goal_outside_limits, v, w);
-  }
   w.metric.update(w.jacobian_transposed);
-  w.pull.update(goal, w.state_, stiffness_);
+  if (fault == GoalFault::invalid || fault == GoalFault::outside_limits) {
+    w.pull.release();  // barriers, damping and recovery go on without a pull: an arm without a goal still evades
+  } else {
+    w.pull.update(goal, w.state_, stiffness_);
+  }
 
   // h = −G⁻¹ ∂U − D (v − v*), its first term perhaps one-sided, or with D (v − v*) under G⁻¹ too.
   const auto velocity = sized(v, nv);
@@ -193,6 +191,8 @@ StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v,
     return fall_back(StepStatus::not_finite, v, w);
   }
   w.status_ = w.inside >= 0                                       ? StepStatus::inside_barrier
+              : fault == GoalFault::invalid                       ? StepStatus::invalid_goal
+              : fault == GoalFault::outside_limits                ? StepStatus::goal_outside_limits
               : is_outside(sized(q, nv), robot_.limits(), nv)     ? StepStatus::outside_limits
               : fault == GoalFault::out_of_reach                  ? StepStatus::goal_out_of_reach
                                                                   : StepStatus::ok;

@@ -14,6 +14,8 @@ namespace {
 
 // λ [m/rad and 1]: directions that the joints move less than this count as not moved.
 constexpr double singular_value_floor = 0.02;
+// A goal at a limit may be beyond it by the rounding of a conversion or of a step along its velocity [rad | m].
+constexpr double limit_rounding = 1e-9;
 
 void check_stiffness(double value, const char* name) {
   if (!(value >= 0.0) || !std::isfinite(value)) {
@@ -119,7 +121,7 @@ GoalFault check(const Goal& goal, const Robot& robot) noexcept {
           return GoalFault::invalid;
         }
       }
-      return is_outside(sized(joint->position, nv), robot.limits(), nv) ? GoalFault::outside_limits : GoalFault::none;
+      return is_outside(sized(joint->position, nv), robot.limits(), nv, limit_rounding) ? GoalFault::outside_limits : GoalFault::none;
     });
   }
   const PoseGoal& frame = std::get<PoseGoal>(goal);
@@ -143,6 +145,12 @@ void GoalPull::update(const Goal& goal, const KinematicState& state, const Gain&
   } else {
     update(std::get<PoseGoal>(goal), state);
   }
+}
+
+void GoalPull::release() noexcept {
+  potential = joint_error = position_error = rotation_error = nan;
+  gradient.setZero();
+  velocity.setZero();
 }
 
 void GoalPull::update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept {

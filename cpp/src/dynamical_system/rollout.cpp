@@ -148,8 +148,8 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
       a = flight->acceleration(q, v, dt);
     }
     if (filter) {
-      // After a fallback the workspace holds no clearances of this state.
-      const Clearances* clearances = is_fallback(status) ? nullptr : &w.clearances;
+      // Where the state is unusable nothing was measured.
+      const Clearances* clearances = status == StepStatus::invalid_state ? nullptr : &w.clearances;
       result.filter_statuses.push_back(filter->apply(q, v, a, clearances, filtered));
       a = filtered.acceleration;
       for (int n = 0; n < filtered.num_safety_rows; ++n) {

@@ -16,7 +16,7 @@ struct LoopStatus {
 };
 
 /// The whole control loop: state in, torque out. The acceleration of a GeometricSystem and the clearances it measured go
-/// to a TorqueController; where the system falls back to its damped stop, that is tracked without clearances.
+/// to a TorqueController, whatever the goal is; only where q or v is unusable are there none.
 ///
 /// `step` belongs to one thread, allocates nothing, takes no lock and never throws. Goal and obstacles may be replaced
 /// from other threads meanwhile: whatever they need is built there.

@@ -45,7 +45,7 @@ struct EvasionSettings {
 /// have to be there. A limit of the closing speed (SpeedRegulator) does not hold in it. Where nothing moves, nothing is
 /// looked at.
 ///
-/// Towards a goal that the system falls back from, such as one outside the limits, the arm is taken to brake, as it does.
+/// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
 ///
 /// `look` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
 /// simulated time. One thread at a time.

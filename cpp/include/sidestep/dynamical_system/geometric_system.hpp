@@ -39,16 +39,15 @@ enum class StepStatus {
   outside_limits,       ///< the equations hold, but a joint is outside its position limits
   goal_out_of_reach,    ///< the equations hold, but the frame cannot be where the goal is
   inside_barrier,       ///< the equations hold, with a push: a clearance is below its barrier's floor
-  goal_outside_limits,  ///< fallback: the goal is outside the position limits
+  goal_outside_limits,  ///< the goal is outside the position limits: the equations hold without its pull
+  invalid_goal,         ///< the goal is not finite, or made for another robot: the equations hold without its pull
   invalid_state,        ///< fallback: q or v is not finite
-  invalid_goal,         ///< fallback: the goal is not finite, or made for another robot
   not_finite,           ///< fallback: the equations gave a value that is not finite
 };
 
 /// Whether the acceleration is the fallback, a damped stop within the acceleration limits.
 constexpr bool is_fallback(StepStatus status) noexcept {
-  return status == StepStatus::goal_outside_limits || status == StepStatus::invalid_state ||
-         status == StepStatus::invalid_goal || status == StepStatus::not_finite;
+  return status == StepStatus::invalid_state || status == StepStatus::not_finite;
 }
 
 /// A damped spring that moves on the graph of ψ: obstacles bend its path (Bosc 2024, chapter 5).

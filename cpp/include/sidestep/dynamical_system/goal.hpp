@@ -86,7 +86,7 @@ void advance(Goal& goal, double duration) noexcept;
 enum class GoalFault {
   none,
   invalid,         ///< not finite, or made for another robot
-  outside_limits,  ///< a configuration outside the position limits
+  outside_limits,  ///< a configuration outside the position limits, by more than rounding (1e-9)
   out_of_reach,    ///< a position that the frame cannot have in any configuration; the equations still hold
 };
 GoalFault check(const Goal& goal, const Robot& robot) noexcept;
@@ -97,6 +97,9 @@ struct GoalPull {
 
   /// Computes everything but for a goal with a fault that makes it unusable. No allocation.
   void update(const Goal& goal, const KinematicState& state, const Gain& stiffness) noexcept;
+
+  /// No goal: nothing pulls, and damping brings the arm to rest where it is. No allocation.
+  void release() noexcept;
 
   double potential = 0.0;      ///< U, without the posture pull
   Eigen::VectorXd gradient;    ///< ∂U/∂q − a* (nv), posture pull included

@@ -1,0 +1,74 @@
+"""A goal that is unusable does not switch avoidance off."""
+
+import numpy as np
+import pytest
+
+import sidestep as ss
+from sidestep import presets
+from sidestep.body import Body
+
+# Of the hand, from where nothing of the arm itself is in a ball's way.
+FREE_SIDES = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
+
+
+@pytest.fixture(scope="module")
+def robot() -> ss.Robot:
+    return ss.Robot.named("fr3")
+
+
+@pytest.fixture(scope="module")
+def system(robot: ss.Robot) -> ss.GeometricSystem:
+    return presets.barrier_system(robot, Body.cover(robot))
+
+
+def bad_goals(robot: ss.Robot) -> dict[str, object]:
+    outside = robot.neutral.copy()
+    outside[1] = robot.limits.upper[1] + 0.1
+    drifts = np.zeros(7)
+    drifts[3] = 0.1
+    at_limit = robot.neutral.copy()
+    at_limit[3] = robot.limits.upper[3] - 0.05
+    return {
+        "not finite": np.full(7, np.nan),
+        "outside the limits": outside,
+        "drifts over a limit": ss.JointGoal(at_limit, drifts),
+    }
+
+
+@pytest.mark.parametrize("side", FREE_SIDES)
+@pytest.mark.parametrize("kind", ["not finite", "outside the limits", "drifts over a limit"])
+def test_a_slow_ball_does_not_touch_an_arm_with_a_bad_goal(
+    robot: ss.Robot, system: ss.GeometricSystem, kind: str, side: tuple[float, float, float]
+) -> None:
+    # A ball of 5 cm comes at the hand by 0.1 m/s from 30 cm away, and passes where the hand was.
+    q = robot.neutral
+    hand = robot.pose(q, "fr3_hand")[:3, 3]
+    away = np.array(side)
+    ball = ss.Obstacles([hand + 0.3 * away], radii=[0.05], velocities=[-0.1 * away])
+    motion = ss.rollout(
+        system,
+        q,
+        np.zeros(7),
+        bad_goals(robot)[kind],
+        ball,
+        steps=4500,
+        filter=ss.AccelerationFilter(robot, period=0.001),
+    )
+    exact = ss.ExactClearance(robot, [ss.SceneObject("ball", "sphere", size=(0.05,))])
+    times = np.arange(0, len(motion.q), 20)
+    least = min(
+        exact.distance(motion.q[k], [[*(hand + (0.3 - 1e-4 * k) * away), 1.0, 0.0, 0.0, 0.0]]).distance
+        for k in times
+    )
+    assert least > 0.0
+
+
+def test_the_loop_keeps_the_clearances_with_a_bad_goal(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+    q, v = robot.neutral, np.full(7, 0.2)
+    hand = robot.pose(q, "fr3_hand")[:3, 3]
+    near = ss.Obstacles([hand + np.array([0.0, 0.12, 0.0])], radii=[0.05])
+    M, h = robot.mass_matrix(q), robot.bias(q, v)
+    loop = ss.Loop(system, ss.TorqueController(robot), goal=np.full(7, np.nan), obstacles=near)
+    step = loop.step(q, v, M, h)
+    assert step.status == ss.StepStatus.invalid_goal
+    assert len(step.solution.safety) > 0
