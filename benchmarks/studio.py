@@ -31,7 +31,7 @@ WINDOW = (
 )
 
 
-def view(port: int, stop: object) -> None:
+def view(address: str, stop: object) -> None:
     """Takes in what a browser is sent, until `stop` is set."""
     import asyncio
 
@@ -40,7 +40,7 @@ def view(port: int, stop: object) -> None:
 
     async def listen() -> None:
         protocol = [f"viser-v{viser.__version__}"]
-        async with connect(f"ws://127.0.0.1:{port}", subprotocols=protocol, max_size=None) as connection:  # type: ignore[arg-type]
+        async with connect(address, subprotocols=protocol, max_size=None) as connection:  # type: ignore[arg-type]
             while not stop.is_set():  # type: ignore[attr-defined]
                 try:
                     await asyncio.wait_for(connection.recv(), 0.2)
@@ -62,7 +62,8 @@ def with_viewers(studio: Studio) -> m.Timing:
     """The same with viewers connected."""
     context = multiprocessing.get_context("spawn")
     stop = context.Event()
-    viewers = [context.Process(target=view, args=(studio.port, stop)) for _ in range(VIEWERS)]
+    address = studio.address.replace("http://", "ws://", 1)
+    viewers = [context.Process(target=view, args=(address, stop)) for _ in range(VIEWERS)]
     for viewer in viewers:
         viewer.start()
     end = time.monotonic() + 60.0

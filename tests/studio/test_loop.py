@@ -299,8 +299,8 @@ def test_what_is_not_finite_is_refused(
 @pytest.mark.parametrize(
     ("host", "address"),
     [
-        ("127.0.0.1", "http://localhost:80"),
-        ("0.0.0.0", "http://localhost:80"),
+        ("127.0.0.1", "http://127.0.0.1:80"),
+        ("0.0.0.0", "http://127.0.0.1:80"),
         ("192.168.1.2", "http://192.168.1.2:80"),
         ("robot.local", "http://robot.local:80"),
         ("::1", "http://[::1]:80"),

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import html
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +16,11 @@ from sidestep.cli.output import console
 if TYPE_CHECKING:
     from sidestep.scenario import Scenario
     from sidestep.studio.studio import Studio
+
+LEAD = """<!doctype html>
+<meta charset="utf-8"><meta http-equiv="refresh" content="0; url={address}"><title>Sidestep</title>
+<a href="{address}">Studio</a>
+"""
 
 
 def studio(
@@ -36,7 +45,11 @@ def studio(
         typer.Option(min=1, help="Per link of the covering body [default: as many as it takes, but slower]."),
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Where to listen; anyone who can reach it can move the arm.")
+        str,
+        typer.Option(
+            help="Where to listen; who can reach it and has the printed address, which goes over the network as it "
+            "is, can move the arm."
+        ),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Where to listen; 0: any that is free.")] = 8890,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser.")] = True,
@@ -101,11 +114,32 @@ def open_studio(
     terminal = console()
     with Studio(scenario, method=method, host=host, port=port, ellipsoids=ellipsoids) as running:
         terminal.print(f"Studio: {running.address}   (Ctrl-C ends it)", highlight=False, soft_wrap=True)
-        if browser:
-            import webbrowser
+        with open_browser(running.address) if browser else nullcontext():
+            _wait(running)
 
-            webbrowser.open(running.address)
-        _wait(running)
+
+@contextmanager
+def open_browser(address: str) -> Iterator[None]:
+    """Opens an address by a file that leads there, which others cannot read and which is gone afterwards.
+
+    The command line of a browser, where the address would be otherwise, can be read by all users of the machine.
+    """
+    import tempfile
+    import webbrowser
+
+    try:
+        folder = Path.home()  # browsers in a sandbox read no hidden folder, and have another /tmp
+        handle, name = tempfile.mkstemp(".html", "sidestep-studio-", folder)
+    except (OSError, RuntimeError):
+        handle, name = tempfile.mkstemp(".html", "sidestep-studio-")
+    os.close(handle)
+    file = Path(name)
+    try:
+        file.write_text(LEAD.format(address=html.escape(address)), encoding="utf-8")
+        webbrowser.open(file.as_uri())
+        yield
+    finally:
+        file.unlink(missing_ok=True)
 
 
 def _wait(running: Studio) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
+from sidestep.studio import guard as g
 from sidestep.studio import messages as m
 from sidestep.studio.loop import Beginning, Loop
 from sidestep.studio.truth import Truth
@@ -31,6 +32,9 @@ STEP_OF_TRUTH = 0.05  # [s] between two measurements on the exact meshes, at lea
 class Studio:
     """The page and the loop behind it; stop it with `stop`, or use it as a context.
 
+    Who opens `address`, which has a random token of this start in it, can move the arm; without it, the page and its
+    websocket are refused.
+
     Args:
         scenario: what is on the stage at first.
         method: one of `sidestep.studio.methods.METHODS`. numbers: parameters of methods, by method and name.
@@ -41,6 +45,7 @@ class Studio:
         OSError: the port is taken, or the address is not one of this machine.
         ValueError: that names what is wrong with the scenario or the method.
         ModuleNotFoundError: viser is not installed; says what to install.
+        RuntimeError: a viser whose server cannot be guarded by the token.
     """
 
     def __init__(
@@ -58,10 +63,12 @@ class Studio:
         method_named(method)
         check_port(host, port)
         robot = load_robot(scenario)
-        server = _server(host, port)
+        guard = g.Guard(host)
+        server = _server(host, port, guard)
         from sidestep.studio.page.view import View
 
         self.server, self.host, self.port = server, host, server.get_port()
+        self._token = guard.token
         self._stopping = threading.Event()
         self.snapshot: m.Snapshot | None = None
         self.error = ""
@@ -80,8 +87,8 @@ class Studio:
 
     @property
     def address(self) -> str:
-        """What to open in a browser."""
-        return address_of(self.host, self.port)
+        """What to open in a browser; whoever knows it can move the arm."""
+        return f"{address_of(self.host, self.port)}/{self._token}/"
 
     def _repr_html_(self) -> str:
         """The page inside a notebook whose browser runs on this machine."""
@@ -154,8 +161,11 @@ class Studio:
 
 
 def address_of(host: str, port: int) -> str:
-    """The address of a page that is served at a host, a name or number of this machine."""
-    name = {"0.0.0.0": "localhost", "127.0.0.1": "localhost", "::": "[::1]"}.get(host)
+    """The address of a page that is served at a host, a name or number of this machine.
+
+    A number stays one: the name localhost may lead to a number at which another user listens, who would get the token.
+    """
+    name = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host)
     if name is None:
         name = f"[{host}]" if ":" in host else host
     return f"http://{name}:{port}"
@@ -179,7 +189,7 @@ def check_port(host: str, port: int) -> None:
             raise OSError(f"cannot listen at {host}:{port}: {error.strerror}") from error
 
 
-def _server(host: str, port: int):  # type: ignore[no-untyped-def]
+def _server(host: str, port: int, guard: g.Guard):  # type: ignore[no-untyped-def]
     try:
         import viser
     except ModuleNotFoundError as error:
@@ -189,6 +199,14 @@ def _server(host: str, port: int):  # type: ignore[no-untyped-def]
     quiet = rich.get_console().quiet
     rich.get_console().quiet = True  # viser prints a banner of its own
     try:
-        return viser.ViserServer(host=host, port=port, label="Sidestep", verbose=False)
+        with g.placed(guard):
+            server = viser.ViserServer(host=host, port=port, label="Sidestep", verbose=False)
+        if not guard.placed:
+            server.stop()
+            raise RuntimeError(
+                f"viser {viser.__version__} starts its server in a way that the studio cannot guard; "
+                "pip install 'viser==1.1.*'"
+            )
+        return server
     finally:
         rich.get_console().quiet = quiet
