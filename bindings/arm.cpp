@@ -1,0 +1,169 @@
+#include "sidestep/model/arm.hpp"
+
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "arguments.hpp"
+#include "module.hpp"
+
+namespace sidestep::python {
+namespace {
+
+/// Runs `action`; what the system refuses becomes OSError with the number that Python makes FileNotFoundError and such of.
+template <class Action>
+auto with_os_errors(const std::filesystem::path& path, Action&& action) {
+  try {
+    return action();
+  } catch (const std::system_error& error) {
+    const nb::object arguments = nb::make_tuple(error.code().value(), error.code().message(), path);
+    PyErr_SetObject(PyExc_OSError, arguments.ptr());
+    throw nb::python_error();
+  }
+}
+
+/// Dynamics with the memory they work in, for one thread (the GIL is held).
+struct Dynamics {
+  RigidBodyDynamics model;
+  RigidBodyDynamics::Workspace workspace;
+
+  Dynamics(Robot robot, std::vector<Inertial> inertials, const Eigen::Vector3d& gravity)
+      : model(std::move(robot), std::move(inertials), gravity), workspace(model) {}
+};
+
+void bind_dynamics(nb::module_& m) {
+  nb::class_<Inertial>(m, "Inertial", "Mass properties of a rigid body, in the frame of that body.")
+      .def(
+          "__init__",
+          [](Inertial* self, double mass, const ArrayLike& com, const ArrayLike& inertia) {
+            new (self) Inertial{mass, as_vector(com, "com", 3), as_matrix(inertia, "inertia", 3, 3)};
+          },
+          nb::arg("mass"), nb::arg("com"), nb::arg("inertia"),
+          "mass [kg]; com (3,): centre of mass [m]; inertia (3, 3): rotational inertia about it [kg m^2].")
+      .def_ro("mass", &Inertial::mass)
+      .def_prop_ro("com", [](const Inertial& i) { return to_numpy(i.com); })
+      .def_prop_ro("inertia", [](const Inertial& i) { return to_numpy_matrix(i.inertia); });
+
+  m.def("fold_inertials", &fold_inertials, nb::arg("robot"), nb::arg("links"),
+        "Sums the inertias of the links, one per frame in that frame, to one per joint in the frame of its child.\n"
+        "Raises ValueError on a wrong number or an invalid inertia.");
+
+  nb::class_<Dynamics>(m, "RigidBodyDynamics",
+                       "The equation of motion M(q) a + h(q, v) = torque of a tree, without friction and rotor inertia.\n"
+                       "Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 and 6.")
+      .def(
+          "__init__",
+          [](Dynamics* self, const Robot& robot, std::vector<Inertial> inertials, const nb::object& gravity) {
+            new (self) Dynamics(robot, std::move(inertials),
+                                gravity.is_none() ? standard_gravity
+                                                  : Eigen::Vector3d(as_vector(gravity, "gravity", 3)));
+          },
+          nb::arg("robot"), nb::arg("inertials"), nb::kw_only(), nb::arg("gravity").none() = nb::none(),
+          nb::sig("def __init__(self, robot: Robot, inertials: Sequence[Inertial], *, "
+                  "gravity: numpy.typing.ArrayLike | None = None) -> None"),
+          "inertials: one per joint, in the frame of its child; gravity (3,): in the world [m/s^2], 9.81 along -z by default.\n"
+          "Raises ValueError on a wrong number, an invalid inertia or a gravity that is not finite.")
+      .def_prop_ro("gravity", [](const Dynamics& d) { return to_numpy(d.model.gravity()); })
+      .def_prop_ro("inertials", [](const Dynamics& d) { return d.model.inertials(); })
+      .def(
+          "mass_matrix",
+          [](Dynamics& d, const ArrayLike& q) {
+            const int nv = d.model.robot().num_coordinates();
+            Eigen::MatrixXd mass(nv, nv);
+            d.model.mass_matrix(as_finite_vector(q, "q", nv), d.workspace, mass);
+            return to_numpy_matrix(mass);
+          },
+          nb::arg("q"), "M(q) (nv, nv) [kg m^2, kg m, kg] at q (nv,).")
+      .def(
+          "bias",
+          [](Dynamics& d, const ArrayLike& q, const ArrayLike& v) {
+            const int nv = d.model.robot().num_coordinates();
+            Eigen::VectorXd force(nv);
+            d.model.bias(as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv), d.workspace, force);
+            return to_numpy(force);
+          },
+          nb::arg("q"), nb::arg("v"), "h(q, v) = C(q, v) v + g(q) (nv,) [Nm | N] at q (nv,), v (nv,).");
+}
+
+}  // namespace
+
+void bind_arm(nb::module_& m) {
+  bind_dynamics(m);
+
+  nb::class_<CoverProof>(m, "CoverProof", "What is proven and measured of the ellipsoids that cover one link.")
+      .def(nb::init<std::string, double, double, double, double, std::string, double, double>(), nb::arg("link"),
+           nb::kw_only(), nb::arg("coverage"), nb::arg("mean_overshoot"), nb::arg("max_overshoot"),
+           nb::arg("volume_ratio"), nb::arg("volume_of"), nb::arg("interior_coverage"), nb::arg("slimness"))
+      .def_ro("link", &CoverProof::link)
+      .def_ro("coverage", &CoverProof::coverage, "Share of the mesh's area proven to lie inside the ellipsoids.")
+      .def_ro("mean_overshoot", &CoverProof::mean_overshoot, "[m]")
+      .def_ro("max_overshoot", &CoverProof::max_overshoot, "[m]")
+      .def_ro("volume_ratio", &CoverProof::volume_ratio)
+      .def_ro("volume_of", &CoverProof::volume_of)
+      .def_ro("interior_coverage", &CoverProof::interior_coverage)
+      .def_ro("slimness", &CoverProof::slimness);
+
+  nb::class_<Provenance>(m, "Provenance", "Where an arm comes from; does not count for its content hash.")
+      .def(nb::init<std::string, std::string, std::string, std::string>(), nb::kw_only(), nb::arg("source"),
+           nb::arg("fingerprint"), nb::arg("sidestep_version"), nb::arg("date"))
+      .def_ro("source", &Provenance::source)
+      .def_ro("fingerprint", &Provenance::fingerprint)
+      .def_ro("sidestep_version", &Provenance::sidestep_version)
+      .def_ro("date", &Provenance::date);
+
+  nb::class_<Arm>(m, "Arm", nb::is_weak_referenceable(), "Everything that is prepared once for a robot, in the core.")
+      .def(
+          "__init__",
+          [](Arm* self, const Robot& robot, const Body& body, const Pairs& pairs, std::vector<ClearanceTable> tables,
+             std::vector<Inertial> inertials, std::vector<CoverProof> proof,
+             std::vector<std::pair<std::string, std::string>> allowed_pairs, const Provenance& provenance) {
+            new (self) Arm(robot, body, link_pairs(pairs), std::move(tables), std::move(inertials),
+                           {std::move(proof), std::move(allowed_pairs), provenance});
+          },
+          nb::kw_only(), nb::arg("robot"), nb::arg("body"), nb::arg("pairs"), nb::arg("tables"), nb::arg("inertials"),
+          nb::arg("proof"), nb::arg("allowed_pairs"), nb::arg("provenance"),
+          "inertials: one per joint, or none for an arm without dynamics. Raises ValueError that names what is wrong.")
+      .def(nb::init<const Arm&>(), nb::arg("arm"), "The same arm again; the content is shared.")
+      .def_static(
+          "read", [](const std::filesystem::path& path) { return with_os_errors(path, [&] { return Arm::load(path); }); },
+          nb::arg("path"),
+          "Reads an .arm file. Raises OSError if it cannot be read, and ValueError that names the file and what is wrong.")
+      .def(
+          "save",
+          [](const Arm& arm, const std::filesystem::path& path) { with_os_errors(path, [&] { arm.save(path); }); },
+          nb::arg("path"), "Writes an .arm file in one piece. Raises OSError.")
+      .def_prop_ro("name", &Arm::name)
+      .def_prop_ro("num_coordinates", &Arm::num_coordinates, "Number of joint coordinates nv.")
+      .def_prop_ro("robot", &Arm::robot, nb::rv_policy::reference_internal, "The kinematic tree, without meshes.")
+      .def_prop_ro("body", &Arm::body, nb::rv_policy::reference_internal, "The covering body.")
+      .def_prop_ro("limits", [](const Arm& arm) { return arm.robot().limits(); }, "JointLimits of the coordinates.")
+      .def_prop_ro(
+          "pairs",
+          [](const Arm& arm) {
+            std::vector<std::tuple<std::string, std::string, double>> pairs;
+            for (const LinkPair& pair : arm.pairs()) {
+              pairs.emplace_back(pair.first, pair.second, pair.contact);
+            }
+            return pairs;
+          },
+          "Pairs of links that must not touch, without a table: (first, second, contact [m]).")
+      .def_prop_ro("tables", [](const Arm& arm) { return arm.tables(); }, "Clearance tables of the other pairs.")
+      .def_prop_ro("inertials", [](const Arm& arm) { return arm.inertials(); },
+                   "One per joint in the frame of its child; empty without dynamics.")
+      .def_prop_ro("has_dynamics", &Arm::has_dynamics, "Whether mass matrix and bias are known.")
+      .def_prop_ro("proof", [](const Arm& arm) { return arm.proof(); }, "CoverProof of every covered link.")
+      .def_prop_ro("allowed_pairs", [](const Arm& arm) { return arm.allowed_pairs(); }, "Links that may touch.")
+      .def_prop_ro("provenance", [](const Arm& arm) { return arm.provenance(); }, "Where the arm comes from.")
+      .def_prop_ro("content_hash", &Arm::content_hash,
+                   "SHA-256 (64 hex digits) of everything but the provenance: equal arms have equal hashes.")
+      .def_prop_ro("neutral", [](const Arm& arm) { return to_numpy(arm.neutral()); },
+                   "A configuration (nv,) inside the limits: the middle of each interval, 0 without limits.");
+}
+
+}  // namespace sidestep::python
