@@ -13,4 +13,5 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_loop(m);
   sidestep::python::bind_guidance(m);
   sidestep::python::bind_arm(m);
+  sidestep::python::bind_controller(m);
 }

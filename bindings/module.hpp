@@ -15,5 +15,6 @@ void bind_control(nanobind::module_& m);
 void bind_loop(nanobind::module_& m);
 void bind_guidance(nanobind::module_& m);
 void bind_arm(nanobind::module_& m);
+void bind_controller(nanobind::module_& m);
 
 }  // namespace sidestep::python

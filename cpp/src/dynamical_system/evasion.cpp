@@ -87,19 +87,20 @@ Evasion::Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings 
 }
 
 std::optional<Flight> Evasion::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                                    const Obstacles& obstacles, const std::optional<Flight>& followed) {
+                                    const Obstacles& obstacles, const std::optional<Flight>& followed,
+                                    const Leader& leader) {
   const auto usable = [this](const Eigen::VectorXd& x) { return x.size() == num_coordinates() && x.allFinite(); };
   if (!obstacles.tree().moves() || !usable(q) || !usable(v)) {
     return std::nullopt;
   }
-  Motion now{q, v, obstacles, goal, followed};
+  Motion now{q, v, obstacles, goal, leader, followed};
   for (int k = 0; k < periods_; ++k) {
     advance(now, fine_);
   }
   std::optional<Flight> best_flight = std::exchange(now.flight, std::nullopt);
   const auto is_free = [this](double clearance) { return clearance >= settings_.clearance; };
   const auto clearance_of = [&](const std::optional<Flight>& flight, double enough) {
-    return least_clearance({now.q, now.v, now.obstacles, now.goal, flight}, fine_, enough);
+    return least_clearance({now.q, now.v, now.obstacles, now.goal, now.leader, flight}, fine_, enough);
   };
   double best = clearance_of(std::nullopt, -infinity);
   if (is_free(best)) {
@@ -132,13 +133,13 @@ std::optional<Flight> Evasion::look(const Goal& goal, const Eigen::VectorXd& q, 
 }
 
 const Flight* Evasion::pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                              const Obstacles& obstacles, double period) {
+                              const Obstacles& obstacles, double period, const Leader& leader) {
   // Less than half a period too early, so that sums of periods may be rounded. Written so that a period that is not a
   // number makes it look.
-  if (!(until_look_ > 0.5 * period)) {
+  if (is_due(period)) {
     until_look_ = std::max(until_look_ + settings_.delay, 0.0);
     pursued_ = found_;
-    found_ = look(goal, q, v, obstacles, pursued_);
+    found_ = look(goal, q, v, obstacles, pursued_, leader);
   } else if (pursued_) {
     pursued_->advance(period);
   }
@@ -180,7 +181,11 @@ double Evasion::advance(Motion& motion, Stepper& stepper) {
   motion.v += period * filtered_.acceleration;
   motion.q += period * motion.v;
   motion.obstacles.advance(period);
-  sidestep::advance(motion.goal, period);
+  if (motion.leader) {
+    motion.leader(motion.q, period, motion.goal);
+  } else {
+    sidestep::advance(motion.goal, period);
+  }
   return clearance;
 }
 
@@ -245,7 +250,7 @@ std::vector<Evasion::Tried> Evasion::promising(const Motion& now, const std::opt
       break;
     }
     const double enough = full ? best.back().clearance : -infinity;
-    const double clearance = least_clearance({now.q, now.v, now.obstacles, now.goal, flight}, coarse_, enough);
+    const double clearance = least_clearance({now.q, now.v, now.obstacles, now.goal, now.leader, flight}, coarse_, enough);
     if (full && !(clearance > best.back().clearance)) {
       continue;
     }

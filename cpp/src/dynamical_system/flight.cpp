@@ -21,12 +21,17 @@ Flight::Flight(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen:
       position_(q),
       velocity_(v) {}
 
-Eigen::VectorXd Flight::acceleration(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double period) const {
-  Eigen::VectorXd a = stiffness * stiffness * (position_ - q) + 2.0 * stiffness * (velocity_ - v);
-  for (Eigen::Index j = 0; j < a.size(); ++j) {
-    a[j] += reference_acceleration(j, period);
-  }
+Eigen::VectorXd Flight::acceleration(ConstVectorRef q, ConstVectorRef v, double period) const {
+  Eigen::VectorXd a(q.size());
+  acceleration(q, v, period, a);
   return a;
+}
+
+void Flight::acceleration(ConstVectorRef q, ConstVectorRef v, double period, Eigen::Ref<Eigen::VectorXd> out) const noexcept {
+  for (Eigen::Index j = 0; j < out.size(); ++j) {
+    out[j] = stiffness * stiffness * (position_[j] - q[j]) + 2.0 * stiffness * (velocity_[j] - v[j]) +
+             reference_acceleration(j, period);
+  }
 }
 
 void Flight::advance(double period) noexcept {

@@ -71,6 +71,12 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
   floors_ = Eigen::VectorXd::NullaryExpr(num_embedding_coordinates_, [this](Eigen::Index k) {
     return labels_[static_cast<std::size_t>(k)].floor;
   });
+  activations_.resize(num_embedding_coordinates_);
+  Eigen::Index start = 0;
+  for (const auto& embedding : embeddings_) {
+    embedding->write_activations(activations_.segment(start, embedding->num_coordinates()));
+    start += embedding->num_coordinates();
+  }
   std::visit(Overloaded{
                  [](const Unswitched&) {}, [](const HarmonicOnly&) {}, [](const GeodesicOnly&) {},
                  [](const BinarySwitch& s) { check_finite(s.threshold, "switch threshold"); },
@@ -93,13 +99,24 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
              settings_.combination);
 }
 
+bool GeometricSystem::lower_activations(ConstVectorRef q, const Obstacles& obstacles, Workspace& w,
+                                        Eigen::Ref<Eigen::VectorXd> activations) const noexcept {
+  if (!embed(q, w.rest_, obstacles, w)) {
+    return false;
+  }
+  Eigen::Index start = 0;
+  for (const auto& embedding : embeddings_) {
+    const Eigen::Index m = embedding->num_coordinates();
+    embedding->lower_activations(w.clearances.values.segment(start, m), activations.segment(start, m));
+    start += m;
+  }
+  return true;
+}
+
 GeometricSystem GeometricSystem::relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const {
   GeometricSystem relaxed = *this;
-  for (auto& embedding : relaxed.embeddings_) {
-    if (auto other = embedding->relaxed_at(goal, obstacles)) {
-      embedding = std::move(other);
-    }
-  }
+  Workspace workspace(*this);
+  static_cast<void>(lower_activations(goal, obstacles, workspace, relaxed.activations_));
   return relaxed;
 }
 
@@ -114,6 +131,7 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
       curvatures(values),
       jacobian_transposed(Eigen::MatrixXd::Zero(acceleration.size(), values.size())),
       clearances(system.robot().num_coordinates(), system.num_embedding_coordinates()),
+      activations(system.activations()),
       metric(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       pull(system.robot().num_coordinates()),
       state_(system.robot()),
@@ -215,7 +233,8 @@ bool GeometricSystem::embed(ConstVectorRef q, ConstVectorRef v,
     embedding->add_to({{w.values.data() + start, m},
                        {w.jacobian_transposed.data() + start * q.size(), q.size(), m},
                        {w.curvatures.data() + start, m},
-                       w.clearances.view(start, m)},
+                       w.clearances.view(start, m),
+                       {w.activations.data() + start, m}},
                       w.state_, obstacles);
     start += m;
   }

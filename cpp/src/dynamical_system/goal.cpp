@@ -113,6 +113,13 @@ void advance(Goal& goal, double duration) noexcept {
   }
 }
 
+bool is_moving(const Goal& goal) noexcept {
+  if (const auto* joint = std::get_if<JointGoal>(&goal)) {
+    return !joint->velocity.isZero(0.0) || !joint->acceleration.isZero(0.0);
+  }
+  return !std::get<PoseGoal>(goal).twist.isZero(0.0);
+}
+
 GoalFault check(const Goal& goal, const Robot& robot) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     return with_size(robot.num_coordinates(), [&](auto nv) {

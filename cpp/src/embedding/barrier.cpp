@@ -11,17 +11,20 @@ Barrier::Barrier(Robot robot, const BarrierFunction& function, const char* owner
 }
 
 void Barrier::add_barriers(EmbeddingView out) const noexcept {
+  const Eigen::Map<const Eigen::VectorXd> own(activations_.data(), activations_.size());
+  const Eigen::Map<const Eigen::VectorXd> activations = out.activations.size() == own.size() ? out.activations : own;
   if (!is_seen()) {
-    out.clearances.margins = margin_share * activations_;
+    out.clearances.margins = margin_share * activations;
   }
   BarrierFunction function = function_;
   for (Eigen::Index k = 0; k < out.values.size(); ++k) {
     const double h = out.clearances.values[k];
-    if (!(h < activations_[k])) {
+    if (!(h < activations[k])) {
       continue;
     }
     // ψ = f(h): ∇ψ = f' ∇h,  ψ̈ = f' ḧ + f'' ḣ².
-    function.activation = activations_[k];
+    function.activation = activations[k];
+    function.floor = floor(k);
     const BarrierFunction::Value f = function(h);
     const double rate = out.clearances.rates[k];
     out.values[k] += f.value;
@@ -30,15 +33,11 @@ void Barrier::add_barriers(EmbeddingView out) const noexcept {
   }
 }
 
-std::shared_ptr<const Embedding> Barrier::relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const {
-  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(goal.size());
-  const Eigen::VectorXd clearances = evaluate(*this, goal, rest, obstacles).clearances.values;
-  std::shared_ptr<Barrier> relaxed = clone();
-  const double least = std::min(relaxed_floors * function_.floor, function_.activation);
-  for (Eigen::Index k = 0; k < clearances.size(); ++k) {
-    relaxed->activations_[k] = std::clamp(relaxed_share * clearances[k], least, std::max(least, activations_[k]));
+void Barrier::lower_activations(ConstVectorRef clearances, Eigen::Ref<Eigen::VectorXd> activations) const noexcept {
+  for (Eigen::Index k = 0; k < activations.size(); ++k) {
+    const double least = std::min(relaxed_floors * floor(k), activations_[k]);
+    activations[k] = std::clamp(relaxed_share * clearances[k], least, std::max(least, activations[k]));
   }
-  return relaxed;
 }
 
 }  // namespace sidestep

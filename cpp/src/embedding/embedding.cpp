@@ -12,10 +12,11 @@ void Embedding::add_block(EmbeddingBlock& /*out*/, const KinematicBlock& /*state
 
 CoordinateLabel Embedding::label(int /*k*/) const { return {}; }
 
-std::shared_ptr<const Embedding> Embedding::relaxed_at(const Eigen::VectorXd& /*goal*/,
-                                                       const Obstacles& /*obstacles*/) const {
-  return nullptr;
+void Embedding::write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept {
+  activations.setConstant(std::numeric_limits<double>::infinity());
 }
+
+void Embedding::lower_activations(ConstVectorRef /*clearances*/, Eigen::Ref<Eigen::VectorXd> /*activations*/) const noexcept {}
 
 void Embedding::lower_distances(Eigen::Ref<Eigen::VectorXd> /*distances*/, const KinematicState& /*state*/,
                                 const Obstacles& /*obstacles*/) const noexcept {}

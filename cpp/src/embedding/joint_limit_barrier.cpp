@@ -19,6 +19,10 @@ JointLimitBarrier::JointLimitBarrier(const Robot& robot, BarrierFunction barrier
     throw std::invalid_argument("joint limit barrier: robot '" + robot.name() + "' has no finite position limit");
   }
   set_num_coordinates(static_cast<int>(limits_.size()));
+  for (std::size_t k = 0; k < limits_.size(); ++k) {
+    const Eigen::Index j = limits_[k].joint_coordinate;
+    shorten_activation(static_cast<int>(k), range_share * (robot.limits().upper[j] - robot.limits().lower[j]));
+  }
 }
 
 void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
@@ -28,7 +32,7 @@ void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
     const PositionLimit& limit = limits_[i];
     const double v = state.v()[limit.joint_coordinate];
     const double h = limit.sign * (state.q()[limit.joint_coordinate] - limit.position);
-    if (!(h < function().activation)) {
+    if (!(h < activations()[k])) {
       continue;
     }
     out.clearances.values[k] = h;
@@ -44,7 +48,7 @@ CoordinateLabel JointLimitBarrier::label(int k) const {
   const PositionLimit& limit = limits_[static_cast<std::size_t>(k)];
   return {CoordinateLabel::Kind::joint_limit,
           robot().coordinate_names()[static_cast<std::size_t>(limit.joint_coordinate)],
-          limit.sign > 0.0 ? "lower" : "upper", function().floor};
+          limit.sign > 0.0 ? "lower" : "upper", floor(k)};
 }
 
 }  // namespace sidestep

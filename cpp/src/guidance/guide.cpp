@@ -150,14 +150,14 @@ GuideStatus Guide::step(ConstVectorRef q, double time, Attractor& attractor) noe
   if (ours && answer.status == PlanStatus::found && !answer.direct) {
     if (answer.route_number != followed_) {
       followed_ = answer.route_number;
-      follower_.enter(answer.route, q, velocity_);
+      follower_.enter(*answer.route, q, velocity_);
     }
     attractor.position.resize(goal_.size());
-    follower_.advance(answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity,
+    follower_.advance(*answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity,
                       attractor.acceleration);
-    if (const Eigen::Index num = follower_.narrow(answer.route, settings_.route, attractor.places); num > 0) {
+    if (const Eigen::Index num = follower_.narrow(*answer.route, settings_.route, attractor.places); num > 0) {
       attractor.num_places = num;
-      attractor.arrives = answer.route.length() - follower_.station <= settings_.route.lead;
+      attractor.arrives = answer.route->length() - follower_.station <= settings_.route.lead;
     }
   } else {
     attractor.position = goal_;
@@ -169,7 +169,7 @@ GuideStatus Guide::step(ConstVectorRef q, double time, Attractor& attractor) noe
     progress_.reset();
     return GuideStatus::arrived;
   }
-  const double left = ours && !answer.direct ? answer.route.length() - follower_.station : 0.0;
+  const double left = ours && !answer.direct && answer.route ? answer.route->length() - follower_.station : 0.0;
   const double away = (attractor.position - q).norm() + left;
   if (ours && answer.path_number != measured_) {  // another way may be longer
     measured_ = answer.path_number;
@@ -194,6 +194,18 @@ GuideStatus Guide::step(ConstVectorRef q, double time, Attractor& attractor) noe
     }
   }
   return time - begin_ > settings_.duration ? GuideStatus::timeout : GuideStatus::moving;
+}
+
+Guide::Following Guide::following() noexcept {
+  const Answer& answer = answers_.current();
+  const bool follows = answer.goal_number == goal_number_ && answer.status == PlanStatus::found && !answer.direct &&
+                       answer.route_number == followed_;
+  return {follows ? followed_ : 0, follower_};
+}
+
+std::shared_ptr<const Route> Guide::route(std::uint64_t number) const {
+  const std::lock_guard lock(mutex_);
+  return number != 0 && number == shown_route_number_ ? shown_route_ : nullptr;
 }
 
 Plan Guide::last_plan() const {

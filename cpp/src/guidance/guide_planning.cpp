@@ -87,12 +87,12 @@ void Guide::look(const State& state) {
 }
 
 Eigen::VectorXd Guide::on_route(double station) const {
-  const Eigen::VectorXd& at = route_.station;
+  const Eigen::VectorXd& at = route_->station;
   const Eigen::Index last = at.size() - 1;
   const Eigen::Index next = std::clamp<Eigen::Index>(std::upper_bound(at.begin(), at.end(), station) - at.begin(), 1, last);
   const double length = at[next] - at[next - 1];
   const double share = length > 0.0 ? std::clamp((station - at[next - 1]) / length, 0.0, 1.0) : 1.0;
-  return route_.q.col(next - 1) + share * (route_.q.col(next) - route_.q.col(next - 1));
+  return route_->q.col(next - 1) + share * (route_->q.col(next) - route_->q.col(next - 1));
 }
 
 Eigen::Index Guide::waypoint_after(double station) const {
@@ -215,7 +215,8 @@ void Guide::follow(const State& state, const Eigen::MatrixXd& path, const Obstac
   for (Eigen::Index k = 1; k < path_.cols(); ++k) {
     stations_[k] = stations_[k - 1] + (path_.col(k) - path_.col(k - 1)).norm();
   }
-  route_ = make_route(path_, body_, obstacles, settings_.route, planner_.workspace(), measured);
+  route_ = std::make_shared<const Route>(
+      make_route(path_, body_, obstacles, settings_.route, planner_.workspace(), measured));
   ++route_number_;
   answer(state, PlanStatus::found, false);
 }
@@ -230,6 +231,9 @@ void Guide::answer(const State& state, PlanStatus status, bool direct) {
   answer.path_number = path_number_;
   if (status == PlanStatus::found && !direct) {
     answer.route = route_;
+    const std::lock_guard lock(mutex_);
+    shown_route_ = route_;
+    shown_route_number_ = route_number_;
   }
   answers_.submit();
 }

@@ -38,6 +38,9 @@ class Handover {
     return true;
   }
 
+  /// What the reader has, without taking over a newer one; its to change.
+  T& current() noexcept { return slots_[current_]; }
+
   /// The newest value; valid until the next call.
   const T& get() noexcept {
     update();

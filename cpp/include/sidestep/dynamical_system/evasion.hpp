@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <random>
@@ -51,6 +52,10 @@ struct EvasionSettings {
 /// simulated time. One thread at a time.
 class Evasion {
  public:
+  /// Moves a goal on for a duration [s] while the arm is at q (nv): along a path, for example. Empty: as the goal's own
+  /// velocity says (`advance`). Each motion that is looked at has a copy.
+  using Leader = std::function<void(const Eigen::VectorXd& q, double duration, Goal& goal)>;
+
   /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
   /// which it names.
   explicit Evasion(std::shared_ptr<const GeometricSystem> system, EvasionSettings settings = {});
@@ -59,12 +64,15 @@ class Evasion {
   /// there is one. What is to be followed from `delay` on: a flight, or the system to the goal where it is empty, as it is
   /// if nothing moves or the state is unusable. Allocates.
   std::optional<Flight> look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                             const Obstacles& obstacles, const std::optional<Flight>& followed = std::nullopt);
+                             const Obstacles& obstacles, const std::optional<Flight>& followed = std::nullopt,
+                             const Leader& leader = {});
 
   /// The flight to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every `delay`,
   /// and follows what the look before found.
   const Flight* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
-                       double period);
+                       double period, const Leader& leader = {});
+  /// Whether the next `pursue` looks.
+  bool is_due(double period) const noexcept { return !(until_look_ > 0.5 * period); }
   /// Before another motion is pursued: what was found is forgotten.
   void reset() noexcept;
 
@@ -79,6 +87,7 @@ class Evasion {
     Eigen::VectorXd q, v;
     Obstacles obstacles;
     Goal goal;
+    Leader leader;
     std::optional<Flight> flight;
   };
   struct Tried {

@@ -22,7 +22,9 @@ class Flight {
   Flight(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd refuge);
 
   /// The acceleration (nv) [/s²] that follows the reference from q, v for a period [s] > 0.
-  Eigen::VectorXd acceleration(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double period) const;
+  Eigen::VectorXd acceleration(ConstVectorRef q, ConstVectorRef v, double period) const;
+  /// The same into `out` (nv). No allocation.
+  void acceleration(ConstVectorRef q, ConstVectorRef v, double period, Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
   /// Moves the reference on by a period [s] > 0.
   void advance(double period) noexcept;

@@ -80,8 +80,12 @@ class GeometricSystem {
     Eigen::VectorXd values, curvatures;   ///< ψ and d²ψ/dt² (m)
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
     Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
+    Eigen::VectorXd activations;          ///< input: their activation distances (m), at first the system's
     GraphMetric metric;
     GoalPull pull;                        ///< ∂U, v* and the way left
+
+    /// Positions and velocities of the links at the last step.
+    const KinematicState& state() const noexcept { return state_; }
 
    private:
     friend class GeometricSystem;
@@ -123,9 +127,17 @@ class GeometricSystem {
   Diagnosis diagnose(ConstVectorRef q, ConstVectorRef v, const Goal& goal,
                      const Obstacles& obstacles, Workspace& workspace) const noexcept;
 
-  /// This system with barriers that leave a goal (nv) [rad | m] free, see Barrier. Allocates: to be made when the goal or
-  /// the obstacles change, not in the loop.
+  /// Lowers activation distances (m) so that barriers leave a configuration (nv) [rad | m] free, see Barrier. What the
+  /// workspace says of its last step is lost. False, and nothing changes, where the configuration is not finite. No
+  /// allocation.
+  [[nodiscard]] bool lower_activations(ConstVectorRef q, const Obstacles& obstacles, Workspace& workspace,
+                                       Eigen::Ref<Eigen::VectorXd> activations) const noexcept;
+
+  /// This system with activation distances that leave a goal (nv) [rad | m] free. Allocates.
   GeometricSystem relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const;
+
+  /// The activation distances (m) that a workspace begins with.
+  const Eigen::VectorXd& activations() const noexcept { return activations_; }
 
   /// What every embedding coordinate stands for (m).
   const std::vector<CoordinateLabel>& labels() const noexcept { return labels_; }
@@ -149,7 +161,7 @@ class GeometricSystem {
   Gain stiffness_, damping_;
   int num_embedding_coordinates_ = 0;
   std::vector<CoordinateLabel> labels_;
-  Eigen::VectorXd floors_;
+  Eigen::VectorXd floors_, activations_;
 };
 
 }  // namespace sidestep

@@ -82,6 +82,9 @@ using Goal = std::variant<JointGoal, PoseGoal>;
 /// Moves a goal for `duration` [s] as its velocity and acceleration say. No allocation.
 void advance(Goal& goal, double duration) noexcept;
 
+/// Whether a goal has a velocity or an acceleration.
+bool is_moving(const Goal& goal) noexcept;
+
 /// What is wrong with a goal.
 enum class GoalFault {
   none,

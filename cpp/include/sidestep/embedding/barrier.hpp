@@ -1,6 +1,6 @@
 #pragma once
 
-#include <memory>
+#include <algorithm>
 
 #include "sidestep/embedding/approach_mean.hpp"
 #include "sidestep/embedding/barrier_function.hpp"
@@ -10,10 +10,10 @@ namespace sidestep {
 
 /// An embedding whose coordinates are barriers of clearances, ψ_k = f(h_k).
 ///
-/// Every coordinate has an activation distance of its own, at first the barrier function's. Where the arm has to come
-/// close, at its goal, it is made shorter (`relaxed_at`): else the metric there is so steep that the pull to the goal
-/// is all but lost, and the arm creeps. The safety margin (SafetySettings) shrinks with it, of what is known and not seen:
-/// a link that has to come near another one can.
+/// Every coordinate has an activation distance of its own, and whoever evaluates may ask for shorter ones
+/// (EmbeddingView::activations): where the arm has to come close, at its goal, the metric is else so steep that the pull to
+/// the goal is all but lost, and the arm creeps. The safety margin (SafetySettings) shrinks with it, of what is known and not
+/// seen: a link that has to come near another one can.
 class Barrier : public Embedding {
  public:
   int num_coordinates() const noexcept final { return static_cast<int>(activations_.size()); }
@@ -23,7 +23,11 @@ class Barrier : public Embedding {
   /// The activation distance of every coordinate (m) [m | rad].
   const Eigen::VectorXd& activations() const noexcept { return activations_; }
 
-  std::shared_ptr<const Embedding> relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const final;
+  /// The floor of a coordinate: the barrier function's, shorter by as much as its own activation distance is.
+  double floor(Eigen::Index k) const noexcept { return function_.floor * activations_[k] / function_.activation; }
+
+  void write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept final { activations = activations_; }
+  void lower_activations(ConstVectorRef clearances, Eigen::Ref<Eigen::VectorXd> activations) const noexcept final;
 
   /// Share of a clearance at the goal that remains of the activation distance there.
   static constexpr double relaxed_share = 0.9;
@@ -37,6 +41,8 @@ class Barrier : public Embedding {
   Barrier(Robot robot, const BarrierFunction& function, const char* owner);
 
   void set_num_coordinates(int num) { activations_.setConstant(num, function_.activation); }
+  /// Makes the activation distance of a coordinate shorter than the barrier function's.
+  void shorten_activation(int k, double most) { activations_[k] = std::min(activations_[k], most); }
 
   /// Within which what approaches is looked for: the activation distance beyond what can be closed while the arm stops.
   Horizon horizon(const KinematicState& state) const noexcept {
@@ -46,7 +52,6 @@ class Barrier : public Embedding {
   /// Adds ψ_k = f(h_k) with its derivatives, for every clearance that `out.clearances` holds.
   void add_barriers(EmbeddingView out) const noexcept;
 
-  virtual std::shared_ptr<Barrier> clone() const = 0;
   /// Whether the clearances are from points that a sensor sees, with errors that the safety margin covers.
   virtual bool is_seen() const noexcept { return false; }
 

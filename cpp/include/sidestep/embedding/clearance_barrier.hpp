@@ -34,7 +34,6 @@ class ClearanceBarrier final : public Barrier {
   double reach() const noexcept { return reach_; }
 
  private:
-  std::shared_ptr<Barrier> clone() const override { return std::make_shared<ClearanceBarrier>(*this); }
   bool is_seen() const noexcept override { return true; }
 
   ClearanceField field_;

@@ -26,8 +26,6 @@ class ClearanceTableBarrier final : public Barrier {
   CoordinateLabel label(int k) const override;
 
  private:
-  std::shared_ptr<Barrier> clone() const override { return std::make_shared<ClearanceTableBarrier>(*this); }
-
   double reach_;
   std::vector<ClearanceTable> tables_;
   std::vector<Eigen::Vector2d> steepest_;  // of each

@@ -20,6 +20,8 @@ struct EmbeddingView {
   Eigen::Map<Eigen::MatrixXd> jacobian_transposed;  ///< ∂ψ/∂q as columns (nv × m)
   Eigen::Map<Eigen::VectorXd> curvatures;           ///< d²ψ/dt² along q̇ = v, q̈ = 0 (m)
   ClearanceView clearances;                         ///< for barriers of clearances; others leave it as it is
+  /// Activation distances (m) in place of the embedding's own, see Barrier; empty: its own.
+  Eigen::Map<const Eigen::VectorXd> activations{nullptr, 0};
 };
 
 /// The same for a single coordinate at the states of a block, for each of which it has a number.
@@ -82,9 +84,12 @@ class Embedding {
   /// Whether `lower_distances` does anything.
   virtual bool measures_distances() const noexcept { return false; }
 
-  /// The same embedding with activation distances that leave the goal (nv) [rad | m] free, see Barrier; null where
-  /// there is nothing to relax. Allocates: to be asked when the goal or the obstacles change, not in the loop.
-  virtual std::shared_ptr<const Embedding> relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const;
+  /// Writes the embedding's own activation distances (m) [m | rad]; infinity where it is no barrier. No allocation.
+  virtual void write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept;
+
+  /// Lowers activation distances (m) so that a configuration with these clearances (m) is left free, see Barrier. Changes
+  /// nothing where it is no barrier. No allocation.
+  virtual void lower_activations(ConstVectorRef clearances, Eigen::Ref<Eigen::VectorXd> activations) const noexcept;
 
   /// The robot the embedding was made for.
   const Robot& robot() const noexcept { return robot_; }

@@ -10,10 +10,13 @@ namespace sidestep {
 ///
 ///     ψ = strength (activation / h − 1)^power,   h = q_j − q_j⁻ or q_j⁺ − q_j  [rad | m],
 ///
-/// of the same kind as the clearance barriers. The acceleration bounds of the controller hold the limits; this one
+/// of the same kind as the clearance barriers. The activation distance of a joint is no longer than `range_share` of its
+/// range: a finger with 40 mm of travel is free to use nearly all of it. The acceleration bounds of the controller hold the limits; this one
 /// makes the motion bend before it comes to that.
 class JointLimitBarrier final : public Barrier {
  public:
+  static constexpr double range_share = 0.05;
+
   /// Throws std::invalid_argument that names the setting, or if the robot has no finite position limit.
   JointLimitBarrier(const Robot& robot, BarrierFunction barrier);
 
@@ -21,8 +24,6 @@ class JointLimitBarrier final : public Barrier {
   CoordinateLabel label(int k) const override;
 
  private:
-  std::shared_ptr<Barrier> clone() const override { return std::make_shared<JointLimitBarrier>(*this); }
-
   struct PositionLimit {
     int joint_coordinate;
     double sign;      // +1: lower limit, −1: upper limit

@@ -28,8 +28,6 @@ class SelfCollisionBarrier final : public Barrier {
   CoordinateLabel label(int k) const override;
 
  private:
-  std::shared_ptr<Barrier> clone() const override { return std::make_shared<SelfCollisionBarrier>(*this); }
-
   struct Group {
     std::string link;
     int joint;
@@ -61,8 +59,6 @@ class PlaneBarrier final : public Barrier {
   CoordinateLabel label(int k) const override;
 
  private:
-  std::shared_ptr<Barrier> clone() const override { return std::make_shared<PlaneBarrier>(*this); }
-
   Eigen::Vector3d normal_;
   double offset_;
   double temperature_, reach_;

@@ -95,6 +95,15 @@ class Guide {
 
   /// What the guide found last: the path, or what is in the way. A copy; not for the loop.
   Plan last_plan() const;
+  /// Which route the loop follows, 0 if none, and where it is on it. For the loop; allocates nothing.
+  struct Following {
+    std::uint64_t route_number = 0;
+    RouteFollower follower = {};
+  };
+  Following following() noexcept;
+  /// A route by its number; null if there is a newer one. Not for the loop.
+  std::shared_ptr<const Route> route(std::uint64_t number) const;
+
   /// How often it searched for a path, and how often it found one.
   struct Counts {
     int searches = 0, found = 0;
@@ -117,7 +126,7 @@ class Guide {
     std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
     PlanStatus status = PlanStatus::no_path;
     bool direct = true;  // straight to the goal
-    Route route;
+    std::shared_ptr<const Route> route;  // kept alive by the guide's side: a slot is only overwritten there
   };
 
   void run();
@@ -159,6 +168,8 @@ class Guide {
   std::shared_ptr<const Obstacles> newest_;
   std::uint64_t scene_number_ = 0;
   Plan shown_;
+  std::shared_ptr<const Route> shown_route_;
+  std::uint64_t shown_route_number_ = 0;
   Counts counts_;
 
   // Of the guide.
@@ -176,7 +187,7 @@ class Guide {
   Eigen::MatrixXd path_;
   Eigen::VectorXd stations_;  // of its waypoints
   Margins path_margins_;
-  Route route_;
+  std::shared_ptr<const Route> route_;
   std::thread thread_;
 };
 

@@ -1,0 +1,331 @@
+#include "sidestep/controller/controller.hpp"
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <limits>
+
+#include "arguments.hpp"
+#include "dynamical_system.hpp"
+#include "module.hpp"
+#include "sidestep/controller/motion.hpp"
+
+namespace sidestep::python {
+namespace {
+
+std::string listed(const nb::object& names) { return nb::cast<std::string>(nb::str(", ").attr("join")(names)); }
+
+/// Sets a field from Python; refuses what is no number of its kind.
+template <class Settings>
+void set_field(Settings& settings, const Field<Settings>& field, nb::handle value) {
+  std::visit(
+      [&](auto member) {
+        using Value = std::remove_reference_t<decltype(settings.*member)>;
+        if (!nb::try_cast<Value>(value, settings.*member)) {
+          throw nb::type_error((std::string(field.name) + " is " + nb::repr(value).c_str() + ", must be a number [" +
+                                field.unit + "]").c_str());
+        }
+      },
+      field.member);
+}
+
+template <class Settings>
+nb::object get_field(const Settings& settings, const Field<Settings>& field) {
+  return std::visit([&](auto member) { return nb::cast(settings.*member); }, field.member);
+}
+
+/// A part of the settings: a struct of its own, or None for one that is left out.
+struct Part {
+  const char* name;
+  std::function<nb::object(const ControllerSettings&)> get;
+  std::function<void(ControllerSettings&, nb::handle)> set;
+};
+
+template <class Settings>
+void describe_fields(nb::list& rows, const std::string& group) {
+  const Settings defaults{};
+  for (const Field<Settings>& field : fields<Settings>()) {
+    nb::dict row;
+    row["name"] = group + field.name;
+    row["unit"] = field.unit;
+    row["default"] = get_field(defaults, field);
+    row["least"] = field.least;
+    row["most"] = field.most;
+    row["trades"] = field.trades;
+    rows.append(row);
+  }
+}
+
+/// A class with a keyword and a property for every field.
+template <class Settings>
+nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const char* doc) {
+  nb::class_<Settings> c(m, name, doc);
+  c.def("__init__", [name](Settings* self, const nb::kwargs& values) {
+    new (self) Settings();
+    for (const auto& [key, value] : values) {
+      const auto wanted = nb::cast<std::string>(key);
+      nb::list known;
+      bool found = false;
+      for (const Field<Settings>& field : fields<Settings>()) {
+        known.append(field.name);
+        if (wanted == field.name) {
+          set_field(*self, field, value);
+          found = true;
+        }
+      }
+      if (!found) {
+        throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + listed(known)).c_str());
+      }
+    }
+  });
+  for (const Field<Settings>& field : fields<Settings>()) {
+    c.def_prop_rw(
+        field.name, [field](const Settings& s) { return get_field(s, field); },
+        [field](Settings& s, nb::handle value) { set_field(s, field, value); });
+  }
+  return c;
+}
+
+/// A part that may be left out, as a property.
+template <class Class, class Owner, class Value>
+void optional_part(Class& c, const char* name, std::optional<Value> Owner::*member) {
+  c.def_prop_rw(
+      name, [member](const Owner& s) { return s.*member; },
+      [member](Owner& s, std::optional<Value> value) { s.*member = std::move(value); }, nb::arg("value").none());
+}
+
+const std::vector<Part>& parts() {
+  const auto of = [](auto member) {
+    return std::pair{std::function<nb::object(const ControllerSettings&)>(
+                         [member](const ControllerSettings& s) { return nb::cast(s.*member); }),
+                     std::function<void(ControllerSettings&, nb::handle)>([member](ControllerSettings& s, nb::handle value) {
+                       using Value = std::remove_reference_t<decltype(s.*member)>;
+                       s.*member = nb::cast<Value>(value);
+                     })};
+  };
+  static const std::vector<Part> all = [&] {
+    std::vector<Part> result;
+    const auto add = [&](const char* name, auto member) {
+      auto [get, set] = of(member);
+      result.push_back({name, get, set});
+    };
+    add("barriers", &ControllerSettings::barriers);
+    add("safety", &ControllerSettings::safety);
+    add("arrival", &ControllerSettings::arrival);
+    add("planner", &ControllerSettings::planner);
+    add("look_ahead", &ControllerSettings::look_ahead);
+    add("local_minimum", &ControllerSettings::local_minimum);
+    return result;
+  }();
+  return all;
+}
+
+void bind_settings_tree(nb::module_& m) {
+  bind_settings<BarrierSettings>(m, "BarrierSettings", "The spring that pulls to the goal, and the barriers that bend its way.");
+  bind_settings<ArrivalSettings>(m, "ArrivalSettings", "When a goal counts as reached.");
+  auto planner = bind_settings<OnlinePlannerSettings>(m, "OnlinePlannerSettings", "The planner that runs beside the loop.");
+  planner.def_rw("search", &OnlinePlannerSettings::search).def_rw("route", &OnlinePlannerSettings::route);
+  bind_settings<EvasionSettings>(m, "LookAheadSettings", "Trajectories out of the way of what moves, see Controller.");
+  bind_settings<EscapeSettings>(m, "LocalMinimumSettings", "Sub-goals where the arm is stuck and there is no path.");
+
+  nb::enum_<ControllerSettings::Output>(m, "Output", "What a controller's program solves for.")
+      .value("automatic", ControllerSettings::Output::automatic, "Torque where the arm has inertias and effort limits.")
+      .value("torque", ControllerSettings::Output::torque)
+      .value("acceleration", ControllerSettings::Output::acceleration);
+
+  nb::class_<ControllerSettings> c(
+      m, "ControllerSettings",
+      "All settings of a Controller, see `controller_settings_fields`. Every part is on by default; `planner=None`,\n"
+      "`look_ahead=None` and `local_minimum=None` leave a part out, for comparisons.");
+  c.def("__init__", [](ControllerSettings* self, const nb::kwargs& values) {
+    new (self) ControllerSettings();
+    for (const auto& [key, value] : values) {
+      const auto wanted = nb::cast<std::string>(key);
+      nb::list known;
+      bool found = false;
+      for (const auto& field : fields<ControllerSettings>()) {
+        known.append(field.name);
+        if (wanted == field.name) {
+          set_field(*self, field, value);
+          found = true;
+        }
+      }
+      for (const Part& part : parts()) {
+        known.append(part.name);
+        if (wanted == part.name) {
+          part.set(*self, value);
+          found = true;
+        }
+      }
+      known.append("output");
+      if (wanted == "output") {
+        self->output = as_enum<ControllerSettings::Output>(value, "output");
+        found = true;
+      }
+      if (!found) {
+        throw nb::type_error(("ControllerSettings has no setting '" + wanted + "'; it has: " + listed(known)).c_str());
+      }
+    }
+    self->validate();
+  });
+  for (const auto& field : fields<ControllerSettings>()) {
+    c.def_prop_rw(
+        field.name, [field](const ControllerSettings& s) { return get_field(s, field); },
+        [field](ControllerSettings& s, nb::handle value) { set_field(s, field, value); });
+  }
+  c.def_rw("barriers", &ControllerSettings::barriers)
+      .def_rw("safety", &ControllerSettings::safety)
+      .def_rw("arrival", &ControllerSettings::arrival)
+      .def_rw("output", &ControllerSettings::output)
+      .def("validate", &ControllerSettings::validate,
+           "Raises ValueError that names the setting, its value and what is allowed.")
+      .def("__copy__", [](const ControllerSettings& s) { return ControllerSettings(s); });
+  optional_part(c, "planner", &ControllerSettings::planner);
+  optional_part(c, "look_ahead", &ControllerSettings::look_ahead);
+  optional_part(c, "local_minimum", &ControllerSettings::local_minimum);
+
+  m.def(
+      "controller_settings_fields",
+      [] {
+        nb::list rows;
+        describe_fields<ControllerSettings>(rows, "");
+        describe_fields<BarrierSettings>(rows, "barriers.");
+        describe_fields<SafetySettings>(rows, "safety.");
+        describe_fields<ArrivalSettings>(rows, "arrival.");
+        describe_fields<OnlinePlannerSettings>(rows, "planner.");
+        describe_fields<PlannerSettings>(rows, "planner.search.");
+        describe_fields<RouteSettings>(rows, "planner.route.");
+        describe_fields<EvasionSettings>(rows, "look_ahead.");
+        describe_fields<EscapeSettings>(rows, "local_minimum.");
+        return rows;
+      },
+      nb::sig("def controller_settings_fields() -> list[dict[str, object]]"),
+      "Every setting of the tree: name (dotted), unit, default, least and most allowed, and what it trades.");
+}
+
+void bind_command(nb::module_& m) {
+  nb::enum_<SafetyStatus>(m, "SafetyStatus", nb::is_arithmetic(), "How safe a command is, by severity. Every command may be sent.")
+      .value("ok", SafetyStatus::ok, "The motion is what the goal asks for.")
+      .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
+      .value("relaxed", SafetyStatus::relaxed, "Velocity or acceleration limits gave way to clearances, position or torque limits.")
+      .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
+      .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
+      .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");
+  nb::enum_<Activity>(m, "Activity", "What a controller is about.")
+      .value("no_goal", Activity::no_goal, "None was given: the arm comes to rest, and evades.")
+      .value("moving", Activity::moving, "On the way to its goal.")
+      .value("waiting", Activity::waiting, "Until a posture is found.")
+      .value("arrived", Activity::arrived, "The goal is reached.")
+      .value("blocked", Activity::blocked, "No way leads to the goal now, see Controller.explain.")
+      .value("stale", Activity::stale, "The obstacles are older than obstacle_timeout: the arm stops.");
+
+  nb::class_<Command>(m, "Command", "What one step of a Controller gives; arrays are copies.")
+      .def_ro("status", &Command::status)
+      .def_ro("activity", &Command::activity)
+      .def_prop_ro("torque", [](const Command& c) { return to_numpy(c.torque); },
+                   "(nv,) [Nm | N], gravity included; zero where the output is acceleration.")
+      .def_prop_ro("acceleration", [](const Command& c) { return to_numpy(c.acceleration); }, "(nv,) [rad/s^2 | m/s^2].")
+      .def_prop_ro("velocity", [](const Command& c) { return to_numpy(c.velocity); }, "(nv,) after one period [rad/s | m/s].")
+      .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); }, "(nv,) after one period [rad | m].")
+      .def_ro("clearance", &Command::clearance, "The least, of obstacles, planes and links [m]; inf: far; nan: unknown.")
+      .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")
+      .def_ro("point", &Command::point, "The obstacle point, where it is one; else -1.")
+      .def_ro("bound_by", &Command::bound_by, "The coordinate whose clearance bends the motion most; -1: none.")
+      .def_ro("limits", &Command::limits, "(nv) the limits in the way of each joint.")
+      .def_ro("system", &Command::system, "StepStatus of the geometric system.")
+      .def_ro("program", &Command::program, "TorqueStatus of the quadratic program.")
+      .def_ro("avoiding", &Command::avoiding, "Follows a trajectory out of the way of what moves.")
+      .def_ro("on_path", &Command::on_path, "Follows a path of the planner.");
+}
+
+}  // namespace
+
+void bind_controller(nb::module_& m) {
+  bind_settings_tree(m);
+  bind_command(m);
+
+  nb::class_<Controller>(m, "Controller",
+                         "State in, safe command out, once a period: planner, barriers, look-ahead and quadratic program in one.\n"
+                         "Goals and obstacles may be set from any thread. Raises ValueError that names the setting at fault.")
+      .def(
+          "__init__",
+          [](Controller* self, const Arm& arm, const std::optional<ControllerSettings>& settings) {
+            new (self) Controller(arm, settings.value_or(ControllerSettings{}));
+          },
+          nb::arg("arm"), nb::arg("settings") = nb::none())
+      .def(
+          "set_goal",
+          [](Controller& self, nb::handle goal) { self.set_goal(as_goal(goal, self.arm().num_coordinates())); },
+          nb::arg("goal"),
+          nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal) -> None"),
+          "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose. Raises\n"
+          "ValueError that names the joint, its value and what is allowed; the goal before stays.")
+      .def("clear_goal", &Controller::clear_goal, "The arm comes to rest where it is, and goes on evading.")
+      .def("set_obstacles", &Controller::set_obstacles, nb::arg("obstacles"),
+           "From the next step on. Points move on by their velocities until they are set again.")
+      .def(
+          "step",
+          [](Controller& self, const ArrayLike& q, const ArrayLike& v, nb::handle mass_matrix, nb::handle bias) {
+            const int nv = self.arm().num_coordinates();
+            const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
+            if (mass_matrix.is_none() != bias.is_none()) {
+              throw nb::value_error("mass_matrix and bias go together: give both or none");
+            }
+            if (mass_matrix.is_none()) {
+              return Command(self.step(position, velocity));
+            }
+            const Eigen::MatrixXd M = as_matrix(mass_matrix, "mass_matrix", nv, nv);
+            return Command(self.step(position, velocity, M, as_vector(bias, "bias", nv)));
+          },
+          nb::arg("q"), nb::arg("v"), nb::arg("mass_matrix") = nb::none(), nb::arg("bias") = nb::none(),
+          nb::sig("def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
+                  "mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command"),
+          "One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)\n"
+          "[Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes.")
+      .def_prop_ro("command", [](const Controller& self) { return Command(self.command()); }, "Of the last step.")
+      .def("explain", &Controller::explain, "One sentence: what the last command does and why, and what to do about it.")
+      .def_prop_ro("settings", [](const Controller& self) { return ControllerSettings(self.settings()); }, "A copy.")
+      .def_prop_ro("labels", [](const Controller& self) { return self.labels(); }, "What the clearances are of.")
+      .def_prop_ro("target",
+                   [](const Controller& self) -> nb::object {
+                     const Eigen::VectorXd q = self.target();
+                     return q.size() == 0 ? nb::none() : nb::object(nb::cast(to_numpy(q)));
+                   },
+                   nb::sig("def target(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+                   "(nv,) the configuration that the arm is led to: the goal, or a posture of a pose goal; None: none yet.")
+      .def_prop_ro("plan", [](const Controller& self) { return self.last_plan(); }, "What the planner found last.")
+      .def_prop_ro("searches", [](const Controller& self) { return self.planner_counts().searches; },
+                   "How often a path was looked for.")
+      .def_prop_ro("has_torque", &Controller::has_torque, "Whether the commands hold torque.");
+
+  nb::class_<MotionRecord>(m, "MotionRecord", "A motion of a controller without physics: row k is what step k began with and gave.")
+      .def_prop_ro("q", [](const MotionRecord& r) { return to_numpy_matrix(r.q); }, "(steps, nv).")
+      .def_prop_ro("v", [](const MotionRecord& r) { return to_numpy_matrix(r.v); }, "(steps, nv).")
+      .def_prop_ro("acceleration", [](const MotionRecord& r) { return to_numpy_matrix(r.acceleration); }, "(steps, nv).")
+      .def_ro("statuses", &MotionRecord::statuses)
+      .def_ro("activities", &MotionRecord::activities)
+      .def_prop_ro("clearance", [](const MotionRecord& r) { return to_numpy(r.clearance); }, "(steps,) of the covering body [m].")
+      .def_prop_ro("step_seconds", [](const MotionRecord& r) { return to_numpy(r.step_seconds); }, "(steps,) [s].")
+      .def_prop_ro("last_q", [](const MotionRecord& r) { return to_numpy(r.last_q); }, "(nv,) after the last step.")
+      .def_prop_ro("last_v", [](const MotionRecord& r) { return to_numpy(r.last_v); }, "(nv,) after the last step.")
+      .def_ro("arrived", &MotionRecord::arrived, "Every joint came within the tolerance of the goal, which ended the motion.");
+  m.def(
+      "integrate",
+      [](Controller& controller, const ArrayLike& q, const ArrayLike& v, int steps, nb::handle goal, double tolerance) {
+        const int nv = controller.arm().num_coordinates();
+        const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv),
+                              end = goal.is_none() ? Eigen::VectorXd() : as_vector(goal, "goal", nv);
+        const nb::gil_scoped_release released;
+        return integrate(controller, position, velocity, steps, end, tolerance);
+      },
+      nb::arg("controller"), nb::arg("q"), nb::arg("v"), nb::kw_only(), nb::arg("steps"), nb::arg("goal") = nb::none(),
+      nb::arg("tolerance") = 0.0,
+      nb::sig("def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, "
+              "goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord"),
+      "Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is\n"
+      "within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not\n"
+      "finite, less than one step, and a controller that is not synchronous.");
+}
+
+}  // namespace sidestep::python

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "sidestep/control/acceleration_bounds.hpp"
+#include "sidestep/control/torque_controller.hpp"
+#include "sidestep/dynamical_system/geometric_system.hpp"
+
+namespace sidestep {
+
+/// How safe a command is, by severity. Every command may be sent.
+enum class SafetyStatus {
+  ok,              ///< the motion is what the goal asks for
+  limited,         ///< a limit of the arm or a clearance bends it
+  relaxed,         ///< velocity or acceleration limits gave way to clearances, position or torque limits
+  margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
+  stopping,        ///< the input is unusable or the program was not solved: a damped stop
+  clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
+};
+
+/// What a controller is about.
+enum class Activity {
+  no_goal,  ///< none was given: the arm comes to rest, and evades
+  moving,   ///< on the way to its goal
+  waiting,  ///< it holds on until a path or a posture is found
+  arrived,  ///< the goal is reached
+  blocked,  ///< no way leads to the goal now, see `explain`
+  stale,    ///< the obstacles are older than `obstacle_timeout`: the arm stops
+};
+
+/// Short names, for example "clearance_lost".
+const char* to_string(SafetyStatus status) noexcept;
+const char* to_string(Activity activity) noexcept;
+
+/// What one step gives. Made once, written by every step.
+struct Command {
+  explicit Command(int num_coordinates);
+
+  SafetyStatus status = SafetyStatus::stopping;
+  Activity activity = Activity::no_goal;
+  Eigen::VectorXd torque;        ///< (nv) [Nm | N], gravity included; zero where the output is acceleration
+  Eigen::VectorXd acceleration;  ///< (nv) [rad/s² | m/s²]
+  Eigen::VectorXd velocity;      ///< (nv) after one period of the acceleration [rad/s | m/s]
+  Eigen::VectorXd position;      ///< (nv) after one period at that velocity [rad | m]
+
+  double clearance = std::numeric_limits<double>::infinity();  ///< the least, of obstacles, planes and links [m]; inf: far
+  int coordinate = -1;  ///< whose clearance that is, see Controller::labels; -1: none within reach
+  int point = -1;       ///< the obstacle point, where it is one
+  int bound_by = -1;    ///< the coordinate whose clearance row bends the motion most; -1: none
+  std::vector<Limit> limits;  ///< (nv) the limits in the way of each joint
+
+  StepStatus system = StepStatus::invalid_state;  ///< of the geometric system
+  TorqueStatus program = TorqueStatus::fallback_invalid_input;  ///< of the quadratic program
+  bool avoiding = false;  ///< follows a trajectory of the look-ahead, out of the way of what moves
+  bool on_path = false;   ///< follows a path of the planner
+};
+
+}  // namespace sidestep

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sidestep/controller/command.hpp"
+#include "sidestep/controller/settings.hpp"
+#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/guidance/guide.hpp"
+#include "sidestep/model/arm.hpp"
+#include "sidestep/obstacles/obstacles.hpp"
+
+namespace sidestep {
+
+/// The controller: state in, safe command out, once a period.
+///
+///   1. Reference: the goal; or a point that runs ahead on the planner's path; or a sub-goal out of a local minimum.
+///   2. Geometric system: a damped spring to the reference on the graph of the barriers, see GeometricSystem. Barriers are
+///      lowered where the arm has to come near what rests: at its goal and in narrow places of the path.
+///   3. Look-ahead: where what moves would come too near on that way, a trajectory out of its way is followed instead.
+///   4. Quadratic program: the nearest acceleration within every limit and clearance, as torque or acceleration.
+///
+/// Clearances bound every command: no setting, goal or fault takes them away while the state is known.
+///
+/// `step` belongs to one thread, allocates nothing, takes no lock and never throws. Goals and obstacles may be set from
+/// other threads. Planner, look-ahead and posture search run in threads of their own; with `synchronous` inside `step`,
+/// which may then allocate, and repeats a motion bit for bit.
+class Controller {
+ public:
+  /// Throws std::invalid_argument that names the setting at fault, or what the arm lacks.
+  explicit Controller(Arm arm, ControllerSettings settings = {});
+  ~Controller();
+  Controller(const Controller&) = delete;
+  Controller& operator=(const Controller&) = delete;
+
+  /// From the next step on: a configuration (nv) [rad | m] within the limits. Throws std::invalid_argument that names the
+  /// joint, its value and what is allowed; the goal before stays.
+  void set_goal(const Eigen::VectorXd& position);
+  /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner.
+  void set_goal(Goal goal);
+  /// The arm comes to rest where it is, and goes on evading.
+  void clear_goal();
+
+  /// From the next step on. Points move on by their velocities until they are set again.
+  void set_obstacles(Obstacles obstacles);
+
+  /// One period at q [rad | m] and v [/s] (nv). A size that is wrong, or a value that is not finite, gives a damped stop
+  /// with the status `stopping`.
+  const Command& step(ConstVectorRef q, ConstVectorRef v) noexcept;
+  /// The same with the arm's own mass matrix (nv × nv) and bias (nv) [Nm | N] there; for torque output.
+  const Command& step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
+                      ConstVectorRef bias) noexcept;
+
+  /// Of the last step.
+  const Command& command() const noexcept;
+  /// One sentence: what the last command does and why, and what to do about it. For the thread of `step`; allocates.
+  std::string explain() const;
+
+  const Arm& arm() const noexcept;
+  const ControllerSettings& settings() const noexcept;
+  /// What the clearances are of (m).
+  const std::vector<CoordinateLabel>& labels() const noexcept;
+  const GeometricSystem& system() const noexcept;
+  const GeometricSystem::Workspace& workspace() const noexcept;
+  /// The program's solution of the last step.
+  const TorqueSolution& solution() const noexcept;
+  /// The configuration that the arm is led to: the goal, or the posture of a pose goal; empty if none is known. Not for
+  /// the loop.
+  Eigen::VectorXd target() const;
+  /// What the planner found last, and how often it searched. Not for the loop.
+  Plan last_plan() const;
+  Guide::Counts planner_counts() const;
+  bool has_torque() const noexcept;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sidestep/controller/controller.hpp"
+
+namespace sidestep {
+
+/// A motion of a controller without physics: row k is what step k began with and gave.
+struct MotionRecord {
+  Eigen::MatrixXd q, v, acceleration;  ///< (steps, nv)
+  std::vector<SafetyStatus> statuses;
+  std::vector<Activity> activities;
+  Eigen::VectorXd clearance;      ///< (steps) [m], of the covering body
+  Eigen::VectorXd step_seconds;   ///< (steps) [s] that each step took
+  Eigen::VectorXd last_q, last_v; ///< the state after the last step
+  bool arrived = false;           ///< every joint came within the tolerance of the goal, which ended the motion
+};
+
+/// Moves a model that does exactly what it is told, by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every joint is
+/// within `tolerance` [rad | m] of `goal` (nv), which may be empty. Throws std::invalid_argument on sizes, states that are not
+/// finite, less than one step, and a controller that is not synchronous, whose threads keep the machine's time.
+MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const Eigen::VectorXd& v, int steps,
+                       const Eigen::VectorXd& goal = {}, double tolerance = 0.0);
+
+}  // namespace sidestep

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "sidestep/control/safety_rows.hpp"
+#include "sidestep/dynamical_system/escape.hpp"
+#include "sidestep/dynamical_system/evasion.hpp"
+#include "sidestep/guidance/route.hpp"
+#include "sidestep/guidance/rrt_connect.hpp"
+
+namespace sidestep {
+
+/// The spring that pulls to the goal, and the barriers that bend its way.
+struct BarrierSettings {
+  double stiffness = 4.0, damping = 4.0;
+  double activation = 0.1, strength = 0.1, power = 2.0, floor = 0.002, temperature = 0.002;
+  double limit_activation = 0.1, limit_strength = 0.02;
+  double self_activation = 0.05, self_strength = 0.02;
+};
+
+/// When a goal counts as reached.
+struct ArrivalSettings {
+  double joint = 0.01;        ///< largest joint error [rad]
+  double sliding = 0.001;     ///< the same of sliding joints [m]
+  double position = 0.001;    ///< of a pose goal [m]
+  double rotation = 0.0087;   ///< of a pose goal [rad]: half a degree
+  double speed = 0.05;        ///< largest joint speed [rad/s | m/s]
+};
+
+/// The planner that runs beside the loop, see Guide.
+struct OnlinePlannerSettings {
+  PlannerSettings search = {};
+  RouteSettings route = {};
+  double period = 0.02;    ///< between two looks at the scene [s]
+  double patience = 1.0;   ///< without progress until it plans again [s]
+  double retry = 1.0;      ///< until a failed search is repeated in the same scene [s]
+};
+
+/// All settings of a Controller. Every part is on by default; an empty optional leaves a part out, for comparisons.
+struct ControllerSettings {
+  /// What the program solves for: torque where the arm has inertias and effort limits, or acceleration.
+  enum class Output { automatic, torque, acceleration };
+
+  double period = 0.001;         ///< between two calls of `step` [s]
+  Output output = Output::automatic;
+  double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
+  double stop_time = 0.1;        ///< time constant of the damped stop [s]
+  double obstacle_timeout = std::numeric_limits<double>::infinity();  ///< age from which obstacles count as stale [s]
+  bool local_activation = true;  ///< barriers leave room at goals and narrow places among what rests
+  bool synchronous = false;      ///< planner, look-ahead and posture search run inside `step`, so that motions repeat
+  std::uint64_t seed = 0;        ///< of every random draw
+
+  BarrierSettings barriers = {};
+  SafetySettings safety = {};
+  ArrivalSettings arrival = {};
+  std::optional<OnlinePlannerSettings> planner = OnlinePlannerSettings{};
+  std::optional<EvasionSettings> look_ahead = EvasionSettings{};
+  std::optional<EscapeSettings> local_minimum = EscapeSettings{};  ///< sub-goals where the arm is stuck without a path
+
+  /// Throws std::invalid_argument that names the setting, its value and what is allowed.
+  void validate() const;
+};
+
+/// One number of a settings struct: all that its users need to know.
+template <class Settings>
+struct Field {
+  const char* name;
+  std::variant<double Settings::*, int Settings::*, bool Settings::*, std::uint64_t Settings::*> member;
+  const char* unit;    ///< for example "m"; "-" for none
+  double least, most;  ///< allowed, both ends included; infinity where there is no bound
+  const char* trades;  ///< one sentence: what it is, and what larger and smaller values trade
+};
+
+/// The fields of a settings struct, in the order of its documentation. The one place where unit, range and meaning stand:
+/// `validate`, the Python classes, the schema of scenario files and the reference are made from it. Defaults are those of
+/// the struct.
+template <class Settings>
+const std::vector<Field<Settings>>& fields();
+template <> const std::vector<Field<BarrierSettings>>& fields();
+template <> const std::vector<Field<ArrivalSettings>>& fields();
+template <> const std::vector<Field<SafetySettings>>& fields();
+template <> const std::vector<Field<PlannerSettings>>& fields();
+template <> const std::vector<Field<RouteSettings>>& fields();
+template <> const std::vector<Field<OnlinePlannerSettings>>& fields();
+template <> const std::vector<Field<EvasionSettings>>& fields();
+template <> const std::vector<Field<EscapeSettings>>& fields();
+template <> const std::vector<Field<ControllerSettings>>& fields();
+
+/// The value of a field as a number.
+template <class Settings>
+double value_of(const Field<Settings>& field, const Settings& settings) {
+  return std::visit([&](auto member) { return static_cast<double>(settings.*member); }, field.member);
+}
+
+}  // namespace sidestep

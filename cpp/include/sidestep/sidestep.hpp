@@ -1,0 +1,7 @@
+#pragma once
+
+// Everything that a control program needs.
+#include "sidestep/controller/controller.hpp"
+#include "sidestep/controller/motion.hpp"
+#include "sidestep/model/arm.hpp"
+#include "sidestep/obstacles/obstacles.hpp"

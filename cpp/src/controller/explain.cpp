@@ -1,0 +1,98 @@
+// What a controller does, in words.
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "../settings.hpp"
+#include "impl.hpp"
+
+namespace sidestep {
+namespace {
+
+std::string millimetres(double metres) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f mm", 1e3 * std::abs(metres));
+  return text;
+}
+
+std::string parties(const CoordinateLabel& label, int point) {
+  switch (label.kind) {
+    case CoordinateLabel::Kind::obstacle:
+      return "link '" + label.name + "' and obstacle point " + std::to_string(point);
+    case CoordinateLabel::Kind::self:
+      return "links '" + label.name + "' and '" + label.other + "'";
+    case CoordinateLabel::Kind::plane:
+      return "link '" + label.name + "' and a plane";
+    case CoordinateLabel::Kind::joint_limit:
+      return "joint '" + label.name + "' and its " + label.other + " limit";
+    case CoordinateLabel::Kind::potential:
+      break;
+  }
+  return "a potential";
+}
+
+}  // namespace
+
+Eigen::VectorXd Controller::Impl::target() const { return has_target_ ? Eigen::VectorXd(target_ - turns_) : Eigen::VectorXd(); }
+
+std::string Controller::Impl::explain() const {
+  std::string text;
+  if (command.status == SafetyStatus::stopping) {
+    text = command.program == TorqueStatus::fallback_solver
+               ? "braking to a stop: the program was not solved"
+               : std::string("braking to a stop: the ") + (solution.fault == TorqueFault::none ? "state" : name(solution.fault)) +
+                     " of this step is unusable; check its size and that it is finite";
+    return text;
+  }
+  const auto diagnosis = system->diagnose(workspace);
+  if (command.status == SafetyStatus::clearance_lost) {
+    const CoordinateLabel& label = system->labels()[static_cast<std::size_t>(command.coordinate)];
+    text = parties(label, command.point) + " overlap by " + millimetres(command.clearance) + ", as far as the covering body says; ";
+    if (label.kind == CoordinateLabel::Kind::obstacle) {
+      text += "if points lie on the arm itself, filter the arm out of the cloud; ";
+    }
+  }
+  switch (command.activity) {
+    case Activity::no_goal: return text + "no goal: it holds still, and evades what comes";
+    case Activity::stale: return text + "stopped: the obstacles are " + std::to_string(obstacle_age_) +
+                                 " s old, more than obstacle_timeout; set_obstacles must be called more often";
+    case Activity::waiting: return text + "waiting for a posture that reaches the pose";
+    case Activity::arrived: return text + "arrived";
+    case Activity::blocked:
+    case Activity::moving: break;
+  }
+  if (command.system == StepStatus::invalid_goal || command.system == StepStatus::goal_outside_limits) {
+    return text + "the goal has left the position limits: it is not followed; set a new goal";
+  }
+  if (has_target_ && !posture_found_) {
+    const std::lock_guard lock(mutex_);
+    if (shown_posture_) {
+      char angle[32];
+      std::snprintf(angle, sizeof angle, "%.0f", shown_posture_->rotation_error * 180.0 / std::numbers::pi);
+      text += "the goal is out of reach: nearest posture " + millimetres(shown_posture_->position_error) + " and " + angle +
+              "° away; ";
+    }
+  }
+  if (guide_status_ == GuideStatus::goal_in_collision || guide_status_ == GuideStatus::start_in_collision) {
+    const Plan plan = guide->last_plan();
+    const std::string where = guide_status_ == GuideStatus::goal_in_collision ? "at the goal " : "where the arm is, ";
+    return text + where + describe(plan.obstruction) + "; it goes on when that is free";
+  }
+  if (guide_status_ == GuideStatus::no_path) {
+    text += "no path was found yet; it is looked for again; ";
+  }
+  if (avoiding_) {
+    return text + "steps out of the way of what moves";
+  }
+  if (escape_ && escape_->escaping()) {
+    text += "leaves a local minimum by a sub-goal; ";
+  }
+  if (command.on_path) {
+    text += "follows a path; ";
+  }
+  const CoordinateLabel label =
+      diagnosis.coordinate < 0 ? CoordinateLabel{} : system->labels()[static_cast<std::size_t>(diagnosis.coordinate)];
+  return text + diagnosis.describe(label);
+}
+
+}  // namespace sidestep

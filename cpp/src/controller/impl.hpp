@@ -1,0 +1,176 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <semaphore>
+#include <thread>
+#include <vector>
+
+#include "sidestep/control/acceleration_filter.hpp"
+#include "sidestep/control/handover.hpp"
+#include "sidestep/controller/controller.hpp"
+#include "sidestep/controller/posture_search.hpp"
+#include "sidestep/dynamical_system/escape.hpp"
+#include "sidestep/dynamical_system/evasion.hpp"
+
+namespace sidestep {
+
+/// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
+class Controller::Impl {
+ public:
+  Impl(Arm arm, ControllerSettings settings);
+  ~Impl();
+
+  void set_goal(std::optional<Goal> goal);
+  void set_obstacles(Obstacles obstacles);
+  const Command& step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
+                      const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
+  std::string explain() const;
+  Eigen::VectorXd target() const;
+
+  const Arm arm;
+  const ControllerSettings settings;
+  std::shared_ptr<const GeometricSystem> system;
+  GeometricSystem::Workspace workspace;
+  TorqueSolution solution;
+  Command command;
+  std::unique_ptr<Guide> guide;
+  bool torque = false;
+
+ private:
+  /// A goal as it was set, with its number: 0 is none.
+  struct GoalOrder {
+    std::uint64_t number = 0;
+    std::optional<Goal> goal;
+  };
+  struct ObstacleOrder {
+    std::uint64_t number = 0;
+    Obstacles obstacles = Obstacles::none();
+  };
+  /// What the step tells the worker every `look_period_`.
+  struct Snapshot {
+    explicit Snapshot(const Arm& arm, const Flight& flight);
+
+    double time = 0.0;
+    Eigen::VectorXd q, v;
+    std::uint64_t goal_number = 0, posture_attempt = 0;
+    std::uint64_t obstacle_number = 0;
+    double obstacle_age = 0.0;
+    JointGoal followed;                  // the reference of the step
+    bool by_pose = false;                // the pose goal itself draws
+    Guide::Following following;
+    Eigen::MatrixXd places;              // where barriers leave room (nv × num_places)
+    Eigen::Index num_places = 0;
+    bool avoiding = false;
+    Flight trajectory;
+  };
+  /// Activation distances, and whether the target itself is inside a barrier.
+  struct Activations {
+    std::uint64_t goal_number = 0;
+    Eigen::VectorXd values;
+    bool target_blocked = false;
+  };
+  struct FoundPosture {
+    std::uint64_t goal_number = 0, attempt = 0;
+    Posture posture;
+  };
+  /// What to follow from `time` + delay on.
+  struct FoundTrajectory {
+    double time = 0.0;
+    std::uint64_t goal_number = 0;
+    bool avoid = false;
+    Flight trajectory;
+  };
+
+  // Of the step.
+  bool take_state(ConstVectorRef q, ConstVectorRef v) noexcept;
+  void take_orders() noexcept;
+  void begin_goal() noexcept;
+  void take_posture(const Posture& posture) noexcept;
+  void choose_reference() noexcept;
+  void leave_room(bool looks) noexcept;
+  void avoid() noexcept;
+  void solve(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias, bool known,
+             ConstVectorRef q, ConstVectorRef v) noexcept;
+  void report(bool known) noexcept;
+  Activity judge_activity() noexcept;
+  bool at_goal() noexcept;
+  void write_places(Eigen::MatrixXd& places, Eigen::Index& num) const noexcept;
+  void write_snapshot() noexcept;
+  void keep_room() noexcept;
+  const Obstacles& obstacles() noexcept { return obstacle_orders_.current().obstacles; }
+  bool has_goal() const noexcept { return goal_ != nullptr; }
+  const PoseGoal* pose_goal() const noexcept { return goal_ == nullptr ? nullptr : std::get_if<PoseGoal>(goal_); }
+
+  // Of the worker; in `step` where synchronous.
+  void run();
+  void look(const Snapshot& snapshot);
+  Obstacles obstacles_at(const Snapshot& snapshot) const;
+  Posture search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles,
+                         std::uint64_t attempt);
+  Evasion::Leader leader_of(const Guide::Following& following) const;
+  /// Writes activation distances that leave room at places; whether the last of them is inside a barrier.
+  bool lower_at(const Eigen::MatrixXd& places, Eigen::Index num, const Obstacles& obstacles,
+                GeometricSystem::Workspace& workspace, Eigen::VectorXd& activations) const noexcept;
+
+  // Between the threads.
+  Handover<GoalOrder> goal_orders_;
+  Handover<ObstacleOrder> obstacle_orders_;
+  Handover<Snapshot> snapshots_;
+  Handover<Activations> activations_;
+  Handover<FoundPosture> postures_;
+  Handover<FoundTrajectory> trajectories_;
+  mutable std::mutex mutex_;  // of what follows; the step never takes it unless synchronous
+  std::optional<Goal> shown_goal_;
+  std::uint64_t goal_count_ = 0, obstacle_count_ = 0;
+  std::shared_ptr<const Obstacles> shown_obstacles_;
+  std::optional<Posture> shown_posture_;
+
+  // Of the step.
+  std::optional<RigidBodyDynamics> dynamics_;
+  std::optional<RigidBodyDynamics::Workspace> dynamics_workspace_;
+  std::optional<TorqueController> torque_program_;
+  std::optional<AccelerationFilter> filter_;
+  std::optional<Escape> escape_;
+  BodyClearance body_;
+  BodyClearance::Workspace here_;
+  Eigen::VectorXd q_, v_, last_q_, wanted_, turns_;
+  Eigen::MatrixXd mass_;
+  Eigen::VectorXd bias_;
+  std::vector<bool> is_sliding_, is_unlimited_;
+  std::vector<Eigen::Index> metric_coordinates_;  // of obstacles, planes and links: clearances in metres
+  double time_ = 0.0, next_look_ = 0.0, obstacle_age_ = 0.0;
+  bool known_before_ = false, disturbed_ = false, target_blocked_ = false;
+  Goal* goal_ = nullptr;          // in the current order
+  std::uint64_t goal_number_ = 0, posture_attempt_ = 0, tick_ = 0;
+  bool has_target_ = false, posture_found_ = false, by_pose_ = false, moves_ = false;
+  Eigen::VectorXd target_;        // a configuration that the arm is led to
+  Guide::Attractor attractor_;
+  GuideStatus guide_status_ = GuideStatus::idle;
+  Goal reference_;                // JointGoal
+  const Goal* followed_ = nullptr;
+  Goal refuge_;                   // JointGoal: the target of the trajectory
+  bool avoiding_ = false, pending_ = false;
+  Flight trajectory_;
+  Eigen::VectorXd own_activations_;
+  Eigen::MatrixXd places_, lowered_places_;
+  Eigen::Index num_places_ = 0, num_lowered_ = -1;
+  std::uint64_t lowered_version_ = 0;  // of obstacles
+  GeometricSystem::Workspace room_;    // for looks at places, where synchronous
+
+  // Of the worker.
+  std::unique_ptr<Evasion> evasion_;
+  std::optional<RrtConnect> ends_;     // says what is free at an end
+  GeometricSystem::Workspace worker_workspace_;
+  std::uint64_t sought_goal_ = 0, sought_attempt_ = 0;
+  double next_trajectory_ = 0.0;
+  double look_period_;
+  std::counting_semaphore<> wake_{0};
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,108 @@
+// The part of the controller beside the loop: postures, room at places, trajectories out of the way.
+#include <chrono>
+#include <utility>
+
+#include "../settings.hpp"
+#include "impl.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr int posture_starts = 40;        // from which a posture for a pose is searched at first
+constexpr int posture_starts_again = 20;  // and for another one
+
+}  // namespace
+
+void Controller::Impl::run() {
+  while (!stopping_.load()) {
+    static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(look_period_)));
+    if (snapshots_.update() && !stopping_.load()) {
+      look(snapshots_.current());
+    }
+  }
+}
+
+Obstacles Controller::Impl::obstacles_at(const Snapshot& snapshot) const {
+  std::shared_ptr<const Obstacles> newest;
+  bool same;
+  {
+    const std::lock_guard lock(mutex_);
+    newest = shown_obstacles_;
+    same = obstacle_count_ == snapshot.obstacle_number;
+  }
+  Obstacles now = *newest;
+  if (same) {
+    now.advance(snapshot.obstacle_age);
+  }
+  return now;
+}
+
+void Controller::Impl::look(const Snapshot& s) {
+  std::optional<Goal> goal;
+  {
+    const std::lock_guard lock(mutex_);
+    if (goal_count_ == s.goal_number) {
+      goal = shown_goal_;
+    }
+  }
+  const Obstacles around = obstacles_at(s);
+  if (guide && around.tree().moves()) {
+    guide->set_obstacles(around);
+  }
+  const auto* pose = goal ? std::get_if<PoseGoal>(&*goal) : nullptr;
+  if (pose != nullptr && !is_moving(*pose) && (sought_goal_ != s.goal_number || sought_attempt_ != s.posture_attempt)) {
+    sought_goal_ = s.goal_number;
+    sought_attempt_ = s.posture_attempt;
+    FoundPosture& found = postures_.draft();
+    found = {s.goal_number, s.posture_attempt, search_posture(*pose, s.q, around, s.posture_attempt)};
+    postures_.submit();
+  }
+  if (settings.local_activation && s.num_places > 0) {
+    Activations& room = activations_.draft();
+    room.goal_number = s.goal_number;
+    room.target_blocked = lower_at(s.places, s.num_places, around, worker_workspace_, room.values);
+    activations_.submit();
+  }
+  if (evasion_ && s.time >= next_trajectory_) {
+    next_trajectory_ = s.time + settings.look_ahead->delay - 0.5 * look_period_;
+    const Goal followed = s.by_pose && pose != nullptr ? Goal(*pose) : Goal(s.followed);
+    FoundTrajectory& found = trajectories_.draft();
+    const std::optional<Flight> followed_now = s.avoiding ? std::optional(s.trajectory) : std::nullopt;
+    const std::optional<Flight> best = evasion_->look(followed, s.q, s.v, around, followed_now, leader_of(s.following));
+    found.time = s.time;
+    found.goal_number = s.goal_number;
+    found.avoid = best.has_value();
+    if (best) {
+      found.trajectory = *best;
+    }
+    trajectories_.submit();
+  }
+}
+
+Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& around,
+                                         std::uint64_t attempt) {
+  Obstruction obstruction;
+  Posture posture =
+      find_posture(arm.robot(), goal, near, attempt == 0 ? posture_starts : posture_starts_again, attempt,
+                   [&](const Eigen::VectorXd& q) { return !ends_->obstructed(q, around, obstruction); });
+  const std::lock_guard lock(mutex_);
+  shown_posture_ = posture;
+  return posture;
+}
+
+Evasion::Leader Controller::Impl::leader_of(const Guide::Following& following) const {
+  if (!guide) {
+    return {};
+  }
+  const std::shared_ptr<const Route> route = guide->route(following.route_number);
+  if (route == nullptr) {
+    return {};
+  }
+  return [route, follower = following.follower, route_settings = guide->settings().route](
+             const Eigen::VectorXd& q, double duration, Goal& goal) mutable {
+    JointGoal& reference = std::get<JointGoal>(goal);
+    follower.advance(*route, route_settings, q, duration, reference.position, reference.velocity, reference.acceleration);
+  };
+}
+
+}  // namespace sidestep
