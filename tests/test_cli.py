@@ -137,6 +137,30 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert captured.err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("shape", "message"),
+    [
+        (
+            "size: [0.1, 0.1, 0.1]}, spacing: 1.0e-9",
+            "1e-09 m on 0.06 m^2 asks for about 6e+16 points, allowed",
+        ),
+        ("size: [0.1, 0.1, 0.1]}, spacing: 1.0e-200", "asks for about inf points, allowed are 1000000"),
+        ("size: [1.0e+9, 1.0e-12, 1.0e-12]}", "asks for about 3.3e+10 points, allowed are 1000000"),
+    ],
+)
+@pytest.mark.parametrize("method", ["written", "barrier"])
+def test_a_shape_that_would_take_billions_of_points_is_refused(
+    invoke: Invoke, capsys: pytest.CaptureFixture[str], shape: str, message: str, method: str
+) -> None:
+    obstacle = f"{{shape: {{type: box, {shape}, points: surface, position: [9, 0, 0]}}"
+    Path("bad.yaml").write_text(f"{SCENARIO}method: {method}\nobstacles: [{obstacle}]\n")
+    assert invoke("run", "bad.yaml", "--no-report", "-q") == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: small: obstacles[0]: spacing of ")
+    assert message in error
+    assert error.count("\n") == 1
+
+
 def test_other_bad_input(invoke: Invoke, capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke("run", "nothing") == 2
     assert "no such file; shipped scenarios are planar-" in capsys.readouterr().err

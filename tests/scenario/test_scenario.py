@@ -118,6 +118,62 @@ def test_one_error_names_file_place_value_and_what_is_allowed(old: str, new: str
     assert "\n" not in str(caught.value)
 
 
+LAUGHS = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
+    f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 20)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("? [1, 2]\n: x\n" + BASE, "line 1, column 3: not valid YAML: a key is [1, 2]; it must be text"),
+        (BASE.replace("{name: planar2}", "{{name: a}: b}"), "a key is {'name': 'a'}; it must be text"),
+        (BASE + "x: !!set {? [a]}\n", "a key is ['a']; it must be text"),
+        (BASE + "x: &a [1, *a]\n", "the alias '*a' stands inside the value that it repeats"),
+        ("&all\nname: *all\n", "the alias '*all' stands inside the value that it repeats"),
+        (BASE + "x: " + "[" * 100 + "]" * 100, "nested more than 32 deep; at most 32 is allowed"),
+        (BASE + "x: " + "[" * 100_000, "at most 32 is allowed"),
+        (
+            BASE + "x:\n" + "".join(" " * k + "a:\n" for k in range(1, 200)),
+            "nested more than 32 deep; at most 32",
+        ),
+        (LAUGHS + BASE, "the alias '*a3' makes more than 50000 values; at most 50000 are allowed"),
+        (LAUGHS.replace("[", "{<<: [").replace("]", "]}"), "more than 50000 values; at most 50000"),
+        (BASE + "#" * 4_000_000, "characters; at most 4000000 are allowed"),
+        (BASE.replace("small", "2024-13-45"), "'2024-13-45' is no timestamp: month must be in 1..12"),
+        (BASE.replace("small", "!!bool maybe"), "'maybe' is no bool"),
+        (BASE.replace("0.002", "1.0e-12"), "simulation.period is 1e-12 with a duration of 15.0 s, which"),
+        (BASE.replace("0.002", "5.0e-324"), "at most 2000000 are allowed: a period from 7.5e-06 s"),
+        (BASE + "evasion: {period: 1.0e-12}\n", "evasion.period is 1e-12 with a horizon of 2.0 s, which"),
+        (BASE + "evasion: {horizon: 1.0e+12}\n", "takes 1e+14 steps; at most 10000 are allowed"),
+        (
+            BASE + "evasion: {tries: 100000000000}\n",
+            "evasion.tries is 100000000000; it must be at most 100000",
+        ),
+        (BASE.replace("components: 3", "components: 1000000000"), "it must be at most 200"),
+        (
+            BASE.replace("[0.9, 0.1, 0.0]", f"[1{'0' * 400}, 0, 0]"),
+            f"obstacles[0].position[0] is 1{'0' * 99}…; at most 1e+30 in size is allowed",
+        ),
+        (BASE.replace("[0.9, 0.1, 0.0]", "[1.0e+300, 0, 0]"), "position[0] is 1e+300; at most 1e+30 in size"),
+        (BASE.replace("[0.9, 0.1, 0.0]", f"[1{'0' * 5000}, 0, 0]"), f"'1{'0' * 98}… is no int"),
+        (BASE + f"x: {'y' * 1_000_000}\n", f"unknown key 'x' (value '{'y' * 99}…); allowed: format, name"),
+    ],
+)
+def test_files_that_would_never_be_built_are_refused_in_one_short_line(text: str, message: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        parse(text)
+    assert str(caught.value).startswith("file.yaml")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+def test_an_alias_may_repeat_what_is_complete() -> None:
+    text = BASE.replace("start: {", "start: &here {").replace(GOAL, "goal: *here")
+    assert parse(text).goal == parse(text).start
+
+
 def test_an_integer_beyond_64_bits_is_read_as_it_is() -> None:
     seed = 2**64 + 1
     assert parse(BASE.replace("seed: 7", f"seed: {seed}")).body.seed == seed

@@ -29,7 +29,7 @@ MAX_POINTS = (
 def box(size: Sequence[float], spacing: float) -> Points:
     """Covering points of a box with edge lengths `size` (3,) [m], centred at the origin."""
     x, y, z = size
-    check_spacing(spacing, area=2.0 * (x * y + y * z + z * x))
+    check_spacing(spacing, area=2.0 * (x * y + y * z + z * x), length=x + y + z)
     lines = [_line(length, spacing) for length in size]
     faces = []
     for axis in range(3):
@@ -42,7 +42,7 @@ def box(size: Sequence[float], spacing: float) -> Points:
 
 def cylinder(radius: float, length: float, spacing: float) -> Points:
     """Covering points of a capped cylinder along z, centred at the origin."""
-    check_spacing(spacing, area=2.0 * np.pi * radius * (radius + length))
+    check_spacing(spacing, area=2.0 * np.pi * radius * (radius + length), length=length)
     # the unrolled side is flat; a chord is no longer than its arc
     number = max(3, int(np.ceil(2.0 * np.pi * radius / (GRID_STEP * spacing))))
     rim = _ring(radius, number)
@@ -59,7 +59,7 @@ def cylinder(radius: float, length: float, spacing: float) -> Points:
 
 def sphere(radius: float, spacing: float) -> Points:
     """Covering points of a sphere around the origin."""
-    check_spacing(spacing, area=4.0 * np.pi * radius**2)
+    check_spacing(spacing, area=4.0 * np.pi * radius * radius)
     num_rings = max(2, int(np.ceil(np.pi * radius / (RING_STEP * spacing))))
     rings = []
     for polar in np.linspace(0.0, np.pi, num_rings + 1):
@@ -83,13 +83,15 @@ def triangles(mesh: trimesh.Trimesh, spacing: float) -> Points:
     return _thinned(np.unique(np.asarray(corners, dtype=np.float64), axis=0), half)
 
 
-def check_spacing(spacing: float, *, area: float = 0.0) -> None:
-    """Raises ValueError unless the spacing is a positive length that suits the area [m^2] to be covered."""
+def check_spacing(spacing: float, *, area: float = 0.0, length: float = 0.0) -> None:
+    """Raises ValueError unless the spacing is a positive length that suits the area [m^2] to be covered, and the
+    length [m] of what is too thin to have one."""
     if not (np.isfinite(spacing) and spacing > 0.0):
         raise ValueError(f"spacing is {spacing}, must be positive and finite [m]")
-    if area / spacing**2 > MAX_POINTS:
+    area = max(area, spacing * length)
+    if area / spacing / spacing > MAX_POINTS:
         raise ValueError(
-            f"spacing of {spacing} m on {area:.4g} m^2 asks for about {area / spacing**2:.2g} points, "
+            f"spacing of {spacing} m on {area:.4g} m^2 asks for about {area / spacing / spacing:.2g} points, "
             f"allowed are {MAX_POINTS}; is the shape in metres?"
         )
 

@@ -107,6 +107,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         ScenarioError: a number of values that does not fit the robot, a start or goal outside the limits, an
             unknown robot or frame, a file that is missing or malformed; names the key and what is allowed.
     """
+    _at("simulation", scenario, scenario.check_steps)
     robot = _at("robot", scenario, partial(load_robot, scenario))
     start = _at("start.position", scenario, partial(coordinates, scenario.start, robot, "start.position"))
     velocity = _at("start.velocity", scenario, partial(start_velocity, scenario.start, robot))
@@ -117,7 +118,9 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         name = item.name or f"obstacle{index}"
         things = _at(f"obstacles[{index}]", scenario, partial(solids, scenario, item, name))
         objects += things
-        views += [view_of(item, thing, bare=scenario.method == "written") for thing in things]
+        for thing in things:
+            look = partial(view_of, item, thing, bare=scenario.method == "written")
+            views.append(_at(f"obstacles[{index}]", scenario, look))
     _at("obstacles", scenario, partial(check_scene, objects))
     scripted = any(item.motion is not None for item in scenario.obstacles)
     seen = partial(seen_at, tuple(views)) if scripted else seen_at(tuple(views), 0.0)
@@ -355,7 +358,7 @@ def _at(place: str, scenario: Scenario, make: Callable[[], _T]) -> _T:
         return make()
     except ScenarioError:
         raise
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, ArithmeticError, MemoryError) as error:
         text = str(error)
         text = text if text.startswith(place) else f"{place}: {text}"
         raise ScenarioError(f"{scenario.name}: {text}") from error

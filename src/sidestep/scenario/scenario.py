@@ -14,14 +14,22 @@ from typing import Any, Literal
 import yaml
 
 from sidestep.barriers import Barriers
-from sidestep.scenario.settings import EscapeChoice, EvasionChoice, GuideChoice, TorqueChoice
-from sidestep.scenario.validation import ScenarioError, check_document, parse_yaml
+from sidestep.scenario.settings import (
+    MAX_LOOK_STEPS,
+    EscapeChoice,
+    EvasionChoice,
+    GuideChoice,
+    TorqueChoice,
+    check_steps,
+)
+from sidestep.scenario.validation import MAX_CHARACTERS, ScenarioError, check_document, parse_yaml
 
 Vector3 = tuple[float, float, float]
 Mode = Literal["torque", "kinematic"]
 SwitchType = Literal["none", "harmonic_only", "geodesic_only", "binary", "sigmoid", "distance"]
 
 FORMAT_VERSION = 1
+MAX_STEPS = 2_000_000  # of one run: ten minutes at 0.3 ms; every step is kept for the report
 MethodChoice = Literal["written", "barrier", "reactive", "guided"]
 
 
@@ -225,6 +233,10 @@ class Scenario:
                 )
             path = _shipped_folder() / f"{source}.yaml"
         try:
+            if path.stat().st_size > 4 * MAX_CHARACTERS:  # bytes of a character
+                raise ScenarioError(
+                    f"{path}: has {path.stat().st_size} bytes; at most {MAX_CHARACTERS} characters are allowed"
+                )
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise ScenarioError(f"{path}: cannot be read as UTF-8 text: {error}") from error
@@ -241,6 +253,10 @@ class Scenario:
         check_document(document, file=file)
         document.pop("format")
         scenario: Scenario = _build(cls, document)
+        try:
+            scenario.check_steps()
+        except ValueError as error:
+            raise ScenarioError(f"{file}: {error}") from None
         for index, item in enumerate(scenario.obstacles):
             if item.motion is not None and not item.motion.begin < item.motion.end:
                 raise ScenarioError(
@@ -263,6 +279,12 @@ class Scenario:
                     f"{file}: obstacles[{index}].free is true; a point cloud can only be fixed"
                 )
         return dataclasses.replace(scenario, folder=folder or Path.cwd())
+
+    def check_steps(self) -> None:
+        """Raises ValueError where a run, or a look ahead in it, would take more steps than anybody waits for."""
+        run, look = self.simulation, self.evasion
+        check_steps("simulation", run.period, "duration", run.duration, MAX_STEPS)
+        check_steps("evasion", look.period, "horizon", look.horizon, MAX_LOOK_STEPS)
 
     def to_document(self) -> dict[str, Any]:
         """The scenario as plain dictionaries and lists, as in the file, without what equals the default."""

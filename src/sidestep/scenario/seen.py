@@ -9,7 +9,7 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import Obstacles
-from sidestep.obstacles.covering import box, cylinder, triangles
+from sidestep.obstacles.covering import box, check_spacing, cylinder, triangles
 from sidestep.pose import moved
 from sidestep.scenario.scenario import Obstacle
 from sidestep.simulation import SceneObject
@@ -36,6 +36,7 @@ def view_of(item: Obstacle, thing: SceneObject, *, bare: bool) -> View:
     """
     if bare and item.points == "surface":
         surface = thing.surface(subdivisions=3)
+        check_spacing(item.spacing, area=float(surface.area), length=float(max(surface.extents)))
         count = max(12, round(surface.area / item.spacing**2))
         points, _ = trimesh.sample.sample_surface_even(surface, count, seed=0)
         return View(thing, np.asarray(points), 0.0)

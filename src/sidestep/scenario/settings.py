@@ -8,6 +8,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+MAX_LOOK_STEPS = 10_000  # of one flight, of which a look draws hundreds
+
+
+def check_steps(place: str, period: float, span: str, length: float, most: int) -> None:
+    """Raises ValueError where `length` [s], which the file calls `span`, takes more than `most` periods [s]."""
+    if not length <= most * period:
+        raise ValueError(
+            f"{place}.period is {period} with a {span} of {length} s, which takes {length / period:.3g} steps; "
+            f"at most {most} are allowed: a period from {length / most:.3g} s"
+        )
+
 
 @dataclass(frozen=True)
 class EscapeChoice:
