@@ -26,6 +26,8 @@ def test_round_trip(generator: ProblemGenerator, tmp_path: Path) -> None:
     [
         ("{", "not JSON"),
         ("{}", "format"),
+        ("[" * 100_000, "not JSON: values are nested more than 32 deep"),
+        ('{"format": 1e999}', "1e999 is too large"),
         ('{"format": "sidestep-reach-problems", "version": 9}', "version"),
         ('{"format": "sidestep-reach-problems", "version": 1, "robot": "fr3"}', "problems"),
         (

@@ -177,6 +177,13 @@ def in_link(name: str, value: object) -> Callable[[dict[str, Any]], object]:
         (lambda d: d.update(links=[]), r"at \$\.links"),
         (lambda d: d["settings"].update(covariance="tied"), r"at \$\.settings\.covariance: 'tied'"),
         (in_link("means", [[float("nan"), 0.0, 0.0]]), "NaN is not a finite number"),
+        (in_link("weights", [10**400, 1]), "10{198,200}….* is too large; what is not finite or beyond 1e.30"),
+        (in_link("means", [[1e300, 0.0, 0.0]] * 2), r"1e\+300 is too large"),
+        (
+            in_link("weights", json.loads("[" * 900 + "]" * 900)),
+            "nested more than 32 deep; at most 32 is allowed",
+        ),
+        (lambda d: d.update({"x" * 9999: 1}), r"at \$: Additional properties.*x…$"),
         (in_link("means", [[1.0, 2.0], [0.0, 0.0, 0.0]]), r"at \$\.links\[1\]\.means\[0\]"),
         (in_link("means", [[0.0, 0.0, 0.0]]), "2 weights, 1 means and 2 covariances"),
         (in_link("weights", [0.9, 0.9]), r"sum to 1\.8"),
@@ -205,6 +212,8 @@ def test_files_that_are_no_body_are_refused(planar: Robot, tmp_path: Path) -> No
     for content, message in (
         ("{", "not valid JSON"),
         ("[]", "is not a body file"),
+        ("[" * 100_000, "nested more than 32 deep; at most 32 is allowed"),
+        ('{"a":' * 3000 + "1" + "}" * 3000, "nested more than 32 deep; at most 32 is allowed"),
         ("\x00\xff", "not valid JSON"),
     ):
         (tmp_path / "arm.json").write_bytes(content.encode("latin-1"))

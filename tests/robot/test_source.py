@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 from sidestep.robot import Robot, planar_arm
+from sidestep.robot.srdf import read_srdf
 
 MESH_URDF = re.sub(r"<box [^>]*/>", '<mesh filename="{}" scale="2 1 -1"/>', planar_arm(1), count=1)
 
@@ -68,6 +69,101 @@ def test_unreadable_mesh(packages: Path) -> None:
     robot = Robot.from_urdf(MESH_URDF.format(path))
     with pytest.raises(ValueError, match=r"mesh file .*broken.obj"):
         robot.collision_mesh("link1")
+
+
+@pytest.mark.parametrize(
+    "rest",
+    [
+        "../../other.stl",
+        "meshes/../../other.stl",
+        "meshes/./../../arm/meshes/box.stl",  # out and in again: where a package stands is nobody's business
+        "%2e%2e/other.stl",
+        "meshes%2f..%2F..%2fother.stl",
+        "..\\..\\other.stl",
+        "meshes\\..\\..\\other.stl",
+        "%5C..%5C../other.stl",
+        "//../other.stl",
+        "C:/other.stl",
+        "meshes/box.stl%00",
+    ],
+)
+def test_a_package_reference_stays_in_its_package(packages: Path, rest: str) -> None:
+    (packages / "other.stl").write_bytes((packages / "arm" / "meshes" / "box.stl").read_bytes())
+    with pytest.raises(ValueError, match=r"refers to .*which leaves the package; allowed: a file below"):
+        Robot.from_urdf(MESH_URDF.format(f"package://arm/{rest}"), package_dirs=[packages])
+    with pytest.raises(ValueError, match="leaves the package"):
+        Robot.from_urdf(MESH_URDF.format(f"package://arm/{rest}"), package_dirs=[packages / "arm"])
+
+
+@pytest.mark.parametrize("package", ["..", ".", "%2e%2e", "arm%2f..%2f..", "arm%5c..%5c.."])
+def test_a_package_has_a_name_and_no_path(packages: Path, package: str) -> None:
+    with pytest.raises(ValueError, match="leaves the package"):
+        Robot.from_urdf(MESH_URDF.format(f"package://{package}/box.stl"), package_dirs=[packages / "arm"])
+
+
+@pytest.mark.parametrize(
+    "rest", ["urdf/../meshes/box.stl", "urdf/..\\meshes\\box.stl", "absent/../meshes//./box%2Estl"]
+)
+def test_a_package_reference_may_go_up_inside(packages: Path, rest: str) -> None:
+    check_mesh(Robot.from_urdf(MESH_URDF.format(f"package://arm/{rest}"), package_dirs=[packages]))
+
+
+def test_a_reference_that_is_no_address(packages: Path) -> None:
+    with pytest.raises(ValueError, match=r"link 'link1' refers to 'package://\[arm/x', which is no address"):
+        Robot.from_urdf(MESH_URDF.format("package://[arm/x"), package_dirs=[packages])
+
+
+NAMED = '<?xml version="1.0" encoding="{}"?>\n' + planar_arm(1).replace("link1", "Glied-Ä")
+
+
+@pytest.mark.parametrize(
+    ("declared", "codec"),
+    [
+        ("UTF-8", "utf-8"),
+        ("utf-8", "utf-8-sig"),
+        ("UTF-16", "utf-16"),
+        ("ISO-8859-1", "latin-1"),
+        ("windows-1252", "cp1252"),
+        ("GB18030", "gb18030"),  # more than one byte a character: expat knows none of these
+    ],
+)
+def test_a_description_is_read_in_the_encoding_that_it_declares(
+    tmp_path: Path, declared: str, codec: str
+) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(NAMED.format(declared).encode(codec))
+    assert [link.name for link in Robot.from_urdf(path).links if "Glied" in link.name] == ["Glied-Ä"]
+    assert Robot.from_urdf(NAMED.format(declared)).link("Glied-Ä").name == "Glied-Ä"
+
+
+@pytest.mark.parametrize("declared", ["nonsense", "zip", "rot13", "x-user-defined", "undefined", ""])
+def test_an_unknown_encoding_is_named(tmp_path: Path, declared: str) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(NAMED.format(declared))
+    for read in (lambda: Robot.from_urdf(path), lambda: read_srdf(path, [])):
+        with pytest.raises(
+            ValueError, match=rf"arm\.urdf declares the encoding '{declared}'.*allowed: UTF-8"
+        ) as e:
+            read()
+        assert "\n" not in str(e.value)
+
+
+def test_bytes_that_are_not_in_the_encoding_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(NAMED.format("UTF-8").encode("latin-1"))
+    with pytest.raises(ValueError, match=r"arm\.urdf is not UTF-8 text \(byte \d+: .*; allowed: UTF-8, or"):
+        Robot.from_urdf(path)
+
+
+def test_a_description_that_multiplies_or_calls_itself_is_refused() -> None:
+    laughs = "".join(f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 12))
+    text = f'<!DOCTYPE robot [<!ENTITY a0 "x">{laughs}]><robot name="&a11;"/>'
+    with pytest.raises(ValueError, match="URDF string is not well-formed XML"):
+        Robot.from_urdf(text)
+    endless = PART.replace('<link name="base"/>', '<xacro:part length="1"/>', 1)
+    endless = endless.replace("</robot>", '<xacro:part length="1"/></robot>')
+    with pytest.raises(ValueError, match="URDF string: xacro expansion failed: RecursionError"):
+        Robot.from_urdf(endless)
 
 
 XACRO = """<robot name="made" xmlns:xacro="http://www.ros.org/wiki/xacro">

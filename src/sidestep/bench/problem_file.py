@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sidestep.bench.problems import ReachProblem
+from sidestep.schema import parse_json
 
 FORMAT = "sidestep-reach-problems"
 VERSION = 1
@@ -60,8 +61,8 @@ def read_problems(path: str | Path) -> tuple[ReachProblem, ...]:
         FileNotFoundError: no such file. ValueError: it is no such file; says where it is malformed.
     """
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        document = parse_json(Path(path).read_text(encoding="utf-8"))
+    except ValueError as error:
         raise ValueError(f"{path} is not JSON: {error}") from None
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f"{path} is not a file of reach problems: 'format' must be {FORMAT!r}")

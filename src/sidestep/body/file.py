@@ -18,7 +18,7 @@ from sidestep.body.cover import CoverSettings, LinkCover, TradeOff
 from sidestep.body.fitting import FitSettings, LinkFit
 from sidestep.body.mixture import Mixture
 from sidestep.body.selection import CriterionCurve
-from sidestep.schema import mismatch
+from sidestep.schema import mismatch, parse_json, shortened
 
 if TYPE_CHECKING:
     from sidestep.robot import Robot
@@ -109,13 +109,15 @@ def read(path: str | Path, robot: Robot) -> BodyContents:
     if not path.is_file():
         raise FileNotFoundError(f"body file '{path}' does not exist")
     try:
-        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        document = parse_json(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise ValueError(f"body file '{path}' is not valid JSON: {error}") from error
     _check_version(path, document)
     problem = mismatch(document, (files("sidestep.body") / "body_schema.json").read_text(encoding="utf-8"))
     if problem is not None:
-        raise ValueError(f"body file '{path}' is malformed at {problem.json_path}: {problem.message}")
+        raise ValueError(
+            f"body file '{path}' is malformed at {problem.json_path}: {shortened(problem.message)}"
+        )
     name, fingerprint = document["robot"]["name"], document["robot"]["fingerprint"]
     if fingerprint != robot.fingerprint:
         raise ValueError(
@@ -133,17 +135,13 @@ def read(path: str | Path, robot: Robot) -> BodyContents:
     return contents
 
 
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a finite number")
-
-
 def _check_version(path: Path, document: Any) -> None:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f"'{path}' is not a body file: its \"format\" is not {FORMAT!r}")
     version = document.get("format_version")
     if version not in READABLE_VERSIONS:
         raise ValueError(
-            f"body file '{path}' has format version {version}, this sidestep reads versions "
+            f"body file '{path}' has format version {shortened(str(version))}, this sidestep reads versions "
             f"{', '.join(map(str, READABLE_VERSIONS))}; fit the body again"
         )
 

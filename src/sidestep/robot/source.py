@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import io
+import posixpath
+import re
 import sys
 import tempfile
 import types
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote, urlparse
 
 _XACRO_MARKS = ("ros.org/wiki/xacro", "ros.org/xacro")  # namespaces that xacro documents declare
@@ -33,12 +36,17 @@ class Description:
 
         Raises:
             FileNotFoundError: names `owner`, the reference and the folders searched.
-            ValueError: another scheme.
+            ValueError: another scheme, or a `package://` reference that leaves its package.
         """
-        parsed = urlparse(uri)
+        try:
+            parsed = urlparse(uri)
+        except ValueError as error:
+            raise ValueError(f"{owner} refers to {uri!r}, which is no address: {error}") from error
         parents = () if self.folder is None else (self.folder, *self.folder.parents)
         if parsed.scheme == "package":
-            package, rest = unquote(parsed.netloc), unquote(parsed.path).lstrip("/")
+            package, rest = _inside_package(
+                unquote(parsed.netloc), unquote(parsed.path), f"{owner} refers to {uri!r}"
+            )
             searched = [*self.package_dirs, *parents]
             candidates = [
                 path
@@ -59,6 +67,19 @@ class Description:
         raise FileNotFoundError(f"{owner} refers to {uri!r}, which does not exist; searched in: {folders}")
 
 
+def _inside_package(package: str, path: str, what: str) -> tuple[str, str]:
+    """The name of a package and a path in it without `..`, whatever the path is written with.
+
+    Raises:
+        ValueError: they name a file outside; begins with `what`.
+    """
+    rest = posixpath.normpath(path.replace("\\", "/").lstrip("/"))
+    leaves = rest.split("/")[0] == ".." or package in (".", "..") or any(mark in package for mark in "/\\")
+    if leaves or "\0" in package + rest or PureWindowsPath(rest).drive:
+        raise ValueError(f"{what}, which leaves the package; allowed: a file below package://NAME/")
+    return package, rest
+
+
 def read_description(
     source: str | Path, *, package_dirs: Sequence[str | Path], xacro_arguments: Mapping[str, str] | None
 ) -> Description:
@@ -73,24 +94,55 @@ def read_description(
             raise FileNotFoundError(f"package_dirs: {directory} is not a folder")
     folder: Path | None = None
     if isinstance(source, str) and source.lstrip().startswith("<"):
-        label, text = "URDF string", source
+        label, text = "URDF string", source.lstrip()
     else:
         path = Path(source).resolve()
         if not path.is_file():
             raise FileNotFoundError(f"robot description {path} does not exist or is not a file")
-        label, text, folder = str(path), path.read_text(encoding="utf-8"), path.parent
-    root = _parse(text, label)
+        label, text, folder = str(path), read_xml(path), path.parent
+    root = parse_xml(text, label)
     if any(mark in tag for mark in _XACRO_MARKS for tag in _qualified_names(root)):
-        root = _parse(_expand(text, label, folder, directories, dict(xacro_arguments or {})), label)
+        root = parse_xml(_expand(text, label, folder, directories, dict(xacro_arguments or {})), label)
     elif xacro_arguments:
         raise ValueError(f"{label} uses no xacro, but xacro_arguments are given: {sorted(xacro_arguments)}")
     return Description(root, label, folder, directories)
 
 
-def _parse(text: str, label: str) -> ElementTree.Element:
+def read_xml(path: Path) -> str:
+    """The text of an XML file, in the encoding of its byte order mark or declaration, UTF-8 without either.
+
+    Raises:
+        ValueError: names the file, the encoding and what is allowed.
+    """
+    content = path.read_bytes()
+    marks = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+    encoding = next((name for mark, name in marks.items() if content.startswith(mark)), "utf-8")
+    declared = re.match(rb"""\s*<\?xml\s[^>]*?encoding\s*=\s*["']([^"'>]*)""", content)
+    if declared is not None and encoding == "utf-8":
+        encoding = declared[1].decode("latin-1")
     try:
-        root = ElementTree.fromstring(text.lstrip().encode("utf-8"))
-    except ElementTree.ParseError as error:
+        return content.decode(encoding).lstrip()
+    except UnicodeDecodeError as error:
+        raise ValueError(
+            f"{path} is not {encoding} text (byte {error.start}: {error.reason}); allowed: UTF-8, or another "
+            f"encoding that the file declares"
+        ) from error
+    except (LookupError, ValueError) as error:
+        raise ValueError(
+            f"{path} declares the encoding {encoding!r}, which is unknown; allowed: UTF-8, UTF-16, ISO-8859-1, "
+            "or another text encoding that Python knows"
+        ) from error
+
+
+def parse_xml(text: str, label: str) -> ElementTree.Element:
+    """The root of a robot description; an encoding that the text declares was that of its file and is not applied.
+
+    Raises:
+        ValueError: not XML, or another root than `<robot>`; begins with `label`.
+    """
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError) as error:  # ValueError: characters that no encoding has
         raise ValueError(f"{label} is not well-formed XML: {error}") from error
     if root.tag != "robot":
         raise ValueError(f"{label}: the root element is <{root.tag}>, must be <robot>")
@@ -118,11 +170,10 @@ def _expand(
             path.write_text(text, encoding="utf-8")
         try:
             with contextlib.redirect_stderr(messages), _findable_packages(package_dirs, folder):
-                document = xacro.process_file(str(path), mappings=arguments)
+                return str(xacro.process_file(str(path), mappings=arguments).toxml())
         except Exception as error:  # xacro evaluates expressions, so any exception can come out of it
             detail = f"{error} {messages.getvalue()}".strip()
             raise ValueError(f"{label}: xacro expansion failed: {type(error).__name__}: {detail}") from error
-        return str(document.toxml())
 
 
 @contextlib.contextmanager

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
 from pathlib import Path
+
+from sidestep.robot.source import parse_xml, read_xml
 
 Pair = tuple[str, str]
 
@@ -25,18 +26,13 @@ def read_srdf(source: str | Path, links: Iterable[str]) -> tuple[Pair, ...]:
         ValueError: it is not an SRDF, or an element lacks a link.
     """
     if isinstance(source, str) and source.lstrip().startswith("<"):
-        label, text = "SRDF string", source
+        label, text = "SRDF string", source.lstrip()
     else:
         label = str(source)
         if not Path(source).is_file():
             raise FileNotFoundError(f"SRDF {label} does not exist or is not a file")
-        text = Path(source).read_text(encoding="utf-8")
-    try:
-        root = ElementTree.fromstring(text.lstrip().encode("utf-8"))
-    except ElementTree.ParseError as error:
-        raise ValueError(f"{label} is not well-formed XML: {error}") from error
-    if root.tag != "robot":
-        raise ValueError(f"{label}: the root element is <{root.tag}>, must be <robot>")
+        text = read_xml(Path(source))
+    root = parse_xml(text, label)
 
     def named(tag: str, *keys: str) -> set[frozenset[str]]:
         found = set()
