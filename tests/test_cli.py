@@ -137,6 +137,23 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert captured.err.count("\n") == 1
 
 
+def test_a_goal_in_degrees_is_said_to_look_like_degrees(
+    invoke: Invoke, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("bad.yaml").write_text(SCENARIO.replace("[1, 0.5]", "[90, 0.5]"))
+    assert invoke("run", "bad.yaml", "--no-report", "-q") == 2
+    assert capsys.readouterr().err.endswith("; 90 looks like degrees; radians are expected\n")
+    from sidestep.robot import planar_arm
+
+    Path("arm.urdf").write_text(planar_arm(2).replace('type="revolute"', 'type="continuous"'))
+    text = SCENARIO.replace("name: planar2", "urdf: arm.urdf").replace("[1, 0.5]", "[90, 0.5]")
+    Path("bad.yaml").write_text(text)
+    with pytest.warns(
+        RuntimeWarning, match=r"goal\.position; 90 looks like degrees; radians .*: write unit: deg"
+    ):
+        invoke("run", "bad.yaml", "--no-report", "-q", "--duration", "0.01")
+
+
 @pytest.mark.parametrize(
     ("shape", "message"),
     [

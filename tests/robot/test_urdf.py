@@ -144,3 +144,41 @@ def test_missing_description_and_folder(tmp_path: Path) -> None:
         Robot.from_urdf(tmp_path / "nothing.urdf")
     with pytest.raises(FileNotFoundError, match=r"package_dirs: .*nowhere is not a folder"):
         Robot.from_urdf(GOOD, package_dirs=[tmp_path / "nowhere"])
+
+
+def test_angles_in_degrees_are_said_to_look_like_degrees(recwarn: pytest.WarningsRecorder) -> None:
+    text = re.sub(r'lower="[^"]*" upper="[^"]*"', 'lower="-170" upper="172.5"', planar_arm(2), count=1)
+    with pytest.warns(
+        RuntimeWarning,
+        match=r"URDF string: lower limit -170 of joint 'joint1', upper limit 172\.5 of joint 'joint1' looks like "
+        "degrees; radians are expected",
+    ):
+        robot = Robot.from_urdf(text)
+    assert robot.limits.upper[0] == 172.5
+    turned = planar_arm(2).replace("<origin ", '<origin rpy="0 0 90" ', 1)
+    with pytest.warns(RuntimeWarning, match="rpy '0 0 90' of .* looks like degrees; radians are expected"):
+        Robot.from_urdf(turned)
+    with pytest.raises(ValueError, match=r"locked: 'joint1' = 90 is outside .*; 90 looks like degrees; rad"):
+        Robot.from_urdf(planar_arm(2), locked={"joint1": 90})
+    with pytest.warns(
+        RuntimeWarning, match="locked: 'joint1' = -45 looks like degrees; radians are expected"
+    ):
+        Robot.from_urdf(planar_arm(2).replace('type="revolute"', 'type="continuous"'), locked={"joint1": -45})
+
+
+@pytest.mark.parametrize("limit", ["3.1416", "6.2832", "9.42", "12.566", "18.85", "47.1239", "1e16", "inf"])
+def test_limits_of_whole_turns_and_of_no_end_are_radians(
+    limit: str, recwarn: pytest.WarningsRecorder
+) -> None:
+    Robot.from_urdf(
+        re.sub(r'lower="[^"]*" upper="[^"]*"', f'lower="-{limit}" upper="{limit}"', planar_arm(2))
+    )
+    assert not recwarn.list
+
+
+def test_an_error_about_a_configuration_says_that_it_looks_like_degrees() -> None:
+    robot = Robot.from_urdf(planar_arm(2))
+    with pytest.raises(ValueError, match=r"joint 'joint1' is 4\.0, .*; 90 looks like degrees; radians are"):
+        robot.check_configuration([4.0, 90.0])
+    with pytest.raises(ValueError, match=r"allowed: \[[^;]*\]$"):
+        robot.check_configuration([4.0, 0.0])

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from sidestep import _core
 from sidestep.robot import catalogue
+from sidestep.robot.degrees import degrees_hint
 from sidestep.robot.link import Array, Geometry, Link
 from sidestep.robot.source import read_description
 from sidestep.robot.tool import tree_with_tool
@@ -222,7 +223,9 @@ class Robot(_core.Robot):
             self.coordinate_names, array, limits.lower, limits.upper, strict=True
         ):
             if not (np.isfinite(value) and lower <= value <= upper):
-                raise ValueError(f"{name}: joint {joint!r} is {value}, allowed: [{lower}, {upper}]")
+                turns = {item.coordinate for item in self.joints if item.type == _core.JointType.revolute}
+                hint = degrees_hint(array[sorted(turns)])
+                raise ValueError(f"{name}: joint {joint!r} is {value}, allowed: [{lower}, {upper}]{hint}")
         return array
 
     def mass_matrix(self, q: ArrayLike) -> Array:

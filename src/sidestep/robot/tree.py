@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from sidestep._core import Frame, Joint, JointLimits, JointType
 from sidestep.pose import about_axis, checked_pose, pose_at
+from sidestep.robot.degrees import DEGREES_HINT, degrees_hint, looks_like_degrees
 from sidestep.robot.link import Array, Link
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
@@ -129,7 +131,10 @@ def _checked_locks(urdf: Urdf, locked: Mapping[str, float], *, beyond_limits: bo
         limit = joint.limit
         lower, upper = (-math.inf, math.inf) if limit is None else (limit.lower, limit.upper)
         if not math.isfinite(value) or not (beyond_limits or lower <= value <= upper):
-            raise ValueError(f"locked: {name!r} = {value} is outside its limits [{lower}, {upper}]")
+            hint = "" if joint.type == "prismatic" else degrees_hint([value])
+            raise ValueError(f"locked: {name!r} = {value} is outside its limits [{lower}, {upper}]{hint}")
+        if joint.type != "prismatic" and looks_like_degrees(value):
+            warnings.warn(f"locked: {name!r} = {value:g} {DEGREES_HINT}", RuntimeWarning, stacklevel=5)
         if joint.mimic is None:
             locks[name] = float(value)
     return locks

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import warnings
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
 import numpy as np
 
 from sidestep.pose import from_roll_pitch_yaw, pose_at
+from sidestep.robot.degrees import DEGREES_HINT, looks_like_degrees
 from sidestep.robot.link import Array, Geometry, Inertial, Link
 from sidestep.robot.source import Description
 
@@ -84,7 +86,30 @@ def parse_urdf(description: Description) -> Urdf:
             raise ValueError(f"{description.label}: joint {joint.name!r} is defined twice")
         joints[joint.name] = joint
     root = _root(links, joints, description.label)
+    _warn_of_degrees(description, joints)
     return Urdf(description.root.get("name", "robot"), description.label, links, joints, root)
+
+
+def _warn_of_degrees(description: Description, joints: dict[str, UrdfJoint]) -> None:
+    """One warning of all angles of a description that look like degrees: limits, and angles of <origin>."""
+    odd = [
+        f"{side} limit {value:g} of joint {joint.name!r}"
+        for joint in joints.values()
+        if joint.type == "revolute" and joint.limit is not None
+        for side, value in (("lower", joint.limit.lower), ("upper", joint.limit.upper))
+        if looks_like_degrees(value)
+    ]
+    read = ("joint", *(f"link/{part}" for part in ("inertial", "visual", "collision")))
+    for element in (found for way in read for found in description.root.findall(way)):
+        origin = element.find("origin")
+        rpy = "" if origin is None else origin.get("rpy", "")
+        if any(looks_like_degrees(float(part)) for part in rpy.split()):
+            odd.append(f"rpy {rpy!r} of <{element.tag}> {element.get('name', '')!r}")
+    if odd:
+        more = f" and {len(odd) - 3} more" if len(odd) > 3 else ""
+        warnings.warn(
+            f"{description.label}: {', '.join(odd[:3])}{more} {DEGREES_HINT}", RuntimeWarning, stacklevel=4
+        )
 
 
 def _root(links: dict[str, Link], joints: dict[str, UrdfJoint], label: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -36,6 +37,7 @@ from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.presets import barrier_system
+from sidestep.robot.degrees import degrees_hint
 from sidestep.scenario.parts import escape_of, evasion_of, guide_of, torque_program_of
 from sidestep.scenario.scenario import (
     BasePose,
@@ -200,7 +202,12 @@ def load_robot(scenario: Scenario) -> Robot:
 
 def coordinates(state: JointState, robot: Robot, name: str) -> Array:
     """The position (nv,) of a state in radians and metres, inside the limits of the robot."""
-    return robot.check_configuration(_si(state.position, state.unit, robot, name), name)
+    q = robot.check_configuration(_si(state.position, state.unit, robot, name), name)
+    turns = _turns(robot)
+    hint = degrees_hint(q[turns]) if state.unit == "rad" else ""
+    if hint:  # a joint without limits, so that nothing refuses it
+        warnings.warn(f"{name}{hint}: write unit: deg", RuntimeWarning, stacklevel=2)
+    return q
 
 
 def start_velocity(state: JointState, robot: Robot) -> Array:
@@ -211,7 +218,8 @@ def start_velocity(state: JointState, robot: Robot) -> Array:
     limit = robot.limits.velocity
     for joint, value, most in zip(robot.coordinate_names, velocity, limit, strict=True):
         if abs(value) > most:
-            raise ValueError(f"start.velocity: joint {joint!r} is {value}, allowed: [{-most}, {most}]")
+            hint = degrees_hint(velocity[_turns(robot)]) if state.unit == "rad" else ""
+            raise ValueError(f"start.velocity: joint {joint!r} is {value}, allowed: [{-most}, {most}]{hint}")
     return velocity
 
 
@@ -340,10 +348,14 @@ def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:
         )
     array = np.array(values, dtype=float)
     if unit == "deg":
-        revolute = {joint.coordinate for joint in robot.joints if joint.type == JointType.revolute}
-        for index in revolute:
-            array[index] = np.deg2rad(array[index])
+        turns = _turns(robot)
+        array[turns] = np.deg2rad(array[turns])
     return array
+
+
+def _turns(robot: Robot) -> list[int]:
+    """The coordinates that are angles."""
+    return sorted({joint.coordinate for joint in robot.joints if joint.type == JointType.revolute})
 
 
 def pose_of(thing: BasePose | Obstacle | PoseChoice) -> Array:
