@@ -99,6 +99,71 @@ def test_truncated_files_are_refused(written: Callable[[np.ndarray], Path]) -> N
         load_point_cloud(path)
 
 
+def swapped(path: Path, old: bytes, new: bytes) -> Path:
+    content = path.read_bytes()
+    assert old in content
+    path.write_bytes(content.replace(old, new, 1))
+    return path
+
+
+@pytest.mark.parametrize("encoding", list(Encoding)[:3])
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b"COUNT 1 1 1 1", b"COUNT 1 1 1 99999999999", r"50 points of 100000000002 numbers \(COUNT 1 1 1 9"),
+        (b"COUNT 1 1 1 1", b"COUNT 99999999 1 1 1", "which is more than the .* bytes of the file hold"),
+        (b"COUNT 1 1 1 1", b"COUNT 1 1 1 -1", r"COUNT is \[1, 1, 1, -1\]; it must be a positive number for"),
+        (
+            b"COUNT 1 1 1 1",
+            b"COUNT 1",
+            r"COUNT is \[1\]; it must be a positive number for each of the FIELDS",
+        ),
+        (b"POINTS 50", b"POINTS 99999999999", "announces 99999999999 points of 4 numbers"),
+        (b"WIDTH 50", b"WIDTH 99999999999", "announces 99999999999 points of 4 numbers"),
+        (b"HEIGHT 1", b"HEIGHT 999999999", "announces 49999999950 points of 4 numbers"),
+        (b"POINTS 50", b"POINTS -50", "POINTS is '-50', must be a whole number"),
+        (b"POINTS 50", b"POINTS 5e1", "POINTS is '5e1', must be a whole number"),
+    ],
+)
+def test_a_pcd_file_that_announces_more_than_it_holds_is_refused_at_once(
+    tmp_path: Path, encoding: Encoding, old: bytes, new: bytes, message: str
+) -> None:
+    pcd_writer(encoding)(tmp_path / "cloud.pcd", POINTS)
+    with pytest.raises(ValueError, match=rf"point cloud '.*cloud\.pcd' cannot be read: .*{message}"):
+        load_point_cloud(swapped(tmp_path / "cloud.pcd", old, new))
+
+
+@pytest.mark.parametrize("writer", [write_ply_ascii, ply_binary_writer("<")])
+@pytest.mark.parametrize(
+    ("new", "message"),
+    [
+        (b"element vertex 99999999999", "99999999999 of element vertex, which is more than the .* bytes of"),
+        (b"element vertex -50", "its header says 'element vertex -50'; it must be: element NAME NUMBER"),
+        (b"element camera 99999999999\nproperty float f\nelement vertex 50", "99999999999 of element camera"),
+        (b"element nothing 99999999999\nelement vertex 50", "99999999999 of element nothing"),
+    ],
+)
+def test_a_ply_file_that_announces_more_than_it_holds_is_refused_at_once(
+    tmp_path: Path, writer: Callable[[Path, np.ndarray], None], new: bytes, message: str
+) -> None:
+    writer(tmp_path / "cloud.ply", POINTS)
+    with pytest.raises(ValueError, match=rf"point cloud '.*cloud\.ply' cannot be read: .*{message}"):
+        load_point_cloud(swapped(tmp_path / "cloud.ply", b"element vertex 50", new))
+
+
+def test_a_header_without_end_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "cloud.ply").write_bytes(b"ply\nformat ascii 1.0\n" + b"comment x\n" * 10)
+    with pytest.raises(ValueError, match="its header has no line end_header within 65536 bytes"):
+        load_point_cloud(tmp_path / "cloud.ply")
+
+
+def test_an_array_that_announces_more_than_it_holds_is_refused_at_once(tmp_path: Path) -> None:
+    np.save(tmp_path / "cloud.npy", POINTS)
+    swapped(tmp_path / "cloud.npy", b"(50, 3), }" + b" " * 9, b"(99999999999, 3), }")
+    with pytest.raises(ValueError, match="cannot be read: mmap length is greater than"):
+        load_point_cloud(tmp_path / "cloud.npy")
+
+
 def test_a_pcd_file_with_rows_left_out_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "cloud.pcd"
     pcd_writer(Encoding.ASCII)(path, POINTS)

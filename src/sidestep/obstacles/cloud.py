@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from sidestep._core import Obstacles
 
 Points = NDArray[np.float64]
+MAX_HEADER = 65_536  # bytes of a text header
+COMPRESSION = 100  # at most, of the compression of PCD files: 264 bytes from 3
 
 
 def load_point_cloud(
@@ -115,6 +117,7 @@ def merge_in_voxels(points: ArrayLike, radii: ArrayLike = 0.0, *, voxel: float) 
 def _read_ply(path: Path) -> Points:
     from trimesh.exchange.ply import load_ply
 
+    _check_ply_size(path)
     with path.open("rb") as stream:
         contents = load_ply(stream, fix_texture=False, skip_materials=True)
     faces = contents.get("faces")
@@ -133,6 +136,7 @@ def _read_ply(path: Path) -> Points:
 def _read_pcd(path: Path) -> Points:
     from pypcd4.pypcd4 import PointCloud
 
+    _check_pcd_size(path)
     cloud = PointCloud.from_path(path)
     absent = [name for name in ("x", "y", "z") if name not in cloud.fields]
     if absent:
@@ -143,14 +147,76 @@ def _read_pcd(path: Path) -> Points:
 
 
 def _read_npy(path: Path) -> Points:
-    array = np.load(path, allow_pickle=False)
+    array = np.load(path, allow_pickle=False, mmap_mode="r")  # compares the shape with the size of the file
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         raise ValueError("it does not hold an array of real numbers")
     return _points(array)
 
 
+def _header(path: Path, end: bytes) -> tuple[list[list[str]], int]:
+    """The words of each line of a header up to one that begins with `end`, and the bytes that follow."""
+    with path.open("rb") as stream:
+        start = stream.read(MAX_HEADER)
+    lines: list[list[str]] = []
+    offset = 0
+    for line in start.splitlines(keepends=True):
+        offset += len(line)
+        lines.append(line.decode("utf-8", errors="replace").split())
+        if line.strip().startswith(end):
+            return lines, path.stat().st_size - offset
+    raise ValueError(f"its header has no line {end.decode()} within {MAX_HEADER} bytes")
+
+
+def _check_pcd_size(path: Path) -> None:
+    """Refuses a header that announces more than the file holds, before anything of that size is made."""
+    lines, room = _header(path, b"DATA")
+    head = {words[0].upper(): words[1:] for words in lines if words}
+    size, count = ([int(word) for word in head.get(key, ())] for key in ("SIZE", "COUNT"))
+    count = count or [1] * len(size)
+    encoding = " ".join(head["DATA"]).lower()
+    for key in ("WIDTH", "HEIGHT", "POINTS"):
+        value = " ".join(head.get(key, ["1"]))
+        if not value.isascii() or not value.isdigit():
+            raise ValueError(f"{key} is {value!r}, must be a whole number")
+    width, height = (int(head.get(key, ["1"])[0]) for key in ("WIDTH", "HEIGHT"))
+    points = max(width * height, int(head.get("POINTS", ["0"])[0]))
+    for key, values in (("SIZE", size), ("COUNT", count)):
+        if len(values) != len(head.get("FIELDS", ())) or min(values, default=1) < 1:
+            raise ValueError(f"{key} is {values}; it must be a positive number for each of the FIELDS")
+    of_a_point = sum(count) if encoding == "ascii" else sum(s * n for s, n in zip(size, count, strict=True))
+    if encoding.startswith("binary") and encoding != "binary":
+        room *= COMPRESSION
+    elif encoding == "ascii":
+        room = (room + 1) // 2  # every number has at least a digit and a separator
+    if max(points, 1) * of_a_point > max(room, MAX_HEADER if points == 0 else 0):
+        raise ValueError(
+            f"it announces {points} points of {sum(count)} numbers (COUNT {' '.join(map(str, count))}), which is "
+            f"more than the {path.stat().st_size} bytes of the file hold"
+        )
+
+
+def _check_ply_size(path: Path) -> None:
+    """As `_check_pcd_size`: every row of an element takes at least a byte for each property."""
+    lines, room = _header(path, b"end_header")
+    elements: list[list[str | int]] = []
+    for words in lines:
+        if words[:1] == ["element"]:
+            if len(words) != 3 or not (words[2].isascii() and words[2].isdigit()):
+                raise ValueError(f"its header says {' '.join(words)!r}; it must be: element NAME NUMBER")
+            elements.append([words[1], int(words[2]), 0])
+        elif words[:1] == ["property"] and elements:
+            elements[-1][2] = int(elements[-1][2]) + 1
+    least = sum(int(number) * max(1, int(properties)) for _, number, properties in elements)
+    if least > room + 1:  # the last line may end with the file
+        name, number, _ = max(elements, key=lambda element: int(element[1]))
+        raise ValueError(
+            f"it announces {number} of element {name}, which is more than the {path.stat().st_size} bytes of the "
+            "file hold"
+        )
+
+
 def _points(values: object) -> Points:
-    points = np.asarray(values, dtype=np.float64)
+    points = np.array(values, dtype=np.float64)  # a copy: the file of a mapped array is closed with it
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"its points have shape {points.shape}, expected (N, 3)")
     return points
