@@ -1,5 +1,6 @@
 """Point-cloud files of every encoding, bad files, and thinning that loses nothing."""
 
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -79,9 +80,9 @@ def test_points_that_are_not_finite_are_never_dropped_in_silence(
     with pytest.raises(
         ValueError, match=r"2 of 50 points are not finite, the first is point 3; invalid='drop'"
     ):
-        load_point_cloud(path)
+        load_point_cloud(path, invalid="raise")
     with pytest.warns(RuntimeWarning, match="2 of 50 points are not finite and were dropped"):
-        obstacles = load_point_cloud(path, invalid="drop")
+        obstacles = load_point_cloud(path)
     np.testing.assert_allclose(obstacles.points, np.delete(POINTS, [3, 17], axis=0), rtol=0.0, atol=1e-6)
 
 
@@ -97,6 +98,113 @@ def test_truncated_files_are_refused(written: Callable[[np.ndarray], Path]) -> N
     path.write_bytes(content[: len(content) - 60])
     with pytest.raises(ValueError, match=rf"point cloud '.*{path.name}' cannot be read: ."):
         load_point_cloud(path)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        POINTS.reshape(5, 10, 3),
+        np.column_stack([POINTS, np.ones((50, 1))]),
+        np.column_stack([POINTS, np.ones((50, 4))]).reshape(10, 5, 7),
+        np.asfortranarray(POINTS),
+        POINTS.astype(">f8"),
+        np.rec.fromarrays(POINTS[:, [2, 0, 1]].T, names="Z,X,Y"),
+        np.rec.fromarrays([*POINTS.T, np.ones(50)], names="x,y,z,rgb").reshape(5, 10),
+    ],
+    ids=["image", "homogeneous", "wide image", "columns", "big endian", "named", "named image"],
+)
+@pytest.mark.parametrize("suffix", ["npy", "npz"])
+def test_arrays_of_every_layout_give_the_same_points(tmp_path: Path, array: np.ndarray, suffix: str) -> None:
+    path = tmp_path / f"cloud.{suffix}"
+    if suffix == "npy":
+        np.save(path, array)
+    else:
+        np.savez_compressed(path, points=array, colours=np.ones(3))
+    np.testing.assert_array_equal(load_point_cloud(path).points, POINTS)
+
+
+def test_half_precision_is_read_as_it_is(tmp_path: Path) -> None:
+    np.save(tmp_path / "cloud.npy", POINTS.astype(np.float16))
+    np.testing.assert_array_equal(load_point_cloud(tmp_path / "cloud.npy").points, POINTS.astype(np.float16))
+
+
+def test_archives_and_records_without_points_say_what_they_hold(tmp_path: Path) -> None:
+    np.savez(tmp_path / "two.npz", a=POINTS, b=POINTS)
+    with pytest.raises(ValueError, match="it holds a, b; allowed: one array, or one called points"):
+        load_point_cloud(tmp_path / "two.npz")
+    np.save(tmp_path / "uv.npy", np.rec.fromarrays(POINTS.T, names="u,v,w"))
+    with pytest.raises(ValueError, match="it has no fields x, y, z; its fields are u, v, w"):
+        load_point_cloud(tmp_path / "uv.npy")
+
+
+@pytest.mark.parametrize("mark", [" ", ",", ";", ", ", "\t", "   "])
+@pytest.mark.parametrize(
+    ("head", "order", "suffix"),
+    [
+        ("", [0, 1, 2], "xyz"),
+        ("# made by a camera\n\n", [0, 1, 2], "txt"),
+        ("50\n", [0, 1, 2], "pts"),
+        ("{}\n", [0, 1, 2, 0], "csv"),
+        ("# {}\n", [2, 0, 1], "csv"),
+        ("//{}\n", [2, 2, 0, 1], "asc"),
+    ],
+)
+def test_text_files_give_the_same_points(
+    tmp_path: Path, mark: str, head: str, order: list[int], suffix: str
+) -> None:
+    names, taken = [], set[int]()
+    for axis in reversed(order) if order == [2, 2, 0, 1] else order:
+        names.append("intensity" if axis in taken else "xyz"[axis])
+        taken.add(axis)
+    names = names[::-1] if order == [2, 2, 0, 1] else names
+    rows = "".join(
+        mark.join(
+            repr(float(point[axis])) if name != "intensity" else "7"
+            for axis, name in zip(order, names, strict=True)
+        )
+        + "\r\n"
+        for point in POINTS
+    )
+    (tmp_path / f"cloud.{suffix}").write_text(head.format(mark.join(names)) + rows, newline="")
+    np.testing.assert_array_equal(load_point_cloud(tmp_path / f"cloud.{suffix}").points, POINTS)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "it holds no point"),
+        ("# nothing\n", "it holds no point"),
+        ("# two\n1 2\n3 4\n", "line 2 is '1 2'; allowed: x y z and more, between blanks, commas"),
+        ("1 2 3\n4 5\n", "cannot be read"),
+        ("1 2 three\n", "cannot be read"),
+    ],
+)
+def test_text_that_is_no_cloud_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "cloud.txt").write_text(text)
+    with pytest.raises(ValueError, match=rf"cloud\.txt' cannot be read: .*{message}|{message}"):
+        load_point_cloud(tmp_path / "cloud.txt")
+
+
+def test_clouds_that_are_not_in_metres_are_warned_of(
+    tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    np.save(tmp_path / "mm.npy", 1000.0 * POINTS)
+    with pytest.warns(RuntimeWarning, match=r"mm\.npy': half of its points are farther than .*scale=0\.001"):
+        load_point_cloud(tmp_path / "mm.npy")
+    far = POINTS.astype(float)
+    far[7] = 1e30, 0.0, 0.0
+    np.save(tmp_path / "far.npy", far)
+    with pytest.warns(
+        RuntimeWarning, match=r"1 of 50 points are farther than 100 m: point 7 is at \[1\.e\+30"
+    ):
+        load_point_cloud(tmp_path / "far.npy")
+    recwarn.clear()
+    scaled = load_point_cloud(tmp_path / "mm.npy", scale=0.001)
+    np.testing.assert_allclose(scaled.points, POINTS, rtol=1e-6)
+    assert not recwarn.list
+    for scale in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match=f"scale is {scale}, must be positive and finite"):
+            load_point_cloud(tmp_path / "mm.npy", scale=scale)
 
 
 def swapped(path: Path, old: bytes, new: bytes) -> Path:
@@ -175,9 +283,9 @@ def test_a_pcd_file_with_rows_left_out_is_refused(tmp_path: Path) -> None:
 def test_files_that_are_no_cloud_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"absent\.ply' does not exist"):
         load_point_cloud(tmp_path / "absent.ply")
-    (tmp_path / "cloud.xyz").write_text("0 0 0\n")
-    with pytest.raises(ValueError, match=r"suffix '\.xyz', must be one of \.ply, \.pcd, \.npy"):
-        load_point_cloud(tmp_path / "cloud.xyz")
+    (tmp_path / "cloud.las").write_text("0 0 0\n")
+    with pytest.raises(ValueError, match=r"suffix '\.las', must be one of \.ply, \.pcd, \.npy, \.npz, \.txt"):
+        load_point_cloud(tmp_path / "cloud.las")
     trimesh.creation.box().export(tmp_path / "mesh.ply")
     with pytest.raises(ValueError, match="it is a mesh of 12 faces"):
         load_point_cloud(tmp_path / "mesh.ply")
@@ -185,9 +293,15 @@ def test_files_that_are_no_cloud_are_refused(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(b"nonsense\n")
         with pytest.raises(ValueError, match=f"{name}' cannot be read"):
             load_point_cloud(tmp_path / name)
-    np.save(tmp_path / "wide.npy", np.zeros((5, 4)))
-    with pytest.raises(ValueError, match=r"shape \(5, 4\), expected \(N, 3\)"):
-        load_point_cloud(tmp_path / "wide.npy")
+    for shape in ((5, 2), (3, 50), (5, 17), (3,), (2, 2, 2, 3), (3, 48, 64), ()):
+        np.save(tmp_path / "odd.npy", np.zeros(shape))
+        with pytest.raises(
+            ValueError, match=rf"shape {re.escape(str(shape))}, expected \(N, 3\) or \(H, W, 3\)"
+        ):
+            load_point_cloud(tmp_path / "odd.npy")
+    np.save(tmp_path / "turned.npy", POINTS.T)
+    with pytest.raises(ValueError, match=r"they stand in columns: save array\.T"):
+        load_point_cloud(tmp_path / "turned.npy")
     np.save(tmp_path / "text.npy", np.array([["a", "b", "c"]]))
     with pytest.raises(ValueError, match="does not hold an array of real numbers"):
         load_point_cloud(tmp_path / "text.npy")

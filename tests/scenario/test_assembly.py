@@ -233,3 +233,13 @@ def test_what_does_not_fit_is_named(method: str, frame: str, activation: float, 
     with pytest.raises(ScenarioError) as caught:
         assemble(Scenario.from_text(text))
     assert message in str(caught.value)
+
+
+def test_a_cloud_in_millimetres_is_scaled_and_its_holes_are_left_out(tmp_path: Path) -> None:
+    np.save(tmp_path / "cloud.npy", [[[100.0, 0.0, 0.0], [np.nan] * 3, [0.0, 200.0, 0.0]]])
+    shape = "{type: points, file: cloud.npy, radius: 0.01, scale: 0.001}"
+    text = BASE.replace("{type: sphere, radius: 0.05}", shape)
+    with pytest.warns(RuntimeWarning, match="1 of 3 points are not finite and were dropped"):
+        parts = assemble(parse(text, tmp_path))
+    assert isinstance(parts.seen, Obstacles)
+    np.testing.assert_allclose(parts.seen.points, [[1.0, 0.1, 0.2], [0.9, 0.3, 0.2]], rtol=1e-15)

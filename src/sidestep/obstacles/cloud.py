@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import math
 import re
 import warnings
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
@@ -14,6 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from sidestep._core import Obstacles
 
 Points = NDArray[np.float64]
+MAX_COLUMNS = 16  # of a point: coordinates, normal, colour; more are points that stand in columns
+MAX_UNPACKED = 2_000_000_000  # bytes of an array in an archive
+FAR = 10.0  # [m] half of a cloud beyond this, or a point beyond ten times it, is warned of
 MAX_HEADER = 65_536  # bytes of a text header
 COMPRESSION = 100  # at most, of the compression of PCD files: 264 bytes from 3
 
@@ -23,19 +29,25 @@ def load_point_cloud(
     *,
     radius: float = 0.0,
     voxel: float | None = None,
-    invalid: Literal["raise", "drop"] = "raise",
+    scale: float = 1.0,
+    invalid: Literal["raise", "drop"] = "drop",
 ) -> Obstacles:
-    """Reads obstacle points from a .ply, .pcd or .npy file.
+    """Reads obstacle points from a .ply, .pcd, .npy, .npz or text file.
 
-    Coordinates are taken as metres in the world. PLY may be ASCII or binary of either byte order; PCD may be
-    ASCII, binary or compressed (its VIEWPOINT is not applied); NPY holds an array (N, 3).
+    Coordinates are taken as metres in the world, times `scale`; points that are implausibly far for that are
+    warned of. PLY may be ASCII or binary of either byte order; PCD may be ASCII, binary or compressed (its
+    VIEWPOINT is not applied). NPY, and NPZ with one array or one called "points", hold an array (N, 3) or (H, W, 3),
+    or one with up to 16 columns of which the first three are x, y, z, or a structured one with fields x, y, z. Text
+    files (.txt, .xyz, .csv, .asc, .pts) hold a point a line, x, y, z first or where a first line names them, between
+    blanks, commas or semicolons; `#` begins a comment.
 
     Args:
         path: the file.
         radius: radius of every point [m].
         voxel: edge [m] of the cells in which points are merged, see `merge_in_voxels`; None keeps all points.
+        scale: of the coordinates: 0.001 for a file in millimetres.
         invalid: what to do with points that are not finite, which depth cameras write where they see nothing:
-            refuse the file, or drop them with a warning that gives their number.
+            drop them with a warning that gives their number, or refuse the file.
 
     Raises:
         FileNotFoundError: if there is no such file.
@@ -44,6 +56,8 @@ def load_point_cloud(
     path = Path(path)
     if invalid not in ("raise", "drop"):
         raise ValueError(f"invalid is {invalid!r}, must be 'raise' or 'drop'")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise ValueError(f"scale is {scale}, must be positive and finite")
     if not path.is_file():
         raise FileNotFoundError(f"point cloud '{path}' does not exist")
     reader = READERS.get(path.suffix.lower())
@@ -71,10 +85,31 @@ def load_point_cloud(
         points = points[finite]
     if len(points) == 0:
         raise ValueError(f"point cloud '{path}' holds no point")
+    points *= scale
+    _warn_of_units(points, path)
     radii = np.full(len(points), float(radius))
     if voxel is not None:
         points, radii = merge_in_voxels(points, radii, voxel=voxel)
     return Obstacles(points, radii=radii)
+
+
+def _warn_of_units(points: Points, path: Path) -> None:
+    """Warns of points that no arm reaches: of most of them, or of a few that stand for "nothing seen"."""
+    distance = np.abs(points).max(axis=1)
+    middle, farthest = float(np.median(distance)), int(np.argmax(distance))
+    if middle > FAR:
+        cause = (
+            f"half of its points are farther than {middle:.4g} m; are they in millimetres? Then scale=0.001"
+        )
+    elif distance[farthest] > 10.0 * FAR:
+        count = np.count_nonzero(distance > 10.0 * FAR)
+        cause = (
+            f"{count} of {len(points)} points are farther than {10.0 * FAR:g} m: point {farthest} is at "
+            f"{np.array2string(points[farthest], precision=4)} m; does that stand for nothing seen?"
+        )
+    else:
+        return
+    warnings.warn(f"point cloud '{path}': {cause}", RuntimeWarning, stacklevel=3)
 
 
 def merge_in_voxels(points: ArrayLike, radii: ArrayLike = 0.0, *, voxel: float) -> tuple[Points, Points]:
@@ -148,9 +183,65 @@ def _read_pcd(path: Path) -> Points:
 
 def _read_npy(path: Path) -> Points:
     array = np.load(path, allow_pickle=False, mmap_mode="r")  # compares the shape with the size of the file
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-        raise ValueError("it does not hold an array of real numbers")
+    if not isinstance(array, np.ndarray):
+        raise ValueError("it is a NumPy archive; its suffix must be .npz")
     return _points(array)
+
+
+def _read_npz(path: Path) -> Points:
+    with zipfile.ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if name.endswith(".npy")]
+        name = "points.npy" if "points.npy" in names else names[0] if len(names) == 1 else None
+        if name is None:
+            held = ", ".join(item.removesuffix(".npy") for item in names) or "nothing"
+            raise ValueError(f"it holds {held}; allowed: one array, or one called points")
+        if archive.getinfo(name).file_size > MAX_UNPACKED:
+            raise ValueError(
+                f"{name} has {archive.getinfo(name).file_size} bytes; at most {MAX_UNPACKED} are allowed"
+            )
+        content = io.BytesIO(archive.read(name))
+    version = np.lib.format.read_magic(content)
+    head = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = head(content)
+    if math.prod(shape) * kind.itemsize > len(content.getbuffer()):
+        raise ValueError(f"it announces an array {shape}, which is more than its bytes hold")
+    content.seek(0)
+    return _points(np.load(content, allow_pickle=False))
+
+
+def _read_text(path: Path) -> Points:
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    titles: list[str] = []
+    first = len(lines)
+    for index, line in enumerate(lines):  # a comment may name the columns as well
+        words = _words(line.lstrip("#/ "))
+        if {"x", "y", "z"} <= set(words):
+            titles = words
+        elif words and not line.lstrip().startswith(("#", "//")):
+            first = index
+            break
+    body = lines[first:]
+    if body and len(_words(body[0])) == 1 and len(body) > 1 and _words(body[0])[0].isdigit():
+        body = body[1:]  # the number of points, as .pts and .xyz may begin
+    if not body:
+        raise ValueError("it holds no point")
+    mark = _separator(body[0])
+    columns = [titles.index(axis) for axis in "xyz"] if titles else [0, 1, 2]
+    if len(_words(body[0])) <= max(columns):
+        raise ValueError(
+            f"line {len(lines) - len(body) + 1} is {body[0][:80]!r}; allowed: x y z and more, between blanks, commas "
+            "or semicolons"
+        )
+    return _points(np.loadtxt(body, delimiter=mark, usecols=columns, ndmin=2, comments=["#", "//"]))
+
+
+def _separator(line: str) -> str | None:
+    """Between the numbers of a line; None for blanks."""
+    return next((mark for mark in ";," if mark in line), None)
+
+
+def _words(line: str) -> list[str]:
+    return [word.strip().strip('"').lower() for word in line.split(_separator(line)) if word.strip()]
 
 
 def _header(path: Path, end: bytes) -> tuple[list[list[str]], int]:
@@ -216,10 +307,33 @@ def _check_ply_size(path: Path) -> None:
 
 
 def _points(values: object) -> Points:
-    points = np.array(values, dtype=np.float64)  # a copy: the file of a mapped array is closed with it
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise ValueError(f"its points have shape {points.shape}, expected (N, 3)")
-    return points
+    """Points (N, 3) of what a file holds, as a copy: the file of a mapped array is closed with it."""
+    array = np.asarray(values)
+    if array.dtype.names is not None:
+        names = {str(name).lower(): name for name in array.dtype.names}
+        if not {"x", "y", "z"} <= set(names):
+            raise ValueError(f"it has no fields x, y, z; its fields are {', '.join(array.dtype.names)}")
+        array = np.stack([array[names[axis]].astype(np.float64) for axis in "xyz"], axis=-1)
+    if array.dtype.kind not in "fiu":
+        raise ValueError("it does not hold an array of real numbers")
+    if array.ndim not in (2, 3) or not 3 <= array.shape[-1] <= MAX_COLUMNS:
+        turned = array.ndim == 2 and array.shape[0] == 3
+        hint = "; they stand in columns: save array.T" if turned else ""
+        raise ValueError(
+            f"its points have shape {array.shape}, expected (N, 3) or (H, W, 3), or up to {MAX_COLUMNS} columns "
+            f"beginning with x, y, z{hint}"
+        )
+    return np.array(array.reshape(-1, array.shape[-1])[:, :3], dtype=np.float64)
 
 
-READERS: dict[str, Callable[[Path], Points]] = {".ply": _read_ply, ".pcd": _read_pcd, ".npy": _read_npy}
+READERS: dict[str, Callable[[Path], Points]] = {
+    ".ply": _read_ply,
+    ".pcd": _read_pcd,
+    ".npy": _read_npy,
+    ".npz": _read_npz,
+    ".txt": _read_text,
+    ".xyz": _read_text,
+    ".csv": _read_text,
+    ".asc": _read_text,
+    ".pts": _read_text,
+}

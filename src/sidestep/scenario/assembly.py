@@ -255,7 +255,7 @@ def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, 
         case Shape(type="mesh", file=str(file)):
             return (solid("mesh", mesh=_mesh(scenario.file(file), shape.scale or 1.0)),)
         case Shape(type="points", file=str(file), radius=float(radius)):
-            cloud = load_point_cloud(scenario.file(file)).points
+            cloud = load_point_cloud(scenario.file(file), scale=shape.scale or 1.0).points
             if len(cloud) > MAX_CLOUD_POINTS:
                 raise ValueError(
                     f"shape.file: {file} has {len(cloud)} points; at most {MAX_CLOUD_POINTS} are simulated"

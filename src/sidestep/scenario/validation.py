@@ -91,10 +91,10 @@ def _check_size(text: str) -> None:
     """Refuses what would take for ever to build, from the parser's events alone: these take no recursion."""
     count, open_nodes, sizes = 0, list[tuple[str | None, int]](), dict[str, int | None]()
     for event in yaml.parse(text, Loader=_BASE):
-        anchor = getattr(event, "anchor", None)
+        anchor: str | None = getattr(event, "anchor", None)
         match event:
             case yaml.AliasEvent():
-                size = sizes.get(anchor, 1)  # one that is not defined the loader refuses
+                size = sizes.get(str(anchor), 1)  # one that is not defined the loader refuses
                 if size is None:
                     raise _Refused(f"the alias '*{anchor}' stands inside the value that it repeats", event)
                 count += size

@@ -59,7 +59,9 @@ class Thing:
         shape = self.obstacle.shape
         if shape.type != "points" or shape.file is None:
             return None
-        points: Array = load_point_cloud((self.folder / shape.file).resolve()).points
+        points: Array = load_point_cloud(
+            (self.folder / shape.file).resolve(), scale=shape.scale or 1.0
+        ).points
         if len(points) > CLOUD_LIMIT:
             raise ValueError(
                 f"{self.name}: the cloud has {len(points)} points; the studio takes at most {CLOUD_LIMIT}: "
@@ -178,7 +180,7 @@ def box(name: str, position: Array, size: Array) -> Thing:
 
 
 def cloud(name: str, position: Array, file: Path, radius: float) -> Thing:
-    """The points of a file (.ply, .pcd or .npy) around a position, each a ball [m]."""
+    """The points of a file (see `load_point_cloud`) around a position, each a ball [m]."""
     shape = Shape("points", file=str(file.resolve()), radius=radius)
     return Thing(name, Obstacle(shape, _vector(position), points="ball"), Path.cwd())
 

@@ -57,7 +57,8 @@ class ObstaclePanel:
         gui.add_upload_button("Add a point cloud file …").on_upload(self._upload)
         add_note(
             gui,
-            "A .ply, .pcd or .npy, thinned to balls that hold its points; where it says, if it is free there.",
+            "A .ply, .pcd, .npy, .npz or text file, thinned to balls that hold its points; where it says, if it is "
+            "free there.",
         )
         self._folder = Path(tempfile.mkdtemp(prefix="sidestep-studio-"))
         atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
