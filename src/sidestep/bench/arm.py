@@ -1,8 +1,8 @@
-"""A robot with what a benchmark needs of it: a system to move it and a judge."""
+"""A robot with what a benchmark needs of it: what moves it and a judge."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,15 +10,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, Obstacles
+from sidestep._core import Obstacles
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_guide, build_system
-from sidestep.bench.motion import Motion, MotionSettings, move
+from sidestep.bench.methods import build_mover
+from sidestep.bench.motion import Motion, MotionSettings, Mover
 from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.outcome import Judge
 from sidestep.bench.problem import Problem, SceneProblem
 from sidestep.body import Body
-from sidestep.guidance import GuidedMotion
 from sidestep.obstacles import Shape, obstacles_from_shapes
 from sidestep.robot import Robot
 from sidestep.simulation import ExactClearance, SceneObject, SelfCollision
@@ -41,15 +40,13 @@ class Arm:
     """One robot, with its joints locked as one kind of problem asks for it.
 
     Attributes:
-        robot: it. body: covers its links; the same for every opening of a gripper. system: moves it.
-        guide: makes a guided motion of a seed; None for a method without a guide.
+        robot: it. body: covers its links; the same for every opening of a gripper. mover: moves it.
         allowed: pairs of links that may touch. unknown: joints of the problem that it does not have.
     """
 
     robot: Robot
     body: Body
-    system: GeometricSystem
-    guide: Callable[[int], GuidedMotion] | None = None
+    mover: Mover
     allowed: tuple[Pair, ...] = ()
     unknown: tuple[str, ...] = ()
 
@@ -64,13 +61,11 @@ class Arm:
         unknown: tuple[str, ...] = (),
     ) -> Arm:
         """A robot with a body of it, moved by a method."""
-        system = build_system(method, robot, body)
-        return cls(robot, body, system, build_guide(method, robot, system, body), allowed, unknown)
+        return cls(robot, body, build_mover(method, robot, body), allowed, unknown)
 
     def move(self, problem: Problem, settings: MotionSettings) -> Motion:
         """Runs one problem."""
-        guided = None if self.guide is None else self.guide(problem.index)
-        return move(self.robot, self.system, problem, settings, guided=guided)
+        return self.mover.move(problem, settings)
 
     @cached_property
     def judge(self) -> Judge:

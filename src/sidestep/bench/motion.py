@@ -4,33 +4,31 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from sidestep import _core
 from sidestep._core import (
-    AccelerationFilter,
-    Escape,
-    Evasion,
+    Controller,
+    ControllerSettings,
     GeometricSystem,
-    JointGoal,
-    Obstacles,
-    Plan,
     PlanStatus,
     TorqueController,
+    integrate,
     rollout,
 )
-from sidestep.bench.method import Method
 from sidestep.bench.problem import Problem, poses_over
-from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
-from sidestep.simulation import Arrival, Simulation
+from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation, SystemDriver
 
 Array = npt.NDArray[np.float64]
 
 CHUNK = 1.0  # [s] integrated between two looks at arrival
+FIRST_CHUNK = 0.02  # [s] the same until there is a path: a look of the planner
 
 
 @dataclass(frozen=True)
@@ -41,11 +39,6 @@ class MotionSettings:
         period: control period [s]. duration: after it the arm has not arrived [s].
         tolerance: it has arrived once every joint is this close to the goal [rad | m].
         torque: under torque control in MuJoCo, with the real masses, instead of integrated.
-        safe: clearances and limits bound the acceleration as well (`AccelerationFilter`, or the rows of the
-            torque controller); for systems of barriers, as others have no clearances.
-        escape: sub-goals where the arm is stuck (`Escape`), and barriers that leave a goal free among obstacles at rest
-            (`GeometricSystem.relaxed_at`).
-        evade: flights out of the way of what moves (`Evasion`); with `safe`.
 
     Raises:
         ValueError: a number that is not positive.
@@ -55,21 +48,12 @@ class MotionSettings:
     duration: float = 30.0
     tolerance: float = 0.05
     torque: bool = False
-    safe: bool = False
-    escape: bool = False
-    evade: bool = False
-
-    @classmethod
-    def of(cls, method: Method, **numbers: Any) -> MotionSettings:
-        """With all that belongs to a method; `numbers` are period, duration, tolerance and torque."""
-        return cls(safe=method.safe, escape=method.escapes, evade=method.evades, **numbers)
 
     def __post_init__(self) -> None:
         for name in ("period", "duration", "tolerance"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} is {value}, must be positive and finite")
-
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -81,10 +65,11 @@ class Motion:
         torque: (T, nv), or None where there was none.
         contacts: of MuJoCo, 0 without physics.
         arrived: within the duration.
-        step_seconds: wall time [s] of steps: of the system alone, or with torque control of both from Python.
+        step_seconds: wall time [s] of steps, as a caller sees them: in the core, or from Python in MuJoCo.
         first_path_seconds: wall time [s] until the first path; None where none was found.
         planning_seconds: the same until it was improved.
-        ended: what the guide said at the end, see `GuideStatus`; empty without a guide.
+        ended: what the controller was about at the end, see `Activity`; empty without a controller.
+        safe: clearances bound every command, as the controller's do.
     """
 
     q: Array
@@ -98,6 +83,7 @@ class Motion:
     first_path_seconds: float | None = None
     planning_seconds: float | None = None
     ended: str = ""
+    safe: bool = False
 
     @property
     def first_motion_seconds(self) -> float:
@@ -110,100 +96,180 @@ class Motion:
         return float(np.linalg.norm(np.diff(self.q, axis=0), axis=1).sum())
 
 
-def move(
-    robot: Robot,
-    system: GeometricSystem,
-    problem: Problem,
-    settings: MotionSettings,
-    *,
-    guided: GuidedMotion | None = None,
-) -> Motion:
-    """Runs one problem; with `guided`, made for it alone, a guide leads the goal of the system."""
-    run = _under_torque if settings.torque else _integrated
-    if guided is None:
-        return run(robot, system, problem, settings, None)
-    guided.set_goal(problem.goal)
-    led = _Led(guided)
-    motion = run(robot, system, problem, settings, led)
-    plan = led.first_plan
-    return replace(
-        motion,
-        first_path_seconds=None if plan is None else plan.search_seconds,
-        planning_seconds=None if plan is None else plan.search_seconds + plan.improvement_seconds,
-        ended="arrived" if motion.arrived else led.status,
-    )
+class Mover(Protocol):
+    """What moves an arm through problems."""
+
+    def move(self, problem: Problem, settings: MotionSettings) -> Motion:
+        """Runs one problem."""
 
 
-def _integrated(
-    robot: Robot,
-    system: GeometricSystem,
-    problem: Problem,
-    settings: MotionSettings,
-    guided: _Led | None,
-) -> Motion:
-    look = CHUNK if guided is None else guided.period
-    total, chunk = (max(1, round(span / settings.period)) for span in (settings.duration, look))
-    q, v = problem.start, np.zeros_like(problem.start)
-    relaxed, escape, evasion = _prepared(robot, system, problem, settings)
-    guard = AccelerationFilter(robot, period=settings.period) if settings.safe else None
-    rows: list[tuple[Array, Array, Array]] = []
-    times: list[Array] = []
-    done, arrived = 0, False
-    while done < total and not arrived:
-        changes = (math.ceil(at / settings.period) - done for at in problem.changes)
-        steps = min(chunk, total - done, *(steps for steps in changes if steps > 0))
-        at = done * settings.period
-        obstacles = problem.obstacles_at(at)
-        goal = problem.goal if guided is None else guided.goal(q, obstacles, at)
-        part = rollout(
-            relaxed.at(at) if guided is None else guided.moving,
-            q,
-            v,
-            goal,
-            obstacles,
-            period=settings.period,
-            steps=steps,
-            time_steps=True,
-            filter=guard,
-            escape=escape,
-            evasion=evasion,
+@dataclass(frozen=True, eq=False)
+class SystemMover:
+    """A geometric system alone, as the thesis's methods are; under torque its acceleration is tracked."""
+
+    robot: Robot
+    system: GeometricSystem
+
+    def move(self, problem: Problem, settings: MotionSettings) -> Motion:
+        """Runs one problem."""
+        if settings.torque:
+            program = TorqueController(self.robot, period=settings.period)
+            return _under_torque(
+                self.robot, SystemDriver(self.system, program, problem.goal, problem.obstacles_at), problem, settings
+            )
+        columns = _Columns(problem, settings)
+        q, v = problem.start, np.zeros_like(problem.start)
+        while steps := columns.next_steps(CHUNK):
+            part = rollout(
+                self.system,
+                q,
+                v,
+                problem.goal,
+                problem.obstacles_at(columns.done * settings.period),
+                period=settings.period,
+                steps=steps,
+                time_steps=True,
+            )
+            columns.add(part.q[:-1], part.v[:-1], part.acceleration[:-1], part.step_seconds[:-1])
+            q, v = part.q[-1], part.v[-1]
+        return columns.motion(problem)
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerMover:
+    """The `Controller`, one for every problem, with the settings given in place of its defaults."""
+
+    robot: Robot
+    arm: _core.Arm
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def move(self, problem: Problem, settings: MotionSettings) -> Motion:
+        """Runs one problem."""
+        controller = Controller(
+            self.arm,
+            ControllerSettings(
+                synchronous=True,
+                seed=problem.index,
+                period=settings.period,
+                output="torque" if settings.torque else "acceleration",
+                **self.settings,
+            ),
         )
-        near = np.abs(part.q - problem.goal).max(axis=1) < settings.tolerance
-        keep = steps
+        controller.set_goal(problem.goal)
+        if settings.torque:
+            motion = _under_torque(
+                self.robot, ControllerDriver(controller, _Changing(problem)), problem, settings
+            )
+            return replace(motion, **_planned(controller), ended=_ended(controller, motion), safe=True)
+        columns = _Columns(problem, settings)
+        q, v = problem.start, np.zeros_like(problem.start)
+        seen = _Changing(problem)
+        planned: dict[str, float | None] = _planned(controller)
+        while steps := columns.next_steps(FIRST_CHUNK if planned["first_path_seconds"] is None else CHUNK):
+            obstacles = seen(columns.done * settings.period)
+            if obstacles is not None:
+                controller.set_obstacles(obstacles)
+            part = integrate(
+                controller, q, v, steps=steps, goal=problem.goal, tolerance=settings.tolerance
+            )
+            columns.add(part.q, part.v, part.acceleration, part.step_seconds)
+            q, v = part.last_q, part.last_v
+            if planned["first_path_seconds"] is None:
+                planned = _planned(controller)
+        motion = columns.motion(problem)
+        return replace(motion, **planned, ended=_ended(controller, motion), safe=True)
+
+
+def _planned(controller: Controller) -> dict[str, float | None]:
+    plan = controller.plan
+    if plan.status != PlanStatus.found:
+        return {"first_path_seconds": None, "planning_seconds": None}
+    return {
+        "first_path_seconds": plan.search_seconds,
+        "planning_seconds": plan.search_seconds + plan.improvement_seconds,
+    }
+
+
+def _ended(controller: Controller, motion: Motion) -> str:
+    return "arrived" if motion.arrived else controller.command.activity.name
+
+
+class _Changing:
+    """What is seen of a problem when something comes or goes; between, points move by their velocities."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem, self._looks = problem, [0.0, *problem.changes]
+
+    def __call__(self, time: float) -> _core.Obstacles | None:
+        """The obstacles at a time [s] that does not go back; None where they are as told before."""
+        if not self._looks or time < self._looks[0]:
+            return None
+        while self._looks and time >= self._looks[0]:
+            self._looks.pop(0)
+        return self._problem.obstacles_at(time)
+
+
+class _Columns:
+    """The rows of a motion as it is integrated, up to arrival."""
+
+    def __init__(self, problem: Problem, settings: MotionSettings) -> None:
+        self._goal, self._settings = problem.goal, settings
+        self._total = max(1, round(settings.duration / settings.period))
+        self._changes = problem.changes
+        self._rows: list[tuple[Array, Array, Array]] = []
+        self._times: list[Array] = []
+        self.done, self.arrived = 0, False
+
+    def next_steps(self, span: float) -> int:
+        """How many steps come next [s]: not beyond a change of the scene; 0 at the end."""
+        if self.arrived:
+            return 0
+        period = self._settings.period
+        changes = (math.ceil(at / period) - self.done for at in self._changes)
+        steps = (max(1, round(span / period)), self._total - self.done, *(n for n in changes if n > 0))
+        return max(0, min(steps))
+
+    def add(self, q: Array, v: Array, a: Array, seconds: Array) -> None:
+        """Rows that came next."""
+        near = np.abs(q - self._goal).max(axis=1) < self._settings.tolerance
+        keep = len(q)
         if near.any():
-            keep, arrived = int(near.argmax()) + 1, True
-        # The last row is where the next part begins; only at the end of the motion is it kept here.
-        last = keep + 1 if not arrived and done + steps == total else keep
-        rows.append((part.q[:last], part.v[:last], part.acceleration[:last]))
-        times.append(part.step_seconds[:last])
-        q, v = part.q[steps], part.v[steps]
-        done += keep
-    q, v, a = (np.concatenate(columns) for columns in zip(*rows, strict=True))
-    poses = poses_over(problem.objects, np.arange(len(q), dtype=np.float64) * settings.period)
-    return Motion(q, v, a, poses, None, 0, arrived, np.concatenate(times))
+            keep, self.arrived = int(near.argmax()) + 1, True
+        self._rows.append((q[:keep], v[:keep], a[:keep]))
+        self._times.append(seconds[:keep])
+        self.done += keep
+
+    def motion(self, problem: Problem) -> Motion:
+        """All of it."""
+        q, v, a = (np.concatenate(columns) for columns in zip(*self._rows, strict=True))
+        poses = poses_over(problem.objects, np.arange(len(q), dtype=np.float64) * self._settings.period)
+        return Motion(q, v, a, poses, None, 0, self.arrived, np.concatenate(self._times))
 
 
-def _under_torque(
-    robot: Robot,
-    system: GeometricSystem,
-    problem: Problem,
-    settings: MotionSettings,
-    guided: _Led | None,
-) -> Motion:
+class _Timed:
+    """A driver with a clock around it."""
+
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
+        self.seconds: list[float] = []
+
+    def drive(self, time_: float, q: Array, v: Array, mass_matrix: Array, bias: Array) -> Drive:
+        """The driver's own."""
+        begin = time.perf_counter()
+        result = self._driver.drive(time_, q, v, mass_matrix, bias)
+        self.seconds.append(time.perf_counter() - begin)
+        return result
+
+
+def _under_torque(robot: Robot, driver: Driver, problem: Problem, settings: MotionSettings) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period, visuals=False)
-    relaxed, escape, evasion = _prepared(robot, system, problem, settings)
-    timer = _Timer()
+    timed = _Timed(driver)
     run = simulation.run(
-        _TimedSystem(relaxed, timer, settings.period, guided),
-        _TimedController(TorqueController(robot, period=settings.period), timer),
+        timed,
         problem.start,
         problem.goal,
         settings.duration,
-        problem.obstacles_at,
         arrival=Arrival(position=settings.tolerance, speed=float("inf"), hold=0.0),
-        safe=settings.safe,
-        escape=escape,
-        evasion=evasion,
     )
     return Motion(
         run.q,
@@ -213,92 +279,5 @@ def _under_torque(
         run.torque,
         len(run.contacts),
         run.arrived,
-        np.array(timer.steps),
+        np.array(timed.seconds),
     )
-
-
-def _prepared(
-    robot: Robot,
-    system: GeometricSystem,
-    problem: Problem,
-    settings: MotionSettings,
-) -> tuple[_Relaxed, Escape | None, Evasion | None]:
-    relaxed = _Relaxed(system, problem, relax=settings.escape)
-    escape = Escape(robot, seed=problem.index) if settings.escape else None
-    return relaxed, escape, Evasion(system, seed=problem.index) if settings.evade else None
-
-
-class _Relaxed:
-    """The system with barriers that leave the goal free, again whenever something comes or goes."""
-
-    def __init__(self, system: GeometricSystem, problem: Problem, *, relax: bool) -> None:
-        self._system, self._problem = system, problem
-        self._looks = [0.0, *problem.changes] if relax else []
-        self._current = system
-
-    def at(self, time: float) -> GeometricSystem:
-        """The system at a time [s] that does not go back; where all that is seen rests, relaxed at the goal."""
-        while self._looks and time >= self._looks[0]:
-            self._looks.pop(0)
-            obstacles = self._problem.obstacles_at(time)
-            moving = bool(np.any(obstacles.velocities))
-            self._current = self._system if moving else self._system.relaxed_at(self._problem.goal, obstacles)
-        return self._current
-
-
-class _Led:
-    """A guided motion that keeps what its guide says."""
-
-    def __init__(self, guided: GuidedMotion) -> None:
-        self._guided = guided
-        self.period = guided.guide.period
-        self.first_plan: Plan | None = None
-        self.status = ""
-
-    @property
-    def moving(self) -> GeometricSystem:
-        """What to move by, as of the last goal."""
-        return self._guided.moving
-
-    def goal(self, q: Array, obstacles: Obstacles, time: float) -> JointGoal:
-        """Where to be drawn to."""
-        guidance = self._guided.lead(q, obstacles, time)
-        self.status = guidance.status.name
-        if self.first_plan is None:
-            plan = self._guided.guide.plan
-            if plan.status is PlanStatus.found:
-                self.first_plan = plan
-        return guidance.goal
-
-
-class _Timer:
-    """Adds the time of a step's two calls."""
-
-    def __init__(self) -> None:
-        self.steps: list[float] = []
-
-
-class _TimedSystem:
-    def __init__(self, system: _Relaxed, timer: _Timer, period: float, guided: _Led | None) -> None:
-        self._system, self._timer, self._period, self._guided = system, timer, period, guided
-
-    def acceleration(self, q: Array, v: Array, goal: Any, obstacles: Obstacles) -> Any:
-        begin = time.perf_counter()
-        at = len(self._timer.steps) * self._period
-        if self._guided is not None:
-            goal = self._guided.goal(q, obstacles, at)
-        system = self._system.at(at) if self._guided is None else self._guided.moving
-        step = system.acceleration(q, v, goal, obstacles)
-        self._timer.steps.append(time.perf_counter() - begin)
-        return step
-
-
-class _TimedController:
-    def __init__(self, controller: TorqueController, timer: _Timer) -> None:
-        self._controller, self._timer = controller, timer
-
-    def solve(self, *state: Any, **clearances: Any) -> Any:
-        begin = time.perf_counter()
-        solution = self._controller.solve(*state, **clearances)
-        self._timer.steps[-1] += time.perf_counter() - begin
-        return solution

@@ -134,7 +134,7 @@ class Judge:
             tolerance = own.distance / 2.0
             own = self._self.minimum_over(q, tolerance=tolerance)
         way_out = None
-        if settings.safe and clearance is not None and clearance <= 0.0 and end == len(motion.q):
+        if motion.safe and clearance is not None and clearance <= 0.0 and end == len(motion.q):
             way_out = self._find_way_out(problem, motion, touched, when, settings.period)
         return Outcome(
             index=problem.index,

@@ -11,8 +11,8 @@ import numpy as np
 
 from sidestep._core import __version__
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_guide, build_system
-from sidestep.bench.motion import MotionSettings, move
+from sidestep.bench.methods import build_mover
+from sidestep.bench.motion import MotionSettings
 from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
@@ -36,7 +36,7 @@ class BenchSettings:
 
     problems: ProblemSettings
     count: int = 100
-    method: Method = Method.barrier
+    method: Method = Method.controller
     motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
 
@@ -156,11 +156,9 @@ class _Worker:
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
-        self._system = build_system(settings.method, self._robot)
-        self._guide = build_guide(settings.method, self._robot, self._system)
+        self._mover = build_mover(settings.method, self._robot)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task
-        guided = self._guide and self._guide(problem.index)
-        motion = move(self._robot, self._system, problem, self.settings.motion, guided=guided)
+        motion = self._mover.move(problem, self.settings.motion)
         return problem, self._judge.judge(problem, motion, self.settings.motion), times_of(motion)

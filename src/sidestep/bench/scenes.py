@@ -44,7 +44,7 @@ class SceneSettings:
     """
 
     robot: str
-    method: Method = Method.barrier
+    method: Method = Method.controller
     motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
     spacing: float = SPACING

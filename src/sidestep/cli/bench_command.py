@@ -29,7 +29,7 @@ def reach(
     obstacles: Annotated[int, typer.Option(min=0, help="Balls per problem.")] = 10,
     problems: Annotated[int, typer.Option(min=1, help="Number of problems.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the problems.")] = 0,
-    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.barrier,
+    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.controller,
     moving: Annotated[
         float, typer.Option(min=0.0, metavar="SPEED", help="Balls drift at up to this speed [m/s].")
     ] = 0.0,
@@ -73,7 +73,7 @@ def reach(
         ),
         count=problems,
         method=method,
-        motion=MotionSettings.of(method, period=period, duration=duration, torque=torque),
+        motion=MotionSettings(period=period, duration=duration, torque=torque),
         jobs=jobs or default_jobs(),
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")

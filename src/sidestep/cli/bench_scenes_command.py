@@ -30,7 +30,7 @@ def motion_bench_maker(
         Path, typer.Argument(help="Folder of sets, or one set: sceneNNNN.yaml, requestNNNN.yaml.")
     ],
     robot: Annotated[str, typer.Option(help="A name from `sidestep robots`, or a URDF file.")] = "panda",
-    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.barrier,
+    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.controller,
     torque: Annotated[
         bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
     ] = False,
@@ -81,7 +81,7 @@ def motion_bench_maker(
     settings = SceneSettings(
         robot=robot,
         method=method,
-        motion=_motion_settings(method, period, duration, tolerance, torque=torque),
+        motion=MotionSettings(period=period, duration=duration, tolerance=tolerance, torque=torque),
         jobs=jobs or default_jobs(),
         spacing=spacing,
         point_radius=point_radius,
@@ -105,7 +105,7 @@ def dynamic(
         Path | None, typer.Option(help="A folder of MotionBenchMaker: also in its scenes.")
     ] = None,
     scene_problems: Annotated[int, typer.Option(min=1, help="How many of each of its sets.")] = 1,
-    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.barrier,
+    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.controller,
     torque: Annotated[
         bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
     ] = False,
@@ -141,7 +141,7 @@ def dynamic(
     settings = SceneSettings(
         robot=robot,
         method=method,
-        motion=_motion_settings(method, period, duration, tolerance, torque=torque),
+        motion=MotionSettings(period=period, duration=duration, tolerance=tolerance, torque=torque),
         jobs=jobs or default_jobs(),
         spacing=spacing,
         point_radius=point_radius,
@@ -156,14 +156,6 @@ def dynamic(
         quiet=quiet,
         extra={"seed": seed, "obstacles": obstacles},
     )
-
-
-def _motion_settings(
-    method: Method, period: float, duration: float, tolerance: float, *, torque: bool
-) -> MotionSettings:
-    from sidestep.bench import MotionSettings
-
-    return MotionSettings.of(method, period=period, duration=duration, tolerance=tolerance, torque=torque)
 
 
 def run_and_report(

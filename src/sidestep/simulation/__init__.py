@@ -1,6 +1,7 @@
 """Physics, exact clearance, and what a run achieved."""
 
 from sidestep.simulation.clearance import Clearance, ExactClearance, PathClearance
+from sidestep.simulation.driver import ControllerDriver, Drive, Driver, SystemDriver
 from sidestep.simulation.ellipsoid_clearance import EllipsoidClearance
 from sidestep.simulation.evaluation import Evaluation, LimitViolations, evaluate
 from sidestep.simulation.kinematic import run_kinematically
@@ -14,6 +15,9 @@ __all__ = [
     "Arrival",
     "Clearance",
     "Contact",
+    "ControllerDriver",
+    "Drive",
+    "Driver",
     "EllipsoidClearance",
     "Evaluation",
     "ExactClearance",
@@ -27,6 +31,7 @@ __all__ = [
     "Simulation",
     "SimulationModel",
     "SimulationRun",
+    "SystemDriver",
     "build_model",
     "evaluate",
     "run_kinematically",

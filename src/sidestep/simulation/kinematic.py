@@ -1,16 +1,17 @@
-"""Motion without physics: the dynamical system's own integration, recorded like a simulated run."""
+"""Motion without physics: accelerations integrated, recorded like a simulated run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Literal
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import AccelerationFilter, Escape, Evasion, GeometricSystem, PoseGoal, rollout
+from sidestep._core import GeometricSystem, Obstacles, rollout
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
+from sidestep.simulation.driver import ControllerDriver
 from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.run import (
     Arrival,
@@ -24,16 +25,16 @@ from sidestep.simulation.scene import SceneObject, check_scene
 
 Array = npt.NDArray[np.float64]
 
-CHUNK = 200  # steps between two looks at arrival and two calls of on_step, where obstacles move by themselves
+CHUNK = 200  # steps between two calls of on_step, and of one rollout where obstacles move by themselves
 
 
 def run_kinematically(
     robot: Robot,
-    system: GeometricSystem,
+    mover: GeometricSystem | ControllerDriver,
     start: Array,
     goal: Array | PoseAim,
     duration: float,
-    obstacles: ObstacleSource,
+    obstacles: ObstacleSource | None = None,
     *,
     objects: Sequence[SceneObject] = (),
     timestep: float = 1e-3,
@@ -41,16 +42,16 @@ def run_kinematically(
     start_velocity: Array | None = None,
     arrival: Arrival | None = Arrival(),
     on_step: Callable[[float, Array], None] | None = None,
-    safe: bool = False,
-    escape: Escape | None = None,
-    evasion: Evasion | None = None,
 ) -> KinematicRun:
-    """Integrates the wanted acceleration itself, by the core's `rollout`: no masses, torques or contacts.
+    """Integrates accelerations themselves: no masses, torques or contacts.
 
     Args:
-        integrator: of the core; the rest as in `Simulation.run`. Free objects stay where they are.
+        mover: a `ControllerDriver`, whose goal and obstacles it has, by semi-implicit Euler; or a geometric system,
+            by the core's `rollout`.
+        start, goal, duration, start_velocity, arrival: as in `Simulation.run`. Free objects stay where they are.
+        obstacles: what a geometric system sees.
+        integrator: of the core, for a geometric system.
         on_step: called with time [s] and q every now and then.
-        safe: the acceleration keeps the clearances of the system's barriers and the limits (`AccelerationFilter`).
 
     Raises:
         ValueError: start or goal outside the limits, a duration or timestep that is not positive.
@@ -62,51 +63,29 @@ def run_kinematically(
     start = robot.check_configuration(start, "start")
     if not isinstance(goal, PoseAim):
         goal = robot.check_configuration(goal, "goal")
-    see = obstacles_over_time(obstacles)
+    v = np.zeros_like(start) if start_velocity is None else np.array(start_velocity, dtype=float)
     watch = None if arrival is None else ArrivalWatch(goal, arrival)
     steps = max(1, round(duration / timestep))
-    chunk = 1 if callable(obstacles) else CHUNK
-    q, v = start, np.zeros_like(start) if start_velocity is None else np.asarray(start_velocity, dtype=float)
-    columns: dict[str, list[Array]] = {
-        name: [] for name in ("q", "v", "wanted", "achieved", "switch", "values")
-    }
-    statuses: list[str] = []
-    guard = AccelerationFilter(robot, period=timestep) if safe else None
-    if evasion is not None:
-        evasion.reset()
-    done, arrived = 0, False
-    while done < steps and not arrived:
-        count = min(chunk, steps - done)
-        aim = goal.at(q) if isinstance(goal, PoseAim) else goal
-        part = rollout(
-            system,
-            q,
-            v,
-            aim,
-            see(done * timestep),
-            period=timestep,
-            steps=count,
-            integrator=integrator,
-            filter=guard,
-            escape=None if isinstance(aim, PoseGoal) else escape,  # as under torque
-            evasion=evasion,
-        )
-        if not (np.all(np.isfinite(part.q)) and np.all(np.isfinite(part.v))):
+    if isinstance(mover, GeometricSystem):
+        if obstacles is None:
+            raise ValueError("obstacles: a geometric system is told what it sees, Obstacles.none() in free space")
+        rows = _rolled_out(mover, start, v, goal, obstacles_over_time(obstacles), steps, timestep, integrator,
+                           1 if callable(obstacles) else CHUNK)  # fmt: skip
+    else:
+        rows = _driven(mover, start, v, steps, timestep)
+    columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
+    arrived, done = False, 0
+    for row in rows:
+        if not (np.isfinite(row[0]).all() and np.isfinite(row[1]).all()):
             raise RuntimeError(f"the integration diverged near {done * timestep:.3f} s; shorten the timestep")
-        keep = count
-        for k in range(count):
-            if watch is not None and watch.update((done + k) * timestep, part.q[k], part.v[k]):
-                keep, arrived = k + 1, True
-                break
-        achieved = np.diff(part.v, axis=0) / timestep
-        rows = (part.q, part.v, part.acceleration, achieved, part.switch, part.values)
-        for name, column in zip(columns, rows, strict=True):
-            columns[name].append(column[:keep])
-        statuses += [status_name(status) for status in part.statuses[:keep]]
-        q, v = part.q[count], part.v[count]
-        if on_step is not None:
-            on_step((done + keep - 1) * timestep, part.q[keep - 1])
-        done += keep
+        for name, value in zip(_COLUMNS, row, strict=True):
+            columns[name].append(value)
+        if on_step is not None and done % CHUNK == 0:
+            on_step(done * timestep, row[0])
+        done += 1
+        if watch is not None and watch.update((done - 1) * timestep, row[0], row[1]):
+            arrived = True
+            break
     time = np.arange(done, dtype=np.float64) * timestep
     poses = np.tile(np.array([pose_vector(item.pose) for item in scene]).reshape(-1, 7), (done, 1, 1))
     for j, item in enumerate(scene):
@@ -116,13 +95,56 @@ def run_kinematically(
         robot=robot,
         objects=scene,
         start=start,
-        goal=columns["q"][-1][-1] if isinstance(goal, PoseAim) else goal,
+        goal=columns["q"][-1] if isinstance(goal, PoseAim) else goal,
         pose=goal if isinstance(goal, PoseAim) else None,
         timestep=timestep,
         time=time,
         arrived=arrived,
         time_to_goal=watch.since if watch is not None and arrived else None,
-        system_status=tuple(statuses),
+        system_status=tuple(columns.pop("system_status")),
         object_poses=poses,
-        **{name: np.concatenate(parts) for name, parts in columns.items()},
+        **{name: np.array(column, dtype=float) for name, column in columns.items()},
     )
+
+
+_COLUMNS = ("q", "v", "wanted", "achieved", "switch", "values", "system_status")
+
+
+def _driven(
+    driver: ControllerDriver, q: Array, v: Array, steps: int, period: float
+) -> Iterator[tuple[Any, ...]]:
+    for k in range(steps):
+        step = driver.drive(k * period, q, v)
+        yield q, v, step.wanted, step.acceleration, step.switch, step.values, step.system_status
+        v = v + period * step.acceleration
+        q = q + period * v
+
+
+def _rolled_out(
+    system: GeometricSystem,
+    q: Array,
+    v: Array,
+    goal: Array | PoseAim,
+    see: Callable[[float], Obstacles],
+    steps: int,
+    period: float,
+    integrator: str,
+    chunk: int,
+) -> Iterator[tuple[Any, ...]]:
+    for done in range(0, steps, chunk):
+        count = min(chunk, steps - done)
+        part = rollout(
+            system,
+            q,
+            v,
+            goal.at(q) if isinstance(goal, PoseAim) else goal,
+            see(done * period),
+            period=period,
+            steps=count,
+            integrator=integrator,
+        )
+        achieved = np.diff(part.v, axis=0) / period
+        for k in range(count):
+            status = status_name(part.statuses[k])
+            yield part.q[k], part.v[k], part.acceleration[k], achieved[k], part.switch[k], part.values[k], status
+        q, v = part.q[count], part.v[count]

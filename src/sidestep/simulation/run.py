@@ -62,10 +62,10 @@ class Run:
         start, goal: (nv,). pose: that was to be reached, where `goal` is the configuration at the end.
         timestep: control period [s]; time: (T,) [s].
         q, v: (T, nv) state at the beginning of each step.
-        wanted: (T, nv) acceleration that the dynamical system asked for, or a flight (`Evasion`).
+        wanted: (T, nv) acceleration that was asked for, before any limit.
         achieved: (T, nv) change of v over the step divided by the period.
         switch: (T, num_switches); values: (T, m) embedding values psi.
-        system_status: T names.
+        system_status: T names: of an activity of the `Controller`, or a status of the geometric system.
         object_poses: (T, num_objects, 7) position and quaternion (w, x, y, z) in the world.
         arrived: the run stopped because it arrived; time_to_goal: when it had, [s], or None.
     """
@@ -97,9 +97,9 @@ class SimulationRun(Run):
     """A run under torque control in MuJoCo.
 
     Attributes:
-        solved: (T, nv) acceleration that the torque controller's quadratic program chose.
+        solved: (T, nv) acceleration that the quadratic program chose.
         torque: (T, nv) [Nm | N] applied.
-        controller_status: T names.
+        controller_status: T names: of a status of the `Controller`, or of the torque program.
         contacts: every arm-scene contact point of every physics step, in time order.
     """
 
@@ -111,7 +111,7 @@ class SimulationRun(Run):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class KinematicRun(Run):
-    """A run without physics: the dynamical system's own integration."""
+    """A run without physics."""
 
 
 @dataclass

@@ -3,44 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Escape, Evasion, JointGoal, Obstacles, PoseGoal, is_fallback
 from sidestep.robot import Robot
+from sidestep.simulation.driver import Driver
 from sidestep.simulation.model import build_model
 from sidestep.simulation.pose_aim import PoseAim
-from sidestep.simulation.run import (
-    Arrival,
-    ArrivalWatch,
-    Contact,
-    ObstacleSource,
-    SimulationRun,
-    obstacles_over_time,
-    status_name,
-)
+from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, SimulationRun
 from sidestep.simulation.scene import SceneObject, check_scene
 
 Array = npt.NDArray[np.float64]
-
-
-class MotionSystem(Protocol):
-    """What wants an acceleration: `GeometricSystem`, or anything with its `acceleration`."""
-
-    def acceleration(self, q: Array, v: Array, goal: Any, obstacles: Obstacles) -> Any:
-        """A step with `acceleration` (nv,), `status`, and where they exist `switch` and `values`."""
-
-
-class AccelerationController(Protocol):
-    """What turns an acceleration into torque: `TorqueController`, or anything with its `solve`."""
-
-    @property
-    def solve(self) -> Callable[..., Any]:
-        """From q, v, acceleration, mass_matrix, bias, and `clearances` where a run is safe, to a solution with
-        `torque` (nv,), `acceleration` (nv,) and `status`."""
 
 
 class Simulation:
@@ -91,44 +67,32 @@ class Simulation:
 
     def run(
         self,
-        system: MotionSystem,
-        controller: AccelerationController,
+        driver: Driver,
         start: Array,
         goal: Array | PoseAim,
         duration: float,
-        obstacles: ObstacleSource,
         *,
         start_velocity: Array | None = None,
         arrival: Arrival | None = Arrival(),
         on_step: Callable[[float, Array], None] | None = None,
-        safe: bool = False,
-        escape: Escape | None = None,
-        evasion: Evasion | None = None,
     ) -> SimulationRun:
-        """Runs the loop: state, wanted acceleration, torque, physics, record.
+        """Runs the loop: state, torque, physics, record.
 
         Args:
-            system, controller: the dynamical system and the torque controller.
-            start, goal: (nv,) configurations inside the limits; the goal may be a pose.
+            driver: what turns states into torque: `ControllerDriver` or `SystemDriver`. It never sees `objects`.
+            start, goal: (nv,) configurations inside the limits; the goal, perhaps a pose, is what arrival is
+                measured by: the driver has its own.
             duration: at most this long [s].
-            obstacles: what the controller sees: points, moved along their velocities as time passes, or a
-                function of time [s]. It never sees `objects`.
             start_velocity: (nv,), at rest by default.
             arrival: when to stop early; None: run the whole duration.
             on_step: called with time [s] and q after every step.
-            safe: the controller keeps the clearances of the system's barriers as well.
-            escape: sub-goals where the arm is stuck. evasion: flights out of the way of what moves; with `safe`.
 
         Raises:
-            ValueError: start or goal outside the limits, a duration that is not positive, an evasion without `safe`.
+            ValueError: start or goal outside the limits, a duration that is not positive.
             RuntimeError: the physics diverged (MuJoCo's own check).
         """
         if not (np.isfinite(duration) and duration > 0.0):
             raise ValueError(f"duration must be positive, got {duration}")
-        if evasion is not None:
-            if not safe:
-                raise ValueError("an evasion needs safe=True, which keeps its flights off obstacles")
-            evasion.reset()
         start = self.robot.check_configuration(start, "start")
         if not isinstance(goal, PoseAim):
             goal = self.robot.check_configuration(goal, "goal")
@@ -136,12 +100,11 @@ class Simulation:
         built.set_state(
             data, start, np.zeros_like(start) if start_velocity is None else np.asarray(start_velocity)
         )
-        see = obstacles_over_time(obstacles)
         watch = None if arrival is None else ArrivalWatch(goal, arrival)
         steps = max(1, round(duration / self.timestep))
         rows: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         contacts: list[Contact] = []
-        arrived, potential = False, float("nan")
+        arrived = False
         diverged = data.warning[mujoco.mjtWarning.mjWARN_BADQACC]
         mujoco.mj_kinematics(built.model, data)
         poses = built.object_poses(data)  # of objects at rest, for good
@@ -151,23 +114,9 @@ class Simulation:
             self._drive(data, time)
             mujoco.mj_step1(built.model, data)
             q, v = built.state(data)
-            followed = goal.at(q) if isinstance(goal, PoseAim) else goal
-            seen = see(time)
-            flight = None if evasion is None else evasion.pursue(followed, q, v, seen, self.timestep)
-            if flight is not None:
-                followed = JointGoal(flight.refuge)
-            elif escape is not None and not isinstance(followed, PoseGoal):
-                followed = escape.pursue(followed, q, potential, self.timestep)
-            step = system.acceleration(q, v, followed, seen)
-            potential = getattr(step, "goal_potential", potential)
-            wanted = step.acceleration
-            if flight is not None and not is_fallback(step.status):
-                wanted = flight.acceleration(q, v, self.timestep)
-            kept = {"clearances": step} if safe else {}
-            solution = controller.solve(q, v, wanted, built.mass_matrix(data), built.bias(data), **kept)
-            torque = np.asarray(solution.torque)
+            step = driver.drive(time, q, v, built.mass_matrix(data), built.bias(data))
             poses = poses if at_rest else built.object_poses(data)
-            data.ctrl[built.actuators] = torque
+            data.ctrl[built.actuators] = step.torque
             for substep in range(self.substeps):
                 if substep > 0:
                     self._drive(data, time + substep * self.timestep / self.substeps)
@@ -183,15 +132,15 @@ class Simulation:
                 time,
                 q,
                 v,
-                wanted,
+                step.wanted,
                 (v_next - v) / self.timestep,
-                np.atleast_1d(getattr(step, "switch", ())),
-                np.atleast_1d(getattr(step, "values", ())),
-                status_name(step.status),
+                step.switch,
+                step.values,
+                step.system_status,
                 poses,
-                solution.acceleration,
-                torque,
-                status_name(solution.status),
+                step.acceleration,
+                step.torque,
+                step.controller_status,
             )
             for name, value in zip(_COLUMNS, row, strict=True):
                 rows[name].append(value)
