@@ -4,7 +4,8 @@ C++ core of sidestep. Use the names re-exported by the sidestep package.
 
 from collections.abc import Sequence
 import enum
-from typing import Final
+import os
+from typing import Final, overload
 
 import numpy
 import numpy.typing
@@ -1784,6 +1785,185 @@ class PathPlanner:
     def is_edge_free(self, a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, obstacles: Obstacles, *, margin: float | None = None) -> bool:
         """
         Whether everything keeps the margin [m], less the slack, everywhere on the straight edge from a to b (nv,).
+        """
+
+class Inertial:
+    """Mass properties of a rigid body, in the frame of that body."""
+
+    def __init__(self, mass: float, com: numpy.typing.ArrayLike, inertia: numpy.typing.ArrayLike) -> None:
+        """
+        mass [kg]; com (3,): centre of mass [m]; inertia (3, 3): rotational inertia about it [kg m^2].
+        """
+
+    @property
+    def mass(self) -> float: ...
+
+    @property
+    def com(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def inertia(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+def fold_inertials(robot: Robot, links: Sequence[Inertial]) -> list[Inertial]:
+    """
+    Sums the inertias of the links, one per frame in that frame, to one per joint in the frame of its child.
+    Raises ValueError on a wrong number or an invalid inertia.
+    """
+
+class RigidBodyDynamics:
+    """
+    The equation of motion M(q) a + h(q, v) = torque of a tree, without friction and rotor inertia.
+    Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 and 6.
+    """
+
+    def __init__(self, robot: Robot, inertials: Sequence[Inertial], *, gravity: numpy.typing.ArrayLike | None = None) -> None:
+        """
+        inertials: one per joint, in the frame of its child; gravity (3,): in the world [m/s^2], 9.81 along -z by default.
+        Raises ValueError on a wrong number, an invalid inertia or a gravity that is not finite.
+        """
+
+    @property
+    def gravity(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def inertials(self) -> list[Inertial]: ...
+
+    def mass_matrix(self, q: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """M(q) (nv, nv) [kg m^2, kg m, kg] at q (nv,)."""
+
+    def bias(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """h(q, v) = C(q, v) v + g(q) (nv,) [Nm | N] at q (nv,), v (nv,)."""
+
+class CoverProof:
+    """What is proven and measured of the ellipsoids that cover one link."""
+
+    def __init__(self, link: str, *, coverage: float, mean_overshoot: float, max_overshoot: float, volume_ratio: float, volume_of: str, interior_coverage: float, slimness: float) -> None: ...
+
+    @property
+    def link(self) -> str: ...
+
+    @property
+    def coverage(self) -> float:
+        """Share of the mesh's area proven to lie inside the ellipsoids."""
+
+    @property
+    def mean_overshoot(self) -> float:
+        """[m]"""
+
+    @property
+    def max_overshoot(self) -> float:
+        """[m]"""
+
+    @property
+    def volume_ratio(self) -> float: ...
+
+    @property
+    def volume_of(self) -> str: ...
+
+    @property
+    def interior_coverage(self) -> float: ...
+
+    @property
+    def slimness(self) -> float: ...
+
+class Provenance:
+    """Where an arm comes from; does not count for its content hash."""
+
+    def __init__(self, *, source: str, fingerprint: str, sidestep_version: str, date: str) -> None: ...
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def fingerprint(self) -> str: ...
+
+    @property
+    def sidestep_version(self) -> str: ...
+
+    @property
+    def date(self) -> str: ...
+
+class Arm:
+    """Everything that is prepared once for a robot, in the core."""
+
+    @overload
+    def __init__(self, *, robot: Robot, body: Body, pairs: Sequence[tuple[str, str] | tuple[str, str, float]], tables: Sequence[ClearanceTable], inertials: Sequence[Inertial], proof: Sequence[CoverProof], allowed_pairs: Sequence[tuple[str, str]], provenance: Provenance) -> None:
+        """
+        inertials: one per joint, or none for an arm without dynamics. Raises ValueError that names what is wrong.
+        """
+
+    @overload
+    def __init__(self, arm: Arm) -> None:
+        """The same arm again; the content is shared."""
+
+    @staticmethod
+    def read(path: str | os.PathLike) -> Arm:
+        """
+        Reads an .arm file. Raises OSError if it cannot be read, and ValueError that names the file and what is wrong.
+        """
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Writes an .arm file in one piece. Raises OSError."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def num_coordinates(self) -> int:
+        """Number of joint coordinates nv."""
+
+    @property
+    def robot(self) -> Robot:
+        """The kinematic tree, without meshes."""
+
+    @property
+    def body(self) -> Body:
+        """The covering body."""
+
+    @property
+    def limits(self) -> JointLimits:
+        """JointLimits of the coordinates."""
+
+    @property
+    def pairs(self) -> list[tuple[str, str, float]]:
+        """
+        Pairs of links that must not touch, without a table: (first, second, contact [m]).
+        """
+
+    @property
+    def tables(self) -> list[ClearanceTable]:
+        """Clearance tables of the other pairs."""
+
+    @property
+    def inertials(self) -> list[Inertial]:
+        """One per joint in the frame of its child; empty without dynamics."""
+
+    @property
+    def has_dynamics(self) -> bool:
+        """Whether mass matrix and bias are known."""
+
+    @property
+    def proof(self) -> list[CoverProof]:
+        """CoverProof of every covered link."""
+
+    @property
+    def allowed_pairs(self) -> list[tuple[str, str]]:
+        """Links that may touch."""
+
+    @property
+    def provenance(self) -> Provenance:
+        """Where the arm comes from."""
+
+    @property
+    def content_hash(self) -> str:
+        """
+        SHA-256 (64 hex digits) of everything but the provenance: equal arms have equal hashes.
+        """
+
+    @property
+    def neutral(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        A configuration (nv,) inside the limits: the middle of each interval, 0 without limits.
         """
 
 __version__: str

@@ -1,6 +1,7 @@
 #include "sidestep/model/dynamics.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -9,7 +10,7 @@ namespace sidestep {
 namespace {
 
 constexpr double inertia_tolerance = 1e-6;  // relative to the largest entry: files give a few digits, and bodies are thin
-constexpr double inertia_rounding = 1e-12;  // per mass [m^2]: of point masses that are moved about
+constexpr double inertia_rounding = 1e-12;  // [kg m^2] per kilogram, of a kilogram at least: zeros of CAD exports and sums
 
 /// The inertia of a point mass about the origin, m (|c|² 1 - c cᵀ).
 Eigen::Matrix3d point_inertia(double mass, const Eigen::Vector3d& c) noexcept {
@@ -25,7 +26,7 @@ void Inertial::validate(const std::string& owner) const {
   if (!com.allFinite()) {
     throw std::invalid_argument(owner + ": centre of mass must be finite");
   }
-  const double tolerance = inertia_tolerance * inertia.cwiseAbs().maxCoeff() + inertia_rounding * mass;
+  const double tolerance = inertia_tolerance * inertia.cwiseAbs().maxCoeff() + inertia_rounding * std::max(1.0, mass);
   if (!inertia.allFinite() || (inertia - inertia.transpose()).cwiseAbs().maxCoeff() > tolerance ||
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues()[0] < -tolerance) {
     throw std::invalid_argument(owner + ": rotational inertia must be symmetric and positive semidefinite");

@@ -24,8 +24,6 @@ if TYPE_CHECKING:  # imported where they are used: each takes longer to import t
     import pinocchio as pin
     import trimesh
 
-    from sidestep.robot.dynamics import Dynamics
-
 _HASH_DECIMALS = 9  # lengths [m] and angles are hashed to 1e-9: below any mesh's accuracy, above rounding
 
 
@@ -239,10 +237,29 @@ class Robot(_core.Robot):
         """
         return self._dynamics.bias(self._vector(q, "q"), self._vector(v, "v"))
 
-    @property
+    @cached_property
+    def inertials(self) -> tuple[_core.Inertial, ...]:
+        """Mass properties of what moves with each joint, one per joint of `joints`, in the frame of its child.
+
+        Links without inertia count nothing.
+
+        Raises:
+            ValueError: a link's rotational inertia is not positive semidefinite; names the link.
+        """
+        nothing = _core.Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+        found = (link.inertial for link in self._links)
+        links = [nothing if i is None else _core.Inertial(i.mass, i.com, i.inertia) for i in found]
+        return tuple(_core.fold_inertials(self, links))
+
+    @cached_property
     def pinocchio(self) -> pin.Model:
-        """The same tree for Pinocchio, with a coordinate per moving joint (mimic joints have their own)."""
-        return self._dynamics.model
+        """The same tree for Pinocchio, with a coordinate per moving joint (mimic joints have their own).
+
+        Needs the package `pin`, which nothing else of Sidestep does.
+        """
+        from sidestep.robot.pinocchio_model import pinocchio_model
+
+        return pinocchio_model(self, self._links)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -277,10 +294,8 @@ class Robot(_core.Robot):
         return digest.hexdigest()
 
     @cached_property
-    def _dynamics(self) -> Dynamics:
-        from sidestep.robot.dynamics import Dynamics
-
-        return Dynamics(self, self._links)
+    def _dynamics(self) -> _core.RigidBodyDynamics:
+        return _core.RigidBodyDynamics(self, self.inertials)
 
     def _vector(self, value: ArrayLike, name: str) -> Array:
         array = np.asarray(value, dtype=np.float64)
