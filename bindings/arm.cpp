@@ -140,8 +140,9 @@ void bind_arm(nb::module_& m) {
           nb::arg("path"), "Writes an .arm file in one piece. Raises OSError.")
       .def_prop_ro("name", &Arm::name)
       .def_prop_ro("num_coordinates", &Arm::num_coordinates, "Number of joint coordinates nv.")
-      .def_prop_ro("robot", &Arm::robot, nb::rv_policy::reference_internal, "The kinematic tree, without meshes.")
-      .def_prop_ro("body", &Arm::body, nb::rv_policy::reference_internal, "The covering body.")
+      // Copies: what Python keeps beside an arm must not keep the arm alive, or neither would ever be freed.
+      .def_prop_ro("robot", &Arm::robot, nb::rv_policy::copy, "The kinematic tree, without meshes.")
+      .def_prop_ro("body", &Arm::body, nb::rv_policy::copy, "The covering body.")
       .def_prop_ro("limits", [](const Arm& arm) { return arm.robot().limits(); }, "JointLimits of the coordinates.")
       .def_prop_ro(
           "pairs",

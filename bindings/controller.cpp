@@ -226,6 +226,8 @@ void bind_command(nb::module_& m) {
       .def_prop_ro("torque", [](const Command& c) { return to_numpy(c.torque); },
                    "(nv,) [Nm | N], gravity included; zero where the output is acceleration.")
       .def_prop_ro("acceleration", [](const Command& c) { return to_numpy(c.acceleration); }, "(nv,) [rad/s^2 | m/s^2].")
+      .def_prop_ro("wanted", [](const Command& c) { return to_numpy(c.wanted); },
+                   "(nv,) acceleration that was asked for, before any limit [rad/s^2 | m/s^2].")
       .def_prop_ro("velocity", [](const Command& c) { return to_numpy(c.velocity); }, "(nv,) after one period [rad/s | m/s].")
       .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); }, "(nv,) after one period [rad | m].")
       .def_ro("clearance", &Command::clearance, "The least, of obstacles, planes and links [m]; inf: far; nan: unknown.")
@@ -286,6 +288,8 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("command", [](const Controller& self) { return Command(self.command()); }, "Of the last step.")
       .def("explain", &Controller::explain, "One sentence: what the last command does and why, and what to do about it.")
       .def_prop_ro("settings", [](const Controller& self) { return ControllerSettings(self.settings()); }, "A copy.")
+      .def_prop_ro("values", [](const Controller& self) { return to_numpy(self.workspace().values); },
+                   "(m,) psi of every coordinate at the last step, see labels.")
       .def_prop_ro("labels", [](const Controller& self) { return self.labels(); }, "What the clearances are of.")
       .def_prop_ro("target",
                    [](const Controller& self) -> nb::object {

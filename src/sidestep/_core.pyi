@@ -309,7 +309,8 @@ class ClearanceBarrier(Embedding):
 
 class JointLimitBarrier(Embedding):
     """
-    One coordinate per finite position limit, a barrier of the way h [rad] left to it, as in ClearanceBarrier.
+    One coordinate per finite position limit, a barrier of the way h [rad | m] left to it, as in ClearanceBarrier. The
+    activation distance of a joint is at most a twentieth of its range, its floor shorter by the same share.
     """
 
     def __init__(self, robot: Robot, *, activation: float = 0.1, strength: float = 0.02, power: float = 2.0, floor: float = 0.002) -> None: ...
@@ -549,13 +550,13 @@ class StepStatus(enum.Enum):
     """They hold, with a push out: a clearance is below its barrier's floor."""
 
     goal_outside_limits = 4
-    """Fallback: the goal is outside the limits."""
+    """The goal is outside the limits: no pull."""
 
-    invalid_state = 5
+    invalid_state = 6
     """Fallback: q or v is not finite."""
 
-    invalid_goal = 6
-    """Fallback: the goal is not finite, or of another robot."""
+    invalid_goal = 5
+    """The goal is not finite, or of another robot: no pull."""
 
     not_finite = 7
     """Fallback: the equations gave a value that is not finite."""
@@ -1965,5 +1966,556 @@ class Arm:
         """
         A configuration (nv,) inside the limits: the middle of each interval, 0 without limits.
         """
+
+class BarrierSettings:
+    """The spring that pulls to the goal, and the barriers that bend its way."""
+
+    def __init__(self, **kwargs) -> None: ...
+
+    @property
+    def stiffness(self) -> object: ...
+
+    @stiffness.setter
+    def stiffness(self, arg: object, /) -> None: ...
+
+    @property
+    def damping(self) -> object: ...
+
+    @damping.setter
+    def damping(self, arg: object, /) -> None: ...
+
+    @property
+    def activation(self) -> object: ...
+
+    @activation.setter
+    def activation(self, arg: object, /) -> None: ...
+
+    @property
+    def strength(self) -> object: ...
+
+    @strength.setter
+    def strength(self, arg: object, /) -> None: ...
+
+    @property
+    def power(self) -> object: ...
+
+    @power.setter
+    def power(self, arg: object, /) -> None: ...
+
+    @property
+    def floor(self) -> object: ...
+
+    @floor.setter
+    def floor(self, arg: object, /) -> None: ...
+
+    @property
+    def temperature(self) -> object: ...
+
+    @temperature.setter
+    def temperature(self, arg: object, /) -> None: ...
+
+    @property
+    def limit_activation(self) -> object: ...
+
+    @limit_activation.setter
+    def limit_activation(self, arg: object, /) -> None: ...
+
+    @property
+    def limit_strength(self) -> object: ...
+
+    @limit_strength.setter
+    def limit_strength(self, arg: object, /) -> None: ...
+
+    @property
+    def self_activation(self) -> object: ...
+
+    @self_activation.setter
+    def self_activation(self, arg: object, /) -> None: ...
+
+    @property
+    def self_strength(self) -> object: ...
+
+    @self_strength.setter
+    def self_strength(self, arg: object, /) -> None: ...
+
+class ArrivalSettings:
+    """When a goal counts as reached."""
+
+    def __init__(self, **kwargs) -> None: ...
+
+    @property
+    def joint(self) -> object: ...
+
+    @joint.setter
+    def joint(self, arg: object, /) -> None: ...
+
+    @property
+    def sliding(self) -> object: ...
+
+    @sliding.setter
+    def sliding(self, arg: object, /) -> None: ...
+
+    @property
+    def position(self) -> object: ...
+
+    @position.setter
+    def position(self, arg: object, /) -> None: ...
+
+    @property
+    def rotation(self) -> object: ...
+
+    @rotation.setter
+    def rotation(self, arg: object, /) -> None: ...
+
+    @property
+    def speed(self) -> object: ...
+
+    @speed.setter
+    def speed(self, arg: object, /) -> None: ...
+
+class OnlinePlannerSettings:
+    """The planner that runs beside the loop."""
+
+    def __init__(self, **kwargs) -> None: ...
+
+    @property
+    def period(self) -> object: ...
+
+    @period.setter
+    def period(self, arg: object, /) -> None: ...
+
+    @property
+    def patience(self) -> object: ...
+
+    @patience.setter
+    def patience(self, arg: object, /) -> None: ...
+
+    @property
+    def retry(self) -> object: ...
+
+    @retry.setter
+    def retry(self, arg: object, /) -> None: ...
+
+    @property
+    def search(self) -> PlannerSettings: ...
+
+    @search.setter
+    def search(self, arg: PlannerSettings, /) -> None: ...
+
+    @property
+    def route(self) -> RouteSettings: ...
+
+    @route.setter
+    def route(self, arg: RouteSettings, /) -> None: ...
+
+class LookAheadSettings:
+    """Trajectories out of the way of what moves, see Controller."""
+
+    def __init__(self, **kwargs) -> None: ...
+
+    @property
+    def horizon(self) -> object: ...
+
+    @horizon.setter
+    def horizon(self, arg: object, /) -> None: ...
+
+    @property
+    def period(self) -> object: ...
+
+    @period.setter
+    def period(self, arg: object, /) -> None: ...
+
+    @property
+    def delay(self) -> object: ...
+
+    @delay.setter
+    def delay(self, arg: object, /) -> None: ...
+
+    @property
+    def clearance(self) -> object: ...
+
+    @clearance.setter
+    def clearance(self, arg: object, /) -> None: ...
+
+    @property
+    def tries(self) -> object: ...
+
+    @tries.setter
+    def tries(self, arg: object, /) -> None: ...
+
+class LocalMinimumSettings:
+    """Sub-goals where the arm is stuck and there is no path."""
+
+    def __init__(self, **kwargs) -> None: ...
+
+    @property
+    def patience(self) -> object: ...
+
+    @patience.setter
+    def patience(self, arg: object, /) -> None: ...
+
+    @property
+    def fraction(self) -> object: ...
+
+    @fraction.setter
+    def fraction(self, arg: object, /) -> None: ...
+
+    @property
+    def leg(self) -> object: ...
+
+    @leg.setter
+    def leg(self, arg: object, /) -> None: ...
+
+    @property
+    def spread(self) -> object: ...
+
+    @spread.setter
+    def spread(self, arg: object, /) -> None: ...
+
+class Output(enum.Enum):
+    """What a controller's program solves for."""
+
+    automatic = 0
+    """Torque where the arm has inertias and effort limits."""
+
+    torque = 1
+
+    acceleration = 2
+
+class ControllerSettings:
+    """
+    All settings of a Controller, see `controller_settings_fields`. Every part is on by default; `planner=None`,
+    `look_ahead=None` and `local_minimum=None` leave a part out, for comparisons.
+    """
+
+    def __init__(self, **kwargs) -> None: ...
+
+    @property
+    def period(self) -> object: ...
+
+    @period.setter
+    def period(self, arg: object, /) -> None: ...
+
+    @property
+    def position_margin(self) -> object: ...
+
+    @position_margin.setter
+    def position_margin(self, arg: object, /) -> None: ...
+
+    @property
+    def stop_time(self) -> object: ...
+
+    @stop_time.setter
+    def stop_time(self, arg: object, /) -> None: ...
+
+    @property
+    def obstacle_timeout(self) -> object: ...
+
+    @obstacle_timeout.setter
+    def obstacle_timeout(self, arg: object, /) -> None: ...
+
+    @property
+    def local_activation(self) -> object: ...
+
+    @local_activation.setter
+    def local_activation(self, arg: object, /) -> None: ...
+
+    @property
+    def synchronous(self) -> object: ...
+
+    @synchronous.setter
+    def synchronous(self, arg: object, /) -> None: ...
+
+    @property
+    def seed(self) -> object: ...
+
+    @seed.setter
+    def seed(self, arg: object, /) -> None: ...
+
+    @property
+    def barriers(self) -> BarrierSettings: ...
+
+    @barriers.setter
+    def barriers(self, arg: BarrierSettings, /) -> None: ...
+
+    @property
+    def safety(self) -> SafetySettings: ...
+
+    @safety.setter
+    def safety(self, arg: SafetySettings, /) -> None: ...
+
+    @property
+    def arrival(self) -> ArrivalSettings: ...
+
+    @arrival.setter
+    def arrival(self, arg: ArrivalSettings, /) -> None: ...
+
+    @property
+    def output(self) -> Output: ...
+
+    @output.setter
+    def output(self, arg: Output, /) -> None: ...
+
+    def validate(self) -> None:
+        """
+        Raises ValueError that names the setting, its value and what is allowed.
+        """
+
+    def __copy__(self) -> ControllerSettings: ...
+
+    @property
+    def planner(self) -> OnlinePlannerSettings | None: ...
+
+    @planner.setter
+    def planner(self, value: OnlinePlannerSettings | None) -> None: ...
+
+    @property
+    def look_ahead(self) -> LookAheadSettings | None: ...
+
+    @look_ahead.setter
+    def look_ahead(self, value: LookAheadSettings | None) -> None: ...
+
+    @property
+    def local_minimum(self) -> LocalMinimumSettings | None: ...
+
+    @local_minimum.setter
+    def local_minimum(self, value: LocalMinimumSettings | None) -> None: ...
+
+def controller_settings_fields() -> list[dict[str, object]]:
+    """
+    Every setting of the tree: name (dotted), unit, default, least and most allowed, and what it trades.
+    """
+
+class SafetyStatus(enum.IntEnum):
+    """How safe a command is, by severity. Every command may be sent."""
+
+    ok = 0
+    """The motion is what the goal asks for."""
+
+    limited = 1
+    """A limit of the arm or a clearance bends it."""
+
+    relaxed = 2
+    """
+    Velocity or acceleration limits gave way to clearances, position or torque limits.
+    """
+
+    margin_lost = 3
+    """Not every safety margin can be kept; nothing is touched."""
+
+    stopping = 4
+    """The input is unusable or the program was not solved: a damped stop."""
+
+    clearance_lost = 5
+    """An ellipsoid of the arm reaches into something."""
+
+class Activity(enum.Enum):
+    """What a controller is about."""
+
+    no_goal = 0
+    """None was given: the arm comes to rest, and evades."""
+
+    moving = 1
+    """On the way to its goal."""
+
+    waiting = 2
+    """Until a posture is found."""
+
+    arrived = 3
+    """The goal is reached."""
+
+    blocked = 4
+    """No way leads to the goal now, see Controller.explain."""
+
+    stale = 5
+    """The obstacles are older than obstacle_timeout: the arm stops."""
+
+class Command:
+    """What one step of a Controller gives; arrays are copies."""
+
+    @property
+    def status(self) -> SafetyStatus: ...
+
+    @property
+    def activity(self) -> Activity: ...
+
+    @property
+    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (nv,) [Nm | N], gravity included; zero where the output is acceleration.
+        """
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [rad/s^2 | m/s^2]."""
+
+    @property
+    def wanted(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (nv,) acceleration that was asked for, before any limit [rad/s^2 | m/s^2].
+        """
+
+    @property
+    def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) after one period [rad/s | m/s]."""
+
+    @property
+    def position(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) after one period [rad | m]."""
+
+    @property
+    def clearance(self) -> float:
+        """The least, of obstacles, planes and links [m]; inf: far; nan: unknown."""
+
+    @property
+    def coordinate(self) -> int:
+        """Whose that is, see Controller.labels; -1: none within reach."""
+
+    @property
+    def point(self) -> int:
+        """The obstacle point, where it is one; else -1."""
+
+    @property
+    def bound_by(self) -> int:
+        """The coordinate whose clearance bends the motion most; -1: none."""
+
+    @property
+    def limits(self) -> list[Limit]:
+        """(nv) the limits in the way of each joint."""
+
+    @property
+    def system(self) -> StepStatus:
+        """StepStatus of the geometric system."""
+
+    @property
+    def program(self) -> TorqueStatus:
+        """TorqueStatus of the quadratic program."""
+
+    @property
+    def avoiding(self) -> bool:
+        """Follows a trajectory out of the way of what moves."""
+
+    @property
+    def on_path(self) -> bool:
+        """Follows a path of the planner."""
+
+class Controller:
+    """
+    State in, safe command out, once a period: planner, barriers, look-ahead and quadratic program in one.
+    Goals and obstacles may be set from any thread. Raises ValueError that names the setting at fault.
+    """
+
+    def __init__(self, arm: Arm, settings: ControllerSettings | None = None) -> None: ...
+
+    def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal) -> None:
+        """
+        From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose. Raises
+        ValueError that names the joint, its value and what is allowed; the goal before stays.
+        """
+
+    def clear_goal(self) -> None:
+        """The arm comes to rest where it is, and goes on evading."""
+
+    def set_obstacles(self, obstacles: Obstacles) -> None:
+        """
+        From the next step on. Points move on by their velocities until they are set again.
+        """
+
+    def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command:
+        """
+        One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)
+        [Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes.
+        """
+
+    @property
+    def command(self) -> Command:
+        """Of the last step."""
+
+    def explain(self) -> str:
+        """
+        One sentence: what the last command does and why, and what to do about it.
+        """
+
+    @property
+    def settings(self) -> ControllerSettings:
+        """A copy."""
+
+    @property
+    def values(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(m,) psi of every coordinate at the last step, see labels."""
+
+    @property
+    def labels(self) -> list["sidestep::CoordinateLabel"]:
+        """What the clearances are of."""
+
+    @property
+    def target(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (nv,) the configuration that the arm is led to: the goal, or a posture of a pose goal; None: none yet.
+        """
+
+    @property
+    def plan(self) -> Plan:
+        """What the planner found last."""
+
+    @property
+    def searches(self) -> int:
+        """How often a path was looked for."""
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether the commands hold torque."""
+
+class MotionRecord:
+    """
+    A motion of a controller without physics: row k is what step k began with and gave.
+    """
+
+    @property
+    def q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv)."""
+
+    @property
+    def v(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv)."""
+
+    @property
+    def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps, nv)."""
+
+    @property
+    def statuses(self) -> list[SafetyStatus]: ...
+
+    @property
+    def activities(self) -> list[Activity]: ...
+
+    @property
+    def clearance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) of the covering body [m]."""
+
+    @property
+    def step_seconds(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(steps,) [s]."""
+
+    @property
+    def last_q(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) after the last step."""
+
+    @property
+    def last_v(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) after the last step."""
+
+    @property
+    def arrived(self) -> bool:
+        """
+        Every joint came within the tolerance of the goal, which ended the motion.
+        """
+
+def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord:
+    """
+    Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is
+    within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not
+    finite, less than one step, and a controller that is not synchronous.
+    """
 
 __version__: str

@@ -23,6 +23,7 @@ from sidestep.simulation import SelfCollision
 Array: TypeAlias = npt.NDArray[np.float64]
 Mask: TypeAlias = npt.NDArray[np.bool_]
 Pair: TypeAlias = tuple[str, str]
+Progress: TypeAlias = Callable[[str, int, int], None]
 
 ALGORITHM_VERSION = 1
 SPACING = 0.1  # [rad | m] of control points, at most
@@ -30,6 +31,7 @@ BEYOND = 2  # control points beyond a limit: with one a spline ends at the limit
 NEAR = 0.03  # [m] clearance below which the error is measured
 CHECKS = 400  # random configurations by which what is left of it is taken off everywhere
 TURN = 2.0 * np.pi
+STORED = 1e-6  # [m] unit of the control points, which are whole numbers of it: far below the error of a table
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class ClearanceTables:
         return (*((table.first, table.second) for table in self.tables), *self.apart)
 
 
-def clearance_tables(robot: Robot) -> ClearanceTables:
+def clearance_tables(robot: Robot, *, progress: Progress | None = None) -> ClearanceTables:
     """Measures the distance of the exact meshes of pairs with two coordinates between, over these.
 
     Neighbours but one are always close, and covering ellipsoids, which are larger than links, overlap there. Their
@@ -67,12 +69,13 @@ def clearance_tables(robot: Robot) -> ClearanceTables:
 
     Args:
         robot: with collision meshes.
+        progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
     """
     path = stored_at(robot)
     stored = cache.read_stored(path, _read, "the cached clearance tables are unreadable and are made again")
     if stored is not None:
         return stored
-    tables = _measure(robot)
+    tables = _measure(robot, progress)
     cache.write_stored(path, lambda file: _write(file, tables), "the clearance tables are not cached")
     return tables
 
@@ -117,15 +120,19 @@ class _Axis:
         return slice(None) if self.periodic else slice(BEYOND, self.count - BEYOND)
 
 
-def _measure(robot: Robot) -> ClearanceTables:
+def _measure(robot: Robot, progress: Progress | None = None) -> ClearanceTables:
     check = SelfCollision(robot)
     tables: list[ClearanceTable] = []
     apart: list[Pair] = []
+    found: list[tuple[Pair, tuple[int, ...], list[_Axis]]] = []
     for pair in check.pairs:
         between = check.coordinates_between(*pair)
         axes = [axis for c in between if (axis := _Axis.of(robot, c)) is not None]
-        if len(between) != 2 or len(axes) != 2:
-            continue
+        if len(between) == 2 and len(axes) == 2:
+            found.append((pair, between, axes))
+    for done, (pair, between, axes) in enumerate(found):
+        if progress is not None:
+            progress(", ".join(pair), done, len(found))
         q = robot.neutral.copy()
 
         def distance(
@@ -190,7 +197,9 @@ def _table(
     control = control - maximum_filter(found, size=4, mode=ends)
     table = _spline(pair, axes, control)
     checked = cells[rng.integers(len(cells), size=CHECKS)] if len(cells) else cells
-    return _spline(pair, axes, control - max((excess(table, cell) for cell in checked), default=0.0))
+    lowered = control - max((excess(table, cell) for cell in checked), default=0.0)
+    # Rounded down here, so that a table just measured and one from the cache are the same.
+    return _spline(pair, axes, STORED * np.floor(lowered / STORED))
 
 
 def _near(least: Array, axes: list[_Axis]) -> Mask:
@@ -217,13 +226,13 @@ def _spline(pair: Pair, axes: list[_Axis], control: Array) -> ClearanceTable:
 
 
 def _write(path: Path, tables: ClearanceTables) -> None:
-    """As arrays of their own for every table, in micrometres: far below the error of a table."""
+    """As arrays of their own for every table, the control points as whole numbers of `STORED`."""
     arrays: dict[str, npt.NDArray[np.generic]] = {"apart": np.array(tables.apart, dtype=str).reshape(-1, 2)}
     for k, table in enumerate(tables.tables):
         arrays[f"pair{k}"] = np.array((table.first, table.second))
         arrays[f"coordinates{k}"] = np.array(table.coordinates)
         arrays[f"axes{k}"] = np.array([table.begin, table.spacing, table.periodic], dtype=float)
-        arrays[f"control{k}"] = np.floor(1e6 * table.control).astype(np.int32)
+        arrays[f"control{k}"] = np.rint(table.control / STORED).astype(np.int32)
     content = io.BytesIO()
     np.savez_compressed(content, **arrays)  # type: ignore[arg-type]
     write_bytes(path, content.getvalue())
@@ -247,5 +256,5 @@ def _stored_table(stored: Mapping[str, npt.NDArray[Any]], k: int) -> ClearanceTa
         begin=begin,
         spacing=spacing,
         periodic=[bool(turn) for turn in periodic],
-        control=1e-6 * stored[f"control{k}"],
+        control=STORED * stored[f"control{k}"],
     )

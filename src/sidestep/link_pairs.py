@@ -13,7 +13,7 @@ import numpy.typing as npt
 from sidestep._core import ClearanceTable, Obstacles, SelfCollisionBarrier
 from sidestep.body import Body, cache
 from sidestep.body.file import write_text
-from sidestep.clearance_tables import clearance_tables
+from sidestep.clearance_tables import Progress, clearance_tables
 from sidestep.robot import Robot
 from sidestep.simulation import SelfCollision
 
@@ -56,13 +56,16 @@ def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
     return tuple(pair for pair in stored if pair[:2] not in apart)
 
 
-def tables_and_pairs(robot: Robot, body: Body) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
+def tables_and_pairs(
+    robot: Robot, body: Body, *, progress: Progress | None = None
+) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
     """What tells how far links are apart: tables (`clearance_tables`), for other pairs covers (`barrier_pairs`).
 
     Args:
         robot: with collision meshes. body: a covering body of it.
+        progress: of the tables, as in `clearance_tables`.
     """
-    exact = clearance_tables(robot)
+    exact = clearance_tables(robot, progress=progress)
     return exact.tables, tuple(pair for pair in barrier_pairs(robot, body) if pair[:2] not in exact.pairs)
 
 

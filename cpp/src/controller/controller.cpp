@@ -535,6 +535,7 @@ void Controller::Impl::report(bool known) noexcept {
   if (torque) {
     command.torque = solution.torque;
   }
+  command.wanted = wanted_;
   command.acceleration = solution.acceleration;
   if (!command.acceleration.allFinite()) {
     command.acceleration.setZero();

@@ -41,6 +41,7 @@ struct Command {
   SafetyStatus status = SafetyStatus::stopping;
   Activity activity = Activity::no_goal;
   Eigen::VectorXd torque;        ///< (nv) [Nm | N], gravity included; zero where the output is acceleration
+  Eigen::VectorXd wanted;        ///< (nv) acceleration that was asked for, before any limit [rad/s² | m/s²]
   Eigen::VectorXd acceleration;  ///< (nv) [rad/s² | m/s²]
   Eigen::VectorXd velocity;      ///< (nv) after one period of the acceleration [rad/s | m/s]
   Eigen::VectorXd position;      ///< (nv) after one period at that velocity [rad | m]

@@ -1,0 +1,3 @@
+from .arm import Arm as Arm
+from .preparation import Progress as Progress
+from .preparation import prepare as prepare

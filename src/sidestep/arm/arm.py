@@ -1,0 +1,290 @@
+"""The arm: everything that is prepared once for a robot."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import ArrayLike
+
+from sidestep import _core
+
+if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without them
+    from sidestep.arm.preparation import Progress
+    from sidestep.body import Body
+    from sidestep.robot import Robot
+
+SHIPPED = Path(__file__).parent / "shipped"  # made by benchmarks/ship_arms.py
+SUFFIX = ".arm"
+
+
+class Arm(_core.Arm):
+    """Everything that is made once for a robot, in one object and one file that C++ reads alone.
+
+    Make one with `load` or `from_robot`; `save` writes it. It does not change.
+
+    Attributes:
+        name: of the robot. num_coordinates: joint coordinates nv.
+        limits: position, velocity, acceleration and effort (`JointLimits`).
+        neutral: a configuration (nv,) inside the limits.
+        pairs: links that must not touch, without a table: (first, second, contact [m]).
+        tables: `ClearanceTable` of the other pairs.
+        inertials: one per joint; empty if the description lacks them (`has_dynamics`).
+        proof: what is proven and measured of the ellipsoids of each link.
+        allowed_pairs: links that may touch.
+        provenance: description, fingerprint, version and date it was prepared from.
+        content_hash: SHA-256 (64 hex digits) of everything but the provenance.
+    """
+
+    def __init__(self, arm: _core.Arm, *, description: Callable[[], Robot] | None = None) -> None:
+        """Wraps an arm of the core.
+
+        Args:
+            arm: of the core. description: gives the robot with its meshes when `robot` is first asked for.
+        """
+        super().__init__(arm)
+        self._description = description
+
+    @classmethod
+    def load(
+        cls,
+        source: str | Path,
+        *,
+        package_dirs: Sequence[str | Path] = (),
+        base_pose: ArrayLike | None = None,
+        tip: str | None = None,
+        locked: Mapping[str, float] | None = None,
+        locked_beyond_limits: bool = False,
+        acceleration_limits: ArrayLike | None = None,
+        velocity_limits: ArrayLike | None = None,
+        effort_limits: ArrayLike | None = None,
+        name: str | None = None,
+        xacro_arguments: Mapping[str, str] | None = None,
+        allowed: Sequence[tuple[str, str]] = (),
+        progress: Progress | None = None,
+        cache: bool = True,
+    ) -> Arm:
+        """An arm by the name of a shipped robot, from an `.arm` file, or from a robot description.
+
+        A shipped name without options is read from the file that comes with Sidestep: milliseconds, and no robot
+        package needed. A description, or a name with options, is prepared on first use, which takes minutes, and kept
+        in the user's cache.
+
+        Args:
+            source: a name of `sidestep.robots()`, the path of an `.arm` file, or a URDF or xacro file (or URDF text).
+            package_dirs, base_pose, tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits,
+                effort_limits, name, xacro_arguments: of a description, as in `Robot.from_urdf`; of a name
+                `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
+            allowed: pairs of links that may touch: they get no clearance.
+            progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover" or
+                "tables", the item a link or a pair of links.
+            cache: whether a prepared arm is read from and written to the user's cache (SIDESTEP_CACHE_DIR overrides its
+                place).
+
+        Raises:
+            FileNotFoundError: there is no such file, or a named robot's package is not installed.
+            ValueError: an unknown name, a damaged file, an option that does not suit the source, anything wrong in the
+                description.
+        """
+        options: dict[str, Any] = {
+            "package_dirs": package_dirs,
+            "base_pose": base_pose,
+            "tip": tip,
+            "locked": locked,
+            "locked_beyond_limits": locked_beyond_limits,
+            "acceleration_limits": acceleration_limits,
+            "velocity_limits": velocity_limits,
+            "effort_limits": effort_limits,
+            "name": name,
+            "xacro_arguments": xacro_arguments,
+        }
+        given = {key: value for key, value in options.items() if not _is_default(value)}
+        if _is_text(source):
+            return cls._prepared(lambda: _described(source, given), "URDF text", allowed, progress, cache)
+        path = Path(source)
+        if path.suffix.lower() == SUFFIX:
+            _refuse_options([*given, *(["allowed"] if allowed else [])], (), f"arm file '{path}', which is prepared")
+            return cls(_core.Arm.read(path))
+        if path.suffix or len(path.parts) != 1 or path.is_file():
+            return cls._prepared(lambda: _described(path, given), path.name, allowed, progress, cache)
+        return cls._named(str(source), given, allowed, progress, cache)
+
+    @classmethod
+    def from_robot(
+        cls,
+        robot: Robot,
+        body: Body | None = None,
+        *,
+        allowed: Sequence[tuple[str, str]] = (),
+        progress: Progress | None = None,
+    ) -> Arm:
+        """Prepares an arm for a robot at hand: minutes, unless the user's cache has the parts.
+
+        Args:
+            robot: with geometry.
+            body: a covering body of it; `Body.cover(robot)` by default.
+            allowed: pairs of links that may touch: they get no clearance.
+            progress: as in `load`.
+
+        Raises:
+            ValueError: names what is wrong: a body that does not cover, or belongs to another robot, an unknown link.
+        """
+        from sidestep.arm.preparation import prepare
+
+        arm = prepare(robot, body=body, allowed=allowed, progress=progress)
+        return cls(arm, description=lambda: robot)
+
+    def __repr__(self) -> str:
+        return f"Arm({self.name!r}, {self.num_coordinates} coordinates, {self.content_hash[:12]})"
+
+    @property
+    def robot(self) -> _core.Robot:
+        """The kinematic tree; a `Robot` with meshes where the arm comes from a robot, a description or a name.
+
+        Of an `.arm` file it is the core's, without meshes. So it is, with a warning, where the robot's package is not
+        installed or has other meshes by now.
+        """
+        return self._robot
+
+    @cached_property
+    def body(self) -> Body:
+        """The covering body, with what is proven and measured of each link (`link_covers`)."""
+        from sidestep.body import Body, LinkCover
+
+        core = super().body
+        return Body(
+            links=core.links,
+            weights=core.weights,
+            means=core.means,
+            covariances=core.covariances,
+            levels=core.levels,
+            robot_name=self.name,
+            fingerprint=self.provenance.fingerprint,
+            link_covers=[
+                LinkCover(
+                    link=proof.link,
+                    num_components=core.links.count(proof.link),
+                    coverage=proof.coverage,
+                    mean_overshoot=proof.mean_overshoot,
+                    max_overshoot=proof.max_overshoot,
+                    volume_ratio=proof.volume_ratio,
+                    volume_of=proof.volume_of,
+                    interior_coverage=proof.interior_coverage,
+                    slimness=proof.slimness,
+                )
+                for proof in self.proof
+            ],
+        )
+
+    def mass_matrix(self, q: ArrayLike) -> npt.NDArray[np.float64]:
+        """Joint-space inertia M(q) (nv, nv) [kg m^2, kg m, kg] at q (nv,); without rotor inertias.
+
+        Raises:
+            ValueError: the arm has no inertias; a wrong shape; a number that is not finite.
+        """
+        return self._dynamics.mass_matrix(q)
+
+    def bias(self, q: ArrayLike, v: ArrayLike) -> npt.NDArray[np.float64]:
+        """Coriolis, centrifugal and gravity force (nv,) [Nm | N] at q, v (nv,), gravity 9.81 m/s^2 along -z.
+
+        h(q, v) = C(q, v) v + g(q), so that M(q) a + h(q, v) = torque; no friction.
+
+        Raises:
+            ValueError: the arm has no inertias; a wrong shape; a number that is not finite.
+        """
+        return self._dynamics.bias(q, v)
+
+    @cached_property
+    def _dynamics(self) -> _core.RigidBodyDynamics:
+        if not self.has_dynamics:
+            raise ValueError(f"arm {self.name!r} has no inertias: its description lacks <inertial>")
+        return _core.RigidBodyDynamics(super().robot, self.inertials)
+
+    @cached_property
+    def _robot(self) -> _core.Robot:
+        core = super().robot
+        if self._description is None:
+            return core
+        try:
+            robot = self._description()
+        except FileNotFoundError as error:
+            warnings.warn(f"arm {self.name!r} has no meshes: {error}", RuntimeWarning, stacklevel=4)
+            return core
+        if robot.fingerprint != self.provenance.fingerprint:
+            warnings.warn(
+                f"arm {self.name!r} has no meshes: the installed description is another one than it was prepared from",
+                RuntimeWarning,
+                stacklevel=4,
+            )
+            return core
+        return robot
+
+    @classmethod
+    def _named(
+        cls,
+        name: str,
+        given: Mapping[str, Any],
+        allowed: Sequence[tuple[str, str]],
+        progress: Progress | None,
+        cache: bool,
+    ) -> Arm:
+        from sidestep.robot.catalogue import recipe
+
+        recipe(name)  # raises, with the known names
+        _refuse_options(given, ("locked", "locked_beyond_limits"), f"robot {name!r}, which has its own")
+
+        def describe() -> Robot:
+            from sidestep.robot import Robot
+
+            return Robot.named(name, **given)
+
+        shipped = SHIPPED / f"{name}{SUFFIX}"
+        if not given and not allowed and shipped.is_file():
+            return cls(_core.Arm.read(shipped), description=describe)
+        return cls._prepared(describe, name, allowed, progress, cache)
+
+    @classmethod
+    def _prepared(
+        cls,
+        describe: Callable[[], Robot],
+        source: str,
+        allowed: Sequence[tuple[str, str]],
+        progress: Progress | None,
+        cache: bool,
+    ) -> Arm:
+        from sidestep.arm.cache import arm_path, stored_or_made
+        from sidestep.arm.preparation import prepare
+
+        robot = describe()
+
+        def make() -> _core.Arm:
+            return prepare(robot, allowed=allowed, source=source, progress=progress)
+
+        arm = stored_or_made(arm_path(robot, allowed, source), make) if cache else make()
+        return cls(arm, description=lambda: robot)
+
+
+def _described(source: str | Path, options: Mapping[str, Any]) -> Robot:
+    from sidestep.robot import Robot
+
+    return Robot.from_urdf(source, **options)
+
+
+def _is_text(source: str | Path) -> bool:
+    return isinstance(source, str) and source.lstrip().startswith("<")
+
+
+def _is_default(value: object) -> bool:
+    return value is None or value is False or (isinstance(value, tuple | list | dict) and not value)
+
+
+def _refuse_options(given: Sequence[str] | Mapping[str, Any], known: Sequence[str], of: str) -> None:
+    for option in given:
+        if option not in known:
+            allowed = f"; allowed: {', '.join(known)}" if known else ""
+            raise ValueError(f"{option} cannot be given for {of}{allowed}")

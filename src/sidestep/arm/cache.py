@@ -1,0 +1,60 @@
+"""Prepared arms kept in the user's cache, found by what they were prepared from."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sidestep import _core, clearance_tables, link_pairs
+from sidestep.body import cache as body_cache
+from sidestep.body.cover import CoverSettings
+from sidestep.robot import Robot
+
+FORMAT_VERSION = 1  # to be raised with the version of the file format (cpp/src/model/arm_file.cpp)
+
+
+def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str) -> Path:
+    """The file of one arm; its name is a hash of what it is made from and of the algorithms that make it."""
+    digest = hashlib.sha256()
+
+    def add(*items: object) -> None:
+        for item in items:
+            digest.update((item.tobytes() if isinstance(item, np.ndarray) else repr(item).encode()) + b"\n")
+
+    add(FORMAT_VERSION, source, robot.name, sorted(sorted(pair) for pair in allowed))
+    add(body_cache.cache_path(robot, CoverSettings()).name, clearance_tables.stored_at(robot).name)
+    pairs = link_pairs
+    add(pairs.SAMPLES, pairs.FEW, pairs.TOUCHING, pairs.WAYS, pairs.NEAR, pairs.SHARE)
+    limits = robot.limits
+    add(limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.effort)
+    for joint in robot.joints:  # the fingerprint leaves the base pose out, and rounds
+        add(joint.placement, joint.axis, joint.multiplier, joint.offset)
+    for frame in robot.frames:
+        add(frame.placement)
+    for inertial in robot.inertials:
+        add(inertial.mass, inertial.com, inertial.inertia)
+    return body_cache.cache_directory().parent / "arms" / f"{digest.hexdigest()}.arm"
+
+
+def stored_or_made(path: Path, make: Callable[[], _core.Arm]) -> _core.Arm:
+    """The arm of a file or, without one, what `make` gives, which is stored there.
+
+    Warns about a file that cannot be read or written: an arm without a cache is still an arm.
+    """
+    try:
+        return _core.Arm.read(path)
+    except FileNotFoundError:
+        pass
+    except (ValueError, OSError) as error:
+        warnings.warn(f"the cached arm is prepared again: {error}", RuntimeWarning, stacklevel=4)
+    arm = make()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        arm.save(path)
+    except OSError as error:
+        warnings.warn(f"the prepared arm is not cached: {error}", RuntimeWarning, stacklevel=4)
+    return arm

@@ -1,0 +1,114 @@
+"""Prepares an arm: covers its links, measures its clearance tables, finds the pairs of links that may touch."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import warnings
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from sidestep import _core
+from sidestep.body import Body
+from sidestep.body.cover import CoverProgress
+from sidestep.link_pairs import tables_and_pairs
+from sidestep.robot import Robot
+
+Pair: TypeAlias = tuple[str, str]
+Progress: TypeAlias = Callable[[str, str, int, int], None]
+"""Called as progress(stage, item, done, in_all); the stage is "cover" or "tables", the item a link or a pair."""
+
+# Of the largest eigenvalue of the mass matrix: below it a coordinate moves no mass. A gripper's smallest is 1e-7 of it.
+_NO_MASS = 1e-12
+
+
+def prepare(
+    robot: Robot,
+    *,
+    body: Body | None = None,
+    allowed: Sequence[Pair] = (),
+    source: str = "",
+    progress: Progress | None = None,
+) -> _core.Arm:
+    """Everything that is made once for a robot. Minutes, unless the user's cache has the parts.
+
+    Args:
+        robot: with geometry.
+        body: a covering body of it; `Body.cover(robot)` by default.
+        allowed: pairs of links that may touch, in either order: they get no clearance.
+        source: what the provenance calls the description; the robot's name by default.
+        progress: called as progress(stage, item, done, in_all).
+
+    Raises:
+        ValueError: names what is wrong: a body that does not cover or belongs to another robot, an unknown link, a
+            link's inertia.
+    """
+    for pair in allowed:
+        for link in pair:
+            robot.link(link)
+    if body is None:
+        body = Body.cover(robot, progress=_of_stage("cover", progress))
+    elif body.fingerprint and body.fingerprint != robot.fingerprint:
+        raise ValueError(f"the body was made for robot {body.robot_name!r}, not for {robot.name!r} as it is")
+    elif body.levels is None:
+        raise ValueError("the body does not cover its links (it has no levels); Body.cover(robot) makes one that does")
+    tables, pairs = tables_and_pairs(robot, body, progress=_of_stage("tables", progress))
+    may_touch = {frozenset(pair) for pair in allowed}
+    return _core.Arm(
+        robot=robot,
+        body=body,
+        pairs=[pair for pair in pairs if frozenset(pair[:2]) not in may_touch],
+        tables=[table for table in tables if frozenset((table.first, table.second)) not in may_touch],
+        inertials=_inertials(robot),
+        proof=[
+            _core.CoverProof(
+                cover.link,
+                coverage=cover.coverage,
+                mean_overshoot=cover.mean_overshoot,
+                max_overshoot=cover.max_overshoot,
+                volume_ratio=cover.volume_ratio,
+                volume_of=cover.volume_of,
+                interior_coverage=cover.interior_coverage,
+                slimness=cover.slimness,
+            )
+            for cover in body.link_covers
+        ],
+        allowed_pairs=[(first, second) for first, second in allowed],
+        provenance=_core.Provenance(
+            source=source or robot.name,
+            fingerprint=robot.fingerprint,
+            sidestep_version=_core.__version__,
+            date=_today(),
+        ),
+    )
+
+
+def _of_stage(stage: str, progress: Progress | None) -> CoverProgress | None:
+    if progress is None:
+        return None
+    return lambda item, done, in_all: progress(stage, item, done, in_all)
+
+
+def _inertials(robot: Robot) -> Sequence[_core.Inertial]:
+    """One per joint; none if some motion has no mass, with a warning if the description has inertias at all."""
+    if all(inertial.mass == 0.0 for inertial in robot.inertials):
+        return ()
+    eigenvalues = np.linalg.eigvalsh(robot.mass_matrix(robot.neutral))
+    if eigenvalues[0] > _NO_MASS * eigenvalues[-1]:
+        return robot.inertials
+    warnings.warn(
+        f"robot {robot.name!r}: some motion moves no mass, because links lack <inertial>; "
+        "the arm has no dynamics, so give mass matrix and bias to what needs them",
+        RuntimeWarning,
+        stacklevel=4,
+    )
+    return ()
+
+
+def _today() -> str:
+    """The date in UTC; that of SOURCE_DATE_EPOCH where it is set, for builds that can be repeated."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    now = datetime.datetime.now(datetime.UTC) if epoch is None else datetime.datetime.fromtimestamp(int(epoch), datetime.UTC)
+    return now.date().isoformat()
