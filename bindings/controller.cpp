@@ -290,6 +290,13 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("settings", [](const Controller& self) { return ControllerSettings(self.settings()); }, "A copy.")
       .def_prop_ro("values", [](const Controller& self) { return to_numpy(self.workspace().values); },
                    "(m,) psi of every coordinate at the last step, see labels.")
+      .def_prop_ro(
+          "geometric_step",
+          [](const Controller& self) {
+            return Step{self.command().system, self.workspace(),
+                        Explanation(self.system(), self.system().diagnose(self.workspace()))};
+          },
+          "The Step of the geometric system in the last step, with its clearances, metric and diagnosis.")
       .def_prop_ro("labels", [](const Controller& self) { return self.labels(); }, "What the clearances are of.")
       .def_prop_ro("target",
                    [](const Controller& self) -> nb::object {

@@ -11,23 +11,6 @@
 namespace sidestep::python {
 namespace {
 
-/// A diagnosis with the label of the coordinate that dominates.
-struct Explanation {
-  Diagnosis diagnosis;
-  CoordinateLabel label;
-
-  Explanation(const GeometricSystem& system, const Diagnosis& d)
-      : diagnosis(d),
-        label(d.coordinate < 0 ? CoordinateLabel{} : system.labels()[static_cast<std::size_t>(d.coordinate)]) {}
-};
-
-/// What Python gets from a step: the workspace as it was when the step ended.
-struct Step {
-  StepStatus status;
-  GeometricSystem::Workspace result;
-  Explanation explanation;
-};
-
 Switch as_switch(nb::handle value) { return value.is_none() ? Switch{Unswitched{}} : nb::cast<Switch>(value); }
 
 void bind_switches(nb::module_& m) {

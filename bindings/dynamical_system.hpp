@@ -5,7 +5,7 @@
 #include <string>
 
 #include "arguments.hpp"
-#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/dynamical_system/geometric_system.hpp"
 
 namespace sidestep::python {
 
@@ -27,6 +27,23 @@ Enum as_enum(nb::handle value, const char* name) {
   const std::string allowed = nb::cast<std::string>(nb::str(", ").attr("join")(members));
   throw nb::value_error((std::string(name) + " is " + nb::repr(value).c_str() + ", must be one of: " + allowed).c_str());
 }
+
+/// A diagnosis with the label of the coordinate that dominates.
+struct Explanation {
+  Diagnosis diagnosis;
+  CoordinateLabel label;
+
+  Explanation(const GeometricSystem& system, const Diagnosis& d)
+      : diagnosis(d),
+        label(d.coordinate < 0 ? CoordinateLabel{} : system.labels()[static_cast<std::size_t>(d.coordinate)]) {}
+};
+
+/// What Python gets from a step: the workspace as it was when the step ended.
+struct Step {
+  StepStatus status;
+  GeometricSystem::Workspace result;
+  Explanation explanation;
+};
 
 /// A goal, or a configuration as an array.
 Goal as_goal(nb::handle value, Eigen::Index nv);

@@ -2445,6 +2445,12 @@ class Controller:
         """(m,) psi of every coordinate at the last step, see labels."""
 
     @property
+    def geometric_step(self) -> Step:
+        """
+        The Step of the geometric system in the last step, with its clearances, metric and diagnosis.
+        """
+
+    @property
     def labels(self) -> list["sidestep::CoordinateLabel"]:
         """What the clearances are of."""
 

@@ -108,7 +108,9 @@ class Arm(_core.Arm):
             return cls._prepared(lambda: _described(source, given), "URDF text", allowed, progress, cache)
         path = Path(source)
         if path.suffix.lower() == SUFFIX:
-            _refuse_options([*given, *(["allowed"] if allowed else [])], (), f"arm file '{path}', which is prepared")
+            _refuse_options(
+                [*given, *(["allowed"] if allowed else [])], (), f"arm file '{path}', which is prepared"
+            )
             return cls(_core.Arm.read(path))
         if path.suffix or len(path.parts) != 1 or path.is_file():
             return cls._prepared(lambda: _described(path, given), path.name, allowed, progress, cache)

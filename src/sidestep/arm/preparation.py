@@ -53,7 +53,9 @@ def prepare(
     elif body.fingerprint and body.fingerprint != robot.fingerprint:
         raise ValueError(f"the body was made for robot {body.robot_name!r}, not for {robot.name!r} as it is")
     elif body.levels is None:
-        raise ValueError("the body does not cover its links (it has no levels); Body.cover(robot) makes one that does")
+        raise ValueError(
+            "the body does not cover its links (it has no levels); Body.cover(robot) makes one that does"
+        )
     tables, pairs = tables_and_pairs(robot, body, progress=_of_stage("tables", progress))
     may_touch = {frozenset(pair) for pair in allowed}
     return _core.Arm(
@@ -110,5 +112,9 @@ def _inertials(robot: Robot) -> Sequence[_core.Inertial]:
 def _today() -> str:
     """The date in UTC; that of SOURCE_DATE_EPOCH where it is set, for builds that can be repeated."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.datetime.now(datetime.UTC) if epoch is None else datetime.datetime.fromtimestamp(int(epoch), datetime.UTC)
+    now = (
+        datetime.datetime.now(datetime.UTC)
+        if epoch is None
+        else datetime.datetime.fromtimestamp(int(epoch), datetime.UTC)
+    )
     return now.date().isoformat()

@@ -55,6 +55,7 @@ class MotionSettings:
             if not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} is {value}, must be positive and finite")
 
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """What happened, up to arrival or the end: T rows, one per period.
@@ -115,7 +116,10 @@ class SystemMover:
         if settings.torque:
             program = TorqueController(self.robot, period=settings.period)
             return _under_torque(
-                self.robot, SystemDriver(self.system, program, problem.goal, problem.obstacles_at), problem, settings
+                self.robot,
+                SystemDriver(self.system, program, problem.goal, problem.obstacles_at),
+                problem,
+                settings,
             )
         columns = _Columns(problem, settings)
         q, v = problem.start, np.zeros_like(problem.start)
@@ -169,9 +173,7 @@ class ControllerMover:
             obstacles = seen(columns.done * settings.period)
             if obstacles is not None:
                 controller.set_obstacles(obstacles)
-            part = integrate(
-                controller, q, v, steps=steps, goal=problem.goal, tolerance=settings.tolerance
-            )
+            part = integrate(controller, q, v, steps=steps, goal=problem.goal, tolerance=settings.tolerance)
             columns.add(part.q, part.v, part.acceleration, part.step_seconds)
             q, v = part.last_q, part.last_v
             if planned["first_path_seconds"] is None:

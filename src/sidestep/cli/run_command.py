@@ -29,7 +29,7 @@ class MethodChoice(StrEnum):
     written = "written"
     barrier = "barrier"
     reactive = "reactive"
-    guided = "guided"
+    controller = "controller"
 
 
 class ModeChoice(StrEnum):
@@ -40,9 +40,9 @@ class ModeChoice(StrEnum):
 
 
 METHOD_FACTS = {
-    "barrier": "barriers",
-    "reactive": "barriers without sub-goals",
-    "guided": "barriers, guided",
+    "barrier": "controller without planner",
+    "reactive": "barriers alone",
+    "controller": "controller",
 }
 SWITCH_FORMS = {  # how --switch is written, and what its numbers are
     "none": (),
@@ -87,8 +87,8 @@ def run(
     method: Annotated[
         MethodChoice | None,
         typer.Option(
-            help="Instead of the scenario's: as written, or the recommended system of barriers (reactive: without "
-            "sub-goals; guided: along a path)."
+            help="Instead of the scenario's: as written, or the controller (barrier: without planner; reactive: also "
+            "without look ahead and sub-goals)."
         ),
     ] = None,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the scenario's mode.")] = None,
@@ -150,7 +150,7 @@ def demo(
     """
     from sidestep.scenario import Scenario
 
-    scenario = dataclasses.replace(Scenario.load(DEMO_SCENARIO), method="barrier")
+    scenario = dataclasses.replace(Scenario.load(DEMO_SCENARIO), method="controller")
     if studio if studio is not None else json is None and _can_open_studio():
         from sidestep.cli.studio_command import open_studio
 

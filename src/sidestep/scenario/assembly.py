@@ -17,10 +17,9 @@ from sidestep import (
     BinarySwitch,
     Body,
     CollisionDensity,
+    Controller,
     DistanceSwitch,
     Embedding,
-    Escape,
-    Evasion,
     GeodesicOnly,
     GeometricSystem,
     HarmonicOnly,
@@ -32,13 +31,12 @@ from sidestep import (
     Unswitched,
 )
 from sidestep._core import JointType, Obstacles
-from sidestep.guidance import GuidedMotion
+from sidestep.arm import Arm
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
 from sidestep.pose import from_roll_pitch_yaw, pose_at
-from sidestep.presets import barrier_system
 from sidestep.robot.degrees import degrees_hint
-from sidestep.scenario.parts import escape_of, evasion_of, guide_of, torque_program_of
+from sidestep.scenario.parts import controller_settings_of, torque_program_of
 from sidestep.scenario.scenario import (
     BasePose,
     EmbeddingChoice,
@@ -53,8 +51,8 @@ from sidestep.scenario.scenario import (
 )
 from sidestep.scenario.seen import View, seen_at, view_of
 from sidestep.scenario.validation import ScenarioError
-from sidestep.simulation import SceneObject
-from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
+from sidestep.simulation import ControllerDriver, SceneObject, SystemDriver
+from sidestep.simulation.pose_aim import PoseAim, PoseTarget, Posture, posture_at
 from sidestep.simulation.scene import Kind, check_scene
 
 Array = npt.NDArray[np.float64]
@@ -71,31 +69,31 @@ class Assembly:
     """The parts of a run.
 
     Attributes:
-        robot, body, system: as the scenario asks.
+        robot, body: as the scenario asks.
+        mover: the `Controller`, or for the method "written" its geometric system.
         objects: the solid obstacles, for physics and exact clearance.
-        safe: clearances bound the motion as well, as a part of the method.
-        escape: sub-goals where the arm is stuck, or None. evasion: flights out of the way of what moves, or None.
-        guide: what leads the arm along a path, or None.
-        start, start_velocity, goal: (nv,) [rad | m]; for a pose a configuration that has it, or is near it.
+        start, start_velocity, goal: (nv,) [rad | m]; for a pose the start, or for "written" a posture that has it.
         pose: in place of the goal.
-        seen: what the controller sees; a function of time [s] where an obstacle starts or stops.
-        torque_program: with the weights and limits of the scenario.
+        seen: what the mover sees; a function of time [s] where an obstacle starts or stops.
+        torque_program: of the method "written", with the weights and limits of the scenario.
     """
 
     robot: Robot
     body: Body
-    system: GeometricSystem
+    mover: Controller | GeometricSystem
     objects: tuple[SceneObject, ...]
     start: Array
     start_velocity: Array
     goal: Array
     seen: Obstacles | Callable[[float], Obstacles]
     torque_program: TorqueController
-    safe: bool = False
-    escape: Escape | None = None
-    evasion: Evasion | None = None
-    guide: GuidedMotion | None = None
-    pose: PoseAim | None = None
+    pose: PoseTarget | None = None
+
+    def driver(self) -> ControllerDriver | SystemDriver:
+        """What drives the arm in a simulation."""
+        if isinstance(self.mover, Controller):
+            return ControllerDriver(self.mover, self.seen)
+        return SystemDriver(self.mover, self.torque_program, self.pose or self.goal, self.seen)
 
 
 def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembly:
@@ -113,7 +111,6 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
     robot = _at("robot", scenario, partial(load_robot, scenario))
     start = _at("start.position", scenario, partial(coordinates, scenario.start, robot, "start.position"))
     velocity = _at("start.velocity", scenario, partial(start_velocity, scenario.start, robot))
-    posture = _at("goal", scenario, partial(goal_posture, scenario, robot, start))
     objects: list[SceneObject] = []
     views: list[View] = []
     for index, item in enumerate(scenario.obstacles):
@@ -126,36 +123,54 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
     _at("obstacles", scenario, partial(check_scene, objects))
     scripted = any(item.motion is not None for item in scenario.obstacles)
     seen = partial(seen_at, tuple(views)) if scripted else seen_at(tuple(views), 0.0)
-    barrier, guided = scenario.method != "written", scenario.method == "guided"
-    leads = scenario.method == "barrier"
-    if guided and scenario.simulation.mode != "torque":
-        raise ScenarioError(
-            f"{scenario.name}: method is 'guided', which goes with simulation.mode torque alone"
-        )
+    written = scenario.method == "written"
+    if not written:
+        settings = _at("method", scenario, partial(controller_settings_of, scenario))
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
-    system = _at("barriers" if barrier else "system", scenario, partial(_system, scenario, robot, body))
-    if barrier and not guided and isinstance(seen, Obstacles) and not np.any(seen.velocities):
-        system = system.relaxed_at(posture.q, seen)
+    program = _at(
+        "torque", scenario, partial(torque_program_of, scenario.torque, robot, scenario.simulation.period)
+    )
+    mover: Controller | GeometricSystem
+    pose: PoseTarget | None = None
+    if written:
+        mover = _at(
+            "system", scenario, partial(written_system, scenario.embedding, scenario.system, robot, body)
+        )
+        posture = _at("goal", scenario, partial(goal_posture, scenario, robot, start))
+        pose, goal = _pose_aim(scenario, robot, posture), posture.q
+    else:
+        arm = _at("body", scenario, partial(Arm.from_robot, robot, body))
+        mover = _at("method", scenario, partial(Controller, arm, settings))
+        pose, goal = _at("goal", scenario, partial(_target, scenario, robot, start))
+        mover.set_goal(goal if pose is None else pose.goal)
     return Assembly(
         robot=robot,
         body=body,
-        system=system,
+        mover=mover,
         objects=tuple(objects),
         start=start,
         start_velocity=velocity,
-        goal=posture.q,
+        goal=goal,
         seen=seen,
-        safe=barrier,
-        escape=_at("escape", scenario, partial(escape_of, scenario.escape, robot)) if leads else None,
-        evasion=_at("evasion", scenario, partial(evasion_of, scenario.evasion, system)) if leads else None,
-        guide=_at("guide", scenario, partial(guide_of, scenario.guide, robot, body, system, synchronous=True))
-        if guided
-        else None,
-        pose=_pose_aim(scenario, robot, posture),
-        torque_program=_at(
-            "torque", scenario, partial(torque_program_of, scenario.torque, robot, scenario.simulation.period)
-        ),
+        pose=pose,
+        torque_program=program,
     )
+
+
+def _target(scenario: Scenario, robot: Robot, start: Array) -> tuple[PoseTarget | None, Array]:
+    """The pose to be reached, if it is one, and the configuration; for a pose the start stands for it."""
+    choice = scenario.goal
+    if isinstance(choice, JointState):
+        return None, coordinates(choice, robot, "goal.position")
+    _check_frame(choice, robot)
+    rest = None if choice.posture is None else coordinates(choice.posture, robot, "goal.posture.position")
+    return PoseTarget(robot, choice.frame, pose_of(choice), rest=rest), start
+
+
+def _check_frame(choice: PoseChoice, robot: Robot) -> None:
+    links = [frame.name for frame in robot.frames if frame.joint >= 0]
+    if choice.frame not in links:
+        raise ValueError(f"goal.frame is {choice.frame!r}; allowed: {', '.join(links)}")
 
 
 def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> Posture:
@@ -166,9 +181,7 @@ def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> Posture:
     choice = scenario.goal
     if isinstance(choice, JointState):
         return Posture(coordinates(choice, robot, "goal.position"))
-    links = [frame.name for frame in robot.frames if frame.joint >= 0]
-    if choice.frame not in links:
-        raise ValueError(f"goal.frame is {choice.frame!r}; allowed: {', '.join(links)}")
+    _check_frame(choice, robot)
     if choice.posture is not None:
         return Posture(coordinates(choice.posture, robot, "goal.posture.position"))
     return posture_at(robot, choice.frame, pose_of(choice), start, starts=POSTURE_STARTS)
@@ -178,8 +191,7 @@ def _pose_aim(scenario: Scenario, robot: Robot, posture: Posture) -> PoseAim | N
     choice = scenario.goal
     if isinstance(choice, JointState):
         return None
-    stiffness = scenario.system.stiffness if scenario.method == "written" else scenario.barriers.stiffness
-    return PoseAim(robot, choice.frame, pose_of(choice), stiffness=stiffness, posture=posture)
+    return PoseAim(robot, choice.frame, pose_of(choice), stiffness=scenario.system.stiffness, posture=posture)
 
 
 def load_robot(scenario: Scenario) -> Robot:
@@ -287,12 +299,6 @@ def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
         seed=choice.seed,
         progress=progress,
     )
-
-
-def _system(scenario: Scenario, robot: Robot, body: Body) -> GeometricSystem:
-    if scenario.method != "written":
-        return barrier_system(robot, body, numbers=scenario.barriers)
-    return written_system(scenario.embedding, scenario.system, robot, body)
 
 
 def written_system(

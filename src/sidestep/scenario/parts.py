@@ -1,45 +1,64 @@
-"""The parts of a run beside body and system, by the numbers of a scenario: sub-goals, flights, guide, torque."""
+"""The parts of a run by the numbers of a scenario: the settings of the controller, the thesis's torque program."""
 
 from __future__ import annotations
 
 import dataclasses
 
 from sidestep._core import (
-    Escape,
-    Evasion,
-    GeometricSystem,
+    BarrierSettings,
+    ControllerSettings,
+    LocalMinimumSettings,
+    LookAheadSettings,
+    OnlinePlannerSettings,
     PlannerSettings,
     RouteSettings,
     SafetySettings,
     TorqueController,
 )
-from sidestep.body import Body
-from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
-from sidestep.scenario.settings import EscapeChoice, EvasionChoice, GuideChoice, TorqueChoice
+from sidestep.scenario.scenario import Scenario
+from sidestep.scenario.settings import TorqueChoice
+
+OWN_OF_PROGRAM = (
+    "torque_weight",
+    "slack_weight",
+    "safety_weight",
+    "stop_damping",
+)  # with method written alone
 
 
-def escape_of(choice: EscapeChoice, robot: Robot) -> Escape:
-    """Sub-goals where the arm is stuck; raises ValueError that names the number at fault."""
-    return Escape(robot, **dataclasses.asdict(choice))
+def controller_settings_of(scenario: Scenario, *, synchronous: bool = True) -> ControllerSettings:
+    """The settings of the `Controller` that a scenario asks for.
 
-
-def evasion_of(choice: EvasionChoice, system: GeometricSystem) -> Evasion:
-    """Flights out of the way of what moves; raises ValueError that names the number at fault."""
-    return Evasion(system, **dataclasses.asdict(choice))
-
-
-def guide_of(
-    choice: GuideChoice, robot: Robot, body: Body, system: GeometricSystem, *, synchronous: bool
-) -> GuidedMotion:
-    """What leads the arm along a path; raises ValueError that names the number at fault."""
-    return GuidedMotion(
-        robot,
-        body,
-        system=system,
-        planner=PlannerSettings(**dataclasses.asdict(choice.planner)),
-        route=RouteSettings(**dataclasses.asdict(choice.route)),
+    Raises:
+        ValueError: names the number at fault and what is allowed.
+    """
+    usual, torque = TorqueChoice(), scenario.torque
+    for name in OWN_OF_PROGRAM:
+        if getattr(torque, name) != getattr(usual, name):
+            raise ValueError(f"torque.{name} goes with method written alone; the controller has its own")
+    if scenario.simulation.integrator != "semi_implicit_euler":
+        raise ValueError(
+            f"simulation.integrator is {scenario.simulation.integrator!r}; the controller's commands are held for a "
+            "period: allowed is semi_implicit_euler"
+        )
+    barriers = dataclasses.asdict(scenario.barriers)
+    barriers.pop("ellipsoids")
+    planner = OnlinePlannerSettings()
+    planner.search = PlannerSettings(**dataclasses.asdict(scenario.guide.planner))
+    planner.route = RouteSettings(**dataclasses.asdict(scenario.guide.route))
+    reactive = scenario.method == "reactive"
+    return ControllerSettings(
         synchronous=synchronous,
+        period=scenario.simulation.period,
+        output="torque" if scenario.simulation.mode == "torque" else "acceleration",
+        position_margin=torque.position_margin,
+        stop_time=torque.stop_time,
+        barriers=BarrierSettings(**barriers),
+        safety=SafetySettings(**dataclasses.asdict(torque.safety)),
+        planner=planner if scenario.method == "controller" else None,
+        look_ahead=None if reactive else LookAheadSettings(**dataclasses.asdict(scenario.evasion)),
+        local_minimum=None if reactive else LocalMinimumSettings(**dataclasses.asdict(scenario.escape)),
     )
 
 

@@ -8,13 +8,21 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Obstacles, Step
-from sidestep.guidance import GuidedMotion
+from sidestep._core import Controller
 from sidestep.scenario.assembly import Assembly, Progress, assemble
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.scenario import Scenario
-from sidestep.simulation import Arrival, ExactClearance, Run, Simulation, evaluate, run_kinematically
+from sidestep.simulation import (
+    Arrival,
+    ControllerDriver,
+    ExactClearance,
+    Run,
+    Simulation,
+    evaluate,
+    run_kinematically,
+)
 from sidestep.simulation.evaluation import POSE_TOLERANCE
+from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.run import obstacles_over_time
 
 Array = npt.NDArray[np.float64]
@@ -68,10 +76,12 @@ def run_scenario(
 
 
 def _reason(parts: Assembly, run: Run) -> str:
+    if isinstance(parts.mover, Controller):
+        return parts.mover.explain()
     seen = obstacles_over_time(parts.seen)(float(run.time[-1]))
-    goal = parts.goal if parts.pose is None else parts.pose.at(run.q[-1])
-    words = parts.system.diagnose(run.q[-1], run.v[-1], goal, seen).describe()
-    return words if parts.pose is None else parts.pose.posture.in_words(words)
+    goal = parts.pose.at(run.q[-1]) if isinstance(parts.pose, PoseAim) else parts.goal
+    words = parts.mover.diagnose(run.q[-1], run.v[-1], goal, seen).describe()
+    return parts.pose.posture.in_words(words) if isinstance(parts.pose, PoseAim) else words
 
 
 def _arrival(scenario: Scenario) -> Arrival:
@@ -84,39 +94,21 @@ def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> 
     choice = scenario.simulation
     simulation = Simulation(parts.robot, parts.objects, timestep=choice.period, visuals=False)
     return simulation.run(
-        parts.system if parts.guide is None else _Guided(parts.guide, parts.goal, choice.period),
-        parts.torque_program,
+        parts.driver(),
         parts.start,
         parts.pose or parts.goal,
         choice.duration,
-        parts.seen,
         start_velocity=parts.start_velocity,
         arrival=_arrival(scenario),
         on_step=on_step,
-        safe=parts.safe,
-        escape=parts.escape,
-        evasion=parts.evasion,
     )
 
 
-class _Guided:
-    """A guided motion in the place of a system."""
-
-    def __init__(self, motion: GuidedMotion, goal: Array, period: float) -> None:
-        self._motion, self._period, self._steps = motion, period, 0
-        motion.set_goal(goal)
-
-    def acceleration(self, q: Array, v: Array, goal: object, obstacles: Obstacles) -> Step:
-        """The step of the system towards where the guide leads."""
-        self._steps += 1
-        return self._motion.step(q, v, obstacles, time=self._steps * self._period).step
-
-
 def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
-    choice = scenario.simulation
+    choice, driver = scenario.simulation, parts.driver()
     return run_kinematically(
         parts.robot,
-        parts.system,
+        driver if isinstance(driver, ControllerDriver) else parts.mover,
         parts.start,
         parts.pose or parts.goal,
         choice.duration,
@@ -127,7 +119,4 @@ def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) 
         integrator=choice.integrator,
         arrival=_arrival(scenario),
         on_step=on_step,
-        safe=parts.safe,
-        escape=parts.escape,
-        evasion=parts.evasion,
     )

@@ -30,7 +30,7 @@ SwitchType = Literal["none", "harmonic_only", "geodesic_only", "binary", "sigmoi
 
 FORMAT_VERSION = 1
 MAX_STEPS = 2_000_000  # of one run: ten minutes at 0.3 ms; every step is kept for the report
-MethodChoice = Literal["written", "barrier", "reactive", "guided"]
+MethodChoice = Literal["written", "controller", "barrier", "reactive"]
 
 
 @dataclass(frozen=True)
@@ -185,9 +185,9 @@ class Scenario:
 
     Args:
         name: letters, digits, dot, dash, underscore.
-        method: "written": body, embedding and system as this file says; in place of them the recommended system with
-            the real size of the obstacles: "barrier" (with sub-goals where it is stuck, and flights out of the way of
-            what moves), "reactive" (without), "guided" (led along a path).
+        method: "written": body, embedding and system as this file says; in place of them the `Controller`, which sees
+            the real size of the obstacles: "controller", "barrier" (without planner), "reactive" (without planner, look
+            ahead and sub-goals).
         robot, start, goal, body, obstacles, embedding, system, barriers, escape, evasion, guide, torque, simulation:
             the parts, see their classes.
         description, source: what happens, and where it comes from.

@@ -94,7 +94,9 @@ class SystemDriver:
         goal: (nv,), or a pose. obstacles: what the system sees, as for `ControllerDriver`.
     """
 
-    def __init__(self, system: GeometricSystem | Any, program: Any, goal: Array | PoseAim, obstacles: ObstacleSource) -> None:
+    def __init__(
+        self, system: GeometricSystem | Any, program: Any, goal: Array | PoseAim, obstacles: ObstacleSource
+    ) -> None:
         self._system, self._program, self._goal = system, program, goal
         self._see = obstacles_over_time(obstacles)
 

@@ -8,11 +8,11 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, Obstacles, rollout
+from sidestep._core import GeometricSystem, JointGoal, Obstacles, PoseGoal, rollout
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.driver import ControllerDriver
-from sidestep.simulation.pose_aim import PoseAim
+from sidestep.simulation.pose_aim import PoseAim, PoseTarget
 from sidestep.simulation.run import (
     Arrival,
     ArrivalWatch,
@@ -32,7 +32,7 @@ def run_kinematically(
     robot: Robot,
     mover: GeometricSystem | ControllerDriver,
     start: Array,
-    goal: Array | PoseAim,
+    goal: Array | PoseTarget,
     duration: float,
     obstacles: ObstacleSource | None = None,
     *,
@@ -61,14 +61,16 @@ def run_kinematically(
         raise ValueError(f"duration and timestep must be finite and positive, got {duration} and {timestep}")
     scene = check_scene(objects)
     start = robot.check_configuration(start, "start")
-    if not isinstance(goal, PoseAim):
+    if not isinstance(goal, PoseTarget):
         goal = robot.check_configuration(goal, "goal")
     v = np.zeros_like(start) if start_velocity is None else np.array(start_velocity, dtype=float)
     watch = None if arrival is None else ArrivalWatch(goal, arrival)
     steps = max(1, round(duration / timestep))
     if isinstance(mover, GeometricSystem):
         if obstacles is None:
-            raise ValueError("obstacles: a geometric system is told what it sees, Obstacles.none() in free space")
+            raise ValueError(
+                "obstacles: a geometric system is told what it sees, Obstacles.none() in free space"
+            )
         rows = _rolled_out(mover, start, v, goal, obstacles_over_time(obstacles), steps, timestep, integrator,
                            1 if callable(obstacles) else CHUNK)  # fmt: skip
     else:
@@ -95,8 +97,8 @@ def run_kinematically(
         robot=robot,
         objects=scene,
         start=start,
-        goal=columns["q"][-1] if isinstance(goal, PoseAim) else goal,
-        pose=goal if isinstance(goal, PoseAim) else None,
+        goal=columns["q"][-1] if isinstance(goal, PoseTarget) else goal,
+        pose=goal if isinstance(goal, PoseTarget) else None,
         timestep=timestep,
         time=time,
         arrived=arrived,
@@ -124,7 +126,7 @@ def _rolled_out(
     system: GeometricSystem,
     q: Array,
     v: Array,
-    goal: Array | PoseAim,
+    goal: Array | PoseTarget,
     see: Callable[[float], Obstacles],
     steps: int,
     period: float,
@@ -137,7 +139,7 @@ def _rolled_out(
             system,
             q,
             v,
-            goal.at(q) if isinstance(goal, PoseAim) else goal,
+            _attractor(goal, q),
             see(done * period),
             period=period,
             steps=count,
@@ -146,5 +148,19 @@ def _rolled_out(
         achieved = np.diff(part.v, axis=0) / period
         for k in range(count):
             status = status_name(part.statuses[k])
-            yield part.q[k], part.v[k], part.acceleration[k], achieved[k], part.switch[k], part.values[k], status
+            yield (
+                part.q[k],
+                part.v[k],
+                part.acceleration[k],
+                achieved[k],
+                part.switch[k],
+                part.values[k],
+                status,
+            )
         q, v = part.q[count], part.v[count]
+
+
+def _attractor(goal: Array | PoseTarget, q: Array) -> Array | JointGoal | PoseGoal:
+    if isinstance(goal, PoseAim):
+        return goal.at(q)
+    return goal.goal if isinstance(goal, PoseTarget) else goal

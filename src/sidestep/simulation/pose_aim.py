@@ -48,8 +48,38 @@ class Posture:
         )
 
 
-class PoseAim:
-    """A pose (4, 4) of a frame as the goal: what draws an arm there.
+class PoseTarget:
+    """A pose (4, 4) of a frame in the world that an arm is to reach: how far it is.
+
+    Args:
+        robot, frame, pose: what is to be where.
+        stiffness: of the system's pull to configurations [1/s^2], for the goal.
+        rest: (nv,) a posture near which one for the pose is looked for; None: near where the arm is.
+
+    Raises:
+        ValueError: see `PoseGoal`.
+    """
+
+    def __init__(
+        self, robot: Robot, frame: str, pose: Array, *, stiffness: float = 1.0, rest: Array | None = None
+    ) -> None:
+        self.robot = robot
+        self.goal = PoseGoal(
+            robot,
+            frame,
+            pose,
+            position_stiffness=POSITION_SHARE * stiffness,
+            orientation_stiffness=TURN_SHARE * stiffness,
+            rest=rest,
+        )
+
+    def errors(self, q: Array) -> tuple[float, float]:
+        """Distance [m] and angle [rad] of the frame at q (nv,) from the pose."""
+        return _sizes(_error(self.robot.pose(q, self.goal.frame), self.goal.pose))
+
+
+class PoseAim(PoseTarget):
+    """What draws an arm without a `Controller` to a pose.
 
     The pull of a `PoseGoal`, J^T k e, is weak in directions in which the joints move the frame little: an arm with
     seven joints may be centimetres away after many seconds. From afar it is therefore drawn to a posture that has the
@@ -66,14 +96,8 @@ class PoseAim:
     """
 
     def __init__(self, robot: Robot, frame: str, pose: Array, *, stiffness: float, posture: Posture) -> None:
-        self.robot, self.posture = robot, posture
-        self.goal = PoseGoal(
-            robot,
-            frame,
-            pose,
-            position_stiffness=POSITION_SHARE * stiffness,
-            orientation_stiffness=TURN_SHARE * stiffness,
-        )
+        super().__init__(robot, frame, pose, stiffness=stiffness)
+        self.posture = posture
         self._there = JointGoal(posture.q)
         self._near = False
 
@@ -84,10 +108,6 @@ class PoseAim:
             bound = LEAVE if self._near else ENTER
             self._near = distance < bound[0] and angle < bound[1]
         return self.goal if self._near else self._there
-
-    def errors(self, q: Array) -> tuple[float, float]:
-        """Distance [m] and angle [rad] of the frame at q (nv,) from the pose."""
-        return _sizes(_error(self.robot.pose(q, self.goal.frame), self.goal.pose))
 
 
 def posture_at(

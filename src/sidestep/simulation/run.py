@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from sidestep._core import Obstacles
 from sidestep.robot import Robot
-from sidestep.simulation.pose_aim import PoseAim
+from sidestep.simulation.pose_aim import PoseTarget
 from sidestep.simulation.scene import SceneObject
 
 Array = npt.NDArray[np.float64]
@@ -86,7 +86,7 @@ class Run:
     object_poses: Array
     arrived: bool
     time_to_goal: float | None
-    pose: PoseAim | None = None
+    pose: PoseTarget | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -118,13 +118,13 @@ class KinematicRun(Run):
 class ArrivalWatch:
     """Follows a motion and says when it has arrived."""
 
-    goal: Array | PoseAim
+    goal: Array | PoseTarget
     rule: Arrival
     since: float | None = field(default=None, init=False)
 
     def update(self, time: float, q: Array, v: Array) -> bool:
         """True once error and speed have been small for the rule's hold time; `since` is when that began."""
-        if isinstance(self.goal, PoseAim):
+        if isinstance(self.goal, PoseTarget):
             distance, angle = self.goal.errors(q)
             near = distance < self.rule.distance and angle < self.rule.position
         else:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from sidestep.robot import Robot
 from sidestep.simulation.driver import Driver
 from sidestep.simulation.model import build_model
-from sidestep.simulation.pose_aim import PoseAim
+from sidestep.simulation.pose_aim import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, SimulationRun
 from sidestep.simulation.scene import SceneObject, check_scene
 
@@ -69,7 +69,7 @@ class Simulation:
         self,
         driver: Driver,
         start: Array,
-        goal: Array | PoseAim,
+        goal: Array | PoseTarget,
         duration: float,
         *,
         start_velocity: Array | None = None,
@@ -94,7 +94,7 @@ class Simulation:
         if not (np.isfinite(duration) and duration > 0.0):
             raise ValueError(f"duration must be positive, got {duration}")
         start = self.robot.check_configuration(start, "start")
-        if not isinstance(goal, PoseAim):
+        if not isinstance(goal, PoseTarget):
             goal = self.robot.check_configuration(goal, "goal")
         built, data = self.built, mujoco.MjData(self.built.model)
         built.set_state(
@@ -153,8 +153,8 @@ class Simulation:
             robot=self.robot,
             objects=self.objects,
             start=start,
-            goal=rows["q"][-1] if isinstance(goal, PoseAim) else goal,
-            pose=goal if isinstance(goal, PoseAim) else None,
+            goal=rows["q"][-1] if isinstance(goal, PoseTarget) else goal,
+            pose=goal if isinstance(goal, PoseTarget) else None,
             timestep=self.timestep,
             arrived=arrived,
             time_to_goal=watch.since if watch is not None and arrived else None,
