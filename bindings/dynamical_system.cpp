@@ -55,6 +55,10 @@ void bind_diagnosis(nb::module_& m) {
       .value("self", CoordinateLabel::Kind::self, "Two links of the robot.")
       .value("plane", CoordinateLabel::Kind::plane, "A link against a plane.")
       .value("joint_limit", CoordinateLabel::Kind::joint_limit, "A joint against a position limit.");
+  nb::class_<CoordinateLabel>(m, "CoordinateLabel", "What one coordinate of an embedding is about.")
+      .def_ro("kind", &CoordinateLabel::kind)
+      .def_ro("name", &CoordinateLabel::name, "Of the link, or of the joint for a limit; empty for a potential.")
+      .def_ro("other", &CoordinateLabel::other, "The second link of a pair; 'lower' or 'upper' for a joint limit.");
   using E = Explanation;
   nb::class_<E>(m, "Diagnosis",
                 "Why a motion is what it is, from one step. Stuck: |v| < 0.02 rad/s short of the goal, and the metric lets\n"
@@ -71,9 +75,11 @@ void bind_diagnosis(nb::module_& m) {
       .def_prop_ro("blocked", [](const E& e) { return e.diagnosis.blocked; },
                    "The part of the goal's pull that is held back, 1 - |G^-1 dU| / |dU|.")
       .def_prop_ro("speed", [](const E& e) { return e.diagnosis.speed; }, "|v| [rad/s].")
-      .def_prop_ro("joint_error", [](const E& e) { return e.diagnosis.joint_error; }, "Largest [rad]; nan for a pose.")
+      .def_prop_ro("joint_error", [](const E& e) { return e.diagnosis.joint_error; }, "Largest [rad | m]; nan for a pose.")
       .def_prop_ro("position_error", [](const E& e) { return e.diagnosis.position_error; }, "[m]; nan for joints.")
       .def_prop_ro("rotation_error", [](const E& e) { return e.diagnosis.rotation_error; }, "[rad]; nan if not wanted.")
+      .def_prop_ro("way_left", [](const E& e) { return e.diagnosis.way_left(); },
+                   "How far the goal is, in words: '0.31 rad', '12.0 mm' of a sliding joint.")
       .def("describe", [](const E& e) { return e.diagnosis.describe(e.label); }, "In one English sentence.")
       .def("__str__", [](const E& e) { return e.diagnosis.describe(e.label); });
 
@@ -236,6 +242,8 @@ void bind_dynamical_system(nb::module_& m) {
           "This system with barriers that leave a goal (nv,) [rad] free: the activation distance of every coordinate is at\n"
           "most 0.9 of its clearance there, and at least two floors. To be made when the goal or the obstacles change.")
       .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
+      .def_prop_ro("labels", [](const GeometricSystem& s) { return s.labels(); },
+                   "What every embedding coordinate is about, as CoordinateLabel.")
       .def_prop_ro("stiffness", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().stiffness); })
       .def_prop_ro("damping", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().damping); })
       .def_prop_ro("pull_form", [](const GeometricSystem& s) { return s.settings().pull_form; })

@@ -93,6 +93,16 @@ void bind_kinematics(nb::module_& m) {
       .def_prop_ro("joints", [](const Robot& r) { return r.joints(); })
       .def_prop_ro("frames", [](const Robot& r) { return r.frames(); })
       .def_prop_ro("coordinate_names", [](const Robot& r) { return r.coordinate_names(); })
+      .def_prop_ro(
+          "coordinate_units",
+          [](const Robot& r) {
+            std::vector<std::string> units;
+            for (int c = 0; c < r.num_coordinates(); ++c) {
+              units.emplace_back(r.slides(c) ? "m" : "rad");
+            }
+            return units;
+          },
+          "The unit of every coordinate: 'rad', or 'm' of a sliding joint.")
       .def_prop_ro("limits", [](const Robot& r) { return r.limits(); })
       .def(
           "pose",

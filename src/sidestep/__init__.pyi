@@ -11,6 +11,7 @@ from ._core import Command as Command
 from ._core import Controller as Controller
 from ._core import ControllerSettings as ControllerSettings
 from ._core import CoordinateKind as CoordinateKind
+from ._core import CoordinateLabel as CoordinateLabel
 from ._core import DampingForm as DampingForm
 from ._core import Diagnosis as Diagnosis
 from ._core import DistanceSwitch as DistanceSwitch

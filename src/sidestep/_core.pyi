@@ -113,6 +113,10 @@ class Robot:
     def coordinate_names(self) -> list[str]: ...
 
     @property
+    def coordinate_units(self) -> list[str]:
+        """The unit of every coordinate: 'rad', or 'm' of a sliding joint."""
+
+    @property
     def limits(self) -> JointLimits: ...
 
     def pose(self, q: numpy.typing.ArrayLike, link: str) -> numpy.typing.NDArray[numpy.float64]:
@@ -608,6 +612,20 @@ class CoordinateKind(enum.Enum):
     joint_limit = 4
     """A joint against a position limit."""
 
+class CoordinateLabel:
+    """What one coordinate of an embedding is about."""
+
+    @property
+    def kind(self) -> CoordinateKind: ...
+
+    @property
+    def name(self) -> str:
+        """Of the link, or of the joint for a limit; empty for a potential."""
+
+    @property
+    def other(self) -> str:
+        """The second link of a pair; 'lower' or 'upper' for a joint limit."""
+
 class Diagnosis:
     """
     Why a motion is what it is, from one step. Stuck: |v| < 0.02 rad/s short of the goal, and the metric lets
@@ -656,7 +674,7 @@ class Diagnosis:
 
     @property
     def joint_error(self) -> float:
-        """Largest [rad]; nan for a pose."""
+        """Largest [rad | m]; nan for a pose."""
 
     @property
     def position_error(self) -> float:
@@ -665,6 +683,12 @@ class Diagnosis:
     @property
     def rotation_error(self) -> float:
         """[rad]; nan if not wanted."""
+
+    @property
+    def way_left(self) -> str:
+        """
+        How far the goal is, in words: '0.31 rad', '12.0 mm' of a sliding joint.
+        """
 
     def describe(self) -> str:
         """In one English sentence."""
@@ -794,6 +818,10 @@ class GeometricSystem:
 
     @property
     def num_embedding_coordinates(self) -> int: ...
+
+    @property
+    def labels(self) -> list[CoordinateLabel]:
+        """What every embedding coordinate is about, as CoordinateLabel."""
 
     @property
     def stiffness(self) -> numpy.typing.NDArray[numpy.float64]: ...

@@ -18,6 +18,11 @@ std::string distance(double clearance) {
   return clearance < 0.0 ? number("%.0f mm deep", -1000.0 * clearance) : number("%.0f mm away", 1000.0 * clearance);
 }
 
+/// A way of a joint: in mm if it slides, else in rad by this format.
+std::string way(double value, const char* radians, bool slides) {
+  return slides ? number("%.1f mm", 1000.0 * value) : number(radians, value);
+}
+
 /// For example "link fr3_link5" and "obstacle point 2, 31 mm away".
 struct Parties {
   std::string who, what;
@@ -35,23 +40,13 @@ Parties parties(const Diagnosis& d, const CoordinateLabel& label) {
     case CoordinateLabel::Kind::joint_limit:
       return {"joint " + label.name,
               "its " + label.other + " limit" +
-                  (std::isfinite(d.clearance) ? number(d.clearance < 0.0 ? ", %.3f beyond it" : ", %.3f away",
-                                                       std::abs(d.clearance))
+                  (std::isfinite(d.clearance) ? ", " + way(std::abs(d.clearance), "%.3f rad", label.slides) +
+                                                    (d.clearance < 0.0 ? " beyond it" : " away")
                                               : "")};
     case CoordinateLabel::Kind::potential:
       break;
   }
   return {"the arm", "an obstacle or a limit (a density does not tell which)"};
-}
-
-std::string remaining(const Diagnosis& d) {
-  if (!std::isnan(d.joint_error)) {
-    return number("%.2f rad", d.joint_error);
-  }
-  if (std::isnan(d.rotation_error)) {
-    return number("%.3f m", d.position_error);
-  }
-  return number("%.3f m", d.position_error) + number(" and %.2f rad", d.rotation_error);
 }
 
 bool arrived(const GoalPull& pull) noexcept {
@@ -83,21 +78,31 @@ const char* name(MotionState state) noexcept {
   return "fallback";
 }
 
+std::string Diagnosis::way_left() const {
+  if (!std::isnan(joint_error)) {
+    return way(joint_error, "%.2f rad", slides);
+  }
+  if (std::isnan(rotation_error)) {
+    return number("%.3f m", position_error);
+  }
+  return number("%.3f m", position_error) + number(" and %.2f rad", rotation_error);
+}
+
 std::string Diagnosis::describe(const CoordinateLabel& label) const {
   const Parties p = parties(*this, label);
   const bool known = coordinate >= 0;
   switch (state) {
     case MotionState::free:
-      return "on the way, " + remaining(*this) + " from the goal";
+      return "on the way, " + way_left() + " from the goal";
     case MotionState::sliding:
       return p.who + " slides along " + p.what;
     case MotionState::arriving:
-      return "arriving, " + remaining(*this) + " from the goal";
+      return "arriving, " + way_left() + " from the goal";
     case MotionState::stuck:
-      return "stuck " + remaining(*this) + " from the goal: " +
+      return "stuck " + way_left() + " from the goal: " +
              (known ? p.who + " against " + p.what : "nothing is in the way, so the pose is out of reach");
     case MotionState::blocked_at_goal:
-      return "stopped " + remaining(*this) + " from the goal, which is itself blocked: " + p.who + " against " + p.what;
+      return "stopped " + way_left() + " from the goal, which is itself blocked: " + p.who + " against " + p.what;
     case MotionState::inside_barrier:
       return p.who + " is inside the barrier of " + p.what + ", and moves out";
     case MotionState::fallback:
@@ -114,6 +119,8 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
     return d;
   }
   d.joint_error = w.pull.joint_error;
+  const int farthest = w.pull.farthest_coordinate();
+  d.slides = farthest >= 0 && robot_.slides(farthest);
   d.position_error = w.pull.position_error;
   d.rotation_error = w.pull.rotation_error;
 
@@ -180,6 +187,7 @@ Diagnosis GeometricSystem::diagnose(ConstVectorRef q, ConstVectorRef v,
   there.blocked = here.blocked;
   there.speed = here.speed;
   there.joint_error = here.joint_error;
+  there.slides = here.slides;
   return there;
 }
 

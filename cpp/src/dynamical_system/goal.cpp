@@ -173,6 +173,14 @@ void GoalPull::update(const JointGoal& goal, const KinematicState& state, const 
   position_error = rotation_error = nan;
 }
 
+int GoalPull::farthest_coordinate() const noexcept {
+  Eigen::Index farthest = -1;
+  if (!std::isnan(joint_error)) {
+    displacement_.cwiseAbs().maxCoeff(&farthest);
+  }
+  return static_cast<int>(farthest);
+}
+
 void GoalPull::update(const PoseGoal& goal, const KinematicState& state) noexcept {
   const PoseGoalSettings& settings = goal.settings;
   const KinematicState::Link& link = state.link(goal.frame().joint);

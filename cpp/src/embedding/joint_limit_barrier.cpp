@@ -48,7 +48,7 @@ CoordinateLabel JointLimitBarrier::label(int k) const {
   const PositionLimit& limit = limits_[static_cast<std::size_t>(k)];
   return {CoordinateLabel::Kind::joint_limit,
           robot().coordinate_names()[static_cast<std::size_t>(limit.joint_coordinate)],
-          limit.sign > 0.0 ? "lower" : "upper", floor(k)};
+          limit.sign > 0.0 ? "lower" : "upper", floor(k), robot().slides(limit.joint_coordinate)};
 }
 
 }  // namespace sidestep

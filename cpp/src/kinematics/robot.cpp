@@ -100,6 +100,21 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
   }
 }
 
+bool Robot::slides(int coordinate) const noexcept {
+  bool found = false, slides = false;
+  for (const Joint& joint : joints_) {
+    if (joint.coordinate != coordinate) {
+      continue;
+    }
+    if (joint.name == coordinate_names_[static_cast<std::size_t>(coordinate)]) {
+      return joint.type == JointType::prismatic;  // the others mimic it
+    }
+    slides = found ? slides : joint.type == JointType::prismatic;
+    found = true;
+  }
+  return slides;
+}
+
 bool Robot::same_joints(const Robot& other) const noexcept {
   return coordinate_names_ == other.coordinate_names_ &&
          std::equal(joints_.begin(), joints_.end(), other.joints_.begin(), other.joints_.end(),

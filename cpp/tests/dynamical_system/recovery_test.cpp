@@ -154,7 +154,7 @@ BOOST_AUTO_TEST_CASE(a_joint_found_beyond_its_limit_comes_back) {
   const Diagnosis d = system.diagnose(w);
   const CoordinateLabel& label = system.labels()[static_cast<std::size_t>(d.coordinate)];
   BOOST_TEST((label.kind == CoordinateLabel::Kind::joint_limit));
-  BOOST_TEST(d.describe(label) == "joint joint2 is inside the barrier of its upper limit, 0.020 beyond it, and moves out");
+  BOOST_TEST(d.describe(label) == "joint joint2 is inside the barrier of its upper limit, 0.020 rad beyond it, and moves out");
   const Rollout motion = rollout(system, q, Eigen::VectorXd::Zero(2), goal, Obstacles::none(), {0.001, 12000});
   BOOST_TEST((motion.q.row(12000).transpose() - goal).norm() < 0.05);
 }

@@ -55,6 +55,10 @@ struct Diagnosis {
   double speed = 0.0;   ///< |v| [rad/s]
   // How far the goal is, as in GoalPull; NaN where it has no such part.
   double joint_error = nan, position_error = nan, rotation_error = nan;
+  bool slides = false;  ///< the joint of `joint_error` slides, so that it is in m
+
+  /// How far the goal is, for example "0.31 rad" or "12 mm".
+  std::string way_left() const;
 
   /// In one English sentence, given the label of the dominating coordinate.
   std::string describe(const CoordinateLabel& label) const;

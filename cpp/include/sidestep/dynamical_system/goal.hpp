@@ -112,6 +112,9 @@ struct GoalPull {
   double position_error = nan;  ///< |p − p*| [m]
   double rotation_error = nan;  ///< |φ| [rad], at most π
 
+  /// The coordinate that `joint_error` belongs to; -1 where the goal is no configuration.
+  int farthest_coordinate() const noexcept;
+
  private:
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   void update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept;

@@ -45,6 +45,7 @@ struct CoordinateLabel {
   std::string name = {};   ///< of the link, or of the coordinate for a joint limit
   std::string other = {};  ///< the second link of a pair; "lower" or "upper" for a joint limit
   double floor = -std::numeric_limits<double>::infinity();  ///< below this clearance the arm counts as inside
+  bool slides = false;     ///< a limit of a sliding joint: the clearance is in m, not in rad
 };
 
 /// Extra coordinates ψ(q, t) that embed the joint space in R^(nv + m) as the graph q ↦ (q, ψ(q, t)).
