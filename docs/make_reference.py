@@ -22,13 +22,13 @@ shapes, units, frames and errors.
 
 
 def first_sentence(name: str) -> str:
-    """The first sentence of a public object's docstring, or what comes before its formula, on one line."""
+    """The first sentence of a public object's docstring, or what comes before its formula, as a cell of a table."""
     text = inspect.getdoc(getattr(sidestep, name)) or ""
     if re.match(rf"{name}\(.*\)( -> .*)?$", text.split("\n")[0]):  # a signature that the binding put first
         text = text.split("\n", 1)[1].strip()
     paragraph = re.split(r"\n\s*\n|\n    ", text)[0]
     line = " ".join(paragraph.split())
-    return re.split(r"(?<=[a-z\])])\. (?=[A-Z])", line)[0].rstrip(",;:").replace("|", "/")
+    return re.split(r"(?<=[a-z\])])\. (?=[A-Z])", line)[0].rstrip(",;:").replace("|", r"\|")
 
 
 def page() -> str:

@@ -14,6 +14,15 @@ def test_reference_is_what_its_script_writes() -> None:
     assert (DOCS / "reference.md").read_text(encoding="utf-8") == make_reference["page"]()
 
 
+def test_a_bar_stays_a_bar_in_a_cell_of_the_reference() -> None:
+    first_sentence = runpy.run_path(str(DOCS / "make_reference.py"))["first_sentence"]
+    assert r"x, y [rad \| m] move" in first_sentence("ClearanceTable")
+    assert r"N(y \| mu_k, Sigma_k)" in first_sentence("Body")
+    for row in (DOCS / "reference.md").read_text(encoding="utf-8").splitlines():
+        if row.startswith("| `"):
+            assert len(re.findall(r"(?<!\\)\|", row)) == 3, row  # two cells
+
+
 def test_scenario_example_is_valid() -> None:
     (text,) = re.findall(r"```yaml\n(.*?)```", (DOCS / "scenarios.md").read_text(encoding="utf-8"), re.DOTALL)
     scenario = Scenario.from_text(text, file="docs/scenarios.md")
