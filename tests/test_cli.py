@@ -269,6 +269,26 @@ def test_a_run_without_report_imports_neither_matplotlib_nor_jsonschema() -> Non
     assert done.stdout.endswith("heavy: []\n")
 
 
+@pytest.mark.parametrize(
+    "command",
+    [["run", "small.yaml"], ["demo"], ["fit", "planar2"], ["bench", "reach"], ["reproduce"], ["robots"]],
+)
+def test_a_file_that_cannot_be_written_is_found_out_before_the_run(
+    invoke: Invoke, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    assert invoke(*command, "--json", "nowhere/f.json") == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "there is no folder nowhere" in captured.err
+
+
+def test_the_studio_writes_no_figures(invoke: Invoke, capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke("demo", "--studio", "--json", "-") == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "--json goes with --no-studio" in captured.err
+
+
 def test_a_diverging_run_is_one_line_and_exit_code_1(
     invoke: Invoke, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

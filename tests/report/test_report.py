@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +10,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from sidestep import Obstacles, SimulationRun
 from sidestep.report import write_report
-from sidestep.report.figures import psi_figure
+from sidestep.report.figures import position_figure, psi_figure, switch_figure
+from sidestep.report.tables import csv_columns
 from sidestep.scenario import Scenario, ScenarioResult, run_scenario
+from sidestep.scenario.summary import seen_in_words, summary_rows
 
 TEXT = """\
 format: 1
@@ -104,22 +108,115 @@ def test_the_page_needs_nothing_else(folder: Path, result: ScenarioResult) -> No
     assert "http" not in page.replace("http-equiv", "")
 
 
-def test_of_many_coordinates_the_largest_are_drawn(result: ScenarioResult) -> None:
-    rows, many = len(result.run.time), 40
-    values = np.zeros((rows, many))
-    values[:, 5::4] = np.linspace(0.0, 1.0, rows)[:, None] * np.arange(1.0, 10.0)  # nine of them
-    values[0, 7] = np.nan
+def test_of_many_barriers_the_most_active_are_drawn_by_name(result: ScenarioResult) -> None:
+    rows = len(result.run.time)
+    ramp = np.linspace(0.0, 1.0, rows)
+    links = (f"link{k // 2} - obstacles" for k in range(18))
+    names = (*links, "joint1 - upper limit", "link0 - link8")
+    values = np.zeros((rows, len(names)))
+    values[:, :18] = ramp[:, None] * np.arange(18)  # two per link: the second one is the larger
+    values[0, 17] = np.nan
+    values[:, 18] = 100.0
     barriers = replace(
-        result, run=replace(result.run, values=values), scenario=replace(result.scenario, method="barrier")
+        result,
+        run=replace(result.run, values=values),
+        embedding_names=names,
+        scenario=replace(result.scenario, method="barrier"),
     )
     figure = psi_figure(barriers)
+    assert figure is not None
     (axes,) = figure.axes
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [
-        f"ψ{k + 1}" for k in range(9, 40, 4)
+        "joint1 - upper limit",
+        *(f"link{k} - obstacles" for k in (8, 7, 6, 5, 4)),
     ]
-    np.testing.assert_array_equal(axes.lines[0].get_ydata(), values[:, 9])
-    assert axes.get_title() == "Embedding, the largest 8 of 40 coordinates"
-    assert "barriers" in axes.get_ylabel()
-    (plain,) = psi_figure(result).axes
-    assert (plain.get_title(), len(plain.lines)) == ("Embedding", result.run.values.shape[1])
-    assert "1/m³" in plain.get_ylabel()
+    np.testing.assert_array_equal(axes.lines[2].get_ydata(), values[:, 15])
+    assert axes.get_title() == "Barriers, the 6 most active of 10"
+    at_rest = replace(barriers, run=replace(result.run, values=np.zeros_like(values)))
+    assert psi_figure(at_rest) is None  # none was ever active: there is nothing to see
+    plain = psi_figure(result)
+    assert plain is not None
+    assert (plain.axes[0].get_title(), len(plain.axes[0].lines)) == ("Embedding", 1)
+    assert plain.axes[0].get_ylabel() == "collision density ψ [1/m³]"
+
+
+def test_a_method_without_a_switch_shows_no_switch(result: ScenarioResult) -> None:
+    assert switch_figure(result) is not None
+    assert "switch 1 [-]" in csv_columns(result)
+    barriers = replace(result, scenario=replace(result.scenario, method="barrier"))
+    assert switch_figure(barriers) is None
+    assert not [name for name in csv_columns(barriers) if name.startswith("switch")]
+    document = barriers.to_document()
+    assert (document["method"], document["switch"]) == ("barrier", None)
+
+
+def test_the_columns_of_the_embedding_have_names(result: ScenarioResult) -> None:
+    assert result.embedding_names == ("collision density",)
+    assert "psi 1 collision density [-]" in csv_columns(result)
+
+
+def test_the_summary_says_what_is_seen_and_how_much_torque_was_used(result: ScenarioResult) -> None:
+    rows = {name: (value, note) for name, value, note in summary_rows(result)}
+    assert rows["method"][0] == "as written, switch: distance"
+    assert rows["controller sees"][0] == "1 bare centre"
+    run = result.run
+    assert isinstance(run, SimulationRun)
+    ratios = (np.abs(run.torque) / run.robot.limits.effort).max(axis=0)
+    joint = run.robot.coordinate_names[int(ratios.argmax())]
+    assert rows["largest torque"] == (f"{100 * ratios.max():.0f} % of its limit", f"of {joint}")
+
+
+@pytest.mark.parametrize(
+    ("radii", "solids", "words"),
+    [
+        ([], 0, "no obstacle"),
+        ([0.0, 0.0], 2, "2 bare centres"),
+        ([0.0] * 3, 1, "3 points, bare"),
+        ([0.01, 0.01, 0.03], 1, "3 points with radii of 10 to 30 mm"),
+        ([0.0, 0.03, 0.03], 3, "3 points, 1 of them bare, the others with a radius of 30 mm"),
+    ],
+)
+def test_what_the_controller_sees_in_words(radii: list[float], solids: int, words: str) -> None:
+    seen = Obstacles(np.zeros((len(radii), 3)), np.array(radii)) if radii else Obstacles.none()
+    assert seen_in_words(seen, num_solids=solids) == words
+
+
+SLIDING = """\
+<robot name="cart"><link name="base"/>
+<joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+<limit lower="-0.02" upper="0.04" velocity="1" effort="100"/></joint>
+<link name="cart"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link></robot>
+"""
+
+
+def test_ways_of_sliding_joints_are_in_millimetres(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path / "bodies"))
+    (tmp_path / "cart.urdf").write_text(SLIDING)
+    (tmp_path / "cart.yaml").write_text(
+        "format: 1\nname: cart\nrobot: {urdf: cart.urdf}\nbody: {components: 1}\n"
+        "start: {unit: rad, position: [0.0]}\ngoal: {unit: rad, position: [0.03]}\n"
+        "simulation: {mode: torque, period: 0.005, duration: 0.05, tolerance: 0.002}\n"
+    )
+    result = run_scenario(Scenario.load(tmp_path / "cart.yaml"))
+    left = 0.03 - result.run.q[-1, 0]
+    assert 0.02 < left < 0.03
+    evaluation = result.evaluation
+    assert evaluation.position_error_rad is None
+    assert evaluation.position_error_m == pytest.approx(left, abs=1e-12)
+    assert evaluation.way_left() == f"{1000 * left:.4g} mm"
+    assert f"ends {1000 * left:.4g} mm from the goal" in result.sentence()
+    assert result.stop is not None
+    assert f"{1000 * left:.1f} mm from the goal" in result.stop
+    rows = {name: (value, note) for name, value, note in summary_rows(result)}
+    assert rows["goal reached"][1] == "error under 2 mm at the end"
+    assert rows["tracking error"][0].endswith(" m/s²")
+    assert rows["largest force"][0].endswith(" % of its limit")
+    assert not [row for row in rows.values() if re.search(r"\brad\b", " ".join(row))]
+    document = result.to_document()
+    assert (document["tolerance_rad"], document["tolerance_m"]) == (None, 0.002)
+    (axes,) = position_figure(result).axes
+    assert axes.get_ylabel() == "rail\n[mm]"
+    assert axes.get_title(loc="right") == "limits [-20, 40]"
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), 1000.0 * result.run.q[:, 0])

@@ -24,7 +24,7 @@ from sidestep.scenario.settings import (
     TorqueChoice,
 )
 from sidestep.studio.methods import METHODS, check_numbers
-from sidestep.studio.page.tuning import add_control, show_value, value_of
+from sidestep.studio.page.tuning import add_control, show_value, unit_for, value_of
 from sidestep.studio.parameters import Parameter
 
 
@@ -100,6 +100,19 @@ def test_an_unknown_parameter_is_refused() -> None:
         check_numbers(METHODS["unswitched"], {"magic": 1.0})
     with pytest.raises(ValueError, match=r"density is flat, allowed: \['sum', 'average'\]"):
         check_numbers(METHODS["unswitched"], {"density": "flat"})
+
+
+@pytest.mark.parametrize(
+    ("unit", "joints", "shown"),
+    [
+        ("rad/s²", {"rad"}, "rad/s²"),
+        ("rad/s²", {"m"}, "m/s²"),
+        ("1/rad", {"m", "rad"}, "1/rad | 1/m"),
+        ("s", {"m"}, "s"),
+    ],
+)
+def test_units_are_those_of_the_joints(unit: str, joints: set[str], shown: str) -> None:
+    assert unit_for(unit, joints) == shown
 
 
 @pytest.mark.parametrize("parameter", every_parameter().values(), ids=every_parameter().keys())

@@ -19,7 +19,7 @@ COLUMNS = (  # title, key of the figures, decimals, which quantiles
     ("first path [ms]", "first_path_ms", 2, ("median", "p95", "p99")),
     ("planning [ms]", "planning_ms", 2, ("median", "p95", "p99")),
     ("first motion [ms]", "first_motion_ms", 2, ("median", "p95", "p99")),
-    ("path [rad]", "path_length_rad", 2, ("median", "p95", "p99")),
+    ("path [rad | m]", "path_length_rad", 2, ("median", "p95", "p99")),
     ("motion [s]", "motion_s", 2, ("median", "p95", "p99")),
     ("clearance [mm]", "min_clearance_mm", 1, ("min", "p5", "median")),
 )
@@ -45,7 +45,7 @@ def motion_bench_maker(
     point_radius: Annotated[float, typer.Option(min=0.0, help="Of those points [m].")] = POINT_RADIUS,
     duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 30.0,
     tolerance: Annotated[
-        float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad].")
+        float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
     ] = 0.05,
     period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
@@ -113,7 +113,7 @@ def dynamic(
     point_radius: Annotated[float, typer.Option(min=0.0, help="Of those points [m].")] = POINT_RADIUS,
     duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 20.0,
     tolerance: Annotated[
-        float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad].")
+        float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
     ] = 0.05,
     period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
@@ -127,7 +127,7 @@ def dynamic(
 
     The same seed gives the same problems. Solved: nothing touched, no limit broken, and arrived where the goal is
     or becomes free; where it stays blocked, not arrived. At a goal that the ball is in at first, arrived is within 0.01
-    rad. Exit code as for motionbenchmaker.
+    rad or m. Exit code as for motionbenchmaker.
     """
     from sidestep.bench import SceneSettings, default_jobs, read_motion_bench_maker, run_dynamic
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from sidestep.cli.output import QuietOption, console, write_json
+from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 if TYPE_CHECKING:
     from sidestep import Body, Robot
@@ -38,9 +38,7 @@ def fit(
     seed: Annotated[int, typer.Option(min=0, help="Seed of sampling and EM.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Body file to write.")] = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for figures.")] = None,
-    json: Annotated[
-        str | None, typer.Option("--json", metavar="FILE|-", help="Write the table as JSON; '-' for stdout.")
-    ] = None,
+    json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """Fit a Gaussian mixture to the surface of every link of a robot."""

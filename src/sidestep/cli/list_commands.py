@@ -3,15 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
 
-import typer
-
-from sidestep.cli.output import console, write_json
-
-JsonOption = Annotated[
-    str | None, typer.Option("--json", metavar="FILE|-", help="Write the list as JSON; '-' for stdout.")
-]
+from sidestep.cli.output import JsonOption, console, write_json
 
 
 def robots(json: JsonOption = None) -> None:

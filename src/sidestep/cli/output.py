@@ -13,8 +13,18 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+def _writable(target: str | None) -> str | None:
+    """The file of --json, if its folder exists: found out now, not after the run."""
+    if target is not None and target != "-" and not Path(target).absolute().parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {Path(target).parent}")
+    return target
+
+
 JsonOption: TypeAlias = Annotated[
-    str | None, typer.Option("--json", metavar="FILE|-", help="Write figures as JSON; '-' for stdout.")
+    str | None,
+    typer.Option(
+        "--json", metavar="FILE|-", callback=_writable, help="Write figures as JSON; '-' for stdout."
+    ),
 ]
 QuietOption: TypeAlias = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 

@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from sidestep.scenario.runner import run_scenario
 from sidestep.simulation import ExactClearance
+from sidestep.simulation.joint_words import in_words, largest_ways
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -72,7 +73,8 @@ class _Follower:
         if clock.monotonic() - self._last < REFRESH:
             return
         parts = self._parts
-        error = f"{np.abs(q - parts.goal).max():.3f} rad"
+        left = largest_ways(parts.robot, q - parts.goal)
+        error = in_words(*left, radians=".3f", millimetres=".1f")
         if parts.pose is not None:
             error = f"{1e3 * parts.pose.errors(q)[0]:4.0f} mm"
         facts = f"{time:5.2f} s   error {error}"

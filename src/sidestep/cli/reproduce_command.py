@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from sidestep.cli.output import QuietOption, console, write_json
+from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 
 def reproduce(
@@ -22,10 +22,7 @@ def reproduce(
         bool, typer.Option("--quick", help="Fewer samples and runs: about a minute instead of several.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is drawn.")] = 0,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE|-", help="Write files and times as JSON; '-' for stdout."),
-    ] = None,
+    json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """Run the experiments of the thesis with the correct equations, and write them as a web page.

@@ -39,11 +39,6 @@ class ModeChoice(StrEnum):
     kinematic = "kinematic"
 
 
-METHOD_FACTS = {
-    "barrier": "controller without planner",
-    "reactive": "barriers alone",
-    "controller": "controller",
-}
 SWITCH_FORMS = {  # how --switch is written, and what its numbers are
     "none": (),
     "harmonic_only": (),
@@ -150,6 +145,8 @@ def demo(
     """
     from sidestep.scenario import Scenario
 
+    if studio and json is not None:
+        raise typer.BadParameter("--json goes with --no-studio: the studio has no figures to write")
     scenario = dataclasses.replace(Scenario.load(DEMO_SCENARIO), method="controller")
     if studio if studio is not None else json is None and _can_open_studio():
         from sidestep.cli.studio_command import open_studio
@@ -201,9 +198,9 @@ def _facts(scenario: Scenario) -> str:
     robot = scenario.robot.name or scenario.robot.urdf
     count = len(scenario.obstacles)
     obstacles = "no obstacle" if count == 0 else f"{count} obstacle{'s' if count > 1 else ''}"
-    switch = scenario.system.switch.type.replace("_", " ")
-    method = f"switch: {switch}" if scenario.method == "written" else METHOD_FACTS[scenario.method]
-    return f"{robot}, {obstacles}, {method}, {scenario.simulation.mode} mode"
+    from sidestep.scenario.summary import method_in_words
+
+    return f"{robot}, {obstacles}, {method_in_words(scenario)}, {scenario.simulation.mode} mode"
 
 
 def _table(result: ScenarioResult) -> object:

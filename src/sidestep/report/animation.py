@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from sidestep.drawing import ArmViews
 from sidestep.scenario.result import ScenarioResult
+from sidestep.simulation.joint_words import in_words, largest_ways
 
 VIEW_SIZE = (400, 360)  # [pixel]
 CAPTION_HEIGHT = 24  # [pixel]
@@ -40,7 +41,8 @@ class ArmPictures:
         picture = Image.new("RGB", (views.width, views.height + CAPTION_HEIGHT), "white")
         picture.paste(views, (0, CAPTION_HEIGHT))
         run, q = self._run, self._run.q[sample]
-        error = f"largest joint error {np.abs(q - run.goal).max():.2f} rad"
+        left = in_words(*largest_ways(run.robot, q - run.goal), radians=".2f", millimetres=".0f")
+        error = f"largest joint error {left}"
         if run.pose is not None:
             error = f"{1e3 * run.pose.errors(q)[0]:.0f} mm from the goal"
         caption = f"t = {run.time[sample]:5.2f} s    {error}"

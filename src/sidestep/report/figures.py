@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from sidestep._core import JointType
 from sidestep.drawing.palette import BLACK, BLUE, GREEN, ORANGE, SERIES, VERMILLION
 from sidestep.scenario.result import ScenarioResult
 from sidestep.simulation import SimulationRun
@@ -23,7 +22,7 @@ Array = npt.NDArray[np.float64]
 
 JOINT_STYLES = ("-", "--", "-.", ":")
 DPI = 120
-MOST_COORDINATES = 8  # of an embedding that are drawn: more names than that have no room
+MOST_CURVES = 6  # of barriers: more cannot be told apart
 LIMIT_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": (0, (1, 1)), "linewidth": 1.2}
 
 
@@ -54,20 +53,20 @@ def position_figure(result: ScenarioResult) -> Figure:
     limits = run.robot.limits
 
     def draw(axes: Axes, index: int, scale: float) -> None:
-        axes.plot(run.time, scale * run.q[:, index], color=BLUE, label="q")
+        axes.plot(run.time, scale * run.q[:, index], color=BLUE, label="position")
         axes.plot(run.time[0], scale * run.start[index], "o", color=BLACK, markersize=5, label="start")
         label = "goal" if run.pose is None else "end"
         axes.axhline(scale * run.goal[index], color=GREEN, linestyle="--", label=label)
         low, high = scale * limits.lower[index], scale * limits.upper[index]
         shown = [*(scale * run.q[:, index]), scale * run.goal[index]]
-        span = max(max(shown) - min(shown), 0.2 * scale)
+        span = max(max(shown) - min(shown), (0.2 if scale < 1000.0 else 0.02) * scale)  # [rad | m]
         for value in (low, high):
             if np.isfinite(value) and min(shown) - 0.6 * span < value < max(shown) + 0.6 * span:
                 axes.axhline(value, **LIMIT_STYLE, label="limit")
         axes.set_title(_limit_note(low, high), fontsize=7, color="0.4", loc="right", pad=3)
         _keep_span(axes, shown, span)
 
-    return _per_joint(result, draw, angle="deg", per="", title="Joint position")
+    return _per_joint(result, draw, angle="deg", per="", title="Joint position", length="mm")
 
 
 def velocity_figure(result: ScenarioResult) -> Figure:
@@ -112,9 +111,9 @@ def torque_figure(result: ScenarioResult) -> Figure | None:
 
 
 def switch_figure(result: ScenarioResult) -> Figure | None:
-    """Switch weight of every coordinate; None where the system has no switch."""
+    """Switch weight of every coordinate; None where the method has no switch."""
     run = result.run
-    if run.switch.shape[1] == 0 or result.scenario.system.switch.type == "none":
+    if not result.switched:
         return None
     names = run.robot.coordinate_names if run.switch.shape[1] == run.robot.num_coordinates else ["all joints"]
     figure, axes = _single("Switch weight", "weight [-]   (1 harmonic, 0 geodesic)")
@@ -123,23 +122,30 @@ def switch_figure(result: ScenarioResult) -> Figure | None:
     return figure
 
 
-def psi_figure(result: ScenarioResult) -> Figure:
-    """Embedding coordinates over time; of many those that become largest."""
-    values = result.run.values
-    count = values.shape[1]
-    chosen = np.arange(count)
-    if count > MOST_COORDINATES:
-        largest = np.nan_to_num(np.abs(values)).max(axis=0, initial=0.0)
-        chosen = np.sort(np.argsort(largest, kind="stable")[-MOST_COORDINATES:])
-    title = (
-        "Embedding"
-        if len(chosen) == count
-        else f"Embedding, the largest {len(chosen)} of {count} coordinates"
-    )
+def psi_figure(result: ScenarioResult) -> Figure | None:
+    """Embedding coordinates over time, by name; of barriers those that were active most. None where none ever was.
+
+    Several barriers with one name, such as those of the ellipsoids of one link, are one curve: the largest of them.
+    """
+    values = np.nan_to_num(result.run.values)
+    names = np.array(result.embedding_names, dtype=str)
+    curves = {name: values[:, names == name].max(axis=1) for name in dict.fromkeys(result.embedding_names)}
+    active = [name for name, curve in curves.items() if curve.max() > 0.0]
+    if not active:
+        return None
     written = result.scenario.method == "written"
-    figure, axes = _single(title, f"ψ   ({'collision density in 1/m³' if written else 'of barriers'})")
-    names = ["ψ"] if count == 1 else [f"ψ{i + 1}" for i in chosen]
-    _lines(axes, result.run.time, values[:, chosen], names)
+    shown = active if written else sorted(active, key=lambda name: -curves[name].mean())[:MOST_CURVES]
+    title = "Embedding"
+    if not written:
+        most = (
+            f"the {len(shown)} most active of {len(active)}"
+            if len(shown) < len(active)
+            else "all that were active"
+        )
+        title = f"Barriers, {most}"
+    density = written and list(curves) == ["collision density"]
+    figure, axes = _single(title, "collision density ψ [1/m³]" if density else "ψ [-]")
+    _lines(axes, result.run.time, np.column_stack([curves[name] for name in shown]), shown)
     return figure
 
 
@@ -174,10 +180,9 @@ def _per_joint(
     rows = -(-count // columns)
     figure = Figure(figsize=(4.6 * columns + 0.4, 1.75 * rows + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    revolute = {joint.coordinate for joint in robot.joints if joint.type == JointType.revolute}
     for index, axes in enumerate(grid[:count]):
-        unit = angle if index in revolute else length
-        draw(axes, index, float(np.rad2deg(1.0)) if unit == "deg" else 1.0)
+        unit = angle if robot.coordinate_units[index] == "rad" else length
+        draw(axes, index, {"deg": float(np.rad2deg(1.0)), "mm": 1000.0}.get(unit, 1.0))
         axes.set_ylabel(f"{robot.coordinate_names[index]}\n[{unit}{per}]", fontsize=8)
         _tidy(axes)
     for axes in grid[count:]:

@@ -29,7 +29,7 @@ _CAPTIONS = {
     "acceleration.png": "Joint accelerations: wanted by the dynamical system, achieved by the arm",
     "torque.png": "Joint torques",
     "switch.png": "Switch weights",
-    "psi.png": "Embedding",
+    "psi.png": "Barriers over time",
 }
 
 
@@ -49,7 +49,8 @@ def write_page(result: ScenarioResult, pictures: Sequence[Path], path: Path) -> 
         parts.append(f"<tr><td>{html.escape(name)}<td>{html.escape(value)}<td>{html.escape(allowed)}")
     parts.append("</table>")
     known = {picture.name: picture for picture in pictures}
-    for name, caption in _CAPTIONS.items():
+    captions = _CAPTIONS | ({"psi.png": "Embedding"} if scenario.method == "written" else {})
+    for name, caption in captions.items():
         if name in known:
             kind = "gif" if name.endswith("gif") else "png"
             data = base64.b64encode(known[name].read_bytes()).decode("ascii")

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import JointType
 from sidestep.scenario.result import ScenarioResult
 from sidestep.simulation import SimulationRun
 
@@ -54,12 +53,12 @@ def write_csv(result: ScenarioResult, path: Path) -> None:
 def csv_columns(result: ScenarioResult) -> dict[str, Array]:
     """The columns of the table by name; the clearance is interpolated between the samples it is known at."""
     run, robot = result.run, result.run.robot
-    revolute = {joint.coordinate for joint in robot.joints if joint.type == JointType.revolute}
     columns: dict[str, Array] = {"time [s]": run.time}
 
     def add(symbol: str, values: Array, unit: str, effort: bool = False) -> None:
-        for index, name in enumerate(robot.coordinate_names):
-            base = ("N m" if effort else "rad") if index in revolute else ("N" if effort else "m")
+        names = zip(robot.coordinate_names, robot.coordinate_units, strict=True)
+        for index, (name, base) in enumerate(names):
+            base = {"rad": "N m", "m": "N"}[base] if effort else base
             columns[f"{symbol} {name} [{base}{unit}]"] = values[:, index]
 
     add("position", run.q, "")
@@ -69,10 +68,10 @@ def csv_columns(result: ScenarioResult) -> dict[str, Array]:
     if isinstance(run, SimulationRun):
         add("solved acceleration", run.solved, "/s^2")
         add("torque", run.torque, "", effort=True)
-    for index in range(run.switch.shape[1]):
+    for index in range(run.switch.shape[1] if result.switched else 0):
         columns[f"switch {index + 1} [-]"] = run.switch[:, index]
-    for index in range(run.values.shape[1]):
-        columns[f"psi {index + 1} [-]"] = run.values[:, index]
+    for index, name in enumerate(result.embedding_names):
+        columns[f"psi {index + 1} {name} [-]"] = run.values[:, index]
     if len(result.clearance):
         columns["clearance [m]"] = np.interp(run.time, result.clearance_time, result.clearance)
     for index, item in enumerate(run.objects):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import __version__
+from sidestep._core import Obstacles, __version__
 from sidestep.body import Body
 from sidestep.scenario.scenario import Scenario
 from sidestep.simulation import Evaluation, Run
@@ -26,6 +26,7 @@ class ScenarioResult:
         evaluation: the figures it is judged by.
         clearance_time, clearance: (C,) [s] and [m] exact distance between arm and obstacles at some samples;
             empty without obstacles. `evaluation.min_clearance_m` looks between the samples too.
+        seen: what the controller saw at the start. embedding_names: what each embedding coordinate is about.
         wall_time: what the run took on the clock, without the fit of the body [s].
         stop: why the arm did not arrive, in a sentence; None if it did.
     """
@@ -36,8 +37,20 @@ class ScenarioResult:
     evaluation: Evaluation
     clearance_time: Array
     clearance: Array
+    seen: Obstacles
+    embedding_names: tuple[str, ...]
     wall_time: float
     stop: str | None = None
+
+    @property
+    def switched(self) -> bool:
+        """Whether a switch weighed the motion; barriers have none, whatever the file says."""
+        scenario = self.scenario
+        return scenario.method == "written" and scenario.system.switch.type in (
+            "binary",
+            "sigmoid",
+            "distance",
+        )
 
     @property
     def success(self) -> bool:
@@ -48,14 +61,17 @@ class ScenarioResult:
     def to_document(self) -> dict[str, Any]:
         """The figures as JSON values, with units in the keys (accelerations [rad/s^2], ratios without)."""
         choice = self.scenario.simulation
+        turning, sliding = tolerance_units(self.run)
         return {
             "scenario": self.scenario.name,
             "robot": self.run.robot.name,
             "mode": choice.mode,
-            "switch": self.scenario.system.switch.type,
+            "method": self.scenario.method,
+            "switch": self.scenario.system.switch.type if self.scenario.method == "written" else None,
             "success": self.success,
             **self.evaluation.to_dict(),
-            "tolerance_rad": choice.tolerance,
+            "tolerance_rad": choice.tolerance if turning else None,
+            "tolerance_m": choice.tolerance if sliding else None,
             "period_s": choice.period,
             "wall_time_s": self.wall_time,
             "stop": self.stop,
@@ -81,3 +97,9 @@ class ScenarioResult:
         limits = "exceeds a limit" if evaluation.limits.any else "respects every limit"
         reason = "" if self.stop is None else f" At the end: {self.stop}."
         return f"The arm {arrival}{encounter}, and {limits}.{reason}"
+
+
+def tolerance_units(run: Run) -> tuple[bool, bool]:
+    """Whether the tolerance of a run's goal is an angle [rad], and whether it is a length [m], or both."""
+    units = run.robot.coordinate_units
+    return run.pose is not None or "rad" in units, run.pose is None and "m" in units

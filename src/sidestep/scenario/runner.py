@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Controller
+from sidestep._core import Controller, CoordinateKind, CoordinateLabel
 from sidestep.scenario.assembly import Assembly, Progress, assemble
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.scenario import Scenario
@@ -70,9 +70,32 @@ def run_scenario(
         evaluation=evaluation,
         clearance_time=run.time[samples] if run.objects else np.zeros(0),
         clearance=clearance,
+        seen=obstacles_over_time(parts.seen)(0.0),
+        embedding_names=embedding_names(scenario, parts.mover.labels),
         wall_time=clock.perf_counter() - begin,
         stop=None if evaluation.reached else _reason(parts, run),
     )
+
+
+def embedding_names(scenario: Scenario, labels: Sequence[CoordinateLabel]) -> tuple[str, ...]:
+    """What each embedding coordinate is about: a link, a pair of links, a joint limit, or a density."""
+    choice = scenario.embedding
+    densities = ["collision density"] + ([] if choice.joint_limits is None else ["joint limits"])
+    potentials = iter([" + ".join(densities)] if choice.combine == "sum" else densities)
+
+    def name(label: CoordinateLabel) -> str:
+        match label.kind:
+            case CoordinateKind.obstacle:
+                return f"{label.name} - obstacles"
+            case CoordinateKind.plane:
+                return f"{label.name} - plane"
+            case CoordinateKind.self:
+                return f"{label.name} - {label.other}"
+            case CoordinateKind.joint_limit:
+                return f"{label.name} - {label.other} limit"
+        return next(potentials, "density")
+
+    return tuple(map(name, labels))
 
 
 def _reason(parts: Assembly, run: Run) -> str:

@@ -2,8 +2,43 @@
 
 from __future__ import annotations
 
-from sidestep.scenario.result import ScenarioResult
+import numpy as np
+
+from sidestep._core import Obstacles
+from sidestep.scenario.result import ScenarioResult, tolerance_units
+from sidestep.scenario.scenario import Scenario
+from sidestep.simulation import SimulationRun
 from sidestep.simulation.evaluation import POSE_TOLERANCE
+from sidestep.simulation.joint_words import in_words
+
+METHODS = {
+    "controller": "controller",
+    "barrier": "controller without planner",
+    "reactive": "barriers alone",
+}
+
+
+def method_in_words(scenario: Scenario) -> str:
+    """How the arm is moved."""
+    if scenario.method != "written":
+        return METHODS[scenario.method]
+    return f"as written, switch: {scenario.system.switch.type.replace('_', ' ')}"
+
+
+def seen_in_words(seen: Obstacles, *, num_solids: int) -> str:
+    """What the controller sees of so many solids: points, bare or with radii."""
+    count = len(seen.points)
+    if count == 0:
+        return "no obstacle"
+    points = f"{count} point{'s' if count > 1 else ''}"
+    sized = seen.radii[seen.radii > 0.0]
+    if not sized.size:
+        return f"{count} bare centre{'s' if count > 1 else ''}" if count == num_solids else f"{points}, bare"
+    low, high = (f"{1000.0 * radius:.4g}" for radius in (sized.min(), sized.max()))
+    radii = f"a radius of {low} mm" if low == high else f"radii of {low} to {high} mm"
+    if sized.size == count:
+        return f"{points} with {radii}"
+    return f"{points}, {count - sized.size} of them bare, the others with {radii}"
 
 
 def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
@@ -11,6 +46,8 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
     evaluation, choice = result.evaluation, result.scenario.simulation
     pose = result.run.pose is not None
     rows = [
+        ("method", method_in_words(result.scenario), ""),
+        ("controller sees", seen_in_words(result.seen, num_solids=len(result.run.objects)), "at the start"),
         ("goal reached", _yes(evaluation.reached), _allowed(result)),
         ("error of the pose" if pose else "largest joint error", evaluation.way_left(), "at the end"),
         (
@@ -20,7 +57,7 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
         ),
         (
             "largest detour",
-            f"{evaluation.path_deviation_rad:.4g} rad",
+            in_words(evaluation.path_deviation_rad, evaluation.path_deviation_m),
             f"by {evaluation.path_deviation_joint}",
         ),
     ]
@@ -30,20 +67,12 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
     if evaluation.contacts is not None and result.run.objects:
         pushed = ", ".join(evaluation.moved_objects) or "no obstacle"
         rows.append(("contact points", str(evaluation.contacts), f"pushed away: {pushed}"))
-    if evaluation.max_tracking_error is not None:
-        rows.append(
-            (
-                "tracking error",
-                f"{evaluation.max_tracking_error:.2g} rad/s²",
-                "largest, achieved against wanted acceleration",
-            )
-        )
-    if evaluation.max_torque_ratio is not None:
-        rows.append(("torque over limit", f"{evaluation.max_torque_ratio:.0%}", "largest"))
+    if isinstance(result.run, SimulationRun):
+        rows += _physics(result.run)
     rows += [
         ("limits exceeded", _limits(result), "at samples"),
-        ("system", _counts(evaluation.system_status), "steps by status"),
-        ("controller", _counts(evaluation.controller_status), "steps by status"),
+        (_step_words(result.scenario)[0], _counts(evaluation.system_status), "steps"),
+        (_step_words(result.scenario)[1], _counts(evaluation.controller_status), "steps by status"),
         (
             "computing time",
             f"{result.wall_time:.1f} s",
@@ -53,11 +82,34 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
     return [row for row in rows if row[1] != "-" or row[0] == "time to goal"]
 
 
+def _step_words(scenario: Scenario) -> tuple[str, str]:
+    """What the two columns of step by step words are of."""
+    return ("system", "torque program") if scenario.method == "written" else ("activity", "safety")
+
+
+def _physics(run: SimulationRun) -> list[tuple[str, str, str]]:
+    """How well the arm followed, and how much of its torque that took."""
+    robot, rows = run.robot, []
+    errors = np.nan_to_num(np.abs(run.achieved - run.wanted)).max(axis=0)
+    joint = int(errors.argmax())
+    unit = robot.coordinate_units[joint]
+    note = f"largest, of {robot.coordinate_names[joint]}, achieved against wanted acceleration"
+    if np.isfinite(run.achieved - run.wanted).any():
+        rows.append(("tracking error", f"{errors[joint]:.2g} {unit}/s²", note))
+    ratios = (np.abs(run.torque) / robot.limits.effort).max(axis=0)
+    joint = int(ratios.argmax())
+    name = {"rad": "largest torque", "m": "largest force"}[robot.coordinate_units[joint]]
+    rows.append((name, f"{100.0 * ratios[joint]:.0f} % of its limit", f"of {robot.coordinate_names[joint]}"))
+    return rows
+
+
 def _allowed(result: ScenarioResult) -> str:
-    angle = f"{result.scenario.simulation.tolerance:g} rad"
+    tolerance = result.scenario.simulation.tolerance
+    turning, sliding = tolerance_units(result.run)
+    bound = in_words(tolerance if turning else None, tolerance if sliding else None)
     if result.run.pose is None:
-        return f"error under {angle} at the end"
-    return f"within {1e3 * POSE_TOLERANCE:g} mm and {angle} at the end"
+        return f"error under {bound} at the end"
+    return f"within {1e3 * POSE_TOLERANCE:g} mm and {bound} at the end"
 
 
 def _limits(result: ScenarioResult) -> str:

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.simulation.clearance import ExactClearance
+from sidestep.simulation.joint_words import in_words, largest_ways
 from sidestep.simulation.run import Run, SimulationRun
 
 Array = npt.NDArray[np.float64]
 
-GOAL_TOLERANCE = 0.05  # [rad] the project's definition of arriving
+GOAL_TOLERANCE = 0.05  # [rad | m] the project's definition of arriving
 POSE_TOLERANCE = 0.01  # [m] the same of the frame of a pose goal, whose angle has the tolerance of joints
 MOVED = (
     1e-4  # [m] a free object that nothing touches floats still to rounding; a tenth of a millimetre is a push
@@ -53,12 +54,13 @@ class Evaluation:
     Attributes:
         reached: criterion 1: the largest joint error at the end is under the tolerance; of a pose goal the angle
             under the tolerance and the distance under 1 cm.
-        position_error_rad: that joint error, None for a pose goal.
+        position_error_rad, position_error_m: that of the turning and of the sliding joints, None for a pose goal or
+            without such a joint.
         pose_distance_m, pose_angle_rad: those of a pose goal, else None.
         time_to_goal_s: when the error went under the tolerance for good, or None.
-        path_deviation_rad: criterion 2: the largest joint offset from the straight segment from the start to the
-            goal, or to the configuration at the end of a run to a pose;
-            path_deviation_joint: the name of that joint.
+        path_deviation_rad, path_deviation_m: criterion 2: the largest offset of the turning and of the sliding
+            joints from the straight segment from the start to the goal, or to the configuration at the end of a run
+            to a pose, None without such a joint; path_deviation_joint: the joint with the largest number.
         contacts: criterion 3: arm-scene contact points that MuJoCo counted, over all steps; contact_pairs:
             which "link - obstacle" they were; max_contact_force_n.
         min_clearance_m: criterion 3: smallest exact clearance, between samples too (None: empty scene), found
@@ -66,7 +68,7 @@ class Evaluation:
             clearance_time_s: where and when.
         moved_objects: criterion 3: name to largest displacement [m] of every free object that moved.
         max_tracking_error, rms_tracking_error: criterion 4: |achieved - wanted| acceleration, largest joint
-            [rad/s^2] and root mean square over samples and joints.
+            [rad/s^2 | m/s^2] and root mean square over samples and joints.
         max_qp_error, rms_qp_error: the same for |QP's - wanted|; max_model_error for |achieved - QP's|.
         max_torque_ratio: largest |torque| / limit.
         limits: violations at samples.
@@ -76,10 +78,12 @@ class Evaluation:
 
     reached: bool
     position_error_rad: float | None
+    position_error_m: float | None
     pose_distance_m: float | None
     pose_angle_rad: float | None
     time_to_goal_s: float | None
-    path_deviation_rad: float
+    path_deviation_rad: float | None
+    path_deviation_m: float | None
     path_deviation_joint: str
     contacts: int | None
     contact_pairs: tuple[str, ...] | None
@@ -108,9 +112,9 @@ class Evaluation:
 
     def way_left(self) -> str:
         """How far from the goal the run ended, in words."""
-        if self.position_error_rad is not None:
-            return f"{self.position_error_rad:.4g} rad"
-        return f"{1e3 * (self.pose_distance_m or 0.0):.1f} mm and {self.pose_angle_rad or 0.0:.2g} rad"
+        if self.pose_distance_m is None:
+            return in_words(self.position_error_rad, self.position_error_m)
+        return f"{1e3 * self.pose_distance_m:.1f} mm and {self.pose_angle_rad or 0.0:.2g} rad"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; what is not a finite number is None."""
@@ -151,13 +155,19 @@ def evaluate(
         minimum, when = worst.clearance.distance, worst.sample * run.timestep
         pair = f"{worst.clearance.link} - {worst.clearance.obstacle}"
     effort = run.robot.limits.effort
+    left: tuple[float | None, float | None] = (None, None)
+    if run.pose is None:
+        left = largest_ways(run.robot, run.q[-1] - run.goal)
+    detour = largest_ways(run.robot, deviation)
     return Evaluation(
         reached=bool(inside[-1]),
-        position_error_rad=float(error[-1]) if run.pose is None else None,
+        position_error_rad=left[0],
+        position_error_m=left[1],
         pose_distance_m=None if run.pose is None else float(distance[-1]),
         pose_angle_rad=None if run.pose is None else float(error[-1]),
         time_to_goal_s=_settled(run.time, inside),
-        path_deviation_rad=float(deviation.max()),
+        path_deviation_rad=detour[0],
+        path_deviation_m=detour[1],
         path_deviation_joint=run.robot.coordinate_names[int(deviation.argmax())],
         contacts=None if physics is None else len(physics.contacts),
         contact_pairs=None

@@ -130,7 +130,7 @@ def build_model(
         objects: fixed, free (floating, gravity compensated, until touched) and moving (driven) objects.
         timestep: of the physics [s].
         floor_height: z of a floor [m] that free objects can fall on; None: no floor.
-        joint_damping: [Nm s/rad] on every joint.
+        joint_damping: [Nm s/rad | N s/m] on every joint.
         joint_friction: dry friction [Nm] on every joint.
         visuals: with the visual meshes, which MuJoCo's own pictures show and which take most of the time.
 

@@ -32,7 +32,7 @@ def in_words(
     elif there is not None and here.state in (MotionState.free, MotionState.sliding, MotionState.stuck):
         blocked = INSIDE.fullmatch(there.describe())
         if blocked is not None:
-            way = f"stopped {here.joint_error:.2f} rad from the goal"
+            way = f"stopped {here.way_left} from the goal"
             sentence = f"{way}, which is itself blocked: {blocked[1]} against {blocked[2]}"
         elif here.state == MotionState.free:
             sentence = sentence.replace("on the way", "held by the torque program's clearances", 1)

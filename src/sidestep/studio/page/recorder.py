@@ -45,7 +45,7 @@ class Recorder:
         add_note(
             gui,
             "200 states a second; Restart and loading end a recording. Play shows it while the loop is paused; Live "
-            "shows the loop, which goes on if it ran. The download is NumPy's .npz: time [s], q [rad], "
+            "shows the loop, which goes on if it ran. The download is NumPy's .npz: time [s], q [rad | m], "
             "poses and names of obstacles.",
         )
 

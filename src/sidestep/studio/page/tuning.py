@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 from sidestep.studio import messages as m
@@ -35,6 +36,7 @@ class TuningPanel:
         self._folders: list[Any] = []
         self._controls: dict[str, Any] = {}
         self._shown: Method | None = None
+        self._units: frozenset[str] = frozenset()  # of the joints
         self._numbers: Numbers = {}
         self._changed: Numbers = {}  # and not sent yet
         self._timer: threading.Timer | None = None
@@ -50,7 +52,9 @@ class TuningPanel:
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows the method and the numbers that the loop has."""
         method, numbers = method_named(snapshot.method), snapshot.numbers[snapshot.method]
-        if method is not self._shown:
+        units = frozenset(self._view.robot.coordinate_units)
+        if method is not self._shown or units != self._units:
+            self._units = units
             self._lay_out(method, numbers)
         elif numbers != self._numbers:
             for parameter in method.parameters:
@@ -81,7 +85,7 @@ class TuningPanel:
                             self._add(parameter, numbers[parameter.name])
 
     def _add(self, parameter: Parameter, value: Any) -> None:
-        control = add_control(self._server.gui, parameter, value)
+        control = add_control(self._server.gui, parameter, value, joints=self._units)
         control.on_update(lambda event: self._moved(event, parameter))
         self._controls[parameter.name] = control
         usual = label_of(parameter.default) if parameter.options else f"{parameter.default:g}"
@@ -128,14 +132,26 @@ class TuningPanel:
             self._view.send(m.SetNumbers(self._shown.name, usual))
 
 
-def add_control(gui: Any, parameter: Parameter, value: Any) -> Any:
-    """A slider or a list for a parameter; what a file says may be out of its range, or not in the list."""
+def unit_for(unit: str, joints: Collection[str]) -> str:
+    """The unit of a number for joints with these units: "rad/s" is "m/s" of sliding joints."""
+    if "rad" not in unit:
+        return unit
+    return " | ".join(unit.replace("rad", joint) for joint in ("rad", "m") if joint in joints)
+
+
+def add_control(gui: Any, parameter: Parameter, value: Any, *, joints: Collection[str] = ("rad",)) -> Any:
+    """A slider or a list for a parameter; what a file says may be out of its range, or not in the list.
+
+    `joints` are the units of the robot's joints.
+    """
     label = parameter.field.replace("_", " ")
     if parameter.options:
         options = tuple(dict.fromkeys(label_of(option) for option in (*parameter.options, value)))
         return gui.add_dropdown(label, options, initial_value=label_of(value))
     lower, upper, shown = (position(parameter, end) for end in (parameter.lower, parameter.upper, value))
-    unit = f" [{parameter.unit}]" if parameter.unit else " [10^]" if parameter.powers else ""
+    unit = (
+        f" [{unit_for(parameter.unit, joints)}]" if parameter.unit else " [10^]" if parameter.powers else ""
+    )
     step: float = 1 if parameter.whole and not parameter.powers else (upper - lower) / STEPS
     return gui.add_slider(
         f"{label}{unit}", min=min(lower, shown), max=max(upper, shown), step=step, initial_value=shown
