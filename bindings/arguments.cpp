@@ -1,6 +1,9 @@
 #include "arguments.hpp"
 
+#include <nanobind/stl/string.h>
+
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace sidestep::python {
@@ -24,19 +27,71 @@ NumpyArray make_numpy(std::unique_ptr<double[]> data, std::initializer_list<std:
   return nb::steal<NumpyArray>(nb::cast(nb::ndarray<nb::numpy, double>(raw, shape, owner)).release());
 }
 
+/// Whether an array, or one in lists of them, has masked entries, which numpy's conversion would let out.
+bool is_masked(nb::handle value, const nb::module_& numpy) {
+  const nb::object ma = numpy.attr("ma");
+  if (nb::isinstance(value, ma.attr("MaskedArray"))) {
+    return nb::cast<bool>(ma.attr("is_masked")(value));
+  }
+  if (!nb::isinstance<nb::list>(value) && !nb::isinstance<nb::tuple>(value)) {
+    return false;
+  }
+  for (const nb::handle item : value) {
+    if (!PyFloat_Check(item.ptr()) && !PyLong_Check(item.ptr()) && is_masked(item, numpy)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool is_plain_array(nb::handle value) {
+  static PyObject* const type = nb::object(nb::module_::import_("numpy").attr("ndarray")).release().ptr();
+  return value.type().ptr() == type;
+}
+
+/// A number, not an array of one.
+std::optional<double> as_scalar(nb::handle value, const char* name) {
+  if (PyFloat_Check(value.ptr())) {
+    return nb::cast<double>(value);
+  }
+  const nb::object array = real_array(value, name);
+  if (nb::cast<int>(array.attr("ndim")) == 0) {
+    return nb::cast<double>(array.attr("item")());
+  }
+  return std::nullopt;
+}
+
 }  // namespace
+
+nb::object real_array(nb::handle value, const char* name) {
+  const nb::module_ numpy = nb::module_::import_("numpy");
+  try {
+    if (!is_plain_array(value) && is_masked(value, numpy)) {
+      throw nb::value_error((std::string(name) + " has masked entries; fill them, or leave them out").c_str());
+    }
+    const nb::object array = numpy.attr("asarray")(value), type = array.attr("dtype");
+    const std::string kind = nb::cast<std::string>(type.attr("kind"));
+    if (kind != "f" && kind != "i" && kind != "u") {
+      throw nb::type_error((std::string(name) + " must be an array of real numbers (float or int), has dtype " +
+                            nb::str(type).c_str())
+                               .c_str());
+    }
+    return numpy.attr("asarray")(array, numpy.attr("float64"));
+  } catch (const nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError)) {
+      throw;
+    }
+    throw nb::type_error((std::string(name) + " must be an array of real numbers").c_str());
+  }
+}
 
 Array as_array(nb::handle value, const char* name) {
   Array array;
-  if (nb::try_cast<Array>(value, array, false)) {
+  if (is_plain_array(value) && nb::try_cast<Array>(value, array, false)) {
     return array;
   }
-  try {
-    const nb::module_ numpy = nb::module_::import_("numpy");
-    return nb::cast<Array>(numpy.attr("ascontiguousarray")(value, numpy.attr("float64")));
-  } catch (const nb::python_error&) {
-    throw nb::type_error((std::string(name) + " must be an array of real numbers").c_str());
-  }
+  const nb::object numbers = real_array(value, name);
+  return nb::cast<Array>(nb::module_::import_("numpy").attr("ascontiguousarray")(numbers));
 }
 
 Eigen::VectorXd as_vector(nb::handle value, const char* name, Eigen::Index size) {
@@ -60,17 +115,15 @@ Eigen::VectorXd as_finite_vector(nb::handle value, const char* name, Eigen::Inde
 }
 
 Eigen::VectorXd as_filled_vector(nb::handle value, const char* name, Eigen::Index size) {
-  double scalar = 0.0;
-  if (nb::try_cast<double>(value, scalar)) {
-    return Eigen::VectorXd::Constant(size, scalar);
+  if (const std::optional<double> scalar = as_scalar(value, name)) {
+    return Eigen::VectorXd::Constant(size, *scalar);
   }
   return as_vector(value, name, size);
 }
 
 Eigen::MatrixXd as_square_matrix(nb::handle value, const char* name, Eigen::Index size) {
-  double scalar = 0.0;
-  if (nb::try_cast<double>(value, scalar)) {
-    return scalar * Eigen::MatrixXd::Identity(size, size);
+  if (const std::optional<double> scalar = as_scalar(value, name)) {
+    return *scalar * Eigen::MatrixXd::Identity(size, size);
   }
   const Array array = as_array(value, name);
   if (array.ndim() == 1) {

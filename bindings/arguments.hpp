@@ -22,7 +22,11 @@ namespace sidestep::python {
 
 namespace nb = nanobind;
 
-/// An array-like argument as contiguous float64; raises TypeError or ValueError that names the argument.
+/// Real numbers, as a numpy array of float64: not copied where it is one. Raises TypeError that names the argument and its
+/// type for what numpy would only turn into numbers (complex, bool, dates, text, objects), ValueError for masked entries.
+nb::object real_array(nb::handle value, const char* name);
+
+/// The same, contiguous, with one dimension at least.
 using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 Array as_array(nb::handle value, const char* name);
 

@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "arguments.hpp"
+#include "interruptible.hpp"
 #include "module.hpp"
 #include "sidestep/body/cover_refinement.hpp"
 
@@ -77,10 +78,10 @@ void bind_cover_refinement(nb::module_& m) {
         const CoverRefinement settings{steps,  first_rate, last_rate, stiffness, multiplier_steps,
                                        margin, unit,       area,      slimness};
         const std::vector<Eigen::Matrix3Xd> sets = as_directions(directions);
-        {
-          const nb::gil_scoped_release release;
-          refine_cover(grid, samples, sets, settings, ellipsoids, forces);
-        }
+        interruptible([&](const Interrupted& interrupted) {
+          refine_cover(grid, samples, sets, settings, ellipsoids, forces, interrupted);
+          return true;
+        });
         Eigen::Matrix3Xd moved(3, ellipsoids.size());
         for (int k = 0; k < ellipsoids.size(); ++k) {
           moved.col(k) = ellipsoids.centres[static_cast<std::size_t>(k)];

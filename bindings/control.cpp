@@ -82,7 +82,18 @@ void bind_quadratic_program(nb::module_& m) {
                                "A dense strictly convex quadratic program of fixed size, solved by the dual active-set\n"
                                "method: minimise 1/2 x'Hx + g'x subject to lower <= x <= upper and\n"
                                "row_lower <= A x <= row_upper. Source: Goldfarb and Idnani (1983).")
-      .def(nb::init<int, int>(), nb::arg("num_variables"), nb::arg("num_rows") = 0)
+      .def(
+          "__init__",
+          [](QuadraticProgram* self, int num_variables, int num_rows) {
+            constexpr int most = 4096;  // the matrices of a solve take 0.8 GB then
+            for (const int size : {num_variables, num_rows}) {
+              if (size > most) {
+                throw nb::value_error(("quadratic program: a size is " + std::to_string(size) + ", must be at most 4096").c_str());
+              }
+            }
+            new (self) QuadraticProgram(num_variables, num_rows);
+          },
+          nb::arg("num_variables"), nb::arg("num_rows") = 0)
       .def_prop_ro("num_variables", &QuadraticProgram::num_variables)
       .def_prop_ro("num_rows", &QuadraticProgram::num_rows)
       .def(
@@ -222,7 +233,7 @@ void bind_safety(nb::module_& m) {
       "What is kept of clearances. margin [m]: the clearance that is kept, or `Clearances.margins` if less; rate [1/s]: close to the margin the closing\n"
       "speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest\n"
       "one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;\n"
-      "max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises\n"
+      "max_rows (at most 256): when more clearances are active, those are kept of which the room is smallest after a stop. Raises\n"
       "ValueError that names the setting.")
       .def(
           "__init__",

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "arguments.hpp"
+#include "interruptible.hpp"
 #include "module.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
 #include "sidestep/guidance/guide.hpp"
@@ -204,6 +205,7 @@ void bind_guide(nb::module_& m) {
       .def(
           "set_goal",
           [](Guide& g, const ArrayLike& goal) {
+            const Exclusive use(&g, "the guide");
             g.set_goal(as_finite_vector(goal, "goal", g.body().robot().num_coordinates()));
           },
           nb::arg("goal"), "A configuration (nv,) [rad] to go to; from the loop that calls step().")
@@ -214,14 +216,22 @@ void bind_guide(nb::module_& m) {
           [](Guide& g, const ArrayLike& q, double time) {
             Guidance guidance{GuideStatus::idle, Guide::Attractor(g.body().robot().num_coordinates())};
             const Eigen::VectorXd at = as_vector(q, "q", g.body().robot().num_coordinates());
-            const nb::gil_scoped_release release;
-            guidance.status = g.step(at, time, guidance.attractor);
-            return guidance;
+            const Exclusive use(&g, "the guide");
+            if (!g.settings().synchronous) {
+              guidance.status = g.step(at, time, guidance.attractor);
+              return guidance;
+            }
+            return interruptible([&](const Interrupted& interrupted) {
+              const InterruptedWhile search(&g, interrupted);
+              guidance.status = g.step(at, time, guidance.attractor);
+              return std::move(guidance);
+            });
           },
           nb::arg("q"), nb::arg("time"), "Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.")
       .def(
           "disturbed",
           [](Guide& g, const ArrayLike& q, const Obstacles& obstacles) {
+            const Exclusive use(&g, "the guide");
             return g.disturbed(as_finite_vector(q, "q", g.body().robot().num_coordinates()), obstacles);
           },
           nb::arg("q"), nb::arg("obstacles"),
@@ -268,14 +278,19 @@ void bind_guidance(nb::module_& m) {
           [](PathPlanner& p, const ArrayLike& start, const ArrayLike& goal, const Obstacles& obstacles,
              std::uint64_t seed) {
             const Eigen::VectorXd from = p.configuration(start, "start"), to = p.configuration(goal, "goal");
-            const nb::gil_scoped_release release;
-            return p.planner().plan(from, to, obstacles, seed);
+            const Exclusive use(&p, "the planner");
+            const HeldObstacles held(obstacles);
+            return interruptible([&](const Interrupted& interrupted) {
+              const InterruptedWhile search(&p.planner(), interrupted);
+              return p.planner().plan(from, to, held, seed);
+            });
           },
           nb::arg("start"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(), nb::arg("seed") = 0,
           "A path from start (nv,) to goal (nv,) [rad] among the obstacles where they are now.")
       .def(
           "clearance",
           [](PathPlanner& p, const ArrayLike& q, const Obstacles& obstacles, double cap) {
+            const Exclusive use(&p, "the planner");
             const BodyClearance::Nearest n =
                 p.body().nearest(p.configuration(q, "q"), obstacles, cap, p.planner().workspace());
             return ClearanceReport{n.clearance, n.item < 0 ? CoordinateLabel{} : p.body().label(n.item), n.point};
@@ -285,6 +300,7 @@ void bind_guidance(nb::module_& m) {
       .def(
           "is_free",
           [](PathPlanner& p, const ArrayLike& q, const Obstacles& obstacles, std::optional<double> margin) {
+            const Exclusive use(&p, "the planner");
             return p.body().free(p.configuration(q, "q"), obstacles, p.margins(margin),
                                  p.planner().workspace());
           },
@@ -294,6 +310,7 @@ void bind_guidance(nb::module_& m) {
           "is_edge_free",
           [](PathPlanner& p, const ArrayLike& a, const ArrayLike& b, const Obstacles& obstacles,
              std::optional<double> margin) {
+            const Exclusive use(&p, "the planner");
             return p.body().edge_free(p.configuration(a, "a"), p.configuration(b, "b"), obstacles,
                                       p.margins(margin), p.planner().workspace());
           },

@@ -4,7 +4,11 @@
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
+#include <chrono>
+#include <thread>
+
 #include "dynamical_system.hpp"
+#include "interruptible.hpp"
 #include "module.hpp"
 #include "sidestep/control/real_time.hpp"
 #include "sidestep/dynamical_system/batch.hpp"
@@ -63,20 +67,22 @@ void bind_loop(nb::module_& m) {
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv),
                                   h = as_vector(bias, "bias", nv);
             const Eigen::MatrixXd M = as_matrix(mass_matrix, "mass_matrix", nv, nv);
+            const Loop::Use use(self);
             const LoopStatus status = self.step(position, velocity, M, h);
             return LoopStep{status.system, self.solution()};
           },
           nb::arg("q"), nb::arg("v"), nb::arg("mass_matrix"), nb::arg("bias"),
           "One period at q (nv,) [rad | m] and v (nv,) [/s], with mass matrix (nv, nv) and bias (nv,) [Nm | N] there.\n"
-          "Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.");
+          "Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes,\n"
+          "RuntimeError while a RealTimeRun has the loop.");
 
   nb::class_<RealTimeRun>(
       m, "RealTimeRun",
       "Runs a Loop at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1 periods\n"
       "after the start, and what is late is not left out. The arm is integrated with the acceleration that was commanded;\n"
       "mass_matrix (nv, nv) and bias (nv,) stay as they are given. Until it has ended the loop is its alone, but for\n"
-      "`Loop.set_goal` and `Loop.set_obstacles`. period [s]; priority: ask for real-time scheduling. Raises ValueError on wrong\n"
-      "shapes, what is not finite, and settings at fault.")
+      "`Loop.set_goal` and `Loop.set_obstacles`. period [s], at most 60; steps: at most 100,000,000; priority: ask for real-time\n"
+      "scheduling. Raises ValueError on wrong shapes, what is not finite, and settings at fault, RuntimeError if the loop is in use.")
       .def(
           "__init__",
           [](RealTimeRun* self, Loop& loop, const ArrayLike& q, const ArrayLike& v, const ArrayLike& mass_matrix,
@@ -101,14 +107,21 @@ void bind_loop(nb::module_& m) {
       .def(
           "finish",
           [](RealTimeRun& self) {
-            const RealTimeRecord* record = nullptr;
-            {
-              const nb::gil_scoped_release release;
-              record = &self.finish();
+            try {
+              interruptible([&](const Interrupted& interrupted) {
+                while (self.running() && !interrupted()) {
+                  std::this_thread::sleep_for(std::chrono::milliseconds(5));
+                }
+                return true;
+              });
+            } catch (...) {
+              self.stop();
+              throw;
             }
-            return *record;
+            return self.finish();
           },
-          "Waits for the end; the RealTimeRecord.");
+          "Waits for the end; the RealTimeRecord of the steps done. Ctrl-C stops the run.")
+      .def("stop", &RealTimeRun::stop, "Asks for the end after the step at hand, and waits for nothing: `finish` does.");
   nb::class_<RealTimeRecord>(m, "RealTimeRecord", "When the steps of a real-time run began and ended.")
       .def_prop_ro("late", [](const RealTimeRecord& r) { return to_numpy(r.late); },
                    "(T,) [s] from when a step was due to when it began.")
@@ -129,8 +142,10 @@ void bind_loop(nb::module_& m) {
         const int nv = system.robot().num_coordinates();
         const Eigen::MatrixXd positions = as_rows(q, "q", nv), velocities = as_rows(v, "v", nv),
                               targets = as_rows(goals, "goals", nv);
-        nb::gil_scoped_release release;
-        return evaluate_batch(system, positions, velocities, targets, obstacles, threads);
+        const HeldObstacles held(obstacles);
+        return interruptible([&](const Interrupted& interrupted) {
+          return evaluate_batch(system, positions, velocities, targets, held, threads, interrupted);
+        });
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goals"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("threads") = 0,
@@ -151,8 +166,11 @@ void bind_loop(nb::module_& m) {
         if (filter != nullptr) {
           settings.filter = *filter;
         }
-        nb::gil_scoped_release release;
-        return rollout_batch(system, positions, velocities, targets, obstacles, settings, threads);
+        const HeldObstacles held(obstacles);
+        return interruptible([&](const Interrupted& interrupted) {
+          settings.interrupted = interrupted;
+          return rollout_batch(system, positions, velocities, targets, held, settings, threads);
+        });
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goals"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",

@@ -1,11 +1,22 @@
 #include "sidestep/obstacles/obstacles.hpp"
 
+#include <nanobind/stl/string.h>
+
+#include <string>
+
 #include "arguments.hpp"
 #include "module.hpp"
 
 namespace sidestep::python {
 
 void bind_obstacles(nb::module_& m) {
+  m.def(
+      "real_array", [](nb::handle value, const std::string& name) { return real_array(value, name.c_str()); },
+      nb::arg("value"), nb::arg("name"),
+      nb::sig("def real_array(value: numpy.typing.ArrayLike, name: str) -> numpy.typing.NDArray[numpy.float64]"),
+      "`value` as an array of float64, not copied where it is one. Raises TypeError that names the argument and its dtype for\n"
+      "complex numbers, booleans, dates, text and objects, ValueError for masked entries.");
+
   nb::class_<Obstacles>(m, "Obstacles",
                         "Obstacle points in the world, each a ball with a radius, moving with a constant velocity.")
       .def(
@@ -19,14 +30,24 @@ void bind_obstacles(nb::module_& m) {
           },
           nb::arg("points"), nb::arg("radii") = 0.0, nb::arg("velocities").none() = nb::none(),
           "points (N, 3) [m]; radii scalar or (N,) [m], >= 0; velocities (N, 3) [m/s] or None for rest.\n"
-          "Raises ValueError that names the first bad point; an empty cloud is refused (see none()).")
+          "Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).")
       .def_static("none", &Obstacles::none, "A workspace that is known to be free.")
       .def("__len__", &Obstacles::size)
       .def_prop_ro("points", [](const Obstacles& o) { return to_numpy_points(o.points()); })
       .def_prop_ro("radii", [](const Obstacles& o) { return to_numpy(o.radii()); })
       .def_prop_ro("velocities", [](const Obstacles& o) { return to_numpy_points(o.velocities()); })
-      .def("advance", &Obstacles::advance, nb::arg("duration"),
-           "Moves every point along its velocity for `duration` [s].");
+      .def(
+          "advance",
+          [](Obstacles& self, double duration) {
+            if (!self.advance(duration)) {
+              throw nb::value_error(("duration is " + std::to_string(duration) +
+                                     " s, must be finite, as must be where it takes the points")
+                                        .c_str());
+            }
+          },
+          nb::arg("duration"),
+          "Moves every point along its velocity for `duration` [s]. Raises ValueError, and moves none, where it, or\n"
+          "where it takes a point, is not finite.");
 }
 
 }  // namespace sidestep::python

@@ -11,6 +11,7 @@
 
 #include "arguments.hpp"
 #include "dynamical_system.hpp"
+#include "interruptible.hpp"
 #include "module.hpp"
 #include "sidestep/dynamical_system/progress_monitor.hpp"
 #include "sidestep/dynamical_system/rollout.hpp"
@@ -57,7 +58,9 @@ void bind_rollout(nb::module_& m) {
           "pursue",
           [](Escape& self, nb::handle goal, const ArrayLike& q, double potential, double period) {
             const Goal target = as_goal(goal, self.num_coordinates());
-            return self.pursue(target, as_vector(q, "q", self.num_coordinates()), potential, period);
+            const Eigen::VectorXd at = as_vector(q, "q", self.num_coordinates());
+            const Exclusive use(&self, "the escape");
+            return self.pursue(target, at, potential, as_period(period));
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("potential"), nb::arg("period"),
           nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
@@ -129,8 +132,11 @@ void bind_rollout(nb::module_& m) {
                                           " coordinates, the system has " + std::to_string(nv));
             }
             const Obstacles seen = obstacles;
-            const nb::gil_scoped_release release;
-            return self.look(target, position, velocity, seen, followed);
+            const Exclusive use(&self, "the evasion");
+            return interruptible([&](const Interrupted& interrupted) {
+              const InterruptedWhile look(&self, interrupted);
+              return self.look(target, position, velocity, seen, followed);
+            });
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("followed") = nb::none(),
           nb::sig("def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
@@ -143,16 +149,27 @@ void bind_rollout(nb::module_& m) {
           [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
              double period) {
             const int nv = self.num_coordinates();
-            const Flight* flight = self.pursue(as_goal(goal, nv), as_vector(q, "q", nv), as_vector(v, "v", nv), obstacles,
-                                               as_period(period));
-            return flight == nullptr ? std::nullopt : std::optional<Flight>(*flight);
+            const Goal target = as_goal(goal, nv);
+            const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
+            const Exclusive use(&self, "the evasion");
+            const HeldObstacles held(obstacles);
+            return interruptible([&](const Interrupted& interrupted) {
+              const InterruptedWhile look(&self, interrupted);
+              const Flight* flight = self.pursue(target, position, velocity, held, as_period(period));
+              return flight == nullptr ? std::nullopt : std::optional<Flight>(*flight);
+            });
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("period"),
           nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
                   "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> Flight | None"),
           "The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every\n"
           "`delay`, and follows what the look before found, as if another thread had looked meanwhile.")
-      .def("reset", &Evasion::reset, "Before another motion is pursued: what was found is forgotten.")
+      .def("reset",
+           [](Evasion& self) {
+             const Exclusive use(&self, "the evasion");
+             self.reset();
+           },
+           "Before another motion is pursued: what was found is forgotten.")
       .def_prop_ro("count", &Evasion::count, "How many flights were found.");
 
   nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
@@ -189,8 +206,19 @@ void bind_rollout(nb::module_& m) {
         }
         settings.escape = escape;
         settings.evasion = evasion;
-        nb::gil_scoped_release release;
-        return rollout(system, start, velocity, target, obstacles, settings);
+        const HeldObstacles held(obstacles);
+        std::optional<Exclusive> escapes, evades;
+        if (escape != nullptr) {
+          escapes.emplace(escape, "the escape");
+        }
+        if (evasion != nullptr) {
+          evades.emplace(evasion, "the evasion");
+        }
+        return interruptible([&](const Interrupted& interrupted) {
+          const InterruptedWhile look(evasion, interrupted);
+          settings.interrupted = interrupted;
+          return rollout(system, start, velocity, target, held, settings);
+        });
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
@@ -203,7 +231,7 @@ void bind_rollout(nb::module_& m) {
               "filter: AccelerationFilter | None = None, escape: Escape | None = None, "
               "evasion: Evasion | None = None) -> Rollout"),
       "Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.\n"
-      "period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
+      "period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
       "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;\n"
       "escape: sub-goals where the motion is stuck; evasion: flights out of the way of what moves, with a filter. Both keep their state\n"
       "from one call to the next.");

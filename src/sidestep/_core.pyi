@@ -170,6 +170,12 @@ def refine_cover(*, origin: numpy.typing.ArrayLike, spacing: float, values: nump
     (nx, ny, nz) [m] on a grid from origin (3,); directions (R, J, 3) are R sets of unit vectors, used in turn.
     """
 
+def real_array(value: numpy.typing.ArrayLike, name: str) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    `value` as an array of float64, not copied where it is one. Raises TypeError that names the argument and its dtype for
+    complex numbers, booleans, dates, text and objects, ValueError for masked entries.
+    """
+
 class Obstacles:
     """
     Obstacle points in the world, each a ball with a radius, moving with a constant velocity.
@@ -178,7 +184,7 @@ class Obstacles:
     def __init__(self, points: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike = 0.0, velocities: numpy.typing.ArrayLike | None = None) -> None:
         """
         points (N, 3) [m]; radii scalar or (N,) [m], >= 0; velocities (N, 3) [m/s] or None for rest.
-        Raises ValueError that names the first bad point; an empty cloud is refused (see none()).
+        Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).
         """
 
     @staticmethod
@@ -197,7 +203,10 @@ class Obstacles:
     def velocities(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     def advance(self, duration: float) -> None:
-        """Moves every point along its velocity for `duration` [s]."""
+        """
+        Moves every point along its velocity for `duration` [s]. Raises ValueError, and moves none, where it, or
+        where it takes a point, is not finite.
+        """
 
 def multiply_add_rate(duration: float = 0.2) -> float:
     """
@@ -1024,7 +1033,7 @@ class Rollout:
 def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None, escape: Escape | None = None, evasion: Evasion | None = None) -> Rollout:
     """
     Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.
-    period dt [s]; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
+    period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
     filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;
     escape: sub-goals where the motion is stuck; evasion: flights out of the way of what moves, with a filter. Both keep their state
     from one call to the next.
@@ -1209,7 +1218,7 @@ class SafetySettings:
     What is kept of clearances. margin [m]: the clearance that is kept, or `Clearances.margins` if less; rate [1/s]: close to the margin the closing
     speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest
     one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;
-    max_rows: when more clearances are active, those are kept of which the room is smallest after a stop. Raises
+    max_rows (at most 256): when more clearances are active, those are kept of which the room is smallest after a stop. Raises
     ValueError that names the setting.
     """
 
@@ -1455,7 +1464,8 @@ class Loop:
     def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike) -> LoopStep:
         """
         One period at q (nv,) [rad | m] and v (nv,) [/s], with mass matrix (nv, nv) and bias (nv,) [Nm | N] there.
-        Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
+        Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes,
+        RuntimeError while a RealTimeRun has the loop.
         """
 
 class RealTimeRun:
@@ -1463,8 +1473,8 @@ class RealTimeRun:
     Runs a Loop at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1 periods
     after the start, and what is late is not left out. The arm is integrated with the acceleration that was commanded;
     mass_matrix (nv, nv) and bias (nv,) stay as they are given. Until it has ended the loop is its alone, but for
-    `Loop.set_goal` and `Loop.set_obstacles`. period [s]; priority: ask for real-time scheduling. Raises ValueError on wrong
-    shapes, what is not finite, and settings at fault.
+    `Loop.set_goal` and `Loop.set_obstacles`. period [s], at most 60; steps: at most 100,000,000; priority: ask for real-time
+    scheduling. Raises ValueError on wrong shapes, what is not finite, and settings at fault, RuntimeError if the loop is in use.
     """
 
     def __init__(self, loop: Loop, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, period: float = 0.001, steps: int = 10000, priority: bool = True) -> None: ...
@@ -1477,7 +1487,14 @@ class RealTimeRun:
         """q, v (nv,) before the next step; for one thread."""
 
     def finish(self) -> RealTimeRecord:
-        """Waits for the end; the RealTimeRecord."""
+        """
+        Waits for the end; the RealTimeRecord of the steps done. Ctrl-C stops the run.
+        """
+
+    def stop(self) -> None:
+        """
+        Asks for the end after the step at hand, and waits for nothing: `finish` does.
+        """
 
 class RealTimeRecord:
     """When the steps of a real-time run began and ended."""

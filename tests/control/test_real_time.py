@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep._core import QuadraticProgram
 
 START, GOAL, AT_REST = np.array([0.2, 0.3]), np.array([0.8, -0.4]), np.zeros(2)
 PERIOD = 0.002
@@ -84,3 +85,50 @@ def test_bad_settings_are_named(robot):
     inputs = (START, AT_REST, robot.mass_matrix(START), AT_REST)
     with pytest.raises(ValueError, match=r"real-time run: period is 0.*, must be finite and positive"):
         ss.RealTimeRun(loop_of(robot), *inputs, period=0.0)
+
+
+def test_a_second_run_and_a_step_beside_one_are_refused(robot):
+    loop = loop_of(robot)
+    run = run_of(robot, loop, 100_000)
+    with pytest.raises(RuntimeError, match="the loop is in use: a RealTimeRun"):
+        run_of(robot, loop, 10)
+    with pytest.raises(RuntimeError, match="the loop is in use: a RealTimeRun"):
+        loop.step(START, AT_REST, robot.mass_matrix(START), AT_REST)
+    assert run.running
+    run.stop()
+    record = run.finish()
+    assert len(record.late) == len(record.taken) < 100_000
+    assert loop.step(START, AT_REST, robot.mass_matrix(START), AT_REST).status == ss.StepStatus.ok
+    assert len(run_of(robot, loop, 3).finish().taken) == 3
+
+
+def test_a_run_that_was_refused_leaves_the_loop_free(robot):
+    loop = loop_of(robot)
+    with pytest.raises(ValueError, match="must have the size of the arm and be finite"):
+        run_of(robot, loop, 10, q=np.array([0.0, np.nan]))
+    assert len(run_of(robot, loop, 3).finish().taken) == 3
+
+
+def test_stop_ends_a_run_between_steps_that_are_far_apart(robot):
+    loop = loop_of(robot)
+    inputs = {"q": START, "v": AT_REST, "mass_matrix": robot.mass_matrix(START), "bias": AT_REST}
+    run = ss.RealTimeRun(loop, **inputs, period=60.0, steps=100)
+    run.stop()
+    begin = time.monotonic()
+    assert len(run.finish().taken) == 0
+    assert time.monotonic() - begin < 20.0  # of a period of 60 s
+
+
+def test_sizes_have_an_upper_bound(robot):
+    with pytest.raises(ValueError, match=r"steps is 2147483647.*, must be from 1 to 100,000,000"):
+        run_of(robot, loop_of(robot), 2**31 - 1)
+    inputs = {"q": START, "v": AT_REST, "mass_matrix": robot.mass_matrix(START), "bias": AT_REST}
+    with pytest.raises(ValueError, match=r"period is 60\.1.*, must be at most 60 s"):
+        ss.RealTimeRun(loop_of(robot), **inputs, period=60.1)
+    with pytest.raises(ValueError, match=r"max_rows is 100000.*, must be from 0 to 256"):
+        ss.SafetySettings(max_rows=100_000)
+    assert ss.SafetySettings(max_rows=256).max_rows == 256
+    with pytest.raises(ValueError, match=r"max_nodes is 2147483647.*, must be from 2 to 1,000,000"):
+        ss.PlannerSettings(max_nodes=2**31 - 1)
+    with pytest.raises(ValueError, match="a size is 100000, must be at most 4096"):
+        QuadraticProgram(100_000)

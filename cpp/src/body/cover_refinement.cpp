@@ -238,7 +238,7 @@ double DistanceGrid::operator()(const Eigen::Vector3d& point, Eigen::Vector3d& g
 
 void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points,
                   const std::vector<Eigen::Matrix3Xd>& directions, const CoverRefinement& settings,
-                  SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers) {
+                  SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers, const Interrupted& interrupted) {
   const auto refuse = [](const std::string& what) { throw std::invalid_argument("refine_cover: " + what); };
   const auto nodes = static_cast<std::size_t>(grid.shape[0]) * static_cast<std::size_t>(grid.shape[1]) *
                      static_cast<std::size_t>(grid.shape[2]);
@@ -261,6 +261,9 @@ void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points,
   }
   Descent descent(grid, points, settings, ellipsoids, multipliers);
   for (int number = 0; number < settings.steps; ++number) {
+    if (interrupted()) {
+      throw Interruption();
+    }
     descent.step(number, directions[static_cast<std::size_t>(number) % directions.size()]);
   }
 }

@@ -19,6 +19,13 @@ Loop::Loop(std::shared_ptr<const GeometricSystem> system, TorqueController contr
   }
 }
 
+Loop::Use::Use(Loop& loop) : loop_(&loop) {
+  if (loop.in_use_.exchange(true, std::memory_order_acquire)) {
+    throw std::runtime_error(
+        "the loop is in use: a RealTimeRun or another thread steps it; wait for its end (finish) or stop it first");
+  }
+}
+
 LoopStatus Loop::step(ConstVectorRef q, ConstVectorRef v,
                       Eigen::Ref<const Eigen::MatrixXd> mass_matrix, ConstVectorRef bias) noexcept {
   const Goal& goal = goal_.get();

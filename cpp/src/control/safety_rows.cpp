@@ -82,7 +82,7 @@ void SafetySettings::validate() const {
   require_positive(rate, "safety: rate");
   require(braking_fraction > 0.0 && braking_fraction <= 1.0, "safety: braking_fraction", braking_fraction, "in (0, 1]");
   require(correction > 0.0 && correction <= 1.0, "safety: correction", correction, "in (0, 1]");
-  require(max_rows >= 0, "safety: max_rows", max_rows, ">= 0");
+  require(max_rows >= 0 && max_rows <= 256, "safety: max_rows", max_rows, "from 0 to 256");
 }
 
 SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)

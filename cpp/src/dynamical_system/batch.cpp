@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstring>
 #include <exception>
 #include <limits>
@@ -31,45 +33,81 @@ void check(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen:
   require(goals, "goals");
 }
 
-/// Runs work(next) on every thread, where next() gives each of 0 … num − 1 once and then num. Rethrows.
+constexpr int most_threads = 1024;
+constexpr std::chrono::milliseconds nap{10};  // between two looks for an interruption, while other threads work
+
+/// Runs work(next, halted) on every thread, where next() gives each of 0 … num − 1 once and then num, and halted() says
+/// whether to end at once: at an error, or an interruption, which the calling thread asks for. Rethrows the first error.
 template <class Work>
-void share(Eigen::Index num, int threads, Work&& work) {
-  if (threads < 0) {
-    throw std::invalid_argument("batch: threads is " + std::to_string(threads) + ", must be >= 0");
+void share(Eigen::Index num, int threads, const Interrupted& interrupted, Work&& work) {
+  if (threads < 0 || threads > most_threads) {
+    throw std::invalid_argument("batch: threads is " + std::to_string(threads) + ", must be from 0 to 1024");
   }
   const Eigen::Index wanted = threads > 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
   std::atomic<Eigen::Index> counter{0};
+  std::atomic<bool> stopped{false};
   std::exception_ptr error;
-  std::mutex error_mutex;
-  const auto guarded = [&] {
+  std::size_t ended = 0;
+  std::mutex mutex;  // of the two above
+  std::condition_variable end;
+  const auto run = [&](const Interrupted& halted) {
     try {
-      work([&] { return std::min(counter.fetch_add(1), num); });
+      work([&] { return halted() ? num : std::min(counter.fetch_add(1), num); }, halted);
     } catch (...) {
-      const std::lock_guard lock(error_mutex);
-      error = std::current_exception();
+      stopped = true;
+      const std::lock_guard lock(mutex);
+      error = error ? error : std::current_exception();
     }
   };
+  const auto is_stopped = [&] { return stopped.load(std::memory_order_relaxed); };
+  const auto asks = [&] {
+    if (interrupted()) {
+      stopped = true;
+    }
+    return is_stopped();
+  };
   std::vector<std::thread> pool;
-  for (Eigen::Index i = 1; i < std::min(wanted, num); ++i) {
-    pool.emplace_back(guarded);
+  const auto others = static_cast<std::size_t>(std::max<Eigen::Index>(std::min(wanted, num) - 1, 0));
+  pool.reserve(others);
+  try {
+    while (pool.size() < others) {
+      pool.emplace_back([&] {
+        run(is_stopped);
+        const std::lock_guard lock(mutex);
+        ++ended;
+        end.notify_one();
+      });
+    }
+  } catch (const std::exception&) {  // the machine gives no more: those there are do it
   }
-  guarded();
+  run(asks);
+  for (std::unique_lock lock(mutex); ended < pool.size();) {
+    if (end.wait_for(lock, nap, [&] { return ended == pool.size(); })) {
+      break;
+    }
+    lock.unlock();
+    asks();
+    lock.lock();
+  }
   for (std::thread& thread : pool) {
     thread.join();
   }
   if (error) {
     std::rethrow_exception(error);
   }
+  if (stopped) {
+    throw Interruption();
+  }
 }
 
-/// Runs work(block, first) on every thread, where `first` is that of every block of states.
+/// Runs work(block, first, halted) on every thread, where `first` is that of every block of states.
 template <class Work>
-void share_blocks(const GeometricSystem& system, Eigen::Index num, int threads, Work&& work) {
+void share_blocks(const GeometricSystem& system, Eigen::Index num, int threads, const Interrupted& interrupted, Work&& work) {
   const Eigen::Index blocks = (num + block_states - 1) / block_states;
-  share(blocks, threads, [&](auto&& next) {
+  share(blocks, threads, interrupted, [&](auto&& next, const Interrupted& halted) {
     StepBlock block(system);
     for (Eigen::Index k = next(); k < blocks; k = next()) {
-      work(block, k * block_states);
+      work(block, k * block_states, halted);
     }
   });
 }
@@ -114,13 +152,16 @@ void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, co
 /// Motions [first, first + num) of `result`, side by side.
 void roll_out(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
               const Eigen::MatrixXd& goals, const Obstacles& start_obstacles, const RolloutSettings& settings,
-              std::vector<Rollout>& result) {
+              const Interrupted& halted, std::vector<Rollout>& result) {
   const Eigen::Index num = load(block, first, q, v, goals);
   ObstaclesInMotion obstacles(start_obstacles);
   const auto motions = result.begin() + first;
   std::generate_n(motions, num, [&] { return make_rollout(block.system(), settings); });
   using Numbers = Eigen::Array<double, block_states, 1>;
   for (Eigen::Index k = 0; k <= settings.steps; ++k) {
+    if (halted()) {
+      throw Interruption();
+    }
     block.update(obstacles.now());
     for (Eigen::Index i = 0; i < num; ++i) {
       Rollout& motion = motions[i];
@@ -143,18 +184,19 @@ void roll_out(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, co
 }  // namespace
 
 BatchEvaluation evaluate_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-                               const Eigen::MatrixXd& goals, const Obstacles& obstacles, int threads) {
+                               const Eigen::MatrixXd& goals, const Obstacles& obstacles, int threads,
+                               const Interrupted& interrupted) {
   check(system, q, v, goals);
   BatchEvaluation result{Eigen::MatrixXd(q.rows(), q.cols()),
                          Eigen::MatrixXd(q.rows(), system.num_embedding_coordinates()),
                          std::vector<StepStatus>(static_cast<std::size_t>(q.rows()))};
   if (StepBlock::takes(system)) {
-    share_blocks(system, q.rows(), threads, [&](StepBlock& block, Eigen::Index first) {
+    share_blocks(system, q.rows(), threads, interrupted, [&](StepBlock& block, Eigen::Index first, const Interrupted&) {
       evaluate(block, first, q, v, goals, obstacles, result);
     });
     return result;
   }
-  share(q.rows(), threads, [&](auto&& next) {
+  share(q.rows(), threads, interrupted, [&](auto&& next, const Interrupted&) {
     GeometricSystem::Workspace workspace(system);
     for (Eigen::Index k = next(); k < q.rows(); k = next()) {
       const Eigen::VectorXd position = q.row(k), velocity = v.row(k), goal = goals.row(k);
@@ -178,19 +220,23 @@ std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::M
   if (settings.escape != nullptr || settings.evasion != nullptr) {
     throw std::invalid_argument("batch: an escape or evasion belongs to one motion; give none");
   }
+  check_records(system, settings, q.rows());
   std::vector<Rollout> result(static_cast<std::size_t>(q.rows()));
   if (StepBlock::takes(system) && !settings.filter && !settings.time_steps &&
       settings.integrator != Integrator::runge_kutta_4) {
-    share_blocks(system, q.rows(), threads, [&](StepBlock& block, Eigen::Index first) {
-      roll_out(block, first, q, v, goals, obstacles, settings, result);
+    share_blocks(system, q.rows(), threads, settings.interrupted,
+                 [&](StepBlock& block, Eigen::Index first, const Interrupted& halted) {
+      roll_out(block, first, q, v, goals, obstacles, settings, halted, result);
     });
     return result;
   }
-  share(q.rows(), threads, [&](auto&& next) {
+  share(q.rows(), threads, settings.interrupted, [&](auto&& next, const Interrupted& halted) {
+    RolloutSettings own = settings;
+    own.interrupted = halted;
     for (Eigen::Index k = next(); k < q.rows(); k = next()) {
       result[static_cast<std::size_t>(k)] =
           rollout(system, q.row(k).transpose(), v.row(k).transpose(),
-                  Goal(JointGoal(Eigen::VectorXd(goals.row(k).transpose()))), obstacles, settings);
+                  Goal(JointGoal(Eigen::VectorXd(goals.row(k).transpose()))), obstacles, own);
     }
   });
   return result;

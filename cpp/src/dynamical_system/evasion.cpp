@@ -37,6 +37,7 @@ const EvasionSettings& validated(const EvasionSettings& settings) {
 }
 
 constexpr double most_periods = 1e5;
+constexpr int most_tries = 100'000;
 constexpr double rounding = 1e-6;
 
 int whole_periods(double duration, double period) noexcept {
@@ -63,6 +64,7 @@ void EvasionSettings::validate() const {
   require(horizon <= most_periods * period, "evasion: horizon", horizon, "at most 100,000 periods");
   require(std::isfinite(clearance), "evasion: clearance", clearance, "finite");
   require(tries >= 1, "evasion: tries", tries, ">= 1");
+  require(tries <= most_tries, "evasion: tries", tries, "at most 100,000");
 }
 
 Evasion::Stepper::Stepper(const Robot& robot, double period) : period(period), filter(robot, filter_settings(period)) {}
@@ -137,9 +139,9 @@ const Flight* Evasion::pursue(const Goal& goal, const Eigen::VectorXd& q, const 
   // Less than half a period too early, so that sums of periods may be rounded. Written so that a period that is not a
   // number makes it look.
   if (is_due(period)) {
+    std::optional<Flight> next = look(goal, q, v, obstacles, found_, leader);
     until_look_ = std::max(until_look_ + settings_.delay, 0.0);
-    pursued_ = found_;
-    found_ = look(goal, q, v, obstacles, pursued_, leader);
+    pursued_ = std::exchange(found_, std::move(next));
   } else if (pursued_) {
     pursued_->advance(period);
   }
@@ -161,7 +163,14 @@ double Evasion::obstacle_clearance() const noexcept {
   return least;
 }
 
+void Evasion::check_interrupted() const {
+  if (interrupted_()) {
+    throw Interruption();
+  }
+}
+
 double Evasion::advance(Motion& motion, Stepper& stepper) {
+  check_interrupted();
   const double period = stepper.period;
   bool sees;
   Eigen::VectorXd wanted;
@@ -208,6 +217,7 @@ std::vector<Flight> Evasion::draw_flights(const Motion& now, const std::optional
   std::vector<Reference> references;
   references.reserve(static_cast<std::size_t>(settings_.tries));
   for (int number = 0; number < settings_.tries; ++number) {
+    check_interrupted();
     const double spread = spreads[static_cast<std::size_t>(number / 2) % spreads.size()];
     Eigen::VectorXd refuge =
         number % 2 == 1 && followed ? draw(followed->refuge(), spread_of_followed) : draw(now.q, spread);
@@ -221,6 +231,7 @@ std::vector<Flight> Evasion::draw_flights(const Motion& now, const std::optional
       if (reference.free < k) {
         continue;
       }
+      check_interrupted();
       if (system_->touches(reference.moved.position(), obstacles, -touched, workspace_)) {
         --left;
         continue;

@@ -62,14 +62,13 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
       twist(V),
       settings(std::move(s)),
       frame_(moved_frame(robot, frame)),
-      num_coordinates_(robot.num_coordinates()),
-      num_joints_(robot.num_joints()) {
+      joints_hash_(robot.joints_hash()) {
   check_stiffness(settings.position_stiffness, "position stiffness");
   check_stiffness(settings.orientation_stiffness, "orientation stiffness");
   check_stiffness(settings.posture_stiffness, "posture stiffness");
-  if (settings.rest.size() != 0 && settings.rest.size() != num_coordinates_) {
+  if (settings.rest.size() != 0 && settings.rest.size() != robot.num_coordinates()) {
     throw std::invalid_argument("pose goal: rest has " + std::to_string(settings.rest.size()) + " entries, expected " +
-                                std::to_string(num_coordinates_) + " or none");
+                                std::to_string(robot.num_coordinates()) + " or none");
   }
   if (settings.posture_stiffness > 0.0 && settings.rest.size() == 0) {
     throw std::invalid_argument("pose goal: a posture stiffness needs a rest configuration");
@@ -98,19 +97,30 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
   }
 }
 
-void advance(Goal& goal, double duration) noexcept {
+bool advance(Goal& goal, double duration) noexcept {
   if (auto* joint = std::get_if<JointGoal>(&goal)) {
-    joint->position += duration * joint->velocity + 0.5 * duration * duration * joint->acceleration;
-    joint->velocity += duration * joint->acceleration;
-    return;
+    const auto velocity = joint->velocity + duration * joint->acceleration;
+    const auto position =
+        joint->position + (duration * joint->velocity + 0.5 * duration * duration * joint->acceleration);
+    if (!all_finite(position) || !all_finite(velocity)) {
+      return false;
+    }
+    joint->position = position;
+    joint->velocity = velocity;
+    return true;
   }
   PoseGoal& frame = std::get<PoseGoal>(goal);
-  frame.pose.translation() += duration * frame.twist.head<3>();
+  const Eigen::Vector3d position = frame.pose.translation() + duration * frame.twist.head<3>();
   const Eigen::Vector3d turn = duration * frame.twist.tail<3>();
   const double angle = turn.norm();
+  if (!position.allFinite() || !std::isfinite(angle)) {
+    return false;
+  }
+  frame.pose.translation() = position;
   if (angle > 0.0) {
     frame.pose.linear() = Eigen::AngleAxisd(angle, turn / angle) * frame.pose.linear();
   }
+  return true;
 }
 
 bool is_moving(const Goal& goal) noexcept {
@@ -132,7 +142,7 @@ GoalFault check(const Goal& goal, const Robot& robot) noexcept {
     });
   }
   const PoseGoal& frame = std::get<PoseGoal>(goal);
-  if (frame.num_coordinates() != robot.num_coordinates() || frame.num_joints() != robot.num_joints() ||
+  if (!frame.is_for(robot) ||
       !frame.pose.matrix().allFinite() || !frame.twist.allFinite() || !frame.settings.rest.allFinite()) {
     return GoalFault::invalid;
   }

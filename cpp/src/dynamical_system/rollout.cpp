@@ -72,14 +72,30 @@ void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w,
 
 }  // namespace
 
-Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& settings) {
+void check_records(const GeometricSystem& system, const RolloutSettings& settings, Eigen::Index motions) {
   if (!(settings.period > 0.0) || !std::isfinite(settings.period)) {
     throw std::invalid_argument("period is " + std::to_string(settings.period) + " s, must be positive and finite");
   }
   if (settings.steps < 1) {
     throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at least 1");
   }
-  const Eigen::Index rows = settings.steps + 1, nv = system.robot().num_coordinates();
+  if (!std::isfinite(settings.period * settings.steps)) {
+    throw std::invalid_argument("period times steps is not finite");
+  }
+  const double numbers = 1.0 + 4.0 * system.robot().num_coordinates() + system.num_embedding_coordinates() +
+                         (settings.time_steps ? 1.0 : 0.0) + (settings.filter ? 1.0 : 0.0);
+  const double row = numbers * sizeof(double) + sizeof(StepStatus) + (settings.filter ? sizeof(TorqueStatus) : 0);
+  const double most_rows = std::floor(most_record_bytes / (row * static_cast<double>(std::max<Eigen::Index>(motions, 1))));
+  if (settings.steps > most_rows - 1.0) {
+    throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at most " +
+                                std::to_string(std::max(static_cast<long long>(most_rows) - 1, 0LL)) + " for " +
+                                std::to_string(motions) + " motions: their records may have 8 GiB");
+  }
+}
+
+Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& settings) {
+  check_records(system, settings, 1);
+  const Eigen::Index rows = static_cast<Eigen::Index>(settings.steps) + 1, nv = system.robot().num_coordinates();
   Rollout result{Eigen::VectorXd::LinSpaced(rows, 0.0, settings.period * settings.steps),
                  Eigen::MatrixXd(rows, nv),
                  Eigen::MatrixXd(rows, nv),
@@ -128,6 +144,9 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   Goal refuge = goal;  // of the flight
   const Goal* followed = &goal;
   for (Eigen::Index k = 0; k < rows; ++k) {
+    if (settings.interrupted()) {
+      throw Interruption();
+    }
     const bool known = k > 0 && flight == nullptr;  // how far the goal itself was, as seen from a way to it
     const bool leads = k < settings.steps;          // the last row is the first of the rollout that goes on from here
     if (leads && settings.evasion != nullptr) {

@@ -109,7 +109,7 @@ GuideStatus Guide::step(ConstVectorRef q, double time, Attractor& attractor) noe
   attractor.places.col(0) = goal_;
   attractor.num_places = 1;
   attractor.arrives = false;
-  if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite()) {
+  if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite() || !std::isfinite(time)) {
     attractor.position = goal_;
     if (q.size() == goal_.size()) {
       attractor.position = q;

@@ -23,6 +23,7 @@ constexpr double around_node = 2.4;      // how far each joint of such a sample 
 constexpr double octaves = 2.5;          // of the lengths of steps from a node that was trapped, below the range
 constexpr double domain = 3.0;           // of the range: how far samples may be from a node that was trapped
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
+constexpr int most_nodes = 1'000'000;    // of a planner: the trees have room for them from the beginning
 constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
 
 double seconds() {
@@ -47,7 +48,7 @@ void PlannerSettings::validate() const {
   positive(fade, "planner: fade");
   positive(range, "planner: range");
   positive(max_seconds, "planner: max_seconds");
-  positive(max_nodes - 1.0, "planner: max_nodes less one");
+  require(max_nodes >= 2 && max_nodes <= most_nodes, "planner: max_nodes", max_nodes, "from 2 to 1,000,000");
   positive(max_iterations, "planner: max_iterations");
   if (!(floor >= 0.0) || !(margin >= floor) || !std::isfinite(margin)) {
     throw std::invalid_argument("planner: floor is " + std::to_string(floor) + " m and margin " + std::to_string(margin) +

@@ -1,6 +1,7 @@
 #include "sidestep/kinematics/robot.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -30,6 +31,47 @@ void check_limit(const Eigen::VectorXd& limit, const char* what, const std::vect
                                   std::to_string(limit[i]) + ", must be positive");
     }
   }
+}
+
+/// FNV-1a, of what Robot::same_joints compares.
+class Hash {
+ public:
+  void add(const std::string& text) noexcept {
+    for (const char c : text) {
+      add_byte(static_cast<unsigned char>(c));
+    }
+    add_byte(0);
+  }
+  void add(double value) noexcept {
+    const auto bits = std::bit_cast<std::uint64_t>(value + 0.0);  // of both zeros the same
+    for (int shift = 0; shift < 64; shift += 8) {
+      add_byte(static_cast<unsigned char>(bits >> shift));
+    }
+  }
+  std::uint64_t value() const noexcept { return value_; }
+
+ private:
+  void add_byte(unsigned char byte) noexcept { value_ = (value_ ^ byte) * 0x100000001b3u; }
+  std::uint64_t value_ = 0xcbf29ce484222325u;
+};
+
+std::uint64_t hash_of(const std::vector<Joint>& joints, const std::vector<std::string>& coordinate_names) {
+  Hash hash;
+  for (const std::string& name : coordinate_names) {
+    hash.add(name);
+  }
+  for (const Joint& joint : joints) {
+    hash.add(joint.name);
+    for (const double number : {static_cast<double>(joint.type), static_cast<double>(joint.parent),
+                                static_cast<double>(joint.coordinate), joint.multiplier, joint.offset, joint.axis[0],
+                                joint.axis[1], joint.axis[2]}) {
+      hash.add(number);
+    }
+    for (const double number : joint.X_PJ.matrix().reshaped()) {
+      hash.add(number);
+    }
+  }
+  return hash.value();
 }
 
 }  // namespace
@@ -98,6 +140,7 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
                                   std::to_string(limits_.upper[i]));
     }
   }
+  joints_hash_ = hash_of(joints_, coordinate_names_);
 }
 
 bool Robot::slides(int coordinate) const noexcept {

@@ -1,13 +1,14 @@
 #include "sidestep/obstacles/obstacles.hpp"
 
 #include <atomic>
-#include <limits>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
-namespace sidestep {
+#include "../finite.hpp"
 
+namespace sidestep {
 Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities)
     : points_(std::move(points)), radii_(std::move(radii)), velocities_(std::move(velocities)) {
   const Eigen::Index num = points_.cols();
@@ -26,14 +27,31 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
     if (!points_.col(i).allFinite()) {
       throw std::invalid_argument(owner() + " is not finite");
     }
-    if (!(radii_[i] >= 0.0) || !(radii_[i] < std::numeric_limits<double>::infinity())) {
-      throw std::invalid_argument(owner() + " has radius " + std::to_string(radii_[i]) + ", must be finite and >= 0");
+    if (!(radii_[i] >= 0.0) || !(radii_[i] <= largest_radius)) {
+      throw std::invalid_argument(owner() + " has radius " + std::to_string(radii_[i]) +
+                                  ", must be finite, >= 0 and at most 1e9 m");
     }
     if (!velocities_.col(i).allFinite()) {
       throw std::invalid_argument(owner() + " has a velocity that is not finite");
     }
   }
   tree_ = PointTree(points_, radii_, velocities_);
+}
+
+bool Obstacles::advance(double duration) noexcept {
+  if (!std::isfinite(duration)) {
+    return false;
+  }
+  if (!tree_.moves()) {
+    return true;
+  }
+  if (!all_finite(points_ + duration * velocities_)) {
+    return false;
+  }
+  points_ += duration * velocities_;
+  tree_.advance(duration);
+  version_ = next_version();
+  return true;
 }
 
 std::uint64_t Obstacles::next_version() noexcept {

@@ -199,3 +199,31 @@ BOOST_AUTO_TEST_CASE(what_is_wrong_with_a_goal_is_said) {
   homeless.posture_stiffness = 1.0;
   BOOST_CHECK_EXCEPTION(PoseGoal(robot, "tip", pose, homeless), std::invalid_argument, message_has("needs a rest"));
 }
+
+BOOST_AUTO_TEST_CASE(a_goal_that_would_move_out_of_the_finite_stays) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const Robot robot = test::serial_arm(test::arm_limits(7));
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation().z() = 1.0;
+  Vector6d twist = Vector6d::Zero();
+  for (const int axis : {0, 4}) {
+    twist.setZero();
+    twist[axis] = 1e300;
+    for (const double duration : {nan, infinity, -infinity, 1e300}) {
+      Goal goal = PoseGoal(robot, "tip", pose, {}, twist);
+      BOOST_TEST(!advance(goal, duration));
+      BOOST_TEST((std::get<PoseGoal>(goal).pose.matrix() == pose.matrix()));
+    }
+  }
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(7), one = Eigen::VectorXd::Ones(7);
+  for (const double duration : {nan, infinity, 1e300}) {
+    Goal goal = JointGoal(rest, one, one);
+    BOOST_TEST(!advance(goal, duration));
+    BOOST_TEST((std::get<JointGoal>(goal).position == rest));
+    BOOST_TEST((std::get<JointGoal>(goal).velocity == one));
+  }
+  Goal goal = JointGoal(rest, one, one);
+  BOOST_TEST(advance(goal, 2.0));
+  BOOST_TEST((std::get<JointGoal>(goal).position == 4.0 * one));
+  BOOST_TEST((std::get<JointGoal>(goal).velocity == 3.0 * one));
+}

@@ -36,14 +36,16 @@ struct ArmState {
 /// obstacles.
 class RealTimeRun {
  public:
-  /// Starts. Throws std::invalid_argument on wrong sizes, values that are not finite and settings at fault. The loop is used
-  /// by this run alone until it has ended.
+  /// Starts. Throws std::invalid_argument on wrong sizes, values that are not finite and settings at fault, and
+  /// std::runtime_error if the loop is in use. It is used by this run alone until the run has ended.
   RealTimeRun(Loop& loop, ArmState start, Eigen::MatrixXd mass_matrix, Eigen::VectorXd bias, RealTimeSettings settings = {});
   /// Stops, and waits for the step at hand.
   ~RealTimeRun();
   RealTimeRun(const RealTimeRun&) = delete;
   RealTimeRun& operator=(const RealTimeRun&) = delete;
 
+  /// Asks for the end after the step at hand; waits for nothing.
+  void stop() noexcept { stop_.store(true, std::memory_order_relaxed); }
   bool running() const noexcept { return running_.load(std::memory_order_acquire); }
   /// The state before the next step; for one thread.
   const ArmState& state() noexcept { return state_.get(); }
@@ -54,6 +56,7 @@ class RealTimeRun {
   void run() noexcept;
 
   Loop& loop_;
+  Loop::Use use_;
   RealTimeSettings settings_;
   Eigen::MatrixXd mass_matrix_;
   Eigen::VectorXd bias_;

@@ -12,6 +12,7 @@
 #include "sidestep/dynamical_system/flight.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/interruption.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
 namespace sidestep {
@@ -76,6 +77,9 @@ class Evasion {
   /// Before another motion is pursued: what was found is forgotten.
   void reset() noexcept;
 
+  /// Ends a look once it says so, by an Interruption: what was found before stays.
+  void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
+
   /// How many flights were found.
   int count() const noexcept { return count_; }
   const EvasionSettings& settings() const noexcept { return settings_; }
@@ -103,6 +107,7 @@ class Evasion {
     Stepper(const Robot& robot, double period);
   };
 
+  void check_interrupted() const;
   /// Moves on by one period; the least clearance from obstacles at its beginning [m].
   double advance(Motion& motion, Stepper& stepper);
   /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that goes
@@ -126,6 +131,7 @@ class Evasion {
   std::optional<Flight> found_, pursued_;
   double until_look_ = 0.0;
   int count_ = 0;
+  Interrupted interrupted_ = never_interrupted;
 };
 
 }  // namespace sidestep

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <variant>
@@ -63,8 +64,8 @@ struct PoseGoal {
   PoseGoalSettings settings;
 
   const Frame& frame() const noexcept { return frame_; }
-  int num_coordinates() const noexcept { return num_coordinates_; }
-  int num_joints() const noexcept { return num_joints_; }
+  /// Whether it was made for a robot with these joints.
+  bool is_for(const Robot& robot) const noexcept { return joints_hash_ == robot.joints_hash(); }
   /// Farther than this from `shoulder` the frame cannot be: the lengths between its joints, added.
   double reach() const noexcept { return reach_; }
   /// The origin of the first joint that moves the frame, in the world [m].
@@ -72,15 +73,16 @@ struct PoseGoal {
 
  private:
   Frame frame_;
-  int num_coordinates_, num_joints_;
+  std::uint64_t joints_hash_;
   double reach_ = 0.0;
   Eigen::Vector3d shoulder_ = Eigen::Vector3d::Zero();
 };
 
 using Goal = std::variant<JointGoal, PoseGoal>;
 
-/// Moves a goal for `duration` [s] as its velocity and acceleration say. No allocation.
-void advance(Goal& goal, double duration) noexcept;
+/// Moves a goal for `duration` [s] as its velocity and acceleration say. False where that gives what is not finite: then it
+/// stays where it is. No allocation.
+bool advance(Goal& goal, double duration) noexcept;
 
 /// Whether a goal has a velocity or an acceleration.
 bool is_moving(const Goal& goal) noexcept;

@@ -8,6 +8,7 @@
 #include "sidestep/dynamical_system/escape.hpp"
 #include "sidestep/dynamical_system/evasion.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
+#include "sidestep/interruption.hpp"
 
 namespace sidestep {
 
@@ -32,7 +33,11 @@ struct RolloutSettings {
   /// Flights out of the way of what moves on the way to the goal (not to a sub-goal); none if null. With a filter. While one
   /// is followed, the escape is not asked, and the system's step is that towards its refuge.
   Evasion* evasion = nullptr;
+  Interrupted interrupted = never_interrupted;  ///< asked before every step
 };
+
+/// [bytes] that the records of one call may have together: 8 GiB.
+inline constexpr double most_record_bytes = 8.0 * 1024.0 * 1024.0 * 1024.0;
 
 /// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.
 struct Rollout {
@@ -47,7 +52,8 @@ struct Rollout {
 };
 
 /// Integrates the system from (q, v), obstacles and goal moving at their velocities.
-/// Throws std::invalid_argument on sizes, or a period or number of steps that is not positive.
+/// Throws std::invalid_argument on sizes, a period or number of steps that is not positive, and a record of more than
+/// `most_record_bytes`; Interruption if interrupted.
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                 Goal goal, const Obstacles& obstacles, const RolloutSettings& settings);
 inline Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,

@@ -90,8 +90,16 @@ class Guide {
   /// for what rests. For the loop; allocates nothing.
   [[nodiscard]] bool disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept;
 
-  /// One step of the loop, at a time [s] that does not go back. Never blocks; allocates nothing unless synchronous.
+  /// One step of the loop, at a time [s] that does not go back; where it is not finite, nothing changes and the status is
+  /// `invalid`. Never blocks; allocates nothing unless synchronous.
   [[nodiscard]] GuideStatus step(ConstVectorRef q, double time, Attractor& attractor) noexcept;
+
+  /// For a synchronous guide: ends a search under way once it says so, as if time ran out.
+  void interrupt_when(Interrupted interrupted) {
+    if (settings_.synchronous) {
+      planner_.interrupt_when(std::move(interrupted));
+    }
+  }
 
   /// What the guide found last: the path, or what is in the way. A copy; not for the loop.
   Plan last_plan() const;

@@ -1,16 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 
 #include "sidestep/guidance/body_clearance.hpp"
 #include "sidestep/guidance/random_stream.hpp"
+#include "sidestep/interruption.hpp"
 
 namespace sidestep {
-
-/// Asked between attempts whether what is worked on is still wanted.
-using Interrupted = std::function<bool()>;
-inline bool never_interrupted() { return false; }
 
 /// Shortens a free path: waypoints that can be left out are, then at most `attempts` random stretches of it are replaced by
 /// a straight edge, or by the same with one joint at a constant rate (Geraerts and Overmars 2007), where that is shorter and

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -64,6 +65,8 @@ class Robot {
 
   /// Whether the other robot has the same joints in the same places, so that their states mean the same.
   bool same_joints(const Robot& other) const noexcept;
+  /// The same number for robots with the same joints; another, but for one chance in 2^64, for others. Made once.
+  std::uint64_t joints_hash() const noexcept { return joints_hash_; }
 
   /// Index of a frame; throws std::invalid_argument that lists the known names.
   int frame_index(const std::string& frame) const;
@@ -74,6 +77,7 @@ class Robot {
   std::vector<Frame> frames_;
   std::vector<std::string> coordinate_names_;
   JointLimits limits_;
+  std::uint64_t joints_hash_ = 0;
 };
 
 }  // namespace sidestep

@@ -10,7 +10,10 @@ namespace sidestep {
 /// Obstacle points in the world, each a ball with a radius that may be zero, moving with a constant velocity.
 class Obstacles {
  public:
-  /// points (3 × N) [m], radii (N) [m] >= 0, velocities (3 × N) [m/s]; all finite and N >= 1.
+  /// [m]: single precision still holds what queries make of a ball as large.
+  static constexpr double largest_radius = 1e9;
+
+  /// points (3 × N) [m], radii (N) [m] >= 0 and at most `largest_radius`, velocities (3 × N) [m/s]; all finite and N >= 1.
   /// Throws std::invalid_argument that names the first point at fault. For a free workspace use `none()`.
   Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities);
 
@@ -36,15 +39,9 @@ class Obstacles {
   /// Another number whenever points or radii may be others; copies keep it. For what is remembered about obstacles.
   std::uint64_t version() const noexcept { return version_; }
 
-  /// Moves every point along its velocity: x += s * duration. No allocation.
-  void advance(double duration) noexcept {
-    if (!tree_.moves()) {
-      return;
-    }
-    points_ += duration * velocities_;
-    tree_.advance(duration);
-    version_ = next_version();
-  }
+  /// Moves every point along its velocity: x += s * duration. False where the duration, or where that takes a point, is not
+  /// finite: then none moves. No allocation.
+  bool advance(double duration) noexcept;
 
  private:
   Obstacles() : points_(3, 0), radii_(0), velocities_(3, 0) {}

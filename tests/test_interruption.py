@@ -1,0 +1,120 @@
+"""Ctrl-C ends work of the core, and two threads are not let into one object."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import sidestep as ss
+from support import planar_problems
+
+LONG = {
+    "rollout": "ss.rollout(system, q, 0 * q, q + 1, none, steps=20_000_000)",
+    "rollout_batch": "ss.rollout_batch(system, rows[:4], 0 * rows[:4], rows[:4], none, steps=5_000_000, threads=2)",
+    "rollout_batch side by side": "ss.rollout_batch(dense, rows[:4], 0 * rows[:4], rows[:4], ball, steps=5_000_000)",
+    "evaluate_batch": "ss.evaluate_batch(near, rows, 0 * rows, rows, ball, threads=1)",
+    "plan": "planner.plan([0, 0, 0], [1.5, 0, 0], wall)",
+    "guide": "guide.set_goal([1.5, 0, 0]), guide.set_obstacles(wall), guide.step([0, 0, 0], 0.0)",
+    "finish": "run.finish()",
+    "refine_cover": "refine(steps=10**9)",
+}
+
+PROGRAM = """
+import signal, sys, time
+import numpy as np
+import sidestep as ss
+from support import planar_problems
+from sidestep._core import refine_cover
+
+robot = ss.Robot.named("planar3")
+body = ss.Body(**planar_problems.BODY)
+q, none = np.array([0.1, 0.2, 0.3]), ss.Obstacles.none()
+ball = ss.Obstacles([[0.5, 1.2, 0.0]], 0.1)
+system, dense = ss.GeometricSystem([], robot=robot), ss.GeometricSystem([ss.CollisionDensity(robot, body)])
+near = ss.GeometricSystem([ss.ClearanceBarrier(robot, body)])
+rows = np.tile(q, ({rows}, 1))
+angles = np.linspace(0.0, 2.0 * np.pi, 400)
+wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linspace(0.45, 1.6, 40)], 0.05)
+settings = ss.PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000)
+planner = ss.PathPlanner(robot, body, settings=settings)
+guide = ss.Guide(robot, body, planner=settings, synchronous=True)
+loop = ss.Loop(ss.GeometricSystem([], robot=robot), ss.TorqueController(robot), goal=q, obstacles=none)
+run = ss.RealTimeRun(loop, q, 0 * q, np.eye(3), 0 * q, steps=100_000)
+
+
+def refine(steps):
+    grid = np.random.default_rng(0).normal(size=(4, 4, 4))
+    points = np.random.default_rng(1).normal(size=(50, 3))
+    up = points / np.linalg.norm(points, axis=1)[:, None]
+    refine_cover(origin=[-1, -1, -1], spacing=0.6, values=grid, points=points, multipliers=np.zeros(50),
+                 directions=[up], centres=[[0, 0, 0]], shapes=[np.eye(3)], steps=steps, first_rate=1e-3,
+                 last_rate=1e-4, stiffness=1.0, multiplier_steps=10, margin=0.0, unit=0.01, area=1.0, slimness=0.1)
+
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+print("begins", flush=True)
+try:
+    {work}
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+else:
+    print("ended by itself", flush=True)
+run.stop()
+assert len(run.finish().taken) < 100_000
+moved = ss.rollout(system, q, 0 * q, q + 0.1, none, steps=5)
+assert np.isfinite(moved.q).all() and len(moved.time) == 6
+print("goes on", flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGINT cannot be sent to one process there")
+@pytest.mark.parametrize("name", LONG)
+def test_ctrl_c_ends_what_takes_long(name):
+    source = PROGRAM.replace("{work}", LONG[name]).replace(
+        "{rows}", "3_000_000" if name == "evaluate_batch" else "8"
+    )
+    with subprocess.Popen([sys.executable, "-c", source], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begins\n"
+        time.sleep(0.3)
+        begin = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == "interrupted\n"
+        assert time.monotonic() - begin < 5.0  # 0.1 s on a machine that is free; the work takes far longer
+        assert process.stdout.readline() == "goes on\n"
+    assert process.returncode == 0
+
+
+def test_a_handler_that_does_not_raise_does_not_end_the_work():
+    system = ss.GeometricSystem([], robot=ss.Robot.named("planar2"))
+    seen = []
+    before = signal.signal(signal.SIGINT, lambda *_: seen.append(True))
+    try:
+        timer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        motion = ss.rollout(system, [0, 0], [0, 0], [1, 1], ss.Obstacles.none(), steps=1_500_000)
+        timer.join()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert seen == [True]
+    assert np.isfinite(motion.q).all()
+
+
+def test_two_threads_are_not_let_into_one_planner():
+    robot, body = ss.Robot.named("planar3"), ss.Body(**planar_problems.BODY)
+    wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linspace(0.45, 1.6, 40)], 0.05)
+    settings = ss.PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000, max_seconds=3.0)
+    planner, plans = ss.PathPlanner(robot, body, settings=settings), []
+    thread = threading.Thread(target=lambda: plans.append(planner.plan([0, 0, 0], [1.5, 0, 0], wall)))
+    thread.start()
+    time.sleep(0.3)
+    with pytest.raises(RuntimeError, match="the planner is in use by another thread"):
+        planner.is_free([0, 0, 0], wall)
+    thread.join()
+    assert plans[0].status == ss.PlanStatus.timeout
+    assert planner.is_free([0, 0, 0], wall, margin=0.0)
