@@ -21,6 +21,7 @@ from sidestep._core import (
     PlannerSettings,
     RouteSettings,
     Step,
+    real_array,
 )
 from sidestep.body import Body
 from sidestep.link_pairs import tables_and_pairs
@@ -116,7 +117,7 @@ class GuidedMotion:
     def set_goal(self, goal: npt.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to from now on."""
         self.guide.set_goal(goal)
-        self._goal = np.array(goal, dtype=np.float64)
+        self._goal = real_array(goal, "goal").copy()
         self._next_look = -float("inf")
 
     def step(

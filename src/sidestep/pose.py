@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from sidestep._core import real_array
+
 Array = npt.NDArray[np.float64]
 
 NO_TURN = 1e-9  # sine of an angle that is none, or half a turn
@@ -59,9 +61,9 @@ def rotation_vector(rotation: Array) -> Array:
 def pose_at(translation: npt.ArrayLike, rotation: npt.ArrayLike | None = None) -> Array:
     """A pose (4, 4) at a translation (3,) [m], turned by a rotation (3, 3), or not at all."""
     X = np.eye(4)
-    X[:3, 3] = np.asarray(translation, dtype=np.float64)
+    X[:3, 3] = real_array(translation, "translation")
     if rotation is not None:
-        X[:3, :3] = np.asarray(rotation, dtype=np.float64)
+        X[:3, :3] = real_array(rotation, "rotation")
     return X
 
 
@@ -76,7 +78,7 @@ def checked_pose(value: npt.ArrayLike, owner: str, *, tolerance: float = 1e-6) -
     Raises:
         ValueError: it is not a rigid transform with finite entries.
     """
-    X = np.array(value, dtype=np.float64)
+    X = real_array(value, owner).copy()
     if X.shape != (4, 4):
         raise ValueError(f"{owner} has shape {X.shape}, expected (4, 4): a rigid transform")
     rotation = X[:3, :3]

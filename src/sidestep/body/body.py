@@ -63,10 +63,10 @@ class Body(_core.Body):
     ) -> None:
         super().__init__(
             links=list(links),
-            weights=np.asarray(weights, dtype=np.float64),
-            means=np.asarray(means, dtype=np.float64),
-            covariances=np.asarray(covariances, dtype=np.float64),
-            levels=None if levels is None else np.asarray(levels, dtype=np.float64),
+            weights=weights,
+            means=means,
+            covariances=covariances,
+            levels=levels,
         )
         self.robot_name = robot_name
         self.fingerprint = fingerprint

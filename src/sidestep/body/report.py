@@ -114,7 +114,7 @@ def draw_links(body: Body, robot: Robot) -> Figure:
 
 def draw_arm(body: Body, robot: Robot, q: ArrayLike | None = None) -> Figure:
     """The arm at q (nv,), neutral by default, in the world frame: at an angle, and from the side."""
-    configuration = robot.neutral if q is None else np.asarray(q, dtype=np.float64)
+    configuration = robot.neutral if q is None else robot.check_configuration(q)
     figure = _figure(11.0, 5.8)
     for index, (elevation, azimuth, projection) in enumerate(((20.0, -55.0, "persp"), (0.0, -90.0, "ortho"))):
         axes: Axes3D = figure.add_subplot(1, 2, index + 1, projection="3d", proj_type=projection)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sidestep._core import Obstacles
+from sidestep._core import Obstacles, real_array
 
 Points = NDArray[np.float64]
 MAX_COLUMNS = 16  # of a point: coordinates, normal, colour; more are points that stand in columns
@@ -130,12 +130,12 @@ def merge_in_voxels(points: ArrayLike, radii: ArrayLike = 0.0, *, voxel: float) 
     Raises:
         ValueError: if the voxel is not a positive length or the points are not finite (N, 3).
     """
-    cloud = np.asarray(points, dtype=np.float64)
+    cloud = real_array(points, "points")
     if cloud.ndim != 2 or cloud.shape[1] != 3 or not np.isfinite(cloud).all():
         raise ValueError(f"points have shape {cloud.shape}, expected finite points (N, 3)")
     if not (np.isfinite(voxel) and voxel > 0.0):
         raise ValueError(f"voxel is {voxel}, must be positive and finite [m]")
-    own = np.broadcast_to(np.asarray(radii, dtype=np.float64), len(cloud))
+    own = np.broadcast_to(real_array(radii, "radii"), len(cloud))
     _, cell = np.unique(np.floor(cloud / voxel), axis=0, return_inverse=True)
     cell = cell.reshape(-1)
     order = np.argsort(cell, kind="stable")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sidestep._core import Obstacles
+from sidestep._core import Obstacles, real_array
 from sidestep.obstacles.covering import check_spacing
 from sidestep.obstacles.shapes import Shape, Sphere
 
@@ -44,7 +44,7 @@ def obstacles_from_shapes(
     if not (np.isfinite(radius) and radius >= 0.0):
         raise ValueError(f"radius is {radius}, must be >= 0 and finite [m]")
     shape_velocities = (
-        np.zeros((len(shapes), 3)) if velocities is None else np.asarray(velocities, dtype=np.float64)
+        np.zeros((len(shapes), 3)) if velocities is None else real_array(velocities, "velocities")
     )
     if shape_velocities.shape != (len(shapes), 3) or not np.isfinite(shape_velocities).all():
         raise ValueError(

@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from sidestep._core import real_array
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import covering
 from sidestep.pose import checked_pose, moved
@@ -136,7 +137,7 @@ class MeshShape:
     def __post_init__(self) -> None:
         if not Path(self.path).is_file():
             raise FileNotFoundError(f"mesh file '{self.path}' does not exist")
-        scale = np.asarray(self.scale, dtype=np.float64)
+        scale = real_array(self.scale, f"mesh '{self.path}': scale")
         if scale.shape not in ((), (3,)) or not (np.isfinite(scale).all() and (scale > 0.0).all()):
             raise ValueError(
                 f"mesh '{self.path}': scale is {self.scale}, must be one or three positive numbers"

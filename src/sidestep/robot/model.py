@@ -210,10 +210,7 @@ class Robot(_core.Robot):
         Raises:
             ValueError: names `name`, the joint, its value and the interval allowed.
         """
-        try:
-            array = np.asarray(q, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise TypeError(f"{name} must be an array of {self.num_coordinates} real numbers") from None
+        array = _core.real_array(q, name)
         if array.shape != (self.num_coordinates,):
             raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
         limits = self.limits
@@ -298,7 +295,7 @@ class Robot(_core.Robot):
         return _core.RigidBodyDynamics(self, self.inertials)
 
     def _vector(self, value: ArrayLike, name: str) -> Array:
-        array = np.asarray(value, dtype=np.float64)
+        array = _core.real_array(value, name)
         if array.shape != (self.num_coordinates,):
             raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
         if not np.isfinite(array).all():

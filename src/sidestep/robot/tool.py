@@ -34,7 +34,7 @@ def tree_with_tool(
         raise ValueError(f"robot {robot.name!r} has no link {link!r}; its links are: {', '.join(known)}")
     if not 0.0 <= mass < np.inf:
         raise ValueError(f"mass of tool {name!r} is {mass}, must be finite and >= 0 [kg]")
-    X = np.eye(4) if pose is None else np.asarray(pose, dtype=np.float64)
+    X = np.eye(4) if pose is None else _core.real_array(pose, f"pose of tool {name!r}")
     if X.shape != (4, 4) or not np.isfinite(X).all() or not np.array_equal(X[3], [0.0, 0.0, 0.0, 1.0]):
         raise ValueError(f"pose of tool {name!r} must be a homogeneous matrix (4, 4), got {X}")
     R = X[:3, :3]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sidestep._core import Frame, Joint, JointLimits, JointType
+from sidestep._core import Frame, Joint, JointLimits, JointType, real_array
 from sidestep.pose import about_axis, checked_pose, pose_at
 from sidestep.robot.degrees import DEGREES_HINT, degrees_hint, looks_like_degrees
 from sidestep.robot.link import Array, Link
@@ -271,7 +271,7 @@ def _limits(
 
 
 def _per_coordinate(value: ArrayLike, what: str, names: list[str]) -> Array:
-    array = np.asarray(value, dtype=np.float64)
+    array = real_array(value, what)
     if array.shape not in ((), (len(names),)):
         raise ValueError(
             f"{what} has shape {array.shape}, expected a number or ({len(names)},) for {', '.join(names)}"

@@ -30,7 +30,7 @@ from sidestep import (
     TorqueController,
     Unswitched,
 )
-from sidestep._core import JointType, Obstacles
+from sidestep._core import Obstacles, real_array
 from sidestep.arm import Arm
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
@@ -352,7 +352,7 @@ def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:
             f"{name} has {len(values)} values; robot {robot.name!r} has {robot.num_coordinates} coordinates "
             f"({', '.join(robot.coordinate_names)})"
         )
-    array = np.array(values, dtype=float)
+    array = real_array(values, name).copy()
     if unit == "deg":
         turns = _turns(robot)
         array[turns] = np.deg2rad(array[turns])

@@ -16,6 +16,7 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
+from sidestep._core import real_array
 from sidestep.pose import from_quaternion, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.link_parts import LinkParts, hulls_apart
@@ -123,7 +124,7 @@ class ExactClearance:
             object_poses: (num_objects, 7) position [m] and quaternion (w, x, y, z) of each object in the
                 world; None takes the poses at time 0.
         """
-        poses = self._start_poses() if object_poses is None else np.asarray(object_poses, dtype=float)
+        poses = self._start_poses() if object_poses is None else real_array(object_poses, "object_poses")
         best = _nothing()
         for i, link in enumerate(self._links):
             X_WL = self.robot.pose(q, link.name)
@@ -137,7 +138,7 @@ class ExactClearance:
 
     def of_links(self, q: Array, object_poses: Array | None = None) -> tuple[Clearance, ...]:
         """What is nearest to each link; arguments as in `distance`. Nothing where the scene is empty."""
-        poses = self._start_poses() if object_poses is None else np.asarray(object_poses, dtype=float)
+        poses = self._start_poses() if object_poses is None else real_array(object_poses, "object_poses")
         radii = np.array([item.bounding_radius for item in self._objects])
         nearest = []
         for i, link in enumerate(self._links):
@@ -224,7 +225,7 @@ class ExactClearance:
         return closest
 
     def _check_path(self, trajectory: Array, object_poses: Array | None) -> tuple[Array, Array]:
-        path = np.asarray(trajectory, dtype=float)
+        path = real_array(trajectory, "trajectory")
         if path.ndim != 2 or path.shape[1] != self.robot.num_coordinates or len(path) == 0:
             raise ValueError(
                 f"trajectory has shape {path.shape}, expected (T, {self.robot.num_coordinates}), T > 0"
@@ -233,7 +234,7 @@ class ExactClearance:
         if object_poses is None:
             poses: Array = np.broadcast_to(self._start_poses(), expected)
         else:
-            poses = np.asarray(object_poses, dtype=float)
+            poses = real_array(object_poses, "object_poses")
         if poses.shape != expected:
             raise ValueError(f"object_poses has shape {poses.shape}, expected {expected}")
         if not (np.all(np.isfinite(path)) and np.all(np.isfinite(poses))):

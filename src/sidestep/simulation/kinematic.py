@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import GeometricSystem, JointGoal, Obstacles, PoseGoal, rollout
+from sidestep._core import GeometricSystem, JointGoal, Obstacles, PoseGoal, real_array, rollout
 from sidestep.pose import pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.driver import ControllerDriver
@@ -63,7 +63,7 @@ def run_kinematically(
     start = robot.check_configuration(start, "start")
     if not isinstance(goal, PoseTarget):
         goal = robot.check_configuration(goal, "goal")
-    v = np.zeros_like(start) if start_velocity is None else np.array(start_velocity, dtype=float)
+    v = np.zeros_like(start) if start_velocity is None else real_array(start_velocity, "start_velocity")
     watch = None if arrival is None else ArrivalWatch(goal, arrival)
     steps = max(1, round(duration / timestep))
     if isinstance(mover, GeometricSystem):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import JointGoal, PoseGoal
+from sidestep._core import JointGoal, PoseGoal, real_array
 from sidestep.pose import rotation_vector
 from sidestep.robot import Robot
 
@@ -129,7 +129,7 @@ def posture_at(
     """
     lower, upper = robot._finite_interval()
     rng = np.random.default_rng(0)
-    near = np.clip(np.array(near, dtype=float), lower, upper)
+    near = np.clip(real_array(near, "near"), lower, upper)
     best = _descend(robot, frame, pose, near)
     if best.found and free(best.q):
         return best

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from sidestep._core import Obstacles
+from sidestep._core import Obstacles, real_array
 from sidestep.obstacles import Box, Cylinder, Shape, Sphere
 from sidestep.pose import checked_pose, pose_at
 
@@ -75,7 +75,7 @@ class SceneObject:
                 f"object {self.name!r}: size of a {self.kind} is {meaning}, positive, got {self.size}"
             )
         pose = checked_pose(self.pose, f"object {self.name!r}: pose")
-        velocity = np.array(self.velocity, dtype=float)
+        velocity = real_array(self.velocity, f"{self.name}: velocity").copy()
         if velocity.shape != (3,) or not np.all(np.isfinite(velocity)):
             raise ValueError(f"object {self.name!r}: velocity must be (3,), finite, got {self.velocity}")
         if not (np.isfinite(self.mass) and self.mass > 0.0):
@@ -114,7 +114,7 @@ class SceneObject:
             pose=pose_at(center),
             motion=motion,
             mass=mass,
-            velocity=np.asarray(velocity, dtype=float),
+            velocity=real_array(velocity, f"{name}: velocity"),
             moves_during=moves_during,
             present=present,
         )
@@ -150,7 +150,7 @@ class SceneObject:
             pose=shape.pose,
             motion=motion,
             mass=mass,
-            velocity=np.asarray(velocity, dtype=float),
+            velocity=real_array(velocity, f"{name}: velocity"),
             moves_during=moves_during,
             mesh=mesh,
         )

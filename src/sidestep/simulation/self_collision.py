@@ -14,6 +14,7 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
+from sidestep._core import real_array
 from sidestep.robot import Robot, read_srdf
 from sidestep.simulation.link_parts import LinkParts, hulls_apart
 from sidestep.simulation.solid import mesh_model
@@ -183,7 +184,7 @@ class SelfCollision:
             ValueError: wrong shape, values that are not finite, a tolerance that is not positive, or a prismatic
                 joint between the links that has no position limits.
         """
-        path = np.asarray(trajectory, dtype=float)
+        path = real_array(trajectory, "trajectory")
         if path.ndim != 2 or path.shape[1] != self.robot.num_coordinates or len(path) == 0:
             raise ValueError(
                 f"trajectory has shape {path.shape}, expected (T, {self.robot.num_coordinates}), T > 0"

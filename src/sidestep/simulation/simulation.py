@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from sidestep._core import real_array
 from sidestep.robot import Robot
 from sidestep.simulation.driver import Driver
 from sidestep.simulation.model import build_model
@@ -98,7 +99,9 @@ class Simulation:
             goal = self.robot.check_configuration(goal, "goal")
         built, data = self.built, mujoco.MjData(self.built.model)
         built.set_state(
-            data, start, np.zeros_like(start) if start_velocity is None else np.asarray(start_velocity)
+            data,
+            start,
+            np.zeros_like(start) if start_velocity is None else real_array(start_velocity, "start_velocity"),
         )
         watch = None if arrival is None else ArrivalWatch(goal, arrival)
         steps = max(1, round(duration / self.timestep))

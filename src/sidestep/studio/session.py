@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Obstacles, Step, TorqueController, TorqueSolution
+from sidestep._core import Obstacles, Step, TorqueController, TorqueSolution, real_array
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
@@ -355,7 +355,7 @@ class Session:
 
 def finite(values: npt.ArrayLike, what: str) -> Array:
     """The values as an array; raises ValueError where one of them is not finite."""
-    array = np.array(values, dtype=float)
+    array = real_array(values, what).copy()
     if not np.isfinite(array).all():
         raise ValueError(f"{what} is {array.tolist()}; allowed: finite numbers")
     return array
