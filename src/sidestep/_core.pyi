@@ -2496,7 +2496,7 @@ class Controller:
         """
 
     @property
-    def labels(self) -> list["sidestep::CoordinateLabel"]:
+    def labels(self) -> list[CoordinateLabel]:
         """What the clearances are of."""
 
     @property

@@ -30,7 +30,7 @@ from sidestep import (
     TorqueController,
     Unswitched,
 )
-from sidestep._core import Obstacles, real_array
+from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
