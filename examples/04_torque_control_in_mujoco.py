@@ -1,15 +1,14 @@
 """Torque control in MuJoCo.
 
-The whole chain on a Franka Research 3: wanted acceleration, torque within every limit, rigid-body physics
-with the real meshes, 1 kHz. The run is judged afterwards by exact clearance and by MuJoCo's contacts.
+The whole chain on a Franka Research 3: the controller's torque within every limit, rigid-body physics with the real
+meshes, 1 kHz. The run is judged afterwards by exact clearance and by MuJoCo's contacts.
 """
 
 import numpy as np
 
 import sidestep as ss
 
-robot = ss.Robot.named("fr3_arm")
-body = ss.Body.fit(robot, components=4, seed=0)
+arm = ss.Arm.load("fr3_arm")
 start = np.deg2rad([0, 45, 0, -66, 0, 66, 45])
 goal = np.deg2rad([60, 45, 0, -66, 0, 66, 45])
 
@@ -19,10 +18,10 @@ pose[:3, 3] = 0.55, 0.32, 0.72
 scene = [ss.SceneObject("ball", "sphere", (0.05,), pose=pose)]
 seen = ss.Obstacles([pose[:3, 3]], radii=0.05)
 
-psi = ss.Sum([ss.CollisionDensity(robot, body), ss.JointLimitPotential(robot)])
-system = ss.GeometricSystem([psi], stiffness=2.0, damping=3.0)
-controller = ss.TorqueController(robot)
-run = ss.Simulation(robot, scene).run(system, controller, start, goal, 8.0, seen)
+controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))  # the same motion every time
+controller.set_goal(goal)
+driver = ss.ControllerDriver(controller, seen)
+run = ss.Simulation(arm.robot, scene).run(driver, start, goal, 8.0)
 
 found = ss.evaluate(run)
 print(

@@ -104,6 +104,7 @@ from .scenario import ScenarioResult as ScenarioResult
 from .scenario import run_scenario as run_scenario
 from .scenario import shipped_scenarios as shipped_scenarios
 from .simulation import Arrival as Arrival
+from .simulation import ControllerDriver as ControllerDriver
 from .simulation import Evaluation as Evaluation
 from .simulation import ExactClearance as ExactClearance
 from .simulation import KinematicRun as KinematicRun
@@ -112,5 +113,6 @@ from .simulation import SelfClearance as SelfClearance
 from .simulation import SelfCollision as SelfCollision
 from .simulation import Simulation as Simulation
 from .simulation import SimulationRun as SimulationRun
+from .simulation import SystemDriver as SystemDriver
 from .simulation import evaluate as evaluate
 from .simulation import run_kinematically as run_kinematically

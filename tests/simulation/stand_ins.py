@@ -6,6 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from sidestep.simulation import Simulation, SimulationRun, SystemDriver
+
 PENDULUM = """
 <robot name="pendulum">
   <link name="base"/>
@@ -54,3 +56,10 @@ class Holding:
 
     def solve(self, q, v, acceleration, mass_matrix, bias):
         return SimpleNamespace(torque=self.compensate * bias, acceleration=acceleration, status="ok")
+
+
+def simulate(
+    simulation: Simulation, system, program, start, goal, duration, obstacles, **options
+) -> SimulationRun:
+    """A run driven by a system and a program."""
+    return simulation.run(SystemDriver(system, program, goal, obstacles), start, goal, duration, **options)

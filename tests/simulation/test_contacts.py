@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stand_ins import InverseDynamics, Spring
+from stand_ins import InverseDynamics, Spring, simulate
 
 from sidestep import Robot, SceneObject, Simulation, evaluate
 from sidestep._core import Obstacles
@@ -17,7 +17,9 @@ def _sweep(*objects: SceneObject, duration: float = 2.0, obstacles=None):
     """The planar arm, stretched along x, sweeps a quarter turn to the left."""
     simulation = Simulation(Robot.named("planar2"), objects)
     seen = Obstacles.none() if obstacles is None else obstacles
-    return simulation.run(Spring(6.0, 5.0), InverseDynamics(), START, GOAL, duration, seen, arrival=None)
+    return simulate(
+        simulation, Spring(6.0, 5.0), InverseDynamics(), START, GOAL, duration, seen, arrival=None
+    )
 
 
 def test_free_ball_is_pushed() -> None:
@@ -69,7 +71,8 @@ def test_moving_ball_follows_its_script_and_is_seen() -> None:
         "ball", [0.9, -0.6, 0.0], radius=0.03, motion="moving", velocity=(0, -0.2, 0), moves_during=(0.5, 1.5)
     )
     system = Spring(6.0, 5.0)
-    run = Simulation(Robot.named("planar2"), [ball]).run(
+    run = simulate(
+        Simulation(Robot.named("planar2"), [ball]),
         system,
         InverseDynamics(),
         START,
@@ -86,8 +89,15 @@ def test_moving_ball_follows_its_script_and_is_seen() -> None:
 def test_constant_velocity_obstacles_advance_without_touching_the_callers() -> None:
     obstacles = Obstacles([[0.9, -0.6, 0.0]], 0.0, [[0.0, -0.1, 0.0]])
     system = Spring()
-    Simulation(Robot.named("planar2")).run(
-        system, InverseDynamics(), START, GOAL, 0.5, obstacles, arrival=None
+    simulate(
+        Simulation(Robot.named("planar2")),
+        system,
+        InverseDynamics(),
+        START,
+        GOAL,
+        0.5,
+        obstacles,
+        arrival=None,
     )
     np.testing.assert_allclose(np.array(system.seen)[:, 0, 1], -0.6 - 0.1 * np.arange(500) * 1e-3, atol=1e-12)
     np.testing.assert_array_equal(obstacles.points, [[0.9, -0.6, 0.0]])
@@ -96,8 +106,8 @@ def test_constant_velocity_obstacles_advance_without_touching_the_callers() -> N
 def test_floor_catches_what_the_arm_knocks_down() -> None:
     ball = SceneObject.ball("ball", [0.8, 0.3, 0.0], radius=0.03, motion="free")
     simulation = Simulation(Robot.named("planar2"), [ball], floor_height=-0.02)  # the arm itself dips into it
-    run = simulation.run(
-        Spring(6.0, 5.0), InverseDynamics(), START, np.array([0.1, 0.0]), 0.5, Obstacles.none()
+    run = simulate(
+        simulation, Spring(6.0, 5.0), InverseDynamics(), START, np.array([0.1, 0.0]), 0.5, Obstacles.none()
     )
     assert not run.contacts  # arm-floor contacts are off
 
@@ -107,8 +117,14 @@ def test_floor_catches_what_the_arm_knocks_down() -> None:
 )
 def test_start_outside_the_limits(start, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        Simulation(Robot.named("planar2")).run(
-            Spring(), InverseDynamics(), np.array(start), GOAL, 1.0, Obstacles.none()
+        simulate(
+            Simulation(Robot.named("planar2")),
+            Spring(),
+            InverseDynamics(),
+            np.array(start),
+            GOAL,
+            1.0,
+            Obstacles.none(),
         )
 
 

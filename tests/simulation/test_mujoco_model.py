@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.special import ellipk
-from stand_ins import PENDULUM, Holding, InverseDynamics, Spring
+from stand_ins import PENDULUM, Holding, InverseDynamics, Spring, simulate
 
 from sidestep import Arrival, Robot, SceneObject, Simulation
 from sidestep._core import Obstacles
@@ -65,7 +65,8 @@ def test_position_limits_are_in_radians_and_enforced() -> None:
 def test_pendulum_period() -> None:
     robot = Robot.from_urdf(PENDULUM)
     angle = 0.5
-    run = Simulation(robot).run(
+    run = simulate(
+        Simulation(robot),
         Spring(),
         Holding(compensate=False),
         np.array([angle]),
@@ -88,7 +89,9 @@ def test_pendulum_period() -> None:
 def test_gravity_compensation_holds_still(name: str) -> None:
     robot = _robot(name)
     q = np.deg2rad([0, 45, 0, -66, 0, 66, 45]) if name == "fr3_arm" else np.array([0.4])
-    run = Simulation(robot).run(Spring(), Holding(compensate=True), q, q, 1.0, Obstacles.none(), arrival=None)
+    run = simulate(
+        Simulation(robot), Spring(), Holding(compensate=True), q, q, 1.0, Obstacles.none(), arrival=None
+    )
     assert len(run) == 1000
     # rounding only for the tree; the mimic equality is MuJoCo's soft constraint and sags under gravity
     assert np.abs(run.q - q).max() < (1e-9 if name == "fr3_arm" else 1e-2)
@@ -97,7 +100,7 @@ def test_gravity_compensation_holds_still(name: str) -> None:
 def test_achieved_is_the_wanted_acceleration_under_inverse_dynamics() -> None:
     robot = Robot.named("ur5")
     goal = robot.neutral + 0.4
-    run = Simulation(robot).run(Spring(), InverseDynamics(), robot.neutral, goal, 0.5, Obstacles.none())
+    run = simulate(Simulation(robot), Spring(), InverseDynamics(), robot.neutral, goal, 0.5, Obstacles.none())
     # semi-implicit Euler applies M^-1 (torque - h) unchanged; what is left is rounding divided by 1 ms
     np.testing.assert_allclose(run.achieved, run.wanted, atol=1e-8)
 
@@ -105,7 +108,7 @@ def test_achieved_is_the_wanted_acceleration_under_inverse_dynamics() -> None:
 def test_substeps_hold_the_torque() -> None:
     robot = Robot.from_urdf(PENDULUM)
     args = (Spring(), InverseDynamics(), np.array([0.5]), np.zeros(1), 2.0, Obstacles.none())
-    coarse, fine = Simulation(robot).run(*args), Simulation(robot, substeps=8).run(*args)
+    coarse, fine = simulate(Simulation(robot), *args), simulate(Simulation(robot, substeps=8), *args)
     assert len(coarse) == len(fine) == 2000
     # the torque is held for 1 ms: gravity moves on meanwhile, by less than v g/l dt = 0.03 rad/s^2
     np.testing.assert_allclose(fine.achieved, fine.wanted, atol=0.03)
@@ -139,8 +142,15 @@ def test_two_objects_of_one_name() -> None:
 def test_arrival_stops_the_run() -> None:
     robot = Robot.from_urdf(PENDULUM)
     rule = Arrival(position=0.01, speed=0.01, hold=0.1)
-    run = Simulation(robot).run(
-        Spring(9.0, 6.0), InverseDynamics(), np.array([0.5]), np.zeros(1), 9.0, Obstacles.none(), arrival=rule
+    run = simulate(
+        Simulation(robot),
+        Spring(9.0, 6.0),
+        InverseDynamics(),
+        np.array([0.5]),
+        np.zeros(1),
+        9.0,
+        Obstacles.none(),
+        arrival=rule,
     )
     assert run.arrived
     # critically damped: q = 0.5 (1 + 3t) exp(-3t), |v| = 4.5 t exp(-3t); the later of the two conditions

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from stand_ins import simulate
 
 from sidestep import (
     Body,
@@ -31,7 +32,7 @@ def test_free_workspace_as_in_the_thesis(fr3: tuple[Robot, CollisionDensity]) ->
     """Thesis 6.2.2: only joint 1 moves, exactly as the damped spring, and every limit holds."""
     robot, psi = fr3
     system = GeometricSystem([psi], stiffness=0.5, damping=1.5)
-    run = Simulation(robot).run(system, TorqueController(robot), START, GOAL, 6.0, Obstacles.none())
+    run = simulate(Simulation(robot), system, TorqueController(robot), START, GOAL, 6.0, Obstacles.none())
     result = evaluate(run)
     # roots -1/2 and -1: q - goal = -(pi/2)(2 exp(-t/2) - exp(-t));
     # semi-implicit Euler at 1 ms is off by about dt/2
@@ -51,8 +52,8 @@ def test_torque_control_follows_the_kinematic_motion(fr3: tuple[Robot, Collision
     obstacles = Obstacles([[0.4, 0.53, 0.52], [0.4, 0.51, 0.52], [0.3, 0.45, 0.52]])
     objects = SceneObject.balls(obstacles, radius=0.03, motion="free")
     system = GeometricSystem([psi], stiffness=0.5, damping=1.5)
-    simulated = Simulation(robot, objects).run(
-        system, TorqueController(robot), START, GOAL, 2.0, obstacles, arrival=None
+    simulated = simulate(
+        Simulation(robot, objects), system, TorqueController(robot), START, GOAL, 2.0, obstacles, arrival=None
     )
     kinematic = run_kinematically(robot, system, START, GOAL, 2.0, obstacles, objects=objects, arrival=None)
     assert len(simulated) == len(kinematic) == 2000
