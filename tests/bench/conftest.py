@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from sidestep import Body, Robot, presets
-from sidestep.bench import ProblemGenerator, ProblemSettings
+from sidestep import Arm, Body, Robot
+from sidestep.bench import ControllerMover, ProblemGenerator, ProblemSettings
 
 
 @pytest.fixture(scope="session")
@@ -14,9 +14,9 @@ def generator() -> ProblemGenerator:
 
 
 @pytest.fixture(scope="session")
-def system(generator: ProblemGenerator) -> object:
+def mover(generator: ProblemGenerator) -> ControllerMover:
     body = Body.cover(generator.robot, components=3, cache=False)
-    return presets.barrier_system(generator.robot, body)
+    return ControllerMover(generator.robot, Arm.from_robot(generator.robot, body))
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,6 @@ from sidestep.bench import (
     ProblemGenerator,
     ProblemSettings,
     SceneSettings,
-    move,
     run_dynamic,
 )
 from sidestep.bench.arm import Arm
@@ -85,10 +84,10 @@ def test_the_controller_sees_a_ball_from_the_moment_it_is_there() -> None:
     """Until then the motion is that among the balls at rest, and afterwards it is not."""
     problem = drawn(Kind.sudden)
     settings = MotionSettings(duration=problem.changes[0] + 0.5)
-    motion = move(arm().robot, arm().system, problem, settings)
+    motion = arm().mover.move(problem, settings)
     steps = round(settings.duration / settings.period)
     alone = rollout(
-        arm().system,
+        arm().mover.system,
         problem.start,
         np.zeros(3),
         problem.goal,
@@ -115,8 +114,8 @@ def test_every_kind_is_reported_as_a_set() -> None:
 def test_an_arm_beside_a_ball_in_its_goal_has_not_arrived() -> None:
     settings = SceneSettings(
         robot="planar3",
-        method=Method.barrier,
-        motion=MotionSettings.of(Method.barrier, duration=6.0, tolerance=0.5),
+        method=Method.controller,
+        motion=MotionSettings(duration=6.0, tolerance=0.5),
         jobs=1,
     )
     result = run_dynamic(settings, count=2, seed=3, obstacles=0)

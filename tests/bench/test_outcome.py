@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sidestep import GeometricSystem
-from sidestep.bench import Judge, Motion, MotionSettings, ProblemGenerator, ReachProblem, move
+from sidestep.bench import ControllerMover, Judge, Motion, MotionSettings, ProblemGenerator, ReachProblem
 
 SETTINGS = MotionSettings()
 
@@ -91,9 +90,9 @@ def test_a_state_that_is_not_finite_ends_the_motion(generator: ProblemGenerator,
     assert outcome.time_s == pytest.approx(0.019)
 
 
-def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, system: GeometricSystem) -> None:
+def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, mover: ControllerMover) -> None:
     problem = planted((3.0, 0.0, 0.0), 0.05, generator)
-    motion = move(generator.robot, system, problem, SETTINGS)
+    motion = mover.move(problem, SETTINGS)
     assert motion.arrived
     error = np.abs(motion.q - problem.goal).max(axis=1)
     assert error[-1] < 0.05 <= error[-2]
@@ -103,21 +102,21 @@ def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, system: Geo
     np.testing.assert_allclose(motion.q[1:], motion.q[:-1] + 1e-3 * motion.v[1:], atol=1e-12)
 
 
-def test_a_motion_that_does_not_arrive_has_one_row_more_than_steps(
-    generator: ProblemGenerator, system: GeometricSystem
+def test_a_motion_that_does_not_arrive_has_a_row_for_every_step(
+    generator: ProblemGenerator, mover: ControllerMover
 ) -> None:
     problem = planted((3.0, 0.0, 0.0), 0.05, generator)
-    motion = move(generator.robot, system, problem, MotionSettings(duration=1.2))
+    motion = mover.move(problem, MotionSettings(duration=1.2))
     assert not motion.arrived
-    assert len(motion.q) == 1201
+    assert len(motion.q) == 1200
 
 
 def test_a_safe_motion_keeps_every_limit(
-    generator: ProblemGenerator, system: GeometricSystem, judge: Judge
+    generator: ProblemGenerator, mover: ControllerMover, judge: Judge
 ) -> None:
-    settings = MotionSettings(duration=2.0, safe=True)
+    settings = MotionSettings(duration=2.0)
     for index in range(2):
         problem = generator.problem(index)
-        outcome = judge.judge(problem, move(generator.robot, system, problem, settings), settings)
+        outcome = judge.judge(problem, mover.move(problem, settings), settings)
         assert outcome.limits == {}
         assert not outcome.collision

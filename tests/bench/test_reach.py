@@ -71,7 +71,7 @@ def test_a_fast_arm_minds_what_is_ahead_not_what_is_nearest(index: int) -> None:
     # an obstacle ahead while another was nearer beside it.
     settings = ProblemSettings(robot="ur10", obstacles=10)
     problem = ProblemGenerator(settings).problem(index)
-    bench = BenchSettings(problems=settings, motion=MotionSettings(duration=1.0, safe=True))
+    bench = BenchSettings(problems=settings, motion=MotionSettings(duration=1.0))
     (outcome,) = run_bench(bench, problems=[problem]).outcomes
     assert not outcome.collision
     assert not outcome.self_collision

@@ -50,8 +50,8 @@ def judged(
     steps = round(2.0 / PERIOD)
     q = np.zeros((steps, robot.num_coordinates))
     poses = poses_over([ball], PERIOD * np.arange(steps))
-    still = Motion(q, q, q, poses, None, 0, False, np.zeros(steps))
-    settings = MotionSettings(period=PERIOD, safe=safe)
+    still = Motion(q, q, q, poses, None, 0, False, np.zeros(steps), safe=safe)
+    settings = MotionSettings(period=PERIOD)
     return Judge(robot).judge(Passing(q[0], (ball,)), still, settings)
 
 

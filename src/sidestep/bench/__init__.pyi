@@ -5,10 +5,12 @@ from .dynamic import DynamicProblem as DynamicProblem
 from .dynamic import Kind as Kind
 from .dynamic import run_dynamic as run_dynamic
 from .method import Method as Method
-from .methods import build_system as build_system
+from .methods import build_mover as build_mover
+from .motion import ControllerMover as ControllerMover
 from .motion import Motion as Motion
 from .motion import MotionSettings as MotionSettings
-from .motion import move as move
+from .motion import Mover as Mover
+from .motion import SystemMover as SystemMover
 from .motion_bench_maker import MotionBenchMakerProblem as MotionBenchMakerProblem
 from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_maker
 from .outcome import Judge as Judge

@@ -13,7 +13,7 @@ from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 if TYPE_CHECKING:
-    from sidestep.bench import MotionSettings, SceneResult, SceneSettings
+    from sidestep.bench import SceneResult, SceneSettings
 
 COLUMNS = (  # title, key of the figures, decimals, which quantiles
     ("first path [ms]", "first_path_ms", 2, ("median", "p95", "p99")),
@@ -62,6 +62,7 @@ def motion_bench_maker(
     the request puts them. Exit code: 0 when nothing was touched and no limit broken, 1 when not, 2 on bad input.
     """
     from sidestep.bench import (
+        MotionSettings,
         SceneSettings,
         default_jobs,
         read_motion_bench_maker,
@@ -129,7 +130,13 @@ def dynamic(
     or becomes free; where it stays blocked, not arrived. At a goal that the ball is in at first, arrived is within 0.01
     rad or m. Exit code as for motionbenchmaker.
     """
-    from sidestep.bench import SceneSettings, default_jobs, read_motion_bench_maker, run_dynamic
+    from sidestep.bench import (
+        MotionSettings,
+        SceneSettings,
+        default_jobs,
+        read_motion_bench_maker,
+        run_dynamic,
+    )
 
     published = () if scenes is None else read_motion_bench_maker(scenes)
     sets = dict.fromkeys(item.set for item in published)
