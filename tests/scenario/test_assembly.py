@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep._core import DistanceSwitch, JointGoal, Obstacles
+from sidestep._core import DistanceSwitch, Obstacles
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import assemble
@@ -102,11 +102,14 @@ def test_a_point_cloud_becomes_one_ball_per_point(tmp_path: Path) -> None:
 def test_the_switch_and_embedding_are_those_asked_for() -> None:
     text = BASE + "embedding: {joint_limits: {slope: 10}, combine: stack}\n"
     text += "system: {stiffness: 2, switch: {type: distance, thresholds: [0.1, 0.2], slope: 30}}\n"
-    system = assemble(parse(text)).system
+    system = assemble(parse(text)).mover
+    assert isinstance(system, GeometricSystem)
     assert isinstance(system.switch, DistanceSwitch)
     assert system.switch.thresholds.tolist() == [0.1, 0.2]
     assert system.num_embedding_coordinates == 2
-    assert assemble(parse(text.replace("stack", "sum"))).system.num_embedding_coordinates == 1
+    summed = assemble(parse(text.replace("stack", "sum"))).mover
+    assert isinstance(summed, GeometricSystem)
+    assert summed.num_embedding_coordinates == 1
     np.testing.assert_array_equal(system.stiffness, 2.0 * np.eye(2))
 
 
@@ -147,7 +150,9 @@ def test_impossible_wishes_name_the_place(old: str, new: str, message: str) -> N
 
 def test_numbers_of_the_look_ahead_that_do_not_go_together_are_named() -> None:
     text = POSE.format(method="barrier", frame="tip", activation=0.12) + "evasion: {delay: 3.0}\n"
-    with pytest.raises(ScenarioError, match=r"evasion: delay is 3\.0*, must be no longer than the horizon"):
+    with pytest.raises(
+        ScenarioError, match=r"method: evasion: delay is 3\.0*, must be no longer than the horizon"
+    ):
         assemble(Scenario.from_text(text))
 
 
@@ -168,12 +173,14 @@ obstacles:
     parts = assemble(scenario)
     assert isinstance(parts.seen, Obstacles)
     np.testing.assert_array_equal(parts.seen.radii, [0.05])
-    assert parts.safe
-    assert parts.escape is not None
+    assert isinstance(parts.mover, Controller)
+    assert parts.mover.settings.planner is None
+    assert parts.mover.settings.local_minimum is not None
     assert len(parts.body.levels) == parts.body.num_components
-    step = parts.system.acceleration(parts.goal, np.zeros(2), parts.goal, parts.seen)
-    np.testing.assert_array_equal(step.values, 0.0)
-    assert step.acceleration == pytest.approx([0.0, 0.0], abs=1e-12)
+    drive = parts.driver().drive(0.0, parts.goal, np.zeros(2), np.eye(2), np.zeros(2))
+    np.testing.assert_array_equal(drive.values, 0.0)
+    assert drive.wanted == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert drive.system_status == "arrived"
 
 
 POSE = """
@@ -194,15 +201,17 @@ def test_a_pose_is_reached_from_a_posture_that_has_it() -> None:
     assert parts.pose is not None
     expected = pose_at([0.5, 0.6, 0.0], from_roll_pitch_yaw([0.0, 0.0, np.pi / 2]))
     np.testing.assert_allclose(parts.pose.goal.pose, expected, atol=1e-15)
-    np.testing.assert_allclose(
-        parts.robot.pose(parts.goal, "tip"), expected, atol=1e-7
-    )  # what counts as there
-    assert parts.pose.at(parts.goal) is parts.pose.goal
-    assert isinstance(parts.pose.at(parts.start), JointGoal)
-    assert parts.escape is not None
-    assert parts.evasion is not None
-    alone = assemble(Scenario.from_text(POSE.format(method="reactive", frame="tip", activation=0.12)))
-    assert (alone.escape, alone.evasion) == (None, None)
+    assert isinstance(parts.mover, Controller)
+    assert parts.mover.target is None
+    parts.mover.step(parts.start, np.zeros(3))
+    assert parts.mover.target is not None
+    found = parts.robot.pose(parts.mover.target, "tip")
+    np.testing.assert_allclose(found, expected, atol=1e-7)  # what counts as there
+    assert parts.mover.settings.local_minimum is not None
+    assert parts.mover.settings.look_ahead is not None
+    alone = assemble(Scenario.from_text(POSE.format(method="reactive", frame="tip", activation=0.12))).mover
+    assert isinstance(alone, Controller)
+    assert (alone.settings.local_minimum, alone.settings.look_ahead) == (None, None)
 
 
 def test_a_barrier_sees_a_box_without_gaps() -> None:
@@ -223,9 +232,8 @@ def test_a_barrier_sees_a_box_without_gaps() -> None:
             "barrier",
             "tip",
             0.001,
-            "barriers: clearance barrier: floor is 0.002000, must be positive and below",
+            "method: controller: barriers.activation is 0.001 m, allowed: 0.01 to 1 m",
         ),
-        ("guided", "tip", 0.1, "method is 'guided', which goes with simulation.mode torque alone"),
     ],
 )
 def test_what_does_not_fit_is_named(method: str, frame: str, activation: float, message: str) -> None:

@@ -104,7 +104,7 @@ def test_every_value_of_a_file_arrives() -> None:
         ("body:", "barriers: {flor: 1}\nbody:", "unknown key 'flor' (value 1); allowed: stiffness, damping"),
         ("body:", "barriers: {power: 1}\nbody:", "barriers.power is 1; it must be at least 2"),
         ("body:", "barriers: {ellipsoids: 0}\nbody:", "barriers.ellipsoids is 0; it must be at least 1"),
-        ("body:", "method: magic\nbody:", "allowed: written, barrier, reactive, guided"),
+        ("body:", "method: magic\nbody:", "allowed: written, controller, barrier, reactive"),
         (BASE, "- 1", "a scenario is a mapping of keys to values, got list"),
         (BASE, "", "a scenario is a mapping of keys to values, got NoneType"),
     ],
@@ -188,11 +188,11 @@ def test_a_ball_of_points_is_refused_for_a_box() -> None:
 def test_a_pose_and_the_numbers_of_barriers_arrive_and_survive_saving(tmp_path: Path) -> None:
     numbers = "barriers: {activation: 0.15, floor: 0.003, temperature: 0.001234567890123, ellipsoids: 2}"
     posture = POSE.replace("45]", "45], posture: {unit: deg, position: [10, 20]}")
-    scenario = parse(BASE.replace(GOAL, f"{posture}\nmethod: guided\n{numbers}"))
+    scenario = parse(BASE.replace(GOAL, f"{posture}\nmethod: controller\n{numbers}"))
     assert scenario.goal == module.PoseChoice(
         "tip", (1.0, 0.5, 0.0), (0.0, 0.0, 45.0), module.JointState("deg", (10.0, 20.0))
     )
-    assert scenario.method == "guided"
+    assert scenario.method == "controller"
     assert scenario.barriers == module.BarrierChoice(
         activation=0.15, floor=0.003, temperature=0.001234567890123, ellipsoids=2
     )

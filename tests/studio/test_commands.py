@@ -54,8 +54,8 @@ def test_the_demo_is_the_cluster_of_balls_with_barriers(
     monkeypatch.setattr(run_command, "_can_open_studio", lambda: True)
     assert invoke(monkeypatch, "demo") == 0
     ((scenario, options),) = opened
-    assert scenario == dataclasses.replace(Scenario.load("thesis-6.2.3"), method="barrier")
-    assert options == {"method": "barrier"}
+    assert scenario == dataclasses.replace(Scenario.load("thesis-6.2.3"), method="controller")
+    assert options == {"method": "controller"}
 
 
 def test_it_listens_to_this_machine_alone_unless_told_otherwise(
@@ -73,10 +73,10 @@ def test_a_scenario_opens_with_the_method_it_is_written_for(
     monkeypatch: pytest.MonkeyPatch, opened: list[tuple[Scenario, dict[str, Any]]], tmp_path: Path
 ) -> None:
     shipped = Scenario.load("planar-one-obstacle")
-    dataclasses.replace(shipped, method="guided").save(tmp_path / "mine.yaml")
+    dataclasses.replace(shipped, method="controller").save(tmp_path / "mine.yaml")
     for arguments in ((str(tmp_path / "mine.yaml"),), (shipped.name,), (shipped.name, "--method", "thesis")):
         assert invoke(monkeypatch, "studio", *arguments) == 0
-    assert [options["method"] for _, options in opened] == ["guided", "written", "thesis"]
+    assert [options["method"] for _, options in opened] == ["controller", "written", "thesis"]
 
 
 def test_a_taken_port_is_one_line(

@@ -32,9 +32,7 @@ def test_every_method_of_the_benchmark_is_there() -> None:
     assert {method.value for method in BenchMethod} <= set(METHODS)
     for method in BenchMethod:
         assert METHODS[method.value].safe == method.safe
-        assert METHODS[method.value].escapes == method.escapes
-        assert METHODS[method.value].evades == method.evades
-        assert METHODS[method.value].guided == (method is BenchMethod.guided)
+        assert METHODS[method.value].guided == (method is BenchMethod.controller)
 
 
 def test_the_recommended_numbers_are_the_presets() -> None:

@@ -104,7 +104,7 @@ def test_the_method_is_switched_on_the_page(studio: Studio, looker: Looker) -> N
     assert last(studio).method == "barrier"
     looker.tab("Method")
     studio.send(m.SetRunning(True))
-    for name in ("thesis", "guided", "unswitched", "barrier"):
+    for name in ("thesis", "controller", "unswitched", "barrier"):
         before = last(studio)
         looker.choose("method", METHODS[name].label)
         until(lambda name=name: last(studio).method == name, "the method")  # type: ignore[misc]

@@ -244,7 +244,7 @@ def test_an_arm_stays_at_its_goal(make_session: MakeSession, scenario: Scenario)
 
 
 def test_a_guided_arm_arrives(make_session: MakeSession, scenario: Scenario) -> None:
-    session = make_session(scenario, method="guided")
+    session = make_session(scenario, method="controller")
     last, clearance = record(session, 9.0)  # [s] with a way around by a sub-goal, 2.7 rad off
     assert last.goal is not None
     assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving

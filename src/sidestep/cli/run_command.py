@@ -151,7 +151,7 @@ def demo(
     if studio if studio is not None else json is None and _can_open_studio():
         from sidestep.cli.studio_command import open_studio
 
-        open_studio(scenario, method="barrier")
+        open_studio(scenario, method="controller")
         return
     result = run_and_show(scenario, folder=out, json=json, quiet=quiet)
     raise typer.Exit(0 if result.success else 1)

@@ -85,8 +85,8 @@ METHODS: dict[str, Method] = {
             safe=True,
         ),
         Method(
-            "guided",
-            "barriers, guided",
+            "controller",
+            "controller: barriers and planner",
             "The same, led along a path of configurations that is searched in the background: to a pose by way of a "
             "posture that has it, where the arm rests.",
             (*BARRIERS, *GUIDE, *SAFETY, *TORQUE),

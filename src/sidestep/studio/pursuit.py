@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import (
     Diagnosis,
     Escape,
+    Evasion,
     GeometricSystem,
     JointGoal,
     MotionState,
     Obstacles,
+    PlannerSettings,
     PoseGoal,
+    RouteSettings,
     Step,
     is_fallback,
 )
 from sidestep.body import Body
+from sidestep.guidance import GuidedMotion
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.parts import escape_of, evasion_of, guide_of
+from sidestep.scenario.settings import EscapeChoice, EvasionChoice, GuideChoice
 from sidestep.simulation.pose_aim import PoseAim, Posture
 from sidestep.studio.lookout import Lookout
 from sidestep.studio.methods import Method
@@ -166,3 +172,27 @@ class Pursuit:
         if self._relaxed is None:
             self._relaxed = self.system.relaxed_at(self._posture.q, obstacles)
         return self._relaxed
+
+
+def escape_of(choice: EscapeChoice, robot: Robot) -> Escape:
+    """Sub-goals where the arm is stuck; raises ValueError that names the number at fault."""
+    return Escape(robot, **dataclasses.asdict(choice))
+
+
+def evasion_of(choice: EvasionChoice, system: GeometricSystem) -> Evasion:
+    """Flights out of the way of what moves; raises ValueError that names the number at fault."""
+    return Evasion(system, **dataclasses.asdict(choice))
+
+
+def guide_of(
+    choice: GuideChoice, robot: Robot, body: Body, system: GeometricSystem, *, synchronous: bool
+) -> GuidedMotion:
+    """What leads the arm along a path; raises ValueError that names the number at fault."""
+    return GuidedMotion(
+        robot,
+        body,
+        system=system,
+        planner=PlannerSettings(**dataclasses.asdict(choice.planner)),
+        route=RouteSettings(**dataclasses.asdict(choice.route)),
+        synchronous=synchronous,
+    )
