@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep._core import DistanceSwitch, Obstacles
+from sidestep._core import Controller, DistanceSwitch, GeometricSystem, Obstacles
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import assemble

@@ -137,6 +137,10 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     program.safety = settings.safety;
     program.position_margin = settings.position_margin;
     program.stop_time = settings.stop_time;
+    program.stop_damping = settings.stop_damping;
+    program.torque_weight.setConstant(settings.torque_weight);
+    program.slack_weight = settings.slack_weight;
+    program.safety_weight = settings.safety_weight;
     torque_program_.emplace(arm.robot(), program);
     if (arm.has_dynamics()) {
       dynamics_.emplace(arm.dynamics());

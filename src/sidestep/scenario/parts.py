@@ -33,10 +33,7 @@ def controller_settings_of(scenario: Scenario, *, synchronous: bool = True) -> C
     Raises:
         ValueError: names the number at fault and what is allowed.
     """
-    usual, torque = TorqueChoice(), scenario.torque
-    for name in OWN_OF_PROGRAM:
-        if getattr(torque, name) != getattr(usual, name):
-            raise ValueError(f"torque.{name} goes with method written alone; the controller has its own")
+    torque = scenario.torque
     if scenario.simulation.integrator != "semi_implicit_euler":
         raise ValueError(
             f"simulation.integrator is {scenario.simulation.integrator!r}; the controller's commands are held for a "
@@ -54,6 +51,10 @@ def controller_settings_of(scenario: Scenario, *, synchronous: bool = True) -> C
         output="torque" if scenario.simulation.mode == "torque" else "acceleration",
         position_margin=torque.position_margin,
         stop_time=torque.stop_time,
+        stop_damping=torque.stop_damping,
+        torque_weight=torque.torque_weight,
+        slack_weight=torque.slack_weight,
+        safety_weight=torque.safety_weight,
         barriers=BarrierSettings(**barriers),
         safety=SafetySettings(**dataclasses.asdict(torque.safety)),
         planner=planner if scenario.method == "controller" else None,
