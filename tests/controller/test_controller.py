@@ -1,0 +1,188 @@
+"""The controller: every part together, with commands that are safe whatever it is told."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import sidestep as ss
+from sidestep import _core
+
+PERIOD = 0.001
+
+
+@pytest.fixture(scope="module")
+def robot() -> ss.Robot:
+    return ss.Robot.named("fr3")
+
+
+@pytest.fixture(scope="module")
+def arm(robot: ss.Robot) -> ss.Arm:
+    return ss.Arm.from_robot(robot)
+
+
+def settings(**values: object) -> ss.ControllerSettings:
+    return ss.ControllerSettings(**{"synchronous": True, "output": "acceleration"} | values)
+
+
+def balls(seed: int, num: int = 5) -> ss.Obstacles:
+    points = np.random.default_rng(seed).uniform([-0.2, -0.6, 0.2], [0.7, 0.6, 0.9], (num, 3))
+    return ss.Obstacles(points, [0.05] * num)
+
+
+def test_a_motion_repeats_bit_for_bit(robot: ss.Robot, arm: ss.Arm) -> None:
+    goal = robot.random_configuration(np.random.default_rng(3))
+    runs = []
+    for _ in range(2):
+        controller = ss.Controller(arm, settings())
+        controller.set_goal(goal)
+        controller.set_obstacles(balls(1))
+        runs.append(ss.integrate(controller, robot.neutral, np.zeros(7), steps=2000).q)
+    np.testing.assert_array_equal(*runs)
+
+
+def test_it_arrives_and_says_so(robot: ss.Robot, arm: ss.Arm) -> None:
+    goal = robot.random_configuration(np.random.default_rng(0))
+    controller = ss.Controller(arm, settings())
+    controller.set_goal(goal)
+    assert controller.step(robot.neutral, np.zeros(7)).activity == ss.Activity.moving
+    motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=8000)
+    assert motion.activities[-1] == ss.Activity.arrived
+    assert np.abs(motion.last_q - goal).max() < 0.01
+    assert controller.explain() == "arrived"
+
+
+def test_clearances_bound_commands_without_a_goal(robot: ss.Robot, arm: ss.Arm) -> None:
+    """A ball comes at the hand by 0.1 m/s; nobody gave a goal."""
+    q = robot.neutral
+    hand = robot.pose(q, "fr3_hand")[:3, 3]
+    controller = ss.Controller(arm, settings())
+    controller.set_obstacles(ss.Obstacles([hand + np.array([0.3, 0.0, 0.0])], [0.05], [[-0.1, 0.0, 0.0]]))
+    motion = ss.integrate(controller, q, np.zeros(7), steps=4500)
+    assert set(motion.activities) == {ss.Activity.no_goal}
+    assert ss.SafetyStatus.clearance_lost not in motion.statuses
+    assert motion.clearance.min() > 0.0
+
+
+def test_a_goal_that_is_refused_leaves_the_one_before(robot: ss.Robot, arm: ss.Arm) -> None:
+    controller = ss.Controller(arm, settings())
+    controller.set_goal(robot.neutral)
+    controller.step(robot.neutral, np.zeros(7))
+    outside = robot.neutral.copy()
+    outside[3] = 1.0
+    with pytest.raises(ValueError, match=r"joint 'fr3_joint4' is 1\.0+, allowed: -"):
+        controller.set_goal(outside)
+    with pytest.raises(ValueError, match="the goal must be finite"):
+        controller.set_goal(np.full(7, np.nan))
+    assert controller.step(robot.neutral, np.zeros(7)).activity == ss.Activity.arrived
+
+
+def test_an_unusable_state_gives_a_stop(robot: ss.Robot, arm: ss.Arm) -> None:
+    controller = ss.Controller(arm, settings())
+    command = controller.step(np.full(7, np.nan), np.zeros(7))
+    assert command.status == ss.SafetyStatus.stopping
+    assert np.isnan(command.clearance)
+    assert np.isfinite(command.acceleration).all()
+    assert "unusable" in controller.explain()
+    assert controller.step(robot.neutral, np.zeros(7)).status == ss.SafetyStatus.ok
+
+
+def test_the_status_tells_of_a_lost_clearance(robot: ss.Robot, arm: ss.Arm) -> None:
+    """Against the least clearance of the body, evaluated apart, at random states among random balls."""
+    barrier = ss.ClearanceBarrier(robot, arm.body)
+    rng, lost = np.random.default_rng(7), 0
+    for index in range(150):
+        seen = balls(100 + index)
+        q, v = robot.random_configuration(rng), rng.normal(scale=0.3, size=7)
+        controller = ss.Controller(arm, settings(planner=None, look_ahead=None))
+        controller.set_obstacles(seen)
+        command = controller.step(q, v)
+        least = float(barrier.evaluate(q, v, seen).clearances.min())
+        if least < 0.0:
+            lost += 1
+            assert command.status == ss.SafetyStatus.clearance_lost
+            assert command.clearance <= least
+    assert lost > 10
+
+
+def test_a_pose_is_reached_by_a_posture_that_it_finds(robot: ss.Robot, arm: ss.Arm) -> None:
+    pose = robot.pose(robot.random_configuration(np.random.default_rng(5)), "fr3_hand")
+    controller = ss.Controller(arm, settings())
+    controller.set_goal(ss.PoseGoal(robot, "fr3_hand", pose))
+    motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=8000)
+    reached = robot.pose(motion.last_q, "fr3_hand")
+    assert np.linalg.norm(reached[:3, 3] - pose[:3, 3]) < 1e-3
+    assert np.degrees(np.arccos(min(1.0, (np.trace(reached[:3, :3].T @ pose[:3, :3]) - 1) / 2))) < 0.5
+    assert motion.activities[-1] == ss.Activity.arrived
+
+
+def test_what_is_out_of_reach_is_said(robot: ss.Robot, arm: ss.Arm) -> None:
+    pose = np.eye(4)
+    pose[:3, 3] = 0.0, 0.0, 3.0
+    controller = ss.Controller(arm, settings())
+    controller.set_goal(ss.PoseGoal(robot, "fr3_hand", pose))
+    motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=8000)
+    assert motion.activities[-1] == ss.Activity.blocked
+    assert controller.explain().startswith("the goal is out of reach: nearest posture ")
+
+
+def test_continuous_joints_take_the_nearest_turn_and_survive_encoders_that_wrap() -> None:
+    text = """<robot name="spinner"><link name="base"/><joint name="turn" type="continuous"><parent link="base"/>
+      <child link="bar"/><axis xyz="0 0 1"/><limit velocity="2" effort="50"/></joint><link name="bar"><inertial>
+      <mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial><collision>
+      <origin xyz="0.3 0 0"/><geometry><box size="0.6 0.05 0.05"/></geometry></collision></link></robot>"""
+    robot = ss.Robot.from_urdf(text)
+    spinner = ss.Arm.from_robot(robot, ss.Body.cover(robot, components=2, cache=False))
+    controller = ss.Controller(spinner, settings())
+    controller.set_goal([-3.0])
+    q, v, travelled = np.array([3.0]), np.zeros(1), 0.0
+    for _ in range(6000):
+        measured = (q + np.pi) % (2.0 * np.pi) - np.pi  # an encoder that reports (-pi, pi]
+        command = controller.step(measured, v)
+        v = v + PERIOD * command.acceleration
+        travelled += PERIOD * abs(float(v[0]))
+        q = q + PERIOD * v
+    assert q[0] == pytest.approx(2.0 * np.pi - 3.0, abs=0.01)
+    assert travelled < 0.3
+    assert command.activity == ss.Activity.arrived
+
+
+def test_every_setting_has_a_default_in_its_range() -> None:
+    for field in ss.controller_settings_fields():
+        assert field["least"] <= field["default"] <= field["most"], field["name"]
+        assert field["unit"]
+        assert field["trades"]
+    with pytest.raises(
+        ValueError, match=r"controller: barriers\.stiffness is 1000 1/s\^2, allowed: 0\.01 to 100 1/s\^2"
+    ):
+        ss.ControllerSettings(barriers=ss.BarrierSettings(stiffness=1000.0))
+    with pytest.raises(TypeError, match="has no setting 'stifness'; it has: stiffness, damping"):
+        ss.BarrierSettings(stifness=1.0)
+
+
+def test_threads_of_an_asynchronous_controller_end(robot: ss.Robot, arm: ss.Arm) -> None:
+    for seed in range(3):
+        controller = ss.Controller(arm, _core.ControllerSettings())
+        controller.set_goal(robot.random_configuration(np.random.default_rng(seed)))
+        controller.set_obstacles(balls(seed))
+        q, v = robot.neutral, np.zeros(7)
+        for _ in range(300):
+            command = controller.step(q, v)
+            v = v + PERIOD * command.acceleration
+            q = q + PERIOD * v
+        assert np.isfinite(q).all()
+        assert command.torque.any()
+        del controller
+
+
+def test_a_running_controller_loads_neither_physics_nor_exact_distances(arm: ss.Arm, tmp_path) -> None:
+    arm.save(tmp_path / "fr3.arm")
+    code = (
+        "import sys, numpy as np, sidestep as ss\n"
+        f"controller = ss.Controller(ss.Arm.load({str(tmp_path / 'fr3.arm')!r}))\n"
+        "controller.step(np.zeros(7), np.zeros(7))\n"
+        "print([n for n in ('mujoco', 'coal', 'pinocchio', 'matplotlib', 'sklearn') if n in sys.modules])\n"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
