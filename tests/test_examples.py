@@ -76,3 +76,11 @@ def test_examples_are_short_and_say_what_they_show() -> None:
         text = path.read_text(encoding="utf-8")
         assert text.startswith('"""'), path.name
         assert len(text.splitlines()) < 80, path.name
+
+
+def test_07_the_controller_arrives() -> None:
+    output = run("07")
+    assert output.startswith("arrived, largest torque ")
+    assert (
+        10.0 < number_after("largest torque", output) < 87.0
+    )  # it holds itself, within the limit of the fr3

@@ -17,11 +17,7 @@ def test_python_example_arrives() -> None:
     output = io.StringIO()
     with contextlib.redirect_stdout(output):
         exec(compile(example, "README.md", "exec"), {})
-    error = re.fullmatch(r"joint error (\d\.\d+) rad\n", output.getvalue())
-    assert error is not None
-    assert (
-        float(error[1]) < 0.01
-    )  # the spring's slow pole is 1/s: about e^-8 of 2.4 rad is left, plus the detour
+    assert output.getvalue() == "arrived ok arrived\n"
 
 
 def test_two_set_up_commands() -> None:

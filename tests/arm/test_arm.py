@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from typer.testing import CliRunner
 
 import sidestep as ss
+from sidestep.cli import app
 
 ROBOTS = [entry.name for entry in ss.robots() if entry.available]
 
@@ -73,3 +75,14 @@ def test_dynamics_agree_with_pinocchio(name: str) -> None:
         np.testing.assert_allclose(robot.mass_matrix(q), M, atol=1e-9 * np.abs(M).max())
         h = pin.nonLinearEffects(model, data, full, v)
         np.testing.assert_allclose(robot.bias(q, v), h, atol=1e-9 * max(1.0, np.abs(h).max()))
+
+
+def test_the_command_writes_what_the_library_would(arm: ss.Arm, tmp_path: Path) -> None:
+    out = tmp_path / "planar2.arm"
+    run = CliRunner().invoke(app, ["prepare", "planar2", "-o", str(out)])
+    assert run.exit_code == 0, run.output
+    assert ss.Arm.load(out).content_hash == ss.Arm.load("planar2").content_hash
+    for wrong, word in (("arm.txt", "ends with .arm"), ("none/a.arm", "there is no folder")):
+        refused = CliRunner().invoke(app, ["prepare", "planar2", "-o", str(tmp_path / wrong)])
+        assert isinstance(refused.exception, ValueError)
+        assert word in str(refused.exception)

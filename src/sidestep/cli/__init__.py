@@ -13,6 +13,7 @@ from sidestep.cli import (
     bench_command,
     fit_command,
     list_commands,
+    prepare_command,
     reproduce_command,
     run_command,
     studio_command,
@@ -34,6 +35,7 @@ app.command("scenarios")(list_commands.scenarios)
 app.command("schema")(list_commands.schema)
 app.command("robots")(list_commands.robots)
 app.command("fit")(fit_command.fit)
+app.command("prepare")(prepare_command.prepare)
 app.command("reproduce")(reproduce_command.reproduce)
 app.add_typer(bench_command.app, name="bench")
 

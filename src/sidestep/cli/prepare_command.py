@@ -1,0 +1,42 @@
+"""`sidestep prepare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sidestep.cli.output import QuietOption, console
+
+
+def prepare(
+    source: Annotated[str, typer.Argument(help="A name from `sidestep robots`, or a URDF or xacro file.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Arm file to write (.arm).")],
+    package_dir: Annotated[
+        list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
+    ] = None,
+    tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Prepare an arm once: what a `Controller` needs, in one file that C++ reads alone.
+
+    Covers every link, measures clearance tables and finds pairs of links that may touch: minutes for a new robot,
+    moments where the user's cache has it. Exit code: 0 when the file is written, 2 on bad input.
+    """
+    if out.suffix.lower() != ".arm":
+        raise ValueError(f"--out is {out}; an arm file ends with .arm")
+    if not out.parent.is_dir():
+        raise ValueError(f"--out is {out}; there is no folder {out.parent}")
+    from sidestep.arm import Arm
+
+    terminal = console(quiet=quiet, to_stderr=True)
+
+    def show(stage: str, item: str, done: int, in_all: int) -> None:
+        terminal.print(f"{stage}: {item} ({done} of {in_all})", highlight=False, soft_wrap=True)
+
+    options = {"package_dirs": package_dir, "tip": tip}
+    given = {name: value for name, value in options.items() if value}
+    arm = Arm.load(source, progress=show, **given)  # type: ignore[arg-type]
+    arm.save(out)
+    terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)
