@@ -132,12 +132,13 @@ void bind_arm(nb::module_& m) {
       .def(nb::init<const Arm&>(), nb::arg("arm"), "The same arm again; the content is shared.")
       .def_static(
           "read", [](const std::filesystem::path& path) { return with_os_errors(path, [&] { return Arm::load(path); }); },
-          nb::arg("path"),
+          nb::arg("path"), nb::sig("def read(path: str | os.PathLike[str]) -> Arm"),
           "Reads an .arm file. Raises OSError if it cannot be read, and ValueError that names the file and what is wrong.")
       .def(
           "save",
           [](const Arm& arm, const std::filesystem::path& path) { with_os_errors(path, [&] { arm.save(path); }); },
-          nb::arg("path"), "Writes an .arm file in one piece. Raises OSError.")
+          nb::arg("path"), nb::sig("def save(self, path: str | os.PathLike[str]) -> None"),
+          "Writes an .arm file in one piece. Raises OSError.")
       .def_prop_ro("name", &Arm::name)
       .def_prop_ro("num_coordinates", &Arm::num_coordinates, "Number of joint coordinates nv.")
       // Copies: what Python keeps beside an arm must not keep the arm alive, or neither would ever be freed.

@@ -78,7 +78,7 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const char*
         throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + listed(known)).c_str());
       }
     }
-  });
+  }, nb::sig("def __init__(self, **values: object) -> None"));
   for (const Field<Settings>& field : fields<Settings>()) {
     c.def_prop_rw(
         field.name, [field](const Settings& s) { return get_field(s, field); },
@@ -168,7 +168,7 @@ void bind_settings_tree(nb::module_& m) {
       }
     }
     self->validate();
-  });
+  }, nb::sig("def __init__(self, **values: object) -> None"));
   for (const auto& field : fields<ControllerSettings>()) {
     c.def_prop_rw(
         field.name, [field](const ControllerSettings& s) { return get_field(s, field); },

@@ -1943,12 +1943,12 @@ class Arm:
         """The same arm again; the content is shared."""
 
     @staticmethod
-    def read(path: str | os.PathLike) -> Arm:
+    def read(path: str | os.PathLike[str]) -> Arm:
         """
         Reads an .arm file. Raises OSError if it cannot be read, and ValueError that names the file and what is wrong.
         """
 
-    def save(self, path: str | os.PathLike) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Writes an .arm file in one piece. Raises OSError."""
 
     @property
@@ -2015,7 +2015,7 @@ class Arm:
 class BarrierSettings:
     """The spring that pulls to the goal, and the barriers that bend its way."""
 
-    def __init__(self, **kwargs) -> None: ...
+    def __init__(self, **values: object) -> None: ...
 
     @property
     def stiffness(self) -> object: ...
@@ -2086,7 +2086,7 @@ class BarrierSettings:
 class ArrivalSettings:
     """When a goal counts as reached."""
 
-    def __init__(self, **kwargs) -> None: ...
+    def __init__(self, **values: object) -> None: ...
 
     @property
     def joint(self) -> object: ...
@@ -2121,7 +2121,7 @@ class ArrivalSettings:
 class OnlinePlannerSettings:
     """The planner that runs beside the loop."""
 
-    def __init__(self, **kwargs) -> None: ...
+    def __init__(self, **values: object) -> None: ...
 
     @property
     def period(self) -> object: ...
@@ -2156,7 +2156,7 @@ class OnlinePlannerSettings:
 class LookAheadSettings:
     """Trajectories out of the way of what moves, see Controller."""
 
-    def __init__(self, **kwargs) -> None: ...
+    def __init__(self, **values: object) -> None: ...
 
     @property
     def horizon(self) -> object: ...
@@ -2191,7 +2191,7 @@ class LookAheadSettings:
 class LocalMinimumSettings:
     """Sub-goals where the arm is stuck and there is no path."""
 
-    def __init__(self, **kwargs) -> None: ...
+    def __init__(self, **values: object) -> None: ...
 
     @property
     def patience(self) -> object: ...
@@ -2233,7 +2233,7 @@ class ControllerSettings:
     `look_ahead=None` and `local_minimum=None` leave a part out, for comparisons.
     """
 
-    def __init__(self, **kwargs) -> None: ...
+    def __init__(self, **values: object) -> None: ...
 
     @property
     def period(self) -> object: ...

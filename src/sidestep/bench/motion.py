@@ -164,36 +164,42 @@ class ControllerMover:
             motion = _under_torque(
                 self.robot, ControllerDriver(controller, _Changing(problem)), problem, settings
             )
-            return replace(motion, **_planned(controller), ended=_ended(controller, motion), safe=True)
+            return _told(motion, _planned(controller), controller)
         columns = _Columns(problem, settings)
         q, v = problem.start, np.zeros_like(problem.start)
         seen = _Changing(problem)
-        planned: dict[str, float | None] = _planned(controller)
-        while steps := columns.next_steps(FIRST_CHUNK if planned["first_path_seconds"] is None else CHUNK):
+        planned = _planned(controller)
+        while steps := columns.next_steps(FIRST_CHUNK if planned is None else CHUNK):
             obstacles = seen(columns.done * settings.period)
             if obstacles is not None:
                 controller.set_obstacles(obstacles)
             part = integrate(controller, q, v, steps=steps, goal=problem.goal, tolerance=settings.tolerance)
             columns.add(part.q, part.v, part.acceleration, part.step_seconds)
             q, v = part.last_q, part.last_v
-            if planned["first_path_seconds"] is None:
+            if planned is None:
                 planned = _planned(controller)
         motion = columns.motion(problem)
-        return replace(motion, **planned, ended=_ended(controller, motion), safe=True)
+        return _told(motion, planned, controller)
 
 
-def _planned(controller: Controller) -> dict[str, float | None]:
+def _planned(controller: Controller) -> tuple[float, float] | None:
+    """Wall time [s] until the first path, and until it was improved; None before there is one."""
     plan = controller.plan
     if plan.status != PlanStatus.found:
-        return {"first_path_seconds": None, "planning_seconds": None}
-    return {
-        "first_path_seconds": plan.search_seconds,
-        "planning_seconds": plan.search_seconds + plan.improvement_seconds,
-    }
+        return None
+    return plan.search_seconds, plan.search_seconds + plan.improvement_seconds
 
 
-def _ended(controller: Controller, motion: Motion) -> str:
-    return "arrived" if motion.arrived else controller.command.activity.name
+def _told(motion: Motion, planned: tuple[float, float] | None, controller: Controller) -> Motion:
+    """A motion with what its controller knows of it."""
+    first, improved = (None, None) if planned is None else planned
+    return replace(
+        motion,
+        first_path_seconds=first,
+        planning_seconds=improved,
+        ended="arrived" if motion.arrived else controller.command.activity.name,
+        safe=True,
+    )
 
 
 class _Changing:

@@ -93,7 +93,8 @@ class Assembly:
         """What drives the arm in a simulation."""
         if isinstance(self.mover, Controller):
             return ControllerDriver(self.mover, self.seen)
-        return SystemDriver(self.mover, self.torque_program, self.pose or self.goal, self.seen)
+        goal = self.pose if isinstance(self.pose, PoseAim) else self.goal
+        return SystemDriver(self.mover, self.torque_program, goal, self.seen)
 
 
 def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembly:

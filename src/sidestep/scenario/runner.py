@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Controller, CoordinateKind, CoordinateLabel
+from sidestep._core import Controller, CoordinateKind, CoordinateLabel, GeometricSystem
 from sidestep.scenario.assembly import Assembly, Progress, assemble
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.scenario import Scenario
@@ -128,10 +128,12 @@ def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> 
 
 
 def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
-    choice, driver = scenario.simulation, parts.driver()
+    choice = scenario.simulation
     return run_kinematically(
         parts.robot,
-        driver if isinstance(driver, ControllerDriver) else parts.mover,
+        parts.mover
+        if isinstance(parts.mover, GeometricSystem)
+        else ControllerDriver(parts.mover, parts.seen),
         parts.start,
         parts.pose or parts.goal,
         choice.duration,
