@@ -4,6 +4,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <array>
+#include <deque>
+#include <functional>
 #include <limits>
 
 #include "arguments.hpp"
@@ -33,6 +36,27 @@ void set_field(Settings& settings, const Field<Settings>& field, nb::handle valu
 template <class Settings>
 nb::object get_field(const Settings& settings, const Field<Settings>& field) {
   return std::visit([&](auto member) { return nb::cast(settings.*member); }, field.member);
+}
+
+/// What the type stubs say of a field: kept for as long as the module.
+const char* kept(std::string text) {
+  static std::deque<std::string> texts;
+  texts.push_back(std::move(text));
+  return texts.back().c_str();
+}
+
+/// A property for every field.
+template <class Settings, class Class>
+void field_properties(Class& c) {
+  for (const Field<Settings>& field : fields<Settings>()) {
+    const char* type = std::array{"float", "int", "bool", "int"}[field.member.index()];
+    const std::string name = field.name;
+    c.def_prop_rw(
+        field.name, [field](const Settings& s) { return get_field(s, field); },
+        [field](Settings& s, nb::handle value) { set_field(s, field, value); },
+        nb::for_getter(nb::sig(kept("def " + name + "(self) -> " + type))),
+        nb::for_setter(nb::sig(kept("def " + name + "(self, value: " + type + ", /) -> None"))));
+  }
 }
 
 /// A part of the settings: a struct of its own, or None for one that is left out.
@@ -78,12 +102,8 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const char*
         throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + listed(known)).c_str());
       }
     }
-  }, nb::sig("def __init__(self, **values: object) -> None"));
-  for (const Field<Settings>& field : fields<Settings>()) {
-    c.def_prop_rw(
-        field.name, [field](const Settings& s) { return get_field(s, field); },
-        [field](Settings& s, nb::handle value) { set_field(s, field, value); });
-  }
+  }, nb::sig("def __init__(self, **values: float) -> None"));
+  field_properties<Settings>(c);
   return c;
 }
 
@@ -168,12 +188,9 @@ void bind_settings_tree(nb::module_& m) {
       }
     }
     self->validate();
-  }, nb::sig("def __init__(self, **values: object) -> None"));
-  for (const auto& field : fields<ControllerSettings>()) {
-    c.def_prop_rw(
-        field.name, [field](const ControllerSettings& s) { return get_field(s, field); },
-        [field](ControllerSettings& s, nb::handle value) { set_field(s, field, value); });
-  }
+  }, nb::sig("def __init__(self, **values: float | str | Output | BarrierSettings | SafetySettings | ArrivalSettings | "
+             "OnlinePlannerSettings | LookAheadSettings | LocalMinimumSettings | None) -> None"));
+  field_properties<ControllerSettings>(c);
   c.def_rw("barriers", &ControllerSettings::barriers)
       .def_rw("safety", &ControllerSettings::safety)
       .def_rw("arrival", &ControllerSettings::arrival)
@@ -200,7 +217,7 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<EscapeSettings>(rows, "local_minimum.");
         return rows;
       },
-      nb::sig("def controller_settings_fields() -> list[dict[str, object]]"),
+      nb::sig("def controller_settings_fields() -> list[dict[str, float | str]]"),
       "Every setting of the tree: name (dotted), unit, default, least and most allowed, and what it trades.");
 }
 

@@ -153,7 +153,7 @@ void bind_embedding(nb::module_& m) {
   nb::class_<JointLimitBarrier, Embedding>(
       m, "JointLimitBarrier",
       "One coordinate per finite position limit, a barrier of the way h [rad | m] left to it, as in ClearanceBarrier. The\n"
-      "activation distance of a joint is at most a twentieth of its range, its floor shorter by the same share.")
+      "activation distance of a sliding joint is at most a twentieth of its range, its floor shorter by the same share.")
       .def(
           "__init__",
           [](JointLimitBarrier* self, const Robot& robot, double activation, double strength, double power,

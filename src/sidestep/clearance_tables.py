@@ -31,7 +31,6 @@ BEYOND = 2  # control points beyond a limit: with one a spline ends at the limit
 NEAR = 0.03  # [m] clearance below which the error is measured
 CHECKS = 400  # random configurations by which what is left of it is taken off everywhere
 TURN = 2.0 * np.pi
-STORED = 1e-6  # [m] unit of the control points, which are whole numbers of it: far below the error of a table
 
 
 @dataclass(frozen=True)
@@ -197,9 +196,7 @@ def _table(
     control = control - maximum_filter(found, size=4, mode=ends)
     table = _spline(pair, axes, control)
     checked = cells[rng.integers(len(cells), size=CHECKS)] if len(cells) else cells
-    lowered = control - max((excess(table, cell) for cell in checked), default=0.0)
-    # Rounded down here, so that a table just measured and one from the cache are the same.
-    return _spline(pair, axes, STORED * np.floor(lowered / STORED))
+    return _spline(pair, axes, control - max((excess(table, cell) for cell in checked), default=0.0))
 
 
 def _near(least: Array, axes: list[_Axis]) -> Mask:
@@ -226,13 +223,13 @@ def _spline(pair: Pair, axes: list[_Axis], control: Array) -> ClearanceTable:
 
 
 def _write(path: Path, tables: ClearanceTables) -> None:
-    """As arrays of their own for every table, the control points as whole numbers of `STORED`."""
+    """As arrays of their own for every table, in micrometres: far below the error of a table."""
     arrays: dict[str, npt.NDArray[np.generic]] = {"apart": np.array(tables.apart, dtype=str).reshape(-1, 2)}
     for k, table in enumerate(tables.tables):
         arrays[f"pair{k}"] = np.array((table.first, table.second))
         arrays[f"coordinates{k}"] = np.array(table.coordinates)
         arrays[f"axes{k}"] = np.array([table.begin, table.spacing, table.periodic], dtype=float)
-        arrays[f"control{k}"] = np.rint(table.control / STORED).astype(np.int32)
+        arrays[f"control{k}"] = np.floor(1e6 * table.control).astype(np.int32)
     content = io.BytesIO()
     np.savez_compressed(content, **arrays)  # type: ignore[arg-type]
     write_bytes(path, content.getvalue())
@@ -256,5 +253,5 @@ def _stored_table(stored: Mapping[str, npt.NDArray[Any]], k: int) -> ClearanceTa
         begin=begin,
         spacing=spacing,
         periodic=[bool(turn) for turn in periodic],
-        control=STORED * stored[f"control{k}"],
+        control=1e-6 * stored[f"control{k}"],
     )

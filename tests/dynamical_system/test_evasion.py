@@ -231,10 +231,3 @@ def test_what_does_not_go_together_is_named(system):
         evasion.look(GOAL, GOAL, GOAL, ss.Obstacles.none(), foreign)
     with pytest.raises(ValueError, match=r"q has shape \(3,\), expected \(2,\)"):
         evasion.look(GOAL, q, GOAL, ss.Obstacles.none())
-
-
-def test_a_simulation_does_not_fly_without_clearances(system, robot):
-    simulation = ss.Simulation(robot, (), timestep=PERIOD, visuals=False)
-    controller = ss.TorqueController(robot, period=PERIOD)
-    with pytest.raises(ValueError, match="an evasion needs safe=True, which keeps its flights off obstacles"):
-        simulation.run(system, controller, GOAL, GOAL, 1.0, ball(), evasion=ss.Evasion(system))

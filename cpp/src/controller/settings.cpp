@@ -44,7 +44,7 @@ const std::vector<Field<BarrierSettings>>& fields() {
       {"floor", &S::floor, "m", 1e-4, 0.02, "clearance below which the arm counts as inside and is pushed out"},
       {"temperature", &S::temperature, "m", 1e-4, 0.02, "smoothing over points and ellipsoids: larger is smoother and less exact"},
       {"limit_activation", &S::limit_activation, "rad", 0.01, 1.0,
-       "way to a position limit at which its barrier begins; of any joint at most a twentieth of its range"},
+       "way to a position limit at which its barrier begins; of a sliding joint at most a twentieth of its range"},
       {"limit_strength", &S::limit_strength, "-", 1e-4, 10.0, "of position limits' barriers"},
       {"self_activation", &S::self_activation, "m", 0.005, 0.5, "clearance between links at which their barrier begins"},
       {"self_strength", &S::self_strength, "-", 1e-4, 10.0, "of the barriers between links"},

@@ -20,8 +20,10 @@ JointLimitBarrier::JointLimitBarrier(const Robot& robot, BarrierFunction barrier
   }
   set_num_coordinates(static_cast<int>(limits_.size()));
   for (std::size_t k = 0; k < limits_.size(); ++k) {
-    const Eigen::Index j = limits_[k].joint_coordinate;
-    shorten_activation(static_cast<int>(k), range_share * (robot.limits().upper[j] - robot.limits().lower[j]));
+    const int j = limits_[k].joint_coordinate;
+    if (robot.slides(j)) {
+      shorten_activation(static_cast<int>(k), range_share * (robot.limits().upper[j] - robot.limits().lower[j]));
+    }
   }
 }
 
