@@ -11,6 +11,7 @@
 
 #include "arguments.hpp"
 #include "dynamical_system.hpp"
+#include "interruptible.hpp"
 #include "module.hpp"
 #include "sidestep/controller/motion.hpp"
 
@@ -258,6 +259,15 @@ void bind_command(nb::module_& m) {
       .def_ro("on_path", &Command::on_path, "Follows a path of the planner.");
 }
 
+/// What the thread of `step` alone may read, refused while another one has the controller.
+template <class Get>
+auto of_last_step(Get get) {
+  return [get](Controller& self) {
+    const Controller::Use use(self);
+    return get(self);
+  };
+}
+
 }  // namespace
 
 void bind_controller(nb::module_& m) {
@@ -291,6 +301,7 @@ void bind_controller(nb::module_& m) {
             if (mass_matrix.is_none() != bias.is_none()) {
               throw nb::value_error("mass_matrix and bias go together: give both or none");
             }
+            const Controller::Use use(self);
             if (mass_matrix.is_none()) {
               return Command(self.step(position, velocity));
             }
@@ -301,18 +312,20 @@ void bind_controller(nb::module_& m) {
           nb::sig("def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
                   "mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command"),
           "One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)\n"
-          "[Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes.")
-      .def_prop_ro("command", [](const Controller& self) { return Command(self.command()); }, "Of the last step.")
-      .def("explain", &Controller::explain, "One sentence: what the last command does and why, and what to do about it.")
+          "[Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError\n"
+          "while a RealTimeRun or `integrate` has the controller; so does what tells of the last step.")
+      .def_prop_ro("command", of_last_step([](const Controller& self) { return Command(self.command()); }), "Of the last step.")
+      .def("explain", of_last_step([](const Controller& self) { return self.explain(); }),
+           "One sentence: what the last command does and why, and what to do about it.")
       .def_prop_ro("settings", [](const Controller& self) { return ControllerSettings(self.settings()); }, "A copy.")
-      .def_prop_ro("values", [](const Controller& self) { return to_numpy(self.workspace().values); },
+      .def_prop_ro("values", of_last_step([](const Controller& self) { return to_numpy(self.workspace().values); }),
                    "(m,) psi of every coordinate at the last step, see labels.")
       .def_prop_ro(
           "geometric_step",
-          [](const Controller& self) {
+          of_last_step([](const Controller& self) {
             return Step{self.command().system, self.workspace(),
                         Explanation(self.system(), self.system().diagnose(self.workspace()))};
-          },
+          }),
           "The Step of the geometric system in the last step, with its clearances, metric and diagnosis.")
       .def_prop_ro("labels", [](const Controller& self) { return self.labels(); }, "What the clearances are of.")
       .def_prop_ro("target",
@@ -344,8 +357,10 @@ void bind_controller(nb::module_& m) {
         const int nv = controller.arm().num_coordinates();
         const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv),
                               end = goal.is_none() ? Eigen::VectorXd() : as_vector(goal, "goal", nv);
-        const nb::gil_scoped_release released;
-        return integrate(controller, position, velocity, steps, end, tolerance);
+        const Controller::Use use(controller);
+        return interruptible([&](const Interrupted& interrupted) {
+          return integrate(controller, position, velocity, steps, end, tolerance, interrupted);
+        });
       },
       nb::arg("controller"), nb::arg("q"), nb::arg("v"), nb::kw_only(), nb::arg("steps"), nb::arg("goal") = nb::none(),
       nb::arg("tolerance") = 0.0,

@@ -10,8 +10,9 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_geometry(m);
   sidestep::python::bind_dynamical_system(m);
   sidestep::python::bind_control(m);
-  sidestep::python::bind_loop(m);
+  sidestep::python::bind_batch(m);
   sidestep::python::bind_guidance(m);
   sidestep::python::bind_arm(m);
   sidestep::python::bind_controller(m);
+  sidestep::python::bind_real_time(m);
 }

@@ -12,9 +12,10 @@ void bind_embedding(nanobind::module_& m);
 void bind_geometry(nanobind::module_& m);
 void bind_dynamical_system(nanobind::module_& m);
 void bind_control(nanobind::module_& m);
-void bind_loop(nanobind::module_& m);
+void bind_batch(nanobind::module_& m);
 void bind_guidance(nanobind::module_& m);
 void bind_arm(nanobind::module_& m);
 void bind_controller(nanobind::module_& m);
+void bind_real_time(nanobind::module_& m);
 
 }  // namespace sidestep::python

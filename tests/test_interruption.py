@@ -21,6 +21,7 @@ LONG = {
     "plan": "planner.plan([0, 0, 0], [1.5, 0, 0], wall)",
     "guide": "guide.set_goal([1.5, 0, 0]), guide.set_obstacles(wall), guide.step([0, 0, 0], 0.0)",
     "finish": "run.finish()",
+    "integrate": "ss.integrate(stepped, q, 0 * q, steps=10_000_000)",
     "refine_cover": "refine(steps=10**9)",
 }
 
@@ -43,8 +44,9 @@ wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linsp
 settings = ss.PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000)
 planner = ss.PathPlanner(robot, body, settings=settings)
 guide = ss.Guide(robot, body, planner=settings, synchronous=True)
-loop = ss.Loop(ss.GeometricSystem([], robot=robot), ss.TorqueController(robot), goal=q, obstacles=none)
-run = ss.RealTimeRun(loop, q, 0 * q, np.eye(3), 0 * q, steps=100_000)
+arm = ss.Arm.from_robot(robot)
+run = ss.RealTimeRun(ss.Controller(arm), q, 0 * q, steps=100_000)
+stepped = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
 
 
 def refine(steps):

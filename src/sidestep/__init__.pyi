@@ -72,8 +72,6 @@ from .body import Body as Body
 from .control import AccelerationFilter as AccelerationFilter
 from .control import Clearances as Clearances
 from .control import Limit as Limit
-from .control import Loop as Loop
-from .control import LoopStep as LoopStep
 from .control import SafetyRow as SafetyRow
 from .control import SafetySettings as SafetySettings
 from .control import TorqueController as TorqueController

@@ -1431,90 +1431,6 @@ class AccelerationFilter:
     def count(self, status: TorqueStatus) -> int:
         """Number of calls that ended with this status."""
 
-class LoopStep:
-    """What one step of the loop gives."""
-
-    @property
-    def status(self) -> StepStatus:
-        """StepStatus of the system."""
-
-    @property
-    def solution(self) -> TorqueSolution:
-        """TorqueSolution of the controller."""
-
-    @property
-    def torque(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) [Nm | N], within the effort limits, always finite."""
-
-class Loop:
-    """
-    The whole control loop, state in and torque out: a GeometricSystem and a TorqueController, which gets
-    the clearances that the system measured. Goal and obstacles may be replaced from another thread while
-    a step runs. Raises ValueError if system and controller differ in their number of coordinates.
-    """
-
-    def __init__(self, system: GeometricSystem, controller: TorqueController, *, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> None: ...
-
-    def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal) -> None:
-        """From the next step on."""
-
-    def set_obstacles(self, obstacles: Obstacles) -> None:
-        """From the next step on."""
-
-    def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike) -> LoopStep:
-        """
-        One period at q (nv,) [rad | m] and v (nv,) [/s], with mass matrix (nv, nv) and bias (nv,) [Nm | N] there.
-        Values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes,
-        RuntimeError while a RealTimeRun has the loop.
-        """
-
-class RealTimeRun:
-    """
-    Runs a Loop at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1 periods
-    after the start, and what is late is not left out. The arm is integrated with the acceleration that was commanded;
-    mass_matrix (nv, nv) and bias (nv,) stay as they are given. Until it has ended the loop is its alone, but for
-    `Loop.set_goal` and `Loop.set_obstacles`. period [s], at most 60; steps: at most 100,000,000; priority: ask for real-time
-    scheduling. Raises ValueError on wrong shapes, what is not finite, and settings at fault, RuntimeError if the loop is in use.
-    """
-
-    def __init__(self, loop: Loop, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, period: float = 0.001, steps: int = 10000, priority: bool = True) -> None: ...
-
-    @property
-    def running(self) -> bool:
-        """Whether steps are left."""
-
-    def state(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """q, v (nv,) before the next step; for one thread."""
-
-    def finish(self) -> RealTimeRecord:
-        """
-        Waits for the end; the RealTimeRecord of the steps done. Ctrl-C stops the run.
-        """
-
-    def stop(self) -> None:
-        """
-        Asks for the end after the step at hand, and waits for nothing: `finish` does.
-        """
-
-class RealTimeRecord:
-    """When the steps of a real-time run began and ended."""
-
-    @property
-    def late(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(T,) [s] from when a step was due to when it began."""
-
-    @property
-    def taken(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(T,) [s] from when it began to when its torque was there."""
-
-    @property
-    def missed(self) -> int:
-        """Steps that ended after the next one was due."""
-
-    @property
-    def prioritised(self) -> bool:
-        """Whether real-time scheduling was granted."""
-
 class BatchEvaluation:
     """One step at each of N states."""
 
@@ -2493,7 +2409,8 @@ class Controller:
     def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command:
         """
         One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)
-        [Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes.
+        [Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError
+        while a RealTimeRun or `integrate` has the controller; so does what tells of the last step.
         """
 
     @property
@@ -2592,5 +2509,52 @@ def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing
     within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not
     finite, less than one step, and a controller that is not synchronous.
     """
+
+class RealTimeRun:
+    """
+    Runs a Controller at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1
+    periods after the start, and what is late is not left out. The arm does what it is told: v += a T, q += v T. Until it
+    has ended the controller is its alone, but for goals, obstacles and what the planner knows. steps: at most 100,000,000,
+    of which the record takes 1.6 GB; priority: ask for real-time scheduling. Raises ValueError on wrong shapes, what is not
+    finite, and settings at fault, RuntimeError if the controller is in use.
+    """
+
+    def __init__(self, controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int = 10000, priority: bool = True) -> None: ...
+
+    @property
+    def running(self) -> bool:
+        """Whether steps are left."""
+
+    def state(self) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """q, v (nv,) before the next step; for one thread."""
+
+    def finish(self) -> RealTimeRecord:
+        """
+        Waits for the end; the RealTimeRecord of the steps done. Ctrl-C stops the run.
+        """
+
+    def stop(self) -> None:
+        """
+        Asks for the end after the step at hand, and waits for nothing: `finish` does.
+        """
+
+class RealTimeRecord:
+    """When the steps of a real-time run began and ended."""
+
+    @property
+    def late(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(T,) [s] from when a step was due to when it began."""
+
+    @property
+    def taken(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(T,) [s] from when it began to when its command was there."""
+
+    @property
+    def missed(self) -> int:
+        """Steps that ended after the next one was due."""
+
+    @property
+    def prioritised(self) -> bool:
+        """Whether real-time scheduling was granted."""
 
 __version__: str

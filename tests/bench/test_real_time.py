@@ -16,8 +16,9 @@ def test_every_row_is_of_what_was_asked_for():
         progress=lambda *news: told.append(news),
     )
     assert [row["beside"] for row in document["results"]] == list(BESIDE)
-    assert [news[:2] for news in told] == [(0, 3), (1, 3), (2, 3)]
+    assert [news[:2] for news in told] == [(0, 2), (1, 2)]
     for row in document["results"]:
+        assert row["searches"] >= 0
         assert row["steps"] == sum(row["late_histogram"]["counts"]) == 400
         in_time = row["late_us"]["max"] + row["step_us"]["max"] <= 1000.0
         assert row["missed"] == 0 if in_time else row["missed"] <= 400
@@ -25,7 +26,7 @@ def test_every_row_is_of_what_was_asked_for():
         assert 0.0 < row["late_us"]["median"] <= row["late_us"]["max"]
     clouds = [row["clouds"] for row in document["results"]]
     assert clouds[0] == 0
-    assert all(2 <= count <= 25 for count in clouds[1:])  # 20, fewer on a busy machine
+    assert 2 <= clouds[1] <= 25  # 20, fewer on a busy machine
 
 
 def test_the_command_writes_the_same(capsys, monkeypatch):
@@ -51,7 +52,7 @@ def test_the_command_writes_the_same(capsys, monkeypatch):
     document = json.loads(capsys.readouterr().out)
     assert document["benchmark"] == "realtime"
     assert document["points"] == 20
-    assert [row["steps"] for row in document["results"]] == [100] * 3
+    assert [row["steps"] for row in document["results"]] == [100] * 2
 
 
 @pytest.mark.parametrize("name", ["points", "seconds", "refresh"])

@@ -63,12 +63,18 @@ def test_a_slow_ball_does_not_touch_an_arm_with_a_bad_goal(
     assert least > 0.0
 
 
-def test_the_loop_keeps_the_clearances_with_a_bad_goal(robot: ss.Robot, system: ss.GeometricSystem) -> None:
-    q, v = robot.neutral, np.full(7, 0.2)
+def test_the_controller_keeps_the_clearances_with_a_bad_goal(robot: ss.Robot) -> None:
+    q, v, goals = robot.neutral, np.full(7, 0.2), bad_goals(robot)
     hand = robot.pose(q, "fr3_hand")[:3, 3]
-    near = ss.Obstacles([hand + np.array([0.0, 0.12, 0.0])], radii=[0.05])
-    M, h = robot.mass_matrix(q), robot.bias(q, v)
-    loop = ss.Loop(system, ss.TorqueController(robot), goal=np.full(7, np.nan), obstacles=near)
-    step = loop.step(q, v, M, h)
-    assert step.status == ss.StepStatus.invalid_goal
-    assert len(step.solution.safety) > 0
+    controller = ss.Controller(ss.Arm.from_robot(robot), ss.ControllerSettings(synchronous=True))
+    controller.set_obstacles(ss.Obstacles([hand + np.array([0.0, 0.12, 0.0])], radii=[0.05]))
+    for kind in ("not finite", "outside the limits"):
+        with pytest.raises(ValueError, match="controller: "):
+            controller.set_goal(goals[kind])
+        assert controller.step(q, v).bound_by >= 0
+    controller.set_goal(goals["drifts over a limit"])
+    for _ in range(700):
+        command = controller.step(q, v)
+        assert command.bound_by >= 0
+    assert command.system == ss.StepStatus.goal_outside_limits
+    assert command.activity == ss.Activity.blocked

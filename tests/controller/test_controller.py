@@ -2,12 +2,13 @@
 
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep import _core
+from sidestep import _core, presets
 
 PERIOD = 0.001
 
@@ -159,6 +160,100 @@ def test_every_setting_has_a_default_in_its_range() -> None:
         ss.ControllerSettings(barriers=ss.BarrierSettings(stiffness=1000.0))
     with pytest.raises(TypeError, match="has no setting 'stifness'; it has: stiffness, damping"):
         ss.BarrierSettings(stifness=1.0)
+
+
+@pytest.fixture(scope="module")
+def planar() -> ss.Arm:
+    return ss.Arm.load("planar3")
+
+
+BARE = {
+    "output": "torque",
+    "planner": None,
+    "look_ahead": None,
+    "local_minimum": None,
+    "local_activation": False,
+}
+
+
+def near_the_tip(arm: ss.Arm, aside: float = 0.0) -> ss.Obstacles:
+    return ss.Obstacles([arm.robot.pose(arm.neutral, "link3")[:3, 3] + np.array([0.25, 0.09 + aside, 0.0])])
+
+
+def states(arm: ss.Arm, num: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(4)
+    q = arm.neutral + rng.normal(scale=0.1, size=(num, arm.num_coordinates))
+    return q, rng.normal(scale=0.3, size=q.shape)
+
+
+def bare(arm: ss.Arm, goal: np.ndarray, seen: ss.Obstacles) -> ss.Controller:
+    controller = ss.Controller(arm, settings(**BARE))
+    controller.set_goal(goal)
+    controller.set_obstacles(seen)
+    return controller
+
+
+def test_without_its_further_parts_it_is_the_system_followed_by_the_program(planar: ss.Arm) -> None:
+    robot, goal, seen = planar.robot, planar.neutral + 0.3, near_the_tip(planar)
+    system, program = presets.barrier_system(robot, planar.body), ss.TorqueController(robot)
+    controller, bounded = bare(planar, goal, seen), 0
+    for q, v in zip(*states(planar, 20), strict=True):
+        M, h = robot.mass_matrix(q), robot.bias(q, v)
+        step = system.acceleration(q, v, goal, seen)
+        expected = program.solve(q, v, step.acceleration, M, h, clearances=step)
+        found = controller.step(q, v, M, h)
+        assert found.system == step.status
+        assert found.program == expected.status
+        np.testing.assert_array_equal(found.wanted, step.acceleration)
+        np.testing.assert_array_equal(found.torque, expected.torque)
+        bounded += found.bound_by >= 0
+        # Its own mass matrix and bias are those of the robot, but for rounding.
+        np.testing.assert_allclose(controller.step(q, v).torque, expected.torque, rtol=1e-9, atol=1e-9)
+    assert bounded > 0
+
+
+def test_new_goals_and_obstacles_count_from_the_next_step_on(planar: ss.Arm) -> None:
+    q, v = (rows[0] for rows in states(planar, 1))
+    controller = bare(planar, planar.neutral, ss.Obstacles.none())
+    free = controller.step(q, v).torque
+    controller.set_obstacles(near_the_tip(planar))
+    bent = controller.step(q, v).torque
+    assert not np.allclose(free, bent)
+    controller.set_goal(planar.neutral + 0.5)
+    elsewhere = controller.step(q, v).torque
+    fresh = bare(planar, planar.neutral + 0.5, near_the_tip(planar)).step(q, v).torque
+    np.testing.assert_array_equal(elsewhere, fresh)
+    assert not np.allclose(elsewhere, bent)
+
+
+def test_torque_of_a_stop_is_within_the_limits(planar: ss.Arm) -> None:
+    controller = bare(planar, planar.neutral, near_the_tip(planar))
+    v = states(planar, 1)[1][0]
+    found = controller.step(np.full(planar.num_coordinates, np.nan), v)
+    assert found.system == ss.StepStatus.invalid_state
+    assert found.program == ss.TorqueStatus.fallback_invalid_input
+    assert np.all(np.abs(found.torque) <= planar.limits.effort)
+
+
+def test_obstacles_may_be_replaced_while_steps_run(planar: ss.Arm) -> None:
+    """Every step has seen one of the clouds that were set, whole."""
+    q, v = (rows[0] for rows in states(planar, 1))
+    clouds = [near_the_tip(planar, 0.01 * k) for k in range(4)]
+    allowed = [bare(planar, planar.neutral, cloud).step(q, v).torque for cloud in clouds]
+    assert not np.array_equal(allowed[0], allowed[1])
+    controller, done = bare(planar, planar.neutral, clouds[0]), threading.Event()
+
+    def refresh() -> None:
+        for k in range(2000):
+            controller.set_obstacles(clouds[k % 4])
+        done.set()
+
+    writer = threading.Thread(target=refresh)
+    writer.start()
+    while not done.is_set():
+        torque = controller.step(q, v).torque
+        assert any(np.array_equal(torque, one) for one in allowed)
+    writer.join()
 
 
 def test_threads_of_an_asynchronous_controller_end(robot: ss.Robot, arm: ss.Arm) -> None:

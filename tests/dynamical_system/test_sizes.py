@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep._core import QuadraticProgram
 
 
 @pytest.fixture(scope="module")
@@ -36,3 +37,13 @@ def test_threads_are_bounded(system, threads):
         ss.evaluate_batch(system, Q, Q, Q, ss.Obstacles.none(), threads=threads)
     with pytest.raises(ValueError, match=message):
         ss.rollout_batch(system, Q, Q, Q, ss.Obstacles.none(), steps=2, threads=threads)
+
+
+def test_rows_nodes_and_programs_have_an_upper_bound():
+    with pytest.raises(ValueError, match=r"max_rows is 100000.*, must be from 0 to 256"):
+        ss.SafetySettings(max_rows=100_000)
+    assert ss.SafetySettings(max_rows=256).max_rows == 256
+    with pytest.raises(ValueError, match=r"max_nodes is 2147483647.*, must be from 2 to 1,000,000"):
+        ss.PlannerSettings(max_nodes=2**31 - 1)
+    with pytest.raises(ValueError, match="a size is 100000, must be at most 4096"):
+        QuadraticProgram(100_000)

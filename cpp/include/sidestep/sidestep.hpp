@@ -3,5 +3,6 @@
 // Everything that a control program needs.
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/motion.hpp"
+#include "sidestep/controller/real_time.hpp"
 #include "sidestep/model/arm.hpp"
 #include "sidestep/obstacles/obstacles.hpp"

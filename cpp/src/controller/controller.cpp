@@ -657,6 +657,12 @@ Controller::Controller(Arm arm, ControllerSettings settings)
     : impl_(std::make_unique<Impl>(std::move(arm), std::move(settings))) {}
 Controller::~Controller() = default;
 
+Controller::Use::Use(Controller& controller) : controller_(&controller) {
+  if (controller.in_use_.exchange(true, std::memory_order_acquire)) {
+    throw std::runtime_error("the controller is in use: a RealTimeRun or another thread steps it; stop it first, or wait for its end");
+  }
+}
+
 void Controller::set_goal(const Eigen::VectorXd& position) { impl_->set_goal(Goal(JointGoal(position))); }
 void Controller::set_goal(Goal goal) { impl_->set_goal(std::move(goal)); }
 void Controller::clear_goal() { impl_->set_goal(std::nullopt); }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
-#include "sidestep/control/handover.hpp"
+#include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/posture_search.hpp"
 #include "sidestep/dynamical_system/escape.hpp"
@@ -117,12 +117,12 @@ class Controller::Impl {
                 GeometricSystem::Workspace& workspace, Eigen::VectorXd& activations) const noexcept;
 
   // Between the threads.
-  Handover<GoalOrder> goal_orders_;
-  Handover<ObstacleOrder> obstacle_orders_;
-  Handover<Snapshot> snapshots_;
-  Handover<Activations> activations_;
-  Handover<FoundPosture> postures_;
-  Handover<FoundTrajectory> trajectories_;
+  TripleBuffer<GoalOrder> goal_orders_;
+  TripleBuffer<ObstacleOrder> obstacle_orders_;
+  TripleBuffer<Snapshot> snapshots_;
+  TripleBuffer<Activations> activations_;
+  TripleBuffer<FoundPosture> postures_;
+  TripleBuffer<FoundTrajectory> trajectories_;
   mutable std::mutex mutex_;  // of what follows; the step never takes it unless synchronous
   std::optional<Goal> shown_goal_;
   std::uint64_t goal_count_ = 0, obstacle_count_ = 0;

@@ -20,7 +20,7 @@ void check(const Eigen::VectorXd& value, const char* name, Eigen::Index nv) {
 }  // namespace
 
 MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const Eigen::VectorXd& v, int steps,
-                       const Eigen::VectorXd& goal, double tolerance) {
+                       const Eigen::VectorXd& goal, double tolerance, const Interrupted& interrupted) {
   const Eigen::Index nv = controller.arm().num_coordinates();
   check(q, "q", nv);
   check(v, "v", nv);
@@ -39,6 +39,9 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
                       Eigen::VectorXd(steps),     Eigen::VectorXd(steps),     q,                          v};
   int done = 0;
   while (done < steps && !record.arrived) {
+    if (interrupted()) {
+      throw Interruption();
+    }
     const auto begin = std::chrono::steady_clock::now();
     const Command& command = controller.step(record.last_q, record.last_v);
     record.step_seconds[done] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

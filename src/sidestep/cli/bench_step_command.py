@@ -226,15 +226,15 @@ def realtime(
     points: Annotated[int, typer.Option(min=1, help="Of the cloud of a table with objects.")] = 10_000,
     seconds: Annotated[float, typer.Option(min=0.001, help="Of each row [s].")] = 60.0,
     refresh: Annotated[float, typer.Option(min=0.001, help="Clouds per second.")] = 60.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of goals, points and guide.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of goals, points and planner.")] = 0,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
-    """The whole loop, state in and torque out, at 1 kHz by the machine's clock: how late it is, and what it misses.
+    """The controller, everything on, at 1 kHz by the machine's clock: how late it is, and what it misses.
 
-    Alone, beside new clouds of points, and beside clouds and a guide that leads the goal. A step is late by the time
-    from when it is due to when it begins; it misses its deadline if it ends after the next one is due. Real-time
-    scheduling is used where the machine allows it. Exit code 0: misses are figures, not errors.
+    Another thread sets goals, then goals and clouds of points. A step is late by the time from when it is due to when
+    it begins; it misses its deadline if it ends after the next one is due. Real-time scheduling is used where the
+    machine allows it. Exit code 0: misses are figures, not errors.
     """
     from rich import box
     from rich.table import Table

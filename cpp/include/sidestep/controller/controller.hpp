@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sidestep/controller/command.hpp"
@@ -34,6 +36,24 @@ class Controller {
   ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
+
+  /// Holds a controller for one thread or run: for programs whose parts might both call `step`, which does not ask.
+  class Use {
+   public:
+    /// Throws std::runtime_error if it is held already.
+    explicit Use(Controller& controller);
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+    ~Use() { end(); }
+    void end() noexcept {
+      if (controller_ != nullptr) {
+        std::exchange(controller_, nullptr)->in_use_.store(false, std::memory_order_release);
+      }
+    }
+
+   private:
+    Controller* controller_;
+  };
 
   /// From the next step on: a configuration (nv) [rad | m] within the limits. Throws std::invalid_argument that names the
   /// joint, its value and what is allowed; the goal before stays.
@@ -77,6 +97,7 @@ class Controller {
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;
+  std::atomic<bool> in_use_{false};
 };
 
 }  // namespace sidestep

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sidestep/controller/controller.hpp"
+#include "sidestep/interruption.hpp"
 
 namespace sidestep {
 
@@ -20,8 +21,10 @@ struct MotionRecord {
 
 /// Moves a model that does exactly what it is told, by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every joint is
 /// within `tolerance` [rad | m] of `goal` (nv), which may be empty. Throws std::invalid_argument on sizes, states that are not
-/// finite, less than one step, and a controller that is not synchronous, whose threads keep the machine's time.
+/// finite, less than one step, and a controller that is not synchronous, whose threads keep the machine's time;
+/// Interruption where `interrupted` says so before a step.
 MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const Eigen::VectorXd& v, int steps,
-                       const Eigen::VectorXd& goal = {}, double tolerance = 0.0);
+                       const Eigen::VectorXd& goal = {}, double tolerance = 0.0,
+                       const Interrupted& interrupted = never_interrupted);
 
 }  // namespace sidestep

@@ -8,7 +8,7 @@
 #include <semaphore>
 #include <thread>
 
-#include "sidestep/control/handover.hpp"
+#include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/dynamical_system/progress_monitor.hpp"
 #include "sidestep/guidance/body_clearance.hpp"
 #include "sidestep/guidance/plan.hpp"
@@ -168,8 +168,8 @@ class Guide {
   BodyClearance::Workspace here_;
 
   // Between the two.
-  Handover<State> states_;
-  Handover<Answer> answers_;
+  TripleBuffer<State> states_;
+  TripleBuffer<Answer> answers_;
   std::counting_semaphore<> wake_{0};
   std::atomic<bool> stopping_{false};
   mutable std::mutex mutex_;  // of what follows; the loop never takes it

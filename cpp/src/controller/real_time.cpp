@@ -1,4 +1,4 @@
-#include "sidestep/control/real_time.hpp"
+#include "sidestep/controller/real_time.hpp"
 
 #include <chrono>
 #include <stdexcept>
@@ -17,10 +17,6 @@ namespace sidestep {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-constexpr int most_steps = 100'000'000;  // a day at 1 kHz, of which the record takes 1.6 GB
-constexpr double longest_period = 60.0;   // [s]: so many steps of it are still a time of the clock
-constexpr std::chrono::milliseconds nap{20};  // between two looks whether to stop, while no step is due
 
 double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
@@ -42,12 +38,10 @@ void wake_promptly() noexcept {
 #endif
 }
 
-ArmState checked(ArmState start, const Loop& loop, const Eigen::MatrixXd& mass_matrix, const Eigen::VectorXd& bias) {
-  const Eigen::Index nv = loop.system().robot().num_coordinates();
-  const auto fits = [nv](const auto& x) { return x.rows() == nv && x.allFinite(); };
-  if (!fits(start.q) || !fits(start.v) || !fits(bias) || !fits(mass_matrix) || mass_matrix.cols() != nv) {
-    throw std::invalid_argument("real-time run: q, v, bias (" + std::to_string(nv) +
-                                ") and mass matrix must have the size of the arm and be finite");
+ArmState checked(ArmState start, Eigen::Index nv) {
+  if (start.q.size() != nv || start.v.size() != nv || !start.q.allFinite() || !start.v.allFinite()) {
+    throw std::invalid_argument("real-time run: q and v must have the size of the arm, " + std::to_string(nv) +
+                                ", and be finite");
   }
   return start;
 }
@@ -55,19 +49,14 @@ ArmState checked(ArmState start, const Loop& loop, const Eigen::MatrixXd& mass_m
 }  // namespace
 
 void RealTimeSettings::validate() const {
-  require_positive(period, "real-time run: period");
-  require(period <= longest_period, "real-time run: period", period, "at most 60 s");
-  require(steps >= 1 && steps <= most_steps, "real-time run: steps", steps, "from 1 to 100,000,000");
+  require(steps >= 1 && steps <= most_steps, "real-time run: steps", static_cast<double>(steps), "from 1 to 100,000,000");
 }
 
-RealTimeRun::RealTimeRun(Loop& loop, ArmState start, Eigen::MatrixXd mass_matrix, Eigen::VectorXd bias,
-                         RealTimeSettings settings)
-    : loop_(loop),
-      use_(loop),
+RealTimeRun::RealTimeRun(Controller& controller, ArmState start, RealTimeSettings settings)
+    : controller_(controller),
+      use_(controller),
       settings_((settings.validate(), settings)),
-      mass_matrix_(std::move(mass_matrix)),
-      bias_(std::move(bias)),
-      now_(checked(std::move(start), loop, mass_matrix_, bias_)),
+      now_(checked(std::move(start), controller.arm().num_coordinates())),
       state_(now_) {
   record_.late = record_.taken = Eigen::VectorXd::Zero(settings_.steps);
   thread_ = std::thread([this] { run(); });
@@ -90,29 +79,21 @@ const RealTimeRecord& RealTimeRun::finish() {
 void RealTimeRun::run() noexcept {
   record_.prioritised = settings_.priority && prioritise();
   wake_promptly();
-  const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(settings_.period));
+  const double step = controller_.settings().period;
+  const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(step));
   const Clock::time_point begin = Clock::now();
-  int done = 0;
-  for (; done < settings_.steps; ++done) {
+  std::int64_t done = 0;
+  for (; done < settings_.steps && !stop_; ++done) {
     const Clock::time_point due = begin + (done + 1) * period;
-    while (due - Clock::now() > nap && !stop_) {
-      std::this_thread::sleep_for(nap);
-    }
-    if (stop_) {
-      break;
-    }
     std::this_thread::sleep_until(due);
     const Clock::time_point woken = Clock::now();
-    static_cast<void>(loop_.step(now_.q, now_.v, mass_matrix_, bias_));
+    const Command& command = controller_.step(now_.q, now_.v);
     const Clock::time_point ended = Clock::now();
     record_.late[done] = seconds(woken - due);
     record_.taken[done] = seconds(ended - woken);
     record_.missed += ended > due + period;
-    const Eigen::VectorXd& a = loop_.solution().acceleration;
-    if (a.allFinite()) {
-      now_.v += settings_.period * a;
-      now_.q += settings_.period * now_.v;
-    }
+    now_.v += step * command.acceleration;
+    now_.q += step * now_.v;
     state_.draft().q = now_.q;
     state_.draft().v = now_.v;
     state_.submit();

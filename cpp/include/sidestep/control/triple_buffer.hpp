@@ -14,9 +14,9 @@ namespace sidestep {
 /// place and calls `submit()`, and waits for nobody. Of the three slots one is written, one read and one between the two; what
 /// the reader has done with is overwritten by a writer.
 template <class T>
-class Handover {
+class TripleBuffer {
  public:
-  explicit Handover(const T& initial) : slots_{initial, initial, initial} {}
+  explicit TripleBuffer(const T& initial) : slots_{initial, initial, initial} {}
 
   /// Replaces what `get` gives from its next call on.
   void put(T value) {
