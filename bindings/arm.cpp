@@ -7,7 +7,9 @@
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <system_error>
 
 #include "arguments.hpp"
@@ -88,7 +90,26 @@ void bind_dynamics(nb::module_& m) {
             d.model.bias(as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv), d.workspace, force);
             return to_numpy(force);
           },
-          nb::arg("q"), nb::arg("v"), "h(q, v) = C(q, v) v + g(q) (nv,) [Nm | N] at q (nv,), v (nv,).");
+          nb::arg("q"), nb::arg("v"), "h(q, v) = C(q, v) v + g(q) (nv,) [Nm | N] at q (nv,), v (nv,).")
+      .def(
+          "call_seconds",
+          [](Dynamics& d, const ArrayLike& q, const ArrayLike& v, int calls) {
+            using Clock = std::chrono::steady_clock;
+            const int nv = d.model.robot().num_coordinates();
+            KinematicState state(d.model.robot());
+            state.update(d.model.robot(), as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv));
+            Eigen::MatrixXd mass(nv, nv);
+            Eigen::VectorXd force(nv), seconds(std::max(0, calls));
+            for (double& taken : seconds) {
+              const Clock::time_point begin = Clock::now();
+              d.model.mass_matrix(state, d.workspace, mass);
+              d.model.bias(state, d.workspace, force);
+              taken = std::chrono::duration<double>(Clock::now() - begin).count();
+            }
+            return to_numpy(seconds);
+          },
+          nb::arg("q"), nb::arg("v"), nb::kw_only(), nb::arg("calls"),
+          "(calls,) [s] that mass matrix and bias took together, of links whose poses are known, as in a Controller.");
 }
 
 }  // namespace

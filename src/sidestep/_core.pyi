@@ -1796,6 +1796,11 @@ class RigidBodyDynamics:
     def bias(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """h(q, v) = C(q, v) v + g(q) (nv,) [Nm | N] at q (nv,), v (nv,)."""
 
+    def call_seconds(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, calls: int) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (calls,) [s] that mass matrix and bias took together, of links whose poses are known, as in a Controller.
+        """
+
 class CoverProof:
     """What is proven and measured of the ellipsoids that cover one link."""
 
@@ -2515,8 +2520,8 @@ class RealTimeRun:
     Runs a Controller at its period by the machine's clock, in a thread of its own, from q, v (nv,): step k is due k + 1
     periods after the start, and what is late is not left out. The arm does what it is told: v += a T, q += v T. Until it
     has ended the controller is its alone, but for goals, obstacles and what the planner knows. steps: at most 100,000,000,
-    of which the record takes 1.6 GB; priority: ask for real-time scheduling. Raises ValueError on wrong shapes, what is not
-    finite, and settings at fault, RuntimeError if the controller is in use.
+    of which the record takes 1.6 GB; priority: ask for real-time scheduling. Raises ValueError on wrong shapes, what is not finite, and settings at fault,
+    RuntimeError if the controller is in use.
     """
 
     def __init__(self, controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int = 10000, priority: bool = True) -> None: ...

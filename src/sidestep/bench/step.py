@@ -1,4 +1,4 @@
-"""What one control step costs: the settings of the thesis's Table 6.1, and the whole arm among clouds."""
+"""What one control step costs: the thesis's Table 6.1, the whole arm and the whole controller among clouds."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,17 @@ import sidestep
 from sidestep._core import (
     AccelerationFilter,
     CollisionDensity,
+    Controller,
+    ControllerSettings,
     GeometricSystem,
     Obstacles,
+    RigidBodyDynamics,
     instruction_set,
+    integrate,
     multiply_add_rate,
     rollout,
 )
+from sidestep.arm import Arm
 from sidestep.bench.step_scenes import table_cloud, uniform_cloud
 from sidestep.bench.step_times import StepTimes
 from sidestep.body import Body
@@ -79,6 +85,10 @@ def run_step_bench(
     the call and the reading of its result. An arm with a covering body starts and is drawn to where it has 3 cm of
     clearance to points and to itself (and 0.03 rad to joint limits); only where no such place is found, as among
     many points all around it, to the best of what was drawn.
+
+    Rows of a controller are of all that its step does beside planner and look-ahead, whose threads are not the step's:
+    system, escape from local minima, room at the goal, and a program for torque, or for acceleration as "with filter".
+    Mass matrix and bias, which torque needs, have a row of their own.
 
     A step is as long as the clock says, whatever else the machine did meanwhile: `max_us`. `interruptions` says how
     often the system gave the core to another program, and `undisturbed_max_us` is the longest step of the motions
@@ -271,6 +281,32 @@ class _Row:
         return _inside(self.robot, moved.q[-1]), seconds
 
 
+@dataclass(frozen=True)
+class _ControllerRow(_Row):
+    arm: Arm
+    output: str
+
+    @cached_property
+    def _controller(self) -> Controller:
+        settings = ControllerSettings(planner=None, look_ahead=None, synchronous=True, output=self.output)
+        controller = Controller(self.arm, settings)
+        controller.set_obstacles(self.obstacles)
+        return controller
+
+    def _from_cpp(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
+        self._controller.set_goal(goal)
+        moved = integrate(self._controller, q, np.zeros_like(q), steps=steps)
+        return _inside(self.robot, moved.last_q), moved.step_seconds
+
+
+@dataclass(frozen=True)
+class _DynamicsRow(_Row):
+    dynamics: RigidBodyDynamics
+
+    def _from_cpp(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
+        return goal, self.dynamics.call_seconds(q, goal - q, calls=steps)
+
+
 def clearance_at(q: Array, system: GeometricSystem, obstacles: Obstacles) -> float:
     """The smallest [m] of those with barriers, to the links themselves and joint limits too; inf without any."""
     step = system.acceleration(q, np.zeros_like(q), q, obstacles)
@@ -312,22 +348,23 @@ def _rows(settings: StepSettings) -> Iterator[_Row]:
                 python,
             )
     robot = Robot.named(settings.robot)
-    body = Body.cover(robot)
-    system = barrier_system(robot, body)
+    arm = Arm.from_robot(robot)
+    ellipsoids, system = len(arm.body.links), barrier_system(robot, arm.body)
     for shape, cloud in (("uniform", uniform_cloud), ("table", table_cloud)):
         for num in settings.points:
             obstacles = cloud(num, np.random.default_rng(settings.seed))
-            for name, filtered, python in (
-                ("without filter", False, False),
-                ("with filter", True, False),
-                ("without filter", False, True),
-            ):
-                yield _Row(
-                    f"{robot.name}, {num} points, {shape}, {name}",
-                    robot,
-                    system,
-                    obstacles,
-                    len(body.links),
-                    AccelerationFilter(robot) if filtered else None,
-                    python,
-                )
+            name = f"{robot.name}, {num} points, {shape}"
+            scene = (robot, system, obstacles, ellipsoids)
+            yield _Row(f"{name}, without filter", *scene, None, False)
+            yield _Row(f"{name}, with filter", *scene, AccelerationFilter(robot), False)
+            yield _ControllerRow(f"{name}, controller", *scene, None, False, arm, "automatic")
+            yield _ControllerRow(
+                f"{name}, controller, acceleration", *scene, None, False, arm, "acceleration"
+            )
+            yield _Row(f"{name}, without filter", *scene, None, True)
+    if arm.has_dynamics:
+        dynamics = RigidBodyDynamics(robot, arm.inertials)
+        none = Obstacles.none()
+        yield _DynamicsRow(
+            f"{robot.name}, mass matrix and bias", robot, system, none, ellipsoids, None, False, dynamics
+        )
