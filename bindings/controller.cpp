@@ -247,8 +247,8 @@ void bind_command(nb::module_& m) {
       .def_prop_ro("wanted", [](const Command& c) { return to_numpy(c.wanted); },
                    "(nv,) acceleration that was asked for, before any limit [rad/s^2 | m/s^2].")
       .def_prop_ro("velocity", [](const Command& c) { return to_numpy(c.velocity); }, "(nv,) after one period [rad/s | m/s].")
-      .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); }, "(nv,) after one period [rad | m].")
-      .def_ro("clearance", &Command::clearance, "The least, of obstacles, planes and links [m]; inf: far; nan: unknown.")
+      .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); }, "(nv,) after one period [rad | m]; nan until a state was known.")
+      .def_ro("clearance", &Command::clearance, "The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.")
       .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")
       .def_ro("point", &Command::point, "The obstacle point, where it is one; else -1.")
       .def_ro("bound_by", &Command::bound_by, "The coordinate whose clearance bends the motion most; -1: none.")

@@ -2351,11 +2351,13 @@ class Command:
 
     @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) after one period [rad | m]."""
+        """(nv,) after one period [rad | m]; nan until a state was known."""
 
     @property
     def clearance(self) -> float:
-        """The least, of obstacles, planes and links [m]; inf: far; nan: unknown."""
+        """
+        The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.
+        """
 
     @property
     def coordinate(self) -> int:

@@ -52,6 +52,12 @@ std::string Controller::Impl::explain() const {
       text += "if points lie on the arm itself, filter the arm out of the cloud; ";
     }
   }
+  {
+    const std::lock_guard lock(mutex_);
+    if (shown_fault_[0] != '\0') {
+      text += std::string("background work failed: ") + shown_fault_.data() + "; ";
+    }
+  }
   switch (command.activity) {
     case Activity::no_goal: return text + "no goal: it holds still, and evades what comes";
     case Activity::stale: return text + "stopped: the obstacles are " + std::to_string(obstacle_age_) +
@@ -84,7 +90,7 @@ std::string Controller::Impl::explain() const {
   if (avoiding_) {
     return text + "steps out of the way of what moves";
   }
-  if (escape_ && escape_->escaping()) {
+  if (has_sub_goal()) {
     text += "leaves a local minimum by a sub-goal; ";
   }
   if (command.on_path) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -17,6 +19,9 @@
 #include "sidestep/dynamical_system/evasion.hpp"
 
 namespace sidestep {
+
+/// Which coordinates turn without limits, so that a configuration is the same a turn further (nv).
+std::vector<bool> unlimited_joints(const Robot& robot);
 
 /// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
 class Controller::Impl {
@@ -60,7 +65,8 @@ class Controller::Impl {
     std::uint64_t obstacle_number = 0;
     double obstacle_age = 0.0;
     JointGoal followed;                  // the reference of the step
-    bool by_pose = false;                // the pose goal itself draws
+    bool by_pose = false;                // the pose goal itself is followed, as it moves
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // where it is now
     Guide::Following following;
     Eigen::MatrixXd places;              // where barriers leave room (nv × num_places)
     Eigen::Index num_places = 0;
@@ -69,7 +75,7 @@ class Controller::Impl {
   };
   /// Activation distances, and whether the target itself is inside a barrier.
   struct Activations {
-    std::uint64_t goal_number = 0;
+    std::uint64_t goal_number = 0, posture_attempt = 0;
     Eigen::VectorXd values;
     bool target_blocked = false;
   };
@@ -89,6 +95,7 @@ class Controller::Impl {
   bool take_state(ConstVectorRef q, ConstVectorRef v) noexcept;
   void take_orders() noexcept;
   void begin_goal() noexcept;
+  void next_posture(const PoseGoal& pose) noexcept;
   void take_posture(const Posture& posture) noexcept;
   void choose_reference() noexcept;
   void leave_room(bool looks) noexcept;
@@ -100,6 +107,8 @@ class Controller::Impl {
   bool at_goal() noexcept;
   void write_places(Eigen::MatrixXd& places, Eigen::Index& num) const noexcept;
   void write_snapshot() noexcept;
+  bool is_stale() const noexcept { return obstacle_age_ > settings.obstacle_timeout; }
+  bool has_sub_goal() const noexcept { return followed_ != nullptr && followed_ != &reference_ && followed_ != goal_; }
   void keep_room() noexcept;
   const Obstacles& obstacles() noexcept { return obstacle_orders_.current().obstacles; }
   bool has_goal() const noexcept { return goal_ != nullptr; }
@@ -108,9 +117,13 @@ class Controller::Impl {
   // Of the worker; in `step` where synchronous.
   void run();
   void look(const Snapshot& snapshot);
+  /// Calls action(); what it throws costs its result, is kept for `explain`, and ends neither the thread nor the process.
+  template <class Action>
+  void guarded(Action&& action) noexcept;
+  void note_fault(const char* what) noexcept;
   Obstacles obstacles_at(const Snapshot& snapshot) const;
   Posture search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles,
-                         std::uint64_t attempt);
+                         std::uint64_t attempt, std::uint64_t goal_number);
   Evasion::Leader leader_of(const Guide::Following& following) const;
   /// Writes activation distances that leave room at places; whether the last of them is inside a barrier.
   bool lower_at(const Eigen::MatrixXd& places, Eigen::Index num, const Obstacles& obstacles,
@@ -128,6 +141,7 @@ class Controller::Impl {
   std::uint64_t goal_count_ = 0, obstacle_count_ = 0;
   std::shared_ptr<const Obstacles> shown_obstacles_;
   std::optional<Posture> shown_posture_;
+  std::array<char, 160> shown_fault_{};  // what the worker failed with; empty: nothing
 
   // Of the step.
   std::optional<RigidBodyDynamics> dynamics_;
@@ -142,11 +156,12 @@ class Controller::Impl {
   Eigen::VectorXd bias_;
   std::vector<bool> is_sliding_, is_unlimited_;
   std::vector<Eigen::Index> metric_coordinates_;  // of obstacles, planes and links: clearances in metres
-  double time_ = 0.0, next_look_ = 0.0, obstacle_age_ = 0.0;
+  double time_ = 0.0, next_look_ = 0.0, next_posture_ = 0.0, obstacle_age_ = 0.0;
+  bool begins_goal_ = false, wakes_worker_ = false;
   bool known_before_ = false, disturbed_ = false, target_blocked_ = false;
   Goal* goal_ = nullptr;          // in the current order
   std::uint64_t goal_number_ = 0, posture_attempt_ = 0, tick_ = 0;
-  bool has_target_ = false, posture_found_ = false, by_pose_ = false, moves_ = false;
+  bool has_target_ = false, posture_found_ = false, moves_ = false;
   Eigen::VectorXd target_;        // a configuration that the arm is led to
   Guide::Attractor attractor_;
   GuideStatus guide_status_ = GuideStatus::idle;
@@ -164,6 +179,7 @@ class Controller::Impl {
   // Of the worker.
   std::unique_ptr<Evasion> evasion_;
   std::optional<RrtConnect> ends_;     // says what is free at an end
+  BodyClearance::Workspace posture_room_;
   GeometricSystem::Workspace worker_workspace_;
   std::uint64_t sought_goal_ = 0, sought_attempt_ = 0;
   double next_trajectory_ = 0.0;
@@ -172,5 +188,16 @@ class Controller::Impl {
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };
+
+template <class Action>
+void Controller::Impl::guarded(Action&& action) noexcept {
+  try {
+    action();
+  } catch (const std::exception& error) {
+    note_fault(error.what());
+  } catch (...) {
+    note_fault("an unknown exception");
+  }
+}
 
 }  // namespace sidestep

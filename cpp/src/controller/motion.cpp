@@ -1,8 +1,13 @@
 #include "sidestep/controller/motion.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <string>
+
+#include "impl.hpp"
 
 namespace sidestep {
 namespace {
@@ -37,6 +42,15 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
   const double period = controller.settings().period;
   MotionRecord record{Eigen::MatrixXd(steps, nv), Eigen::MatrixXd(steps, nv), Eigen::MatrixXd(steps, nv), {}, {},
                       Eigen::VectorXd(steps),     Eigen::VectorXd(steps),     q,                          v};
+  const std::vector<bool> unlimited = unlimited_joints(controller.arm().robot());
+  const auto away = [&](const Eigen::VectorXd& at) {  // of the goal; a turn more or less is the same place
+    double largest = 0.0;
+    for (Eigen::Index j = 0; j < nv; ++j) {
+      const double error = at[j] - goal[j];
+      largest = std::max(largest, std::abs(unlimited[static_cast<std::size_t>(j)] ? std::remainder(error, 2.0 * std::numbers::pi) : error));
+    }
+    return largest;
+  };
   int done = 0;
   while (done < steps && !record.arrived) {
     if (interrupted()) {
@@ -52,7 +66,7 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
     record.statuses.push_back(command.status);
     record.activities.push_back(command.activity);
     ++done;
-    if (goal.size() != 0 && (record.last_q - goal).cwiseAbs().maxCoeff() < tolerance) {
+    if (goal.size() != 0 && away(record.last_q) < tolerance) {
       record.arrived = true;
       break;
     }

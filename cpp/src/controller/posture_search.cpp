@@ -19,12 +19,17 @@ constexpr double progress = 0.99;      // of the error: less is no progress
 constexpr double largest_damping = 0.03;  // [m | rad] directions in which an arm moves less than this are left alone
 constexpr double largest_step = 0.3;   // [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
 constexpr double accuracy = 1e-7;      // [m] and [rad]: the frame is at the pose
+constexpr double most_room = 0.05;     // of a joint's range
+constexpr double least_room = 0.02;    // [rad | m] barriers keep the arm off the last of the way to a limit
 constexpr double clearly = 0.9;        // of the error of a posture nearby: less is worth a way to quite another one
 
-/// Limits with a turn for joints that have none.
-std::pair<Eigen::VectorXd, Eigen::VectorXd> finite_interval(const Robot& robot, const Eigen::VectorXd& near) {
+/// Limits with room to them, and a turn for joints that have none.
+std::pair<Eigen::VectorXd, Eigen::VectorXd> finite_interval(const Robot& robot, const Eigen::VectorXd& near, double limit_room) {
   Eigen::VectorXd lower = robot.limits().lower, upper = robot.limits().upper;
   for (Eigen::Index j = 0; j < lower.size(); ++j) {
+    const double room = std::min(limit_room, most_room * (upper[j] - lower[j]));
+    lower[j] += room;
+    upper[j] -= room;
     lower[j] = std::isfinite(lower[j]) ? lower[j] : std::min(upper[j], near[j]) - std::numbers::pi;
     upper[j] = std::isfinite(upper[j]) ? upper[j] : std::max(lower[j], near[j]) + std::numbers::pi;
   }
@@ -35,8 +40,8 @@ double size_of(const Posture& posture) noexcept { return std::hypot(posture.posi
 
 class Descent {
  public:
-  Descent(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near)
-      : robot_(robot), goal_(goal), interval_(finite_interval(robot, near)), state_(robot), rest_(Eigen::VectorXd::Zero(near.size())) {
+  Descent(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, double limit_room)
+      : robot_(robot), goal_(goal), interval_(finite_interval(robot, near, limit_room)), state_(robot), rest_(Eigen::VectorXd::Zero(near.size())) {
     frame_ = robot.frame_index(goal.frame().name);
   }
 
@@ -107,28 +112,41 @@ PoseError pose_error(const PoseGoal& goal, const KinematicState& state) noexcept
           goal.settings.position_only ? 0.0 : rotation_vector(goal.pose.linear().transpose() * R).norm()};
 }
 
-Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, int starts, std::uint64_t seed,
-                     const std::function<bool(const Eigen::VectorXd&)>& free) {
-  Descent descent(robot, goal, near);
-  std::mt19937_64 random(seed);
+Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, const PostureSearchSettings& settings,
+                     const std::function<double(const Eigen::VectorXd&)>& room) {
+  Descent wide(robot, goal, near, settings.limit_room), narrow(robot, goal, near, std::min(settings.limit_room, least_room));
+  std::mt19937_64 random(settings.seed);
   const auto judged = [&](Posture posture) {
-    posture.free = posture.found() && free(posture.q);
+    posture.room = posture.found() ? room(posture.q) : -infinity;
     return posture;
   };
-  Posture best = judged(descent.from(near));
-  if (seed == 0 && best.free) {
+  const auto search = [&](const Eigen::VectorXd& from) {
+    Posture posture = wide.from(from);
+    return judged(posture.found() ? std::move(posture) : narrow.from(posture.q));
+  };
+  Posture best = search(near);
+  if (!settings.another && best.room >= settings.room) {
     return best;
   }
+  if (settings.another) {
+    best.room = -infinity;  // any other one that is free is better
+  }
   Eigen::VectorXd begin(near.size());
-  for (int k = 1; k < starts; ++k) {
-    const double spread = std::numbers::pi * k / std::max(1, starts - 1);
-    random_configuration(random, descent.lower(), descent.upper(), near, spread, begin);
-    Posture other = judged(descent.from(begin));
-    if (other.free) {
+  for (int k = 1; k < settings.starts; ++k) {
+    const double spread = std::numbers::pi * k / std::max(1, settings.starts - 1);
+    random_configuration(random, wide.lower(), wide.upper(), near, spread, begin);
+    Posture other = search(begin);
+    if (other.room >= settings.room) {
       return other;
     }
-    if ((other.found() && !best.found()) || size_of(other) < clearly * size_of(best)) {
+    if (other.found() ? other.room > best.room || !best.found() : size_of(other) < clearly * size_of(best)) {
       best = std::move(other);
+    }
+  }
+  if (!best.found() && settings.limit_room > 0.0) {
+    Posture at_limits = judged(Descent(robot, goal, near, 0.0).from(best.q));
+    if (size_of(at_limits) < size_of(best)) {
+      best = std::move(at_limits);
     }
   }
   return best;

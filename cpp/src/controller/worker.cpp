@@ -1,5 +1,7 @@
 // The part of the controller beside the loop: postures, room at places, trajectories out of the way.
+#include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <utility>
 
 #include "../settings.hpp"
@@ -17,8 +19,16 @@ void Controller::Impl::run() {
   while (!stopping_.load()) {
     static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(look_period_)));
     if (snapshots_.update() && !stopping_.load()) {
-      look(snapshots_.current());
+      guarded([this] { look(snapshots_.current()); });
     }
+  }
+}
+
+void Controller::Impl::note_fault(const char* what) noexcept {
+  try {
+    const std::lock_guard lock(mutex_);
+    std::snprintf(shown_fault_.data(), shown_fault_.size(), "%s", what);
+  } catch (...) {  // a mutex that fails: nothing is noted
   }
 }
 
@@ -47,25 +57,33 @@ void Controller::Impl::look(const Snapshot& s) {
   }
   const Obstacles around = obstacles_at(s);
   if (guide && around.tree().moves()) {
-    guide->set_obstacles(around);
+    const std::lock_guard lock(mutex_);
+    if (obstacle_count_ == s.obstacle_number) {  // else newer ones have been set: the planner knows them already
+      guide->set_obstacles(around);
+    }
   }
   const auto* pose = goal ? std::get_if<PoseGoal>(&*goal) : nullptr;
   if (pose != nullptr && !is_moving(*pose) && (sought_goal_ != s.goal_number || sought_attempt_ != s.posture_attempt)) {
+    FoundPosture& found = postures_.draft();
+    found = {s.goal_number, s.posture_attempt, search_posture(*pose, s.q, around, s.posture_attempt, s.goal_number)};
+    postures_.submit();
     sought_goal_ = s.goal_number;
     sought_attempt_ = s.posture_attempt;
-    FoundPosture& found = postures_.draft();
-    found = {s.goal_number, s.posture_attempt, search_posture(*pose, s.q, around, s.posture_attempt)};
-    postures_.submit();
   }
   if (settings.local_activation && s.num_places > 0) {
     Activations& room = activations_.draft();
     room.goal_number = s.goal_number;
+    room.posture_attempt = s.posture_attempt;
     room.target_blocked = lower_at(s.places, s.num_places, around, worker_workspace_, room.values);
     activations_.submit();
   }
   if (evasion_ && s.time >= next_trajectory_) {
     next_trajectory_ = s.time + settings.look_ahead->delay - 0.5 * look_period_;
-    const Goal followed = s.by_pose && pose != nullptr ? Goal(*pose) : Goal(s.followed);
+    Goal followed = s.followed;
+    if (s.by_pose && pose != nullptr) {
+      followed = *pose;
+      std::get<PoseGoal>(followed).pose = s.pose;
+    }
     FoundTrajectory& found = trajectories_.draft();
     const std::optional<Flight> followed_now = s.avoiding ? std::optional(s.trajectory) : std::nullopt;
     const std::optional<Flight> best = evasion_->look(followed, s.q, s.v, around, followed_now, leader_of(s.following));
@@ -80,13 +98,22 @@ void Controller::Impl::look(const Snapshot& s) {
 }
 
 Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& around,
-                                         std::uint64_t attempt) {
+                                         std::uint64_t attempt, std::uint64_t goal_number) {
   Obstruction obstruction;
-  Posture posture =
-      find_posture(arm.robot(), goal, near, attempt == 0 ? posture_starts : posture_starts_again, attempt,
-                   [&](const Eigen::VectorXd& q) { return !ends_->obstructed(q, around, obstruction); });
+  PostureSearchSettings search;
+  search.starts = attempt == 0 ? posture_starts : posture_starts_again;
+  search.seed = settings.seed + attempt;
+  search.another = attempt > 0;
+  search.limit_room = settings.position_margin + settings.barriers.limit_activation;
+  const Posture posture = find_posture(arm.robot(), goal, near, search, [&](const Eigen::VectorXd& q) {
+    return ends_->obstructed(q, around, obstruction)
+               ? -infinity
+               : std::max(0.0, body_.nearest(q, around, 2.0 * search.room, posture_room_).clearance);
+  });
   const std::lock_guard lock(mutex_);
-  shown_posture_ = posture;
+  if (goal_count_ == goal_number) {
+    shown_posture_ = posture;
+  }
   return posture;
 }
 

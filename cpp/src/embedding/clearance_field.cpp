@@ -262,6 +262,7 @@ class ClearanceField::Search {
     const bool within = query.reference < infinity && nearest.value < reach_;
     if (within || query.ahead < horizon_.distance) {
       sidestep::write(within ? nearest : approach, approach, state, ellipsoid(k).body.joint, at, out);
+      out.least[at] = query.reference;
       out.nearest[at] = tree_.order()[static_cast<std::size_t>(within ? query.nearest : query.minded)];
     }
   }

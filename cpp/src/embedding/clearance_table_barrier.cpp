@@ -79,6 +79,7 @@ void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& stat
     minded.curvature = std::max(minded.curvature, 0.0);  // see the header
     write(minded, out.clearances.approach);
     out.clearances.nearest[static_cast<Eigen::Index>(i)] = 0;
+    out.clearances.least[static_cast<Eigen::Index>(i)] = here.value;
   }
   add_barriers(out);
 }

@@ -153,6 +153,7 @@ class MeanGap {
 
   ClearanceSample mean() const noexcept { return mean_.result(); }
   ClearanceSample approach() const noexcept { return approach_.result(); }
+  double least() const noexcept { return mean_.least(); }
   int nearest() const noexcept { return nearest_; }  ///< of the second link
 
  private:
@@ -313,6 +314,7 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
       write(mean, state, first_joint, second_joint, k, out.clearances);
       write(approach, state, first_joint, second_joint, k, out.clearances.approach);
       out.clearances.nearest[k] = gaps.nearest();
+      out.clearances.least[k] = gaps.least() - contact;
     }
   }
   add_barriers(out);
@@ -382,6 +384,7 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
       write(result, state, joint, -1, k, out.clearances);
       write(minded, state, joint, -1, k, out.clearances.approach);
       out.clearances.nearest[k] = nearest;
+      out.clearances.least[k] = mean.least();
     }
   }
   add_barriers(out);

@@ -139,7 +139,7 @@ GuideStatus Guide::step(ConstVectorRef q, double time, Attractor& attractor) noe
     states_.submit();
     if (settings_.synchronous) {
       next_look_ = time + settings_.period;
-      look(states_.get());
+      look_safely(states_.get());
     } else if (first) {
       wake_.release();
     }

@@ -19,8 +19,18 @@ void Guide::run() {
     static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.period)));
     if ((states_.update() || newer_) && !stopping_.load()) {
       newer_ = false;
-      look(State(states_.get()));  // a copy: newer ones come while it looks
+      look_safely(State(states_.get()));  // a copy: newer ones come while it looks
     }
+  }
+}
+
+void Guide::look_safely(const State& state) noexcept {
+  try {
+    look(state);
+  } catch (...) {  // out of memory, for example: begin again at the next look
+    have_path_ = direct_ = failed_ = improving_ = overtaken_ = false;
+    changed_ = true;
+    status_ = PlanStatus::no_path;
   }
 }
 

@@ -44,9 +44,9 @@ struct Command {
   Eigen::VectorXd wanted;        ///< (nv) acceleration that was asked for, before any limit [rad/s² | m/s²]
   Eigen::VectorXd acceleration;  ///< (nv) [rad/s² | m/s²]
   Eigen::VectorXd velocity;      ///< (nv) after one period of the acceleration [rad/s | m/s]
-  Eigen::VectorXd position;      ///< (nv) after one period at that velocity [rad | m]
+  Eigen::VectorXd position;      ///< (nv) after one period at that velocity [rad | m]; NaN until a state was known
 
-  double clearance = std::numeric_limits<double>::infinity();  ///< the least, of obstacles, planes and links [m]; inf: far
+  double clearance = std::numeric_limits<double>::infinity();  ///< the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is unknown
   int coordinate = -1;  ///< whose clearance that is, see Controller::labels; -1: none within reach
   int point = -1;       ///< the obstacle point, where it is one
   int bound_by = -1;    ///< the coordinate whose clearance row bends the motion most; -1: none

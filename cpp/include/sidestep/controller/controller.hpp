@@ -55,8 +55,8 @@ class Controller {
     Controller* controller_;
   };
 
-  /// From the next step on: a configuration (nv) [rad | m] within the limits. Throws std::invalid_argument that names the
-  /// joint, its value and what is allowed; the goal before stays.
+  /// From the next step on: a configuration (nv) [rad | m] within the limits, of joints without limits at the nearest turn.
+  /// Throws std::invalid_argument that names the joint, its value and what is allowed; the goal before stays.
   void set_goal(const Eigen::VectorXd& position);
   /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner.
   void set_goal(Goal goal);
@@ -86,8 +86,8 @@ class Controller {
   const GeometricSystem::Workspace& workspace() const noexcept;
   /// The program's solution of the last step.
   const TorqueSolution& solution() const noexcept;
-  /// The configuration that the arm is led to: the goal, or the posture of a pose goal; empty if none is known. Not for
-  /// the loop.
+  /// The configuration that the arm is led to: the goal, or the posture of a pose goal; empty if none is known. For the
+  /// thread of `step`; allocates.
   Eigen::VectorXd target() const;
   /// What the planner found last, and how often it searched. Not for the loop.
   Plan last_plan() const;

@@ -38,6 +38,8 @@ class BoltzmannMean {
   /// Returns whether the sample is the smallest so far.
   bool add(const ClearanceSample& sample) noexcept;
 
+  /// The smallest sample; +inf when empty.
+  double least() const noexcept { return reference_; }
   /// The mean of what was added; not to be called when empty.
   ClearanceSample result() const noexcept;
 

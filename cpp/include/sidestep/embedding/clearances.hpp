@@ -18,6 +18,7 @@ struct ClearanceView : ClearanceStateView {
   Eigen::Map<Eigen::VectorXi> nearest;  ///< (m) the nearest point; beyond the reach what approaches; -1: neither
   Eigen::Map<Eigen::VectorXd> margins;  ///< (m) SafetyRows keep no larger margins than these [m]
   ClearanceStateView approach;          ///< of what the arm has to mind where it moves, see approach_mean.hpp
+  Eigen::Map<Eigen::VectorXd> least;    ///< (m) the smallest of those that h is the mean of [m]; +inf: beyond the reach
 };
 
 /// The room such views look into.
@@ -45,12 +46,14 @@ struct Clearances : ClearanceState {
       : ClearanceState(nv, num),
         nearest(Eigen::VectorXi::Constant(num, -1)),
         margins(Eigen::VectorXd::Constant(num, std::numeric_limits<double>::infinity())),
-        approach(nv, num) {}
+        approach(nv, num),
+        least(values) {}
 
   /// Forgets everything: nothing is within reach.
   void clear() noexcept {
     values.setConstant(std::numeric_limits<double>::infinity());
     nearest.setConstant(-1);
+    least.setConstant(std::numeric_limits<double>::infinity());
   }
   /// Lets what is nearest be what approaches.
   void mind_nearest() { approach = *this; }
@@ -59,12 +62,14 @@ struct Clearances : ClearanceState {
     return {state_view(start, num),
             {nearest.data() + start, num},
             {margins.data() + start, num},
-            approach.state_view(start, num)};
+            approach.state_view(start, num),
+            {least.data() + start, num}};
   }
 
   Eigen::VectorXi nearest;
   Eigen::VectorXd margins;
   ClearanceState approach;
+  Eigen::VectorXd least;  ///< (m) never above `values`, which are smooth: what is touched has less than zero here
 };
 
 }  // namespace sidestep

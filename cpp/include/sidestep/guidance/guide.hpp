@@ -139,6 +139,8 @@ class Guide {
 
   void run();
   void look(const State& state);
+  /// The same; what is thrown costs this look alone, not the process.
+  void look_safely(const State& state) noexcept;
   void search(const State& state, const Obstacles& obstacles);
   /// Whether the rest of the path from a station on is still free.
   bool ahead_is_free(double station, const Obstacles& obstacles, BodyClearance::Workspace& w) const;

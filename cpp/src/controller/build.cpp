@@ -1,0 +1,190 @@
+// A controller from an arm and settings: its parts, and the threads' beginning and end.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "../settings.hpp"
+#include "impl.hpp"
+#include "sidestep/embedding/clearance_barrier.hpp"
+#include "sidestep/embedding/clearance_table_barrier.hpp"
+#include "sidestep/embedding/joint_limit_barrier.hpp"
+#include "sidestep/embedding/self_collision_barrier.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
+
+std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const BarrierSettings& b) {
+  const Robot& robot = arm.robot();
+  const int nv = robot.num_coordinates();
+  std::vector<std::shared_ptr<const Embedding>> parts;
+  parts.push_back(std::make_shared<ClearanceBarrier>(
+      robot, arm.body(), BarrierFunction{b.activation, b.strength, b.power, b.floor}, b.temperature));
+  if (robot.limits().lower.array().isFinite().any() || robot.limits().upper.array().isFinite().any()) {
+    parts.push_back(std::make_shared<JointLimitBarrier>(
+        robot, BarrierFunction{b.limit_activation, b.limit_strength, b.power, std::min(b.floor, 0.5 * b.limit_activation)}));
+  }
+  const BarrierFunction self{b.self_activation, b.self_strength, b.power, b.floor};
+  if (!arm.tables().empty()) {
+    parts.push_back(std::make_shared<ClearanceTableBarrier>(robot, arm.tables(), self));
+  }
+  if (!arm.pairs().empty()) {
+    parts.push_back(std::make_shared<SelfCollisionBarrier>(robot, arm.body(), arm.pairs(), self, b.temperature));
+  }
+  GeometricSystemSettings settings;
+  settings.stiffness = b.stiffness * Eigen::MatrixXd::Identity(nv, nv);
+  settings.damping = b.damping * Eigen::MatrixXd::Identity(nv, nv);
+  settings.pull_form = PullForm::one_sided;
+  return std::make_shared<GeometricSystem>(robot, std::move(parts), std::move(settings));
+}
+
+std::unique_ptr<Guide> make_guide(const BodyClearance& body, const ControllerSettings& settings) {
+  if (!settings.planner) {
+    return nullptr;
+  }
+  GuideSettings guide;
+  guide.planner = settings.planner->search;
+  guide.route = settings.planner->route;
+  guide.period = settings.planner->period;
+  guide.patience = settings.planner->patience;
+  guide.retry = settings.planner->retry;
+  guide.seed = settings.seed;
+  guide.synchronous = settings.synchronous;
+  return std::make_unique<Guide>(body, guide);
+}
+
+bool use_torque(const Arm& arm, ControllerSettings::Output output) {
+  const bool possible = arm.has_dynamics() && arm.robot().limits().effort.allFinite();
+  if (output == ControllerSettings::Output::torque && !arm.robot().limits().effort.allFinite()) {
+    throw std::invalid_argument("controller: output is torque, but arm '" + arm.name() +
+                                "' has joints without an effort limit; give effort limits, or ask for acceleration");
+  }
+  return output == ControllerSettings::Output::torque || (output == ControllerSettings::Output::automatic && possible);
+}
+
+EscapeSettings seeded(EscapeSettings settings, std::uint64_t seed) {
+  settings.seed = seed;
+  return settings;
+}
+
+Flight at_rest(const Arm& arm) {
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(arm.num_coordinates());
+  return Flight(arm.robot().limits(), q, q, q);
+}
+
+}  // namespace
+
+std::vector<bool> unlimited_joints(const Robot& robot) {
+  const JointLimits& limits = robot.limits();
+  std::vector<bool> unlimited(static_cast<std::size_t>(robot.num_coordinates()));
+  for (Eigen::Index j = 0; j < limits.lower.size(); ++j) {
+    unlimited[static_cast<std::size_t>(j)] = limits.lower[j] == -infinity && limits.upper[j] == infinity;
+  }
+  for (const Joint& joint : robot.joints()) {
+    if (joint.type != JointType::revolute || std::abs(joint.multiplier) != 1.0) {
+      unlimited[static_cast<std::size_t>(joint.coordinate)] = false;
+    }
+  }
+  return unlimited;
+}
+
+Controller::Impl::Snapshot::Snapshot(const Arm& arm, const Flight& flight)
+    : q(Eigen::VectorXd::Zero(arm.num_coordinates())),
+      v(q),
+      followed(q),
+      places(Eigen::MatrixXd::Zero(q.size(), RouteFollower::most_places + 1)),
+      trajectory(flight) {}
+
+Controller::Impl::Impl(Arm a, ControllerSettings s)
+    : arm(std::move(a)),
+      settings((s.validate(), std::move(s))),
+      system(make_system(arm, settings.barriers)),
+      workspace(*system),
+      solution(arm.num_coordinates(), settings.safety.max_rows),
+      command(arm.num_coordinates()),
+      torque(use_torque(arm, settings.output)),
+      goal_orders_(GoalOrder{}),
+      obstacle_orders_(ObstacleOrder{}),
+      snapshots_(Snapshot(arm, at_rest(arm))),
+      activations_(Activations{0, 0, system->activations()}),
+      postures_(FoundPosture{0, 0, {Eigen::VectorXd::Zero(arm.num_coordinates()), 0.0, 0.0}}),
+      trajectories_(FoundTrajectory{0.0, 0, false, at_rest(arm)}),
+      shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
+      body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables()),
+      here_(body_),
+      q_(Eigen::VectorXd::Zero(arm.num_coordinates())),
+      v_(q_),
+      last_q_(Eigen::VectorXd::Constant(q_.size(), std::numeric_limits<double>::quiet_NaN())),
+      wanted_(q_),
+      turns_(q_),
+      mass_(Eigen::MatrixXd::Constant(q_.size(), q_.size(), std::numeric_limits<double>::quiet_NaN())),
+      bias_(q_),
+      is_sliding_(static_cast<std::size_t>(q_.size()), false),
+      is_unlimited_(unlimited_joints(arm.robot())),
+      target_(q_),
+      attractor_(q_.size()),
+      reference_(JointGoal(q_)),
+      refuge_(JointGoal(q_)),
+      trajectory_(at_rest(arm)),
+      places_(Eigen::MatrixXd::Zero(q_.size(), RouteFollower::most_places + 1)),
+      lowered_places_(places_),
+      room_(*system),
+      posture_room_(body_),
+      worker_workspace_(*system),
+      look_period_(settings.planner ? settings.planner->period : default_look_period) {
+  guide = make_guide(body_, settings);
+  if (torque) {
+    TorqueControllerSettings program;
+    program.period = settings.period;
+    program.safety = settings.safety;
+    program.position_margin = settings.position_margin;
+    program.stop_time = settings.stop_time;
+    program.stop_damping = settings.stop_damping;
+    program.torque_weight.setConstant(settings.torque_weight);
+    program.slack_weight = settings.slack_weight;
+    program.safety_weight = settings.safety_weight;
+    torque_program_.emplace(arm.robot(), program);
+    if (arm.has_dynamics()) {
+      dynamics_.emplace(arm.dynamics());
+      dynamics_workspace_.emplace(*dynamics_);
+    }
+  } else {
+    filter_.emplace(arm.robot(), AccelerationFilterSettings{settings.period, settings.position_margin, settings.stop_time,
+                                                            settings.safety});
+  }
+  if (settings.local_minimum) {
+    escape_.emplace(arm.robot(), seeded(*settings.local_minimum, settings.seed));
+  }
+  if (settings.look_ahead) {
+    EvasionSettings look = *settings.look_ahead;
+    look.seed = settings.seed;
+    evasion_ = std::make_unique<Evasion>(system, look);
+  }
+  ends_.emplace(body_, settings.planner ? settings.planner->search : PlannerSettings{});
+  for (const Joint& joint : arm.robot().joints()) {
+    const auto j = static_cast<std::size_t>(joint.coordinate);
+    is_sliding_[j] = is_sliding_[j] || joint.type == JointType::prismatic;
+  }
+  for (std::size_t k = 0; k < system->labels().size(); ++k) {
+    if (system->labels()[k].kind != CoordinateLabel::Kind::joint_limit) {
+      metric_coordinates_.push_back(static_cast<Eigen::Index>(k));
+    }
+  }
+  if (!settings.synchronous) {
+    thread_ = std::thread([this] { run(); });
+  }
+}
+
+Controller::Impl::~Impl() {
+  stopping_.store(true);
+  wake_.release();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+}  // namespace sidestep

@@ -1,0 +1,223 @@
+// What the arm follows: its goal, a path, a sub-goal, or a trajectory out of the way; and where barriers leave room.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "../settings.hpp"
+#include "impl.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double near_moving = 0.1;       // [m] of the arm: near what moves barriers leave no room
+constexpr double moving_foresight = 1.0;  // [s] in which it could be as near
+constexpr std::uint64_t most_posture_attempts = 12;  // one after the other
+constexpr double posture_pause = 2.0;                // [s] until as many more
+constexpr int periods_late = 1000;                   // a trajectory is moved on by at most so many at once
+
+}  // namespace
+
+void Controller::Impl::begin_goal() noexcept {
+  begins_goal_ = false;
+  if (auto* joint = std::get_if<JointGoal>(goal_)) {
+    for (Eigen::Index j = 0; j < q_.size(); ++j) {
+      if (is_unlimited_[static_cast<std::size_t>(j)]) {  // the nearest turn
+        joint->position[j] += 2.0 * std::numbers::pi * std::round((q_[j] - joint->position[j]) / (2.0 * std::numbers::pi));
+      }
+    }
+    if (moves_) {
+      return;
+    }
+    target_ = joint->position;
+    has_target_ = posture_found_ = true;
+    if (guide) {
+      guide->set_goal(target_);
+    }
+  } else if (!moves_) {
+    next_posture(std::get<PoseGoal>(*goal_));
+  }
+}
+
+void Controller::Impl::next_posture(const PoseGoal& pose) noexcept {
+  guide_status_ = GuideStatus::idle;
+  has_target_ = target_blocked_ = false;
+  if (settings.synchronous) {
+    guarded([&] { take_posture(search_posture(pose, q_, obstacles(), posture_attempt_, goal_number_)); });
+  } else {
+    wakes_worker_ = true;
+  }
+}
+
+void Controller::Impl::take_posture(const Posture& posture) noexcept {
+  target_ = posture.q;
+  has_target_ = true;
+  posture_found_ = posture.found();
+  if (guide) {
+    guide->set_goal(target_);
+  }
+}
+
+void Controller::Impl::choose_reference() noexcept {
+  JointGoal& reference = std::get<JointGoal>(reference_);
+  followed_ = &reference_;
+  const auto rest_at = [&](const Eigen::VectorXd& q) {
+    reference.position = q;
+    reference.velocity.setZero();
+    reference.acceleration.setZero();
+  };
+  if (begins_goal_) {
+    begin_goal();
+  }
+  if (!has_goal() || is_stale()) {
+    rest_at(q_);
+    return;
+  }
+  if (moves_) {
+    followed_ = goal_;
+    return;
+  }
+  const PoseGoal* pose = pose_goal();
+  if (pose != nullptr) {
+    if (!settings.synchronous && postures_.update()) {
+      const FoundPosture& found = postures_.current();
+      if (found.goal_number == goal_number_ && found.attempt == posture_attempt_) {
+        take_posture(found.posture);
+      }
+    }
+    // A posture that no way leads to: another one.
+    const bool fails = guide ? guide_status_ == GuideStatus::no_path || guide_status_ == GuideStatus::goal_in_collision
+                             : target_blocked_;
+    if (has_target_ && fails && time_ >= next_posture_) {
+      if (++posture_attempt_ % most_posture_attempts == 0) {
+        next_posture_ = time_ + posture_pause;
+      }
+      next_posture(*pose);
+    }
+    if (!has_target_) {
+      rest_at(q_);
+      return;
+    }
+  }
+  if (guide) {
+    guide_status_ = guide->step(q_, time_, attractor_);
+    reference.position = attractor_.position;
+    reference.velocity = attractor_.velocity;
+    reference.acceleration = attractor_.acceleration;
+  } else {
+    rest_at(target_);
+  }
+  const bool led = guide && guide_status_ != GuideStatus::no_path;
+  if (escape_ && !led && !target_blocked_ && !avoiding_) {
+    followed_ = &escape_->pursue(reference_, q_, std::numeric_limits<double>::quiet_NaN(), settings.period);
+  }
+}
+
+void Controller::Impl::write_places(Eigen::MatrixXd& places, Eigen::Index& num) const noexcept {
+  num = 0;
+  if (!has_target_) {
+    return;
+  }
+  if (guide) {
+    places.leftCols(attractor_.num_places) = attractor_.places.leftCols(attractor_.num_places);
+    num = attractor_.num_places;
+    if (!attractor_.arrives) {
+      return;
+    }
+  }
+  places.col(num++) = target_;
+}
+
+void Controller::Impl::leave_room(bool looks) noexcept {
+  if (!settings.local_activation) {
+    return;
+  }
+  if (looks) {
+    disturbed_ = body_.nearest_moving(q_, obstacles(), moving_foresight, here_) < near_moving;
+  }
+  if (disturbed_ || !has_target_) {
+    if (looks) {
+      workspace.activations = system->activations();
+      num_lowered_ = -1;
+    }
+    return;
+  }
+  if (settings.synchronous) {
+    if (looks) {
+      keep_room();
+    }
+  } else if (activations_.update() || looks) {
+    const Activations& found = activations_.current();
+    const bool ours = found.goal_number == goal_number_ && found.posture_attempt == posture_attempt_;
+    workspace.activations = ours ? found.values : system->activations();
+    target_blocked_ = ours && found.target_blocked;
+  }
+}
+
+void Controller::Impl::keep_room() noexcept {
+  write_places(places_, num_places_);
+  const std::uint64_t version = obstacles().version();
+  if (num_places_ == num_lowered_ && version == lowered_version_ &&
+      places_.leftCols(num_places_) == lowered_places_.leftCols(num_places_)) {
+    return;
+  }
+  target_blocked_ = lower_at(places_, num_places_, obstacles(), room_, workspace.activations);
+  lowered_places_ = places_;
+  num_lowered_ = num_places_;
+  lowered_version_ = version;
+}
+
+bool Controller::Impl::lower_at(const Eigen::MatrixXd& places, Eigen::Index num, const Obstacles& around,
+                                GeometricSystem::Workspace& w, Eigen::VectorXd& activations) const noexcept {
+  activations = system->activations();
+  bool inside = false;
+  for (Eigen::Index k = 0; k < num; ++k) {
+    static_cast<void>(system->lower_activations(places.col(k), around, w, activations));
+    inside = false;
+    for (const Eigen::Index i : metric_coordinates_) {
+      inside = inside || w.clearances.least[i] < 0.0;
+    }
+  }
+  return inside;
+}
+
+void Controller::Impl::avoid() noexcept {
+  if (!evasion_) {
+    return;
+  }
+  if (settings.synchronous) {
+    guarded([&] {
+      const Evasion::Leader leader = evasion_->is_due(settings.period) && guide && followed_ == &reference_
+                                         ? leader_of(guide->following())
+                                         : Evasion::Leader{};
+      const Flight* found = evasion_->pursue(*followed_, q_, v_, obstacles(), settings.period, leader);
+      avoiding_ = found != nullptr;
+      if (avoiding_) {
+        trajectory_ = *found;
+      }
+    });
+  } else {
+    if (avoiding_) {
+      trajectory_.advance(settings.period);
+    }
+    pending_ = trajectories_.update() || pending_;
+    const FoundTrajectory& found = trajectories_.current();
+    const double late = time_ - (found.time + settings.look_ahead->delay);
+    if (pending_ && late > -0.5 * settings.period) {
+      pending_ = false;
+      avoiding_ = found.avoid;
+      if (avoiding_) {
+        trajectory_ = found.trajectory;
+        const int periods = std::min(periods_late, static_cast<int>(std::lround(late / settings.period)));
+        for (int k = 0; k < periods; ++k) {
+          trajectory_.advance(settings.period);
+        }
+      }
+    }
+  }
+  if (avoiding_) {
+    std::get<JointGoal>(refuge_).position = trajectory_.refuge();
+  }
+}
+
+}  // namespace sidestep

@@ -1,0 +1,244 @@
+// One period: state and orders in, command out.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "../settings.hpp"
+#include "impl.hpp"
+
+namespace sidestep {
+
+const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
+                                      const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
+  time_ = static_cast<double>(++tick_) * settings.period;
+  const bool known = take_state(q, v);
+  take_orders();
+  if (!known) {
+    wanted_.setZero();
+    solve(mass_matrix, bias, false, q, v);
+    report(false);
+    return command;
+  }
+  const bool looks = time_ >= next_look_ || begins_goal_;
+  if (looks) {
+    next_look_ = time_ + look_period_ - 0.5 * settings.period;
+    if (settings.synchronous && guide) {
+      guarded([&] { guide->set_obstacles(obstacles()); });
+    }
+  }
+  choose_reference();
+  leave_room(looks);
+  avoid();
+  const Goal& goal = avoiding_ ? refuge_ : *followed_;
+  const StepStatus status = system->acceleration(q_, v_, goal, obstacles(), workspace);
+  command.system = status;
+  wanted_ = workspace.acceleration;
+  if (avoiding_ && !is_fallback(status)) {
+    trajectory_.acceleration(q_, v_, settings.period, wanted_);
+  }
+  if (is_stale()) {
+    wanted_ = -v_ / settings.stop_time;
+  }
+  solve(mass_matrix, bias, true, q_, v_);
+  report(true);
+  if (!settings.synchronous && (looks || wakes_worker_)) {
+    write_snapshot();
+    if (std::exchange(wakes_worker_, false)) {
+      wake_.release();
+    }
+  }
+  known_before_ = true;
+  last_q_ = q_;
+  return command;
+}
+
+bool Controller::Impl::take_state(ConstVectorRef q, ConstVectorRef v) noexcept {
+  if (q.size() != q_.size() || v.size() != q_.size() || !q.allFinite() || !v.allFinite()) {
+    return false;
+  }
+  q_ = q;
+  v_ = v;
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    if (!is_unlimited_[static_cast<std::size_t>(j)]) {
+      continue;
+    }
+    // An encoder that wraps at a turn: no velocity explains a jump of more than half of one.
+    q_[j] += turns_[j];
+    if (known_before_) {
+      const double turn = 2.0 * std::numbers::pi * std::round((last_q_[j] - q_[j]) / (2.0 * std::numbers::pi));
+      turns_[j] += turn;
+      q_[j] += turn;
+    }
+  }
+  return true;
+}
+
+void Controller::Impl::take_orders() noexcept {
+  if (obstacle_orders_.update()) {
+    obstacle_age_ = 0.0;
+  } else {
+    obstacle_age_ += settings.period;
+    obstacle_orders_.current().obstacles.advance(settings.period);
+  }
+  if (goal_orders_.update()) {
+    GoalOrder& order = goal_orders_.current();
+    goal_ = order.goal ? &*order.goal : nullptr;
+    goal_number_ = order.number;
+    has_target_ = posture_found_ = false;
+    target_blocked_ = false;
+    posture_attempt_ = 0;
+    moves_ = goal_ != nullptr && is_moving(*goal_);
+    guide_status_ = GuideStatus::idle;
+    num_lowered_ = -1;
+    next_posture_ = 0.0;
+    begins_goal_ = goal_ != nullptr;  // where the state is known
+  } else if (goal_ != nullptr && moves_) {
+    advance(*goal_, settings.period);
+  }
+}
+
+void Controller::Impl::solve(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias, bool known,
+                             ConstVectorRef q, ConstVectorRef v) noexcept {
+  const Clearances* clearances = known ? &workspace.clearances : nullptr;
+  if (!torque) {
+    command.program = filter_->apply(q, v, wanted_, clearances, solution);
+    return;
+  }
+  // Without inertias of its own, an arm has to be told them in every step: `mass_` is not a number then.
+  if (mass_matrix != nullptr) {
+    command.program = torque_program_->solve(q, v, wanted_, *mass_matrix, *bias, clearances, solution);
+    return;
+  }
+  if (known && dynamics_) {
+    dynamics_->mass_matrix(workspace.state(), *dynamics_workspace_, mass_);
+    dynamics_->bias(workspace.state(), *dynamics_workspace_, bias_);
+  }
+  command.program = torque_program_->solve(q, v, wanted_, mass_, bias_, clearances, solution);
+}
+
+void Controller::Impl::report(bool known) noexcept {
+  command.torque.setZero();
+  if (torque) {
+    command.torque = solution.torque;
+  }
+  command.wanted = wanted_;
+  command.acceleration = solution.acceleration;
+  if (!command.acceleration.allFinite()) {
+    command.acceleration.setZero();
+  }
+  std::copy(solution.active.begin(), solution.active.end(), command.limits.begin());
+  command.bound_by = solution.dominant < 0 ? -1 : solution.safety[static_cast<std::size_t>(solution.dominant)].coordinate;
+  command.avoiding = avoiding_ && !is_stale();
+  command.on_path = known && has_target_ && followed_ == &reference_ && guide && guide->following().route_number != 0;
+  command.clearance = known ? infinity : std::numeric_limits<double>::quiet_NaN();
+  command.coordinate = command.point = -1;
+  if (!known) {
+    command.status = SafetyStatus::stopping;
+    command.system = StepStatus::invalid_state;
+    command.activity = is_stale() ? Activity::stale : has_goal() ? Activity::waiting : Activity::no_goal;
+    command.velocity.setZero();
+    command.position = last_q_ - turns_;
+    return;
+  }
+  command.velocity = v_ + settings.period * command.acceleration;
+  command.position = q_ - turns_ + settings.period * command.velocity;
+  for (const Eigen::Index k : metric_coordinates_) {
+    if (workspace.clearances.least[k] < command.clearance) {
+      command.clearance = workspace.clearances.least[k];
+      command.coordinate = static_cast<int>(k);
+    }
+  }
+  if (command.coordinate >= 0 && system->labels()[static_cast<std::size_t>(command.coordinate)].kind ==
+                                     CoordinateLabel::Kind::obstacle) {
+    command.point = workspace.clearances.nearest[command.coordinate];
+  }
+  switch (command.program) {
+    case TorqueStatus::ok: command.status = SafetyStatus::ok; break;
+    case TorqueStatus::limited: command.status = SafetyStatus::limited; break;
+    case TorqueStatus::relaxed: command.status = SafetyStatus::relaxed; break;
+    case TorqueStatus::relaxed_safety: command.status = SafetyStatus::margin_lost; break;
+    case TorqueStatus::fallback_invalid_input:
+    case TorqueStatus::fallback_solver: command.status = SafetyStatus::stopping; break;
+  }
+  if (is_fallback(command.system)) {
+    command.status = SafetyStatus::stopping;
+  }
+  if (command.clearance < 0.0) {
+    command.status = SafetyStatus::clearance_lost;
+  }
+  command.activity = judge_activity();
+}
+
+bool Controller::Impl::at_goal() noexcept {
+  const ArrivalSettings& near = settings.arrival;
+  if (v_.cwiseAbs().maxCoeff() > near.speed) {
+    return false;
+  }
+  if (const PoseGoal* pose = pose_goal()) {
+    const PoseError error = pose_error(*pose, workspace.state());
+    return error.position <= near.position && error.rotation <= near.rotation;
+  }
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    const double error = std::abs(q_[j] - std::get<JointGoal>(*goal_).position[j]);
+    if (!(error <= (is_sliding_[static_cast<std::size_t>(j)] ? near.sliding : near.joint))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+Activity Controller::Impl::judge_activity() noexcept {
+  if (is_stale()) {
+    return Activity::stale;
+  }
+  if (!has_goal()) {
+    return Activity::no_goal;
+  }
+  if (at_goal()) {
+    return Activity::arrived;
+  }
+  if (command.system == StepStatus::invalid_goal || command.system == StepStatus::goal_outside_limits) {
+    return Activity::blocked;
+  }
+  if (moves_) {
+    return Activity::moving;
+  }
+  if (!has_target_) {
+    return Activity::waiting;
+  }
+  const bool at_rest = v_.cwiseAbs().maxCoeff() < settings.arrival.speed;
+  const bool out_of_reach = !posture_found_;
+  const bool no_way = guide_status_ == GuideStatus::no_path || guide_status_ == GuideStatus::goal_in_collision ||
+                      (!guide && target_blocked_);
+  return at_rest && (no_way || out_of_reach) ? Activity::blocked : Activity::moving;
+}
+
+void Controller::Impl::write_snapshot() noexcept {
+  Snapshot& s = snapshots_.draft();
+  s.time = time_;
+  s.q = q_;
+  s.v = v_;
+  s.goal_number = goal_number_;
+  s.posture_attempt = posture_attempt_;
+  s.obstacle_number = obstacle_orders_.current().number;
+  s.obstacle_age = obstacle_age_;
+  s.by_pose = followed_ == goal_;
+  if (const PoseGoal* pose = pose_goal()) {
+    s.pose = pose->pose;
+  }
+  if (const auto* joint = std::get_if<JointGoal>(followed_)) {
+    s.followed = *joint;
+  }
+  s.following = guide && has_target_ && followed_ == &reference_ ? guide->following() : Guide::Following{};
+  write_places(s.places, s.num_places);
+  if (disturbed_) {
+    s.num_places = 0;
+  }
+  s.avoiding = avoiding_;
+  s.trajectory = trajectory_;
+  snapshots_.submit();
+}
+
+}  // namespace sidestep
