@@ -327,6 +327,11 @@ void bind_controller(nb::module_& m) {
                         Explanation(self.system(), self.system().diagnose(self.workspace()))};
           }),
           "The Step of the geometric system in the last step, with its clearances, metric and diagnosis.")
+      .def_prop_ro("system", [](const Controller& self) { return GeometricSystem(self.system()); },
+                   "The geometric system, a copy. Its barriers begin at full distance, see activations.")
+      .def_prop_ro("activations", [](const Controller& self) { return to_numpy(self.workspace().activations); },
+                   "(m,) clearance [m | rad] at which each barrier begins now: less than set where the arm has to come near what\n"
+                   "rests, at its goal and in narrow places of its path.")
       .def_prop_ro("labels", [](const Controller& self) { return self.labels(); }, "What the clearances are of.")
       .def_prop_ro("target",
                    [](const Controller& self) -> nb::object {

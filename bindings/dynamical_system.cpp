@@ -233,14 +233,6 @@ void bind_dynamical_system(nb::module_& m) {
                   "switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch "
                   "| None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None, "
                   "speed: SpeedRegulator | None = None) -> None"))
-      .def(
-          "relaxed_at",
-          [](const GeometricSystem& system, const ArrayLike& goal, const Obstacles& obstacles) {
-            return system.relaxed_at(as_finite_vector(goal, "goal", system.robot().num_coordinates()), obstacles);
-          },
-          nb::arg("goal"), nb::arg("obstacles"),
-          "This system with barriers that leave a goal (nv,) [rad] free: the activation distance of every coordinate is at\n"
-          "most 0.9 of its clearance there, and at least two floors. To be made when the goal or the obstacles change.")
       .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
       .def_prop_ro("labels", [](const GeometricSystem& s) { return s.labels(); },
                    "What every embedding coordinate is about, as CoordinateLabel.")
@@ -252,19 +244,25 @@ void bind_dynamical_system(nb::module_& m) {
       .def(
           "acceleration",
           [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal,
-             const Obstacles& obstacles) {
+             const Obstacles& obstacles, nb::handle activations) {
             const int nv = system.robot().num_coordinates();
             Step step{StepStatus::ok, GeometricSystem::Workspace(system), {system, {}}};
+            if (!activations.is_none()) {
+              step.result.activations = as_finite_vector(nb::cast<ArrayLike>(activations), "activations",
+                                                         system.num_embedding_coordinates());
+            }
             step.status = system.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv), as_goal(goal, nv),
                                               obstacles, step.result);
             step.explanation = Explanation(system, system.diagnose(step.result));
             return step;
           },
-          nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"),
+          nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::arg("activations") = nb::none(),
           nb::sig("def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: "
-                  "numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> Step"),
+                  "numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, "
+                  "activations: numpy.typing.ArrayLike | None = None) -> Step"),
           "One step at q, v (nv,) [rad, rad/s] towards a configuration (nv,), a JointGoal or a PoseGoal. Values that are not finite and goals outside\n"
-          "the limits give a status and a damped stop, not an exception; wrong shapes raise ValueError.");
+          "the limits give a status and a damped stop, not an exception; wrong shapes raise ValueError. activations (m,):\n"
+          "clearances at which barriers begin, in place of the system's, see Controller.activations.");
   system
       .def(
           "diagnose",

@@ -111,7 +111,13 @@ void bind_settings(nb::module_& m) {
       .def_ro("floor", &PlannerSettings::floor)
       .def_ro("allowance", &PlannerSettings::allowance)
       .def_ro("pair_allowance", &PlannerSettings::pair_allowance)
-      .def_ro("max_seconds", &PlannerSettings::max_seconds);
+      .def_ro("slack", &PlannerSettings::slack)
+      .def_ro("fade", &PlannerSettings::fade)
+      .def_ro("range", &PlannerSettings::range)
+      .def_ro("max_nodes", &PlannerSettings::max_nodes)
+      .def_ro("max_iterations", &PlannerSettings::max_iterations)
+      .def_ro("max_seconds", &PlannerSettings::max_seconds)
+      .def_ro("shortcuts", &PlannerSettings::shortcuts);
 
   nb::class_<RouteSettings>(
       m, "RouteSettings",
@@ -169,7 +175,7 @@ void bind_guide(nb::module_& m) {
                      return to_numpy_matrix(a.places.leftCols(a.num_places).transpose());
                    },
                    "Where barriers are to leave room (k, nv): the narrow places of the path that the arm is about to pass, or the\n"
-                   "goal where there is none. See GeometricSystem.relaxed_at.")
+                   "goal where there is none. See Controller.activations.")
       .def_prop_ro("arrives", [](const Guidance& g) { return g.attractor.arrives; },
                    "Whether barriers are to leave room at the goal as well: `places` are others, and the end of the path is\n"
                    "within the lead.");

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,7 +81,9 @@ def test_ctrl_c_ends_what_takes_long(name):
     source = PROGRAM.replace("{work}", LONG[name]).replace(
         "{rows}", "3_000_000" if name == "evaluate_batch" else "8"
     )
-    with subprocess.Popen([sys.executable, "-c", source], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", source], stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent
+    ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "begins\n"
         time.sleep(0.3)

@@ -79,8 +79,6 @@ from .control import TorqueFault as TorqueFault
 from .control import TorqueSolution as TorqueSolution
 from .control import TorqueStatus as TorqueStatus
 from .control import acceleration_bounds as acceleration_bounds
-from .guidance import GuidedMotion as GuidedMotion
-from .guidance import GuidedStep as GuidedStep
 from .obstacles import Box as Box
 from .obstacles import Cylinder as Cylinder
 from .obstacles import MeshShape as MeshShape

@@ -819,12 +819,6 @@ class GeometricSystem:
 
     def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None, speed: SpeedRegulator | None = None) -> None: ...
 
-    def relaxed_at(self, goal: numpy.typing.ArrayLike, obstacles: Obstacles) -> GeometricSystem:
-        """
-        This system with barriers that leave a goal (nv,) [rad] free: the activation distance of every coordinate is at
-        most 0.9 of its clearance there, and at least two floors. To be made when the goal or the obstacles change.
-        """
-
     @property
     def num_embedding_coordinates(self) -> int: ...
 
@@ -847,10 +841,11 @@ class GeometricSystem:
     @property
     def switch(self) -> Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch: ...
 
-    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> Step:
+    def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, activations: numpy.typing.ArrayLike | None = None) -> Step:
         """
         One step at q, v (nv,) [rad, rad/s] towards a configuration (nv,), a JointGoal or a PoseGoal. Values that are not finite and goals outside
-        the limits give a status and a damped stop, not an exception; wrong shapes raise ValueError.
+        the limits give a status and a damped stop, not an exception; wrong shapes raise ValueError. activations (m,):
+        clearances at which barriers begin, in place of the system's, see Controller.activations.
         """
 
     def diagnose(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles) -> Diagnosis:
@@ -1570,7 +1565,25 @@ class PlannerSettings:
     def pair_allowance(self) -> float: ...
 
     @property
+    def slack(self) -> float: ...
+
+    @property
+    def fade(self) -> float: ...
+
+    @property
+    def range(self) -> float: ...
+
+    @property
+    def max_nodes(self) -> int: ...
+
+    @property
+    def max_iterations(self) -> int: ...
+
+    @property
     def max_seconds(self) -> float: ...
+
+    @property
+    def shortcuts(self) -> int: ...
 
 class RouteSettings:
     """
@@ -1645,7 +1658,7 @@ class Guidance:
     def places(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         Where barriers are to leave room (k, nv): the narrow places of the path that the arm is about to pass, or the
-        goal where there is none. See GeometricSystem.relaxed_at.
+        goal where there is none. See Controller.activations.
         """
 
     @property
@@ -2441,6 +2454,19 @@ class Controller:
     def geometric_step(self) -> Step:
         """
         The Step of the geometric system in the last step, with its clearances, metric and diagnosis.
+        """
+
+    @property
+    def system(self) -> GeometricSystem:
+        """
+        The geometric system, a copy. Its barriers begin at full distance, see activations.
+        """
+
+    @property
+    def activations(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (m,) clearance [m | rad] at which each barrier begins now: less than set where the arm has to come near what
+        rests, at its goal and in narrow places of its path.
         """
 
     @property

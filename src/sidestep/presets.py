@@ -7,20 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from sidestep._core import (
-    ClearanceBarrier,
-    ClearanceTableBarrier,
+    BarrierSettings,
     CollisionDensity,
+    Controller,
+    ControllerSettings,
     DistanceSwitch,
-    Embedding,
     GeometricSystem,
-    JointLimitBarrier,
     JointLimitPotential,
-    SelfCollisionBarrier,
     Sum,
 )
-from sidestep.barriers import Barriers as Barriers
+from sidestep.arm import Arm
 from sidestep.body import Body
-from sidestep.link_pairs import tables_and_pairs
 from sidestep.robot import Robot
 
 
@@ -43,50 +40,16 @@ class Thesis:
 
 
 def barrier_system(
-    robot: Robot, body: Body | None = None, *, numbers: Barriers = Barriers(), self_collision: bool = True
+    robot: Robot, body: Body | None = None, *, numbers: BarrierSettings | None = None
 ) -> GeometricSystem:
-    """The recommended system: a barrier for every part of the body, every joint limit, every pair of links.
+    """The geometric system of a `Controller`: a barrier for every part of the body, joint limit and pair of links.
 
     Args:
         robot: the arm. body: a covering body of it; by default `Body.cover(robot)`.
         numbers: in place of the defaults.
-        self_collision: whether pairs of links get barriers.
     """
-    body = body if body is not None else Body.cover(robot)
-    parts: list[Embedding] = [
-        ClearanceBarrier(
-            robot,
-            body,
-            activation=numbers.activation,
-            strength=numbers.strength,
-            power=numbers.power,
-            floor=numbers.floor,
-            temperature=numbers.temperature,
-        ),
-        JointLimitBarrier(
-            robot, activation=numbers.limit_activation, strength=numbers.limit_strength, power=numbers.power
-        ),
-    ]
-    if self_collision:
-        parts += _self_collision(robot, body, numbers)
-    return GeometricSystem(parts, stiffness=numbers.stiffness, damping=numbers.damping, pull_form="one_sided")
-
-
-def _self_collision(robot: Robot, body: Body, numbers: Barriers) -> list[Embedding]:
-    """By tables where there are any, by covers between other links that may touch."""
-    settings = {
-        "activation": numbers.self_activation,
-        "strength": numbers.self_strength,
-        "power": numbers.power,
-        "floor": numbers.floor,
-    }
-    parts: list[Embedding] = []
-    tables, pairs = tables_and_pairs(robot, body)
-    if tables:
-        parts.append(ClearanceTableBarrier(robot, tables, **settings))
-    if pairs:
-        parts.append(SelfCollisionBarrier(robot, body, pairs, temperature=numbers.temperature, **settings))
-    return parts
+    settings = ControllerSettings(synchronous=True, planner=None, barriers=numbers or BarrierSettings())
+    return Controller(Arm.from_robot(robot, body), settings).system
 
 
 def thesis_system(

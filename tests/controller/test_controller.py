@@ -128,6 +128,57 @@ def test_what_is_out_of_reach_is_said(robot: ss.Robot, arm: ss.Arm) -> None:
     assert controller.explain().startswith("the goal is out of reach: nearest posture ")
 
 
+def test_what_blocks_a_goal_is_said_without_a_planner_as_well(robot: ss.Robot, arm: ss.Arm) -> None:
+    goal = robot.neutral + np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    hand = robot.pose(goal, "fr3_hand")[:3, 3]
+    words = []
+    for planner in (ss.OnlinePlannerSettings(), None):
+        controller = ss.Controller(arm, settings(planner=planner))
+        controller.set_goal(goal)
+        controller.set_obstacles(ss.Obstacles([hand], radii=0.05))
+        motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=6000)
+        assert motion.activities[-1] == ss.Activity.blocked
+        words.append(controller.explain())
+    assert words[0] == words[1]
+    assert words[0].startswith("at the goal link 'fr3_")
+    assert "obstacle point 0" in words[0]
+
+
+def test_a_posture_is_looked_for_near_the_rest_of_a_pose(robot: ss.Robot, arm: ss.Arm) -> None:
+    """Of the many with the same pose."""
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        rest = robot.random_configuration(rng)
+        controller = ss.Controller(arm, settings())
+        controller.set_goal(ss.PoseGoal(robot, "fr3_hand", robot.pose(rest, "fr3_hand"), rest=rest))
+        controller.step(robot.neutral, np.zeros(7))
+        found = controller.target
+        assert found is not None
+        free = ss.SelfCollision(robot).distance(rest).distance > 0.0
+        assert not free or np.abs(found - rest).max() < 1e-9
+
+
+def test_a_posture_that_is_not_free_is_taken_only_where_there_is_no_other(
+    robot: ss.Robot, arm: ss.Arm
+) -> None:
+    pose = robot.pose(robot.neutral, "fr3_hand")
+
+    def found(*points: np.ndarray) -> np.ndarray:
+        controller = ss.Controller(arm, settings())
+        controller.set_goal(ss.PoseGoal(robot, "fr3_hand", pose))
+        controller.set_obstacles(ss.Obstacles(np.array(points), 0.05) if points else ss.Obstacles.none())
+        controller.step(robot.neutral, np.zeros(7))
+        q = controller.target
+        assert q is not None
+        np.testing.assert_allclose(robot.pose(q, "fr3_hand"), pose, atol=1e-6)
+        return q
+
+    first = found()
+    elbow = robot.pose(first, "fr3_link4")[:3, 3]
+    assert np.abs(found(elbow) - first).max() > 0.1  # [rad] another
+    found(pose[:3, 3])  # in the hand, where no posture is free
+
+
 def test_continuous_joints_take_the_nearest_turn_and_survive_encoders_that_wrap() -> None:
     text = """<robot name="spinner"><link name="base"/><joint name="turn" type="continuous"><parent link="base"/>
       <child link="bar"/><axis xyz="0 0 1"/><limit velocity="2" effort="50"/></joint><link name="bar"><inertial>

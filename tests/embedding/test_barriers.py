@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 import sidestep as ss
 from sidestep import _core
-from sidestep.presets import barrier_system
 from sidestep.simulation import SelfCollision
 from support.finite_differences import derivative, second_derivative
 from support.random_scene import random_body
@@ -322,35 +321,51 @@ def test_what_is_wrong_is_named(make: Callable[[ss.Robot, ss.Body], ss.Embedding
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_relaxed_barriers_leave_the_goal_flat_and_keep_what_is_far(name: str) -> None:
+def test_lowered_barriers_leave_the_goal_flat_and_keep_what_is_far(name: str) -> None:
     robot = ss.Robot.named(name)
-    body, rng = covering(robot, 1), np.random.default_rng(1)
-    wide = {"activation": 0.5, "floor": 0.01}
-    parts = [ss.ClearanceBarrier(robot, body, reach=0.5, **wide), ss.JointLimitBarrier(robot, activation=0.5)]
-    system = ss.GeometricSystem(parts)
+    rng = np.random.default_rng(1)
+    wide = ss.BarrierSettings(activation=0.5, limit_activation=0.5, floor=0.01)
+    arm = _core.Arm(
+        robot=robot,
+        body=covering(robot, 1),
+        pairs=[],
+        tables=[],
+        inertials=(),
+        proof=[],
+        allowed_pairs=[],
+        provenance=_core.Provenance(source="", fingerprint="", sidestep_version="", date=""),
+    )
+    controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True, planner=None, barriers=wide))
+    system = controller.system
     goal, rest = robot.random_configuration(rng), np.zeros(robot.num_coordinates)
     obstacles = ss.Obstacles(rng.uniform(-1.0, 1.0, (10, 3)), radii=0.02)
     before = system.acceleration(goal, rest, goal, obstacles)
-    relaxed = system.relaxed_at(goal, obstacles)
-    after = relaxed.acceleration(goal, rest, goal, obstacles)
-    clearances = np.concatenate([part.evaluate(goal, rest, obstacles).clearances for part in parts])
-    floors = np.repeat([0.01, 0.002], [part.num_coordinates for part in parts])
+    controller.set_goal(goal)
+    controller.set_obstacles(obstacles)
+    controller.step(goal, rest)
+    activations = controller.activations
+    after = system.acceleration(goal, rest, goal, obstacles, activations)
+    np.testing.assert_array_equal(after.values, controller.values)
+    clearances, margins = np.array(before.clearances.values), np.array(before.clearances.margins)
     # 0.9 of a clearance of more than two floors / 0.9 is below it, so the barrier is not active there.
-    free = clearances > 2.0 * floors / 0.9
+    free = clearances > 2.0 * 0.01 / 0.9
     assert np.any(free & (before.values > 0.0))
     np.testing.assert_array_equal(after.values[free], 0.0)
     # What is seen keeps its safety margin, of what is known no more is kept than half the activation distance.
-    joints = parts[1].num_coordinates
-    np.testing.assert_array_equal(
-        before.clearances.margins, np.repeat([np.inf, 0.25], [len(floors) - joints, joints])
+    kinds = np.array([label.kind for label in controller.labels])
+    seen, joints = kinds == ss.CoordinateKind.obstacle, kinds == ss.CoordinateKind.joint_limit
+    np.testing.assert_array_equal(margins[seen], np.inf)
+    np.testing.assert_array_equal(after.clearances.margins[seen], np.inf)
+    np.testing.assert_allclose(after.clearances.margins[joints], 0.5 * activations[joints], rtol=1e-12)
+    np.testing.assert_allclose(
+        activations[joints], np.clip(0.9 * clearances[joints], 2.0 * 0.01, 2.0 * margins[joints]), rtol=1e-12
     )
-    np.testing.assert_array_equal(after.clearances.margins[:-joints], np.inf)
-    expected = 0.5 * np.clip(0.9 * clearances[-joints:], 2.0 * 0.002, 0.5)
-    np.testing.assert_allclose(after.clearances.margins[-joints:], expected, rtol=1e-12)
     # Where nothing is within reach of the goal the activation distance is what it was: elsewhere nothing changes.
     other = robot.random_configuration(rng)
     unchanged = ~np.isfinite(clearances)
-    values = [s.acceleration(other, rest, goal, obstacles).values for s in (system, relaxed)]
+    values = [
+        system.acceleration(other, rest, goal, obstacles, lowered).values for lowered in (None, activations)
+    ]
     np.testing.assert_array_equal(values[0][unchanged], values[1][unchanged])
 
 
@@ -361,11 +376,18 @@ def test_a_goal_at_which_links_almost_touch_is_reached() -> None:
     start = goal + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0])
     exact = SelfCollision(robot)
     assert 0.0 < exact.distance(goal).distance < 0.001
-    none, system = ss.Obstacles.none(), barrier_system(robot)
     errors = {}
-    for name, moving in (("stiff", system), ("relaxed", system.relaxed_at(goal, none))):
-        guard = ss.AccelerationFilter(robot, period=0.001)
-        motion = ss.rollout(moving, start, 0.0 * start, goal, none, period=0.001, steps=4000, filter=guard)
+    for name, lowered in (("stiff", False), ("relaxed", True)):
+        settings = ss.ControllerSettings(
+            synchronous=True,
+            output="acceleration",
+            planner=None,
+            local_minimum=None,
+            local_activation=lowered,
+        )
+        controller = ss.Controller(ss.Arm.from_robot(robot), settings)
+        controller.set_goal(goal)
+        motion = ss.integrate(controller, start, 0.0 * start, steps=4000)
         assert exact.minimum_over(motion.q[::20], tolerance=1e-4).distance > 0.0
-        errors[name] = np.abs(motion.q[-1] - goal).max()
+        errors[name] = np.abs(motion.last_q - goal).max()
     assert errors["relaxed"] < 0.05 < errors["stiff"]

@@ -56,18 +56,6 @@ def test_out_of_reach_the_nearest_posture_draws_and_what_lacks_is_said(arm: Robo
     assert Posture(START).in_words("arriving") == "arriving"
 
 
-def test_a_posture_that_is_not_free_is_taken_only_where_there_is_no_other(arm: Robot) -> None:
-    pose = target(arm)
-    first = posture_at(arm, TIP, pose, START, starts=20)
-    other = posture_at(
-        arm, TIP, pose, START, starts=20, free=lambda q: float(np.abs(q - first.q).max()) > 0.1
-    )
-    assert other.found
-    assert np.abs(other.q - first.q).max() > 0.1  # [rad]
-    none = posture_at(arm, TIP, pose, START, starts=20, free=lambda _: False)
-    assert none.found
-
-
 def test_an_arm_of_seven_joints_comes_to_a_pose_in_seconds(arm: Robot) -> None:
     """20 cm forwards the joints move the hand little: the pull of the pose alone takes over 12 s."""
     system = GeometricSystem([], robot=arm, stiffness=4.0, damping=4.0)

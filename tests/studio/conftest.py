@@ -30,7 +30,8 @@ def scenario() -> Scenario:
 @pytest.fixture
 def make_session() -> Callable[..., Session]:
     def make(scenario: Scenario, **options: object) -> Session:
-        return Session(scenario, prepare=make_body, ellipsoids=SMALL, **options)  # type: ignore[arg-type]
+        kept = {"prepare": make_body, "ellipsoids": SMALL, "synchronous": True}  # motions that repeat
+        return Session(scenario, **kept | options)  # type: ignore[arg-type]
 
     return make
 

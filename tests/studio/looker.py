@@ -188,7 +188,7 @@ def run_to(studio: Studio, time: float) -> m.Snapshot:
 def reset(studio: Studio) -> None:
     """Puts planar2 at its start, paused, with one ball, shown live."""
     studio.view.recorder.show_live()
-    studio.send(m.Load(scenario_of(RobotChoice(name="planar2")), "barrier"))
+    studio.send(m.Load(scenario_of(RobotChoice(name="planar2")), "controller"))
     studio.send(m.Restart(until=0.0))
     until(lambda: len(last(studio).things) == 1 and last(studio).time == 0.0, "the start")
 

@@ -66,7 +66,7 @@ def test_it_listens_to_this_machine_alone_unless_told_otherwise(
     assert invoke(monkeypatch, "studio", "--robot", "planar2", "--host", "0.0.0.0", "--port", "0") == 0
     assert [options["host"] for _, options in opened] == ["127.0.0.1", "0.0.0.0"]
     assert [options["browser"] for _, options in opened] == [False, True]
-    assert all(options["method"] == "barrier" for _, options in opened)
+    assert all(options["method"] == "controller" for _, options in opened)
 
 
 def test_a_scenario_opens_with_the_method_it_is_written_for(

@@ -26,7 +26,6 @@ from sidestep.scenario.scenario import (
     SwitchChoice,
     SystemChoice,
 )
-from sidestep.simulation.pose_aim import PoseAim
 from sidestep.studio import messages as m
 from sidestep.studio.export import (
     not_kept,
@@ -57,69 +56,77 @@ def tuned(name: str) -> dict[str, Any]:
         if p.options:
             return next(option for option in p.options if option != p.default)
         assert isinstance(p.default, int | float)
-        value = p.default + 0.0712345678901 * (p.upper - p.default)
+        value = 1.0712345678901 * p.default or 0.0712345678901 * p.upper
         return round(value) if p.whole else value
 
     return {p.name: other(p) for p in METHODS[name].parameters}
 
 
-def begun(session: Session, goal: str) -> Session:
-    """After the first step to a configuration, or to a pose."""
-    if goal == "pose":
-        session.handle(m.SetPoseGoal(session.robot.pose(POSE, session.tip)))
-    session.step()
-    return session
+def recorded(session: Session, steps: int) -> list[tuple[Any, ...]]:
+    """Of each step q, v, mass matrix and bias that are measured, obstacles that are seen, and the torque."""
+    found: list[tuple[Any, ...]] = []
+    step = session._mover.step
+
+    def spy(*told: Any) -> Any:
+        found.append((*(np.copy(array) for array in told[:4]), told[4], step(*told)))
+        return found[-1][-1]
+
+    session._mover.step = spy  # type: ignore[method-assign]
+    for _ in range(steps):
+        session.step()
+    return found
 
 
 @pytest.mark.parametrize("goal", ["configuration", "pose"])
-@pytest.mark.parametrize(
-    "name", [name for name in METHODS if name not in ("controller", "geodesic_only", WRITTEN)]
-)
+@pytest.mark.parametrize("name", [name for name in METHODS if name not in ("geodesic_only", WRITTEN)])
 def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, name: str, goal: str
 ) -> None:
-    """The first acceleration is the same to the last digit, and so is every number after loading."""
-    session = begun(make_session(scenario, method=name, numbers={name: tuned(name)}), goal)
+    """The first torques are the same to the last digit, and so is every number after loading."""
+    session = make_session(scenario, method=name, numbers={name: tuned(name)})
+    if goal == "pose":
+        session.handle(m.SetPoseGoal(session.robot.pose(POSE, session.tip)))
+    session.step()
     before = session.snapshot()
     session.handle(m.Restart())
     at_start = session.snapshot()
-    expected = np.array(begun(session, goal)._step.acceleration)  # type: ignore[union-attr]
+    motion = recorded(session, 40)
+    expected = np.array([torque for *_, torque in motion])
     assert before.numbers[name] == tuned(name)
-    assert np.abs(expected).max() > 0.01  # [rad/s^2] it does move
+    assert np.abs(session.snapshot().v).max() > 0.01  # [rad/s] it does move
 
+    controlled = METHODS[name].controlled
     loaded = Scenario.load(save_scenario(scenario_now(at_start, name="mine"), tmp_path))
-    assert loaded.method == (name if METHODS[name].covering else "written")
+    assert loaded.method == (name if controlled else "written")
     again = make_session(loaded, method=numbers_of(loaded)[0])
     assert again.snapshot().method == name
     kept = tuned(name)
     if name == "thesis":
         kept["inner"] = METHODS[name].defaults["inner"]  # two joints have no inner ones
     assert again.snapshot().numbers[name] == kept
-    again.step()
-    parts = assemble(loaded)
-    rest = np.zeros_like(parts.start)
-    q, v = again.stage.begin(0.0)
-    dynamics = (q, v, np.ones_like(q), *again.stage.dynamics())
-    torque = parts.torque_program.solve(*dynamics).torque
-    np.testing.assert_array_equal(again._controller.solve(*dynamics).torque, torque)
-    covering = METHODS[name].covering
-    variables: dict[str, Any] = {}
-    exec(python_snippet(at_start), variables)
-    np.testing.assert_array_equal(variables["controller"].solve(*dynamics).torque, torque)
-    system, place = variables["system"], variables.get("posture", variables["goal"])
-    if covering:
-        system = system.relaxed_at(place, parts.seen)
-    written = system.acceleration(parts.start, rest, place, parts.seen)
-    assert max(len(line) for line in python_snippet(at_start).splitlines() if "[" not in line) <= 100
-    np.testing.assert_array_equal(variables["q"], at_start.q)
-    free = variables["system"].acceleration(at_start.q, at_start.v, variables["goal"], ss.Obstacles.none())
-    np.testing.assert_array_equal(variables["step"].acceleration, free.acceleration)
     # A rotation in degrees has lost its last digits, and with it the pose, but not the posture.
-    np.testing.assert_array_equal(again._step.acceleration, expected)  # type: ignore[union-attr]
-    if not covering or goal == "configuration":  # a controller looks for a posture of its own
-        run = parts.driver().drive(0.0, parts.start, rest, *again.stage.dynamics())
-        np.testing.assert_array_equal(run.wanted, expected)
-    np.testing.assert_array_equal(written.acceleration, expected)
+    np.testing.assert_array_equal([torque for *_, torque in recorded(again, 40)], expected)
+
+    parts, code = assemble(loaded), python_snippet(at_start)
+    run = parts.driver()
+    variables: dict[str, Any] = {}
+    exec(code, variables)
+    assert max(len(line) for line in code.splitlines() if "[" not in line) <= 100
+    np.testing.assert_array_equal(variables["q"], at_start.q)
+    controller, place = variables["controller"], variables.get("posture", variables["goal"])
+    if controlled:
+        variables["settings"].synchronous = True  # in this test: motions that repeat
+        controller = ss.Controller(variables["arm"], variables["settings"])
+        controller.set_goal(variables["goal"])
+        controller.set_obstacles(motion[0][4])
+    for k, (q, v, mass, bias, seen, torque) in enumerate(motion):
+        np.testing.assert_array_equal(run.drive(k * session.period, q, v, mass, bias).torque, torque)
+        if controlled:
+            written = controller.step(q, v, mass, bias)
+        else:
+            step = variables["system"].acceleration(q, v, place, seen)
+            written = controller.solve(q, v, step.acceleration, mass, bias)
+        np.testing.assert_array_equal(written.torque, torque)
 
 
 def test_the_thresholds_of_seven_joints_survive() -> None:
@@ -133,8 +140,8 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
         replace(mine, body=replace(mine.body, components=7)),  # not on the list
         replace(mine, body=replace(mine.body, seed=1)),
         replace(mine, embedding=replace(mine.embedding, joint_limits=None)),
-        replace(mine, torque=replace(mine.torque, stop_time=5.0)),  # beyond its slider
-        replace(mine, system=replace(mine.system, stiffness=50.0)),  # beyond its slider
+        replace(mine, torque=replace(mine.torque, stop_time=50.0)),  # out of its range
+        replace(mine, system=replace(mine.system, stiffness=50.0)),  # out of its range
     ):
         assert numbers_of(other) == (WRITTEN, {})
     fall = replace(mine, system=SystemChoice(switch=SwitchChoice("geodesic_only")))
@@ -143,12 +150,11 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
 
 
 CLASSES = {  # of the snippet, by places in a scenario file
-    "barriers": "Barriers",
-    "escape": "Escape",
-    "evasion": "Evasion",
+    "barriers": "BarrierSettings",
+    "escape": "LocalMinimumSettings",
+    "evasion": "LookAheadSettings",
     "guide.planner": "PlannerSettings",
     "guide.route": "RouteSettings",
-    "torque": "TorqueController",
     "torque.safety": "SafetySettings",
     "system": "GeometricSystem",
     "embedding.joint_limits": "JointLimitPotential",
@@ -182,6 +188,9 @@ def test_every_number_is_in_the_file_and_in_the_snippet(
             assert given["CollisionDensity"]["average"] == (value == "average")
         elif parameter.name == "combine":
             assert ("ss.Sum(" in code) == (value == "sum")
+        elif parameter.place == "torque":
+            kind = "ControllerSettings" if METHODS[name].controlled else "TorqueController"
+            assert given[kind][parameter.field] == value
         elif parameter.place in CLASSES:
             assert given[CLASSES[parameter.place]][parameter.field] == value
 
@@ -222,7 +231,7 @@ def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
     expected = parts.mover.acceleration(
         parts.start, parts.start_velocity, parts.goal, parts.seen
     ).acceleration
-    np.testing.assert_array_equal(session._step.acceleration, expected)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(session._mover._step.acceleration, expected)  # type: ignore[union-attr]
     variables: dict[str, Any] = {}
     exec(python_snippet(session.snapshot()), variables)
     again = variables["system"].acceleration(parts.start, parts.start_velocity, parts.goal, parts.seen)
@@ -236,19 +245,32 @@ def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
     np.testing.assert_array_equal(make_session(kept, method=WRITTEN).snapshot().v, kept.start.velocity)
 
 
-def test_barriers_beyond_their_sliders_are_kept_and_others_can_be_moved(
+def test_numbers_beyond_their_sliders_are_kept_and_others_can_be_moved(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
 ) -> None:
-    wide = replace(scenario, barriers=BarrierChoice(activation=0.5, ellipsoids=2))
-    session = make_session(wide)
-    assert session.snapshot().numbers["barrier"]["activation"] == 0.5
+    stiff = replace(scenario, barriers=BarrierChoice(stiffness=50.0, ellipsoids=2))
+    session = make_session(stiff)
+    assert session.snapshot().numbers["controller"]["stiffness"] == 50.0
     kept = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="kept"), tmp_path))
-    assert kept.barriers == wide.barriers
-    moved = {**session.snapshot().numbers["barrier"], "damping": 5.0}
-    session.handle(m.SetNumbers("barrier", moved))
-    assert session.snapshot().numbers["barrier"] == moved
-    with pytest.raises(ValueError, match=r"activation is 0.6, allowed: \[0.02, 0.3\]"):
-        session.handle(m.SetNumbers("barrier", {"activation": 0.6}))
+    assert kept.barriers == stiff.barriers
+    moved = {**session.snapshot().numbers["controller"], "damping": 5.0}
+    session.handle(m.SetNumbers("controller", moved))
+    assert session.snapshot().numbers["controller"] == moved
+    with pytest.raises(ValueError, match=r"stiffness is 200.0, allowed: \[0.01, 100\]"):
+        session.handle(m.SetNumbers("controller", {"stiffness": 200.0}))
+
+
+def test_a_file_of_the_thesis_goes_on_with_the_controller(
+    make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
+) -> None:
+    """Its mode and integrator are of runs without physics; what is saved can be run."""
+    alone = replace(scenario.simulation, mode="kinematic", integrator="runge_kutta_4")
+    session = make_session(replace(scenario, method="written", simulation=alone), method="controller")
+    session.step()
+    assert session.snapshot().torque_share > 0.0
+    loaded = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))
+    assert (loaded.simulation.mode, loaded.simulation.integrator) == ("kinematic", "semi_implicit_euler")
+    assert isinstance(assemble(loaded).mover, ss.Controller)
 
 
 def test_obstacles_go_on_as_they_moved(
@@ -287,12 +309,8 @@ def test_the_snippet_of_a_pose_holds_the_same_pose(
     session.handle(m.SetPoseGoal(session.robot.pose(POSE, session.tip)))
     variables: dict[str, Any] = {}
     exec(python_snippet(session.snapshot()), variables)
-    goal, q, v = variables["goal"], POSE + 0.01, np.zeros(2)
-    assert isinstance(session._pursuit._aim, PoseAim)
-    np.testing.assert_array_equal(
-        variables["system"].acceleration(q, v, goal, ball()).acceleration,
-        session._pursuit.system.acceleration(q, v, session._pursuit._aim.goal, ball()).acceleration,
-    )
+    np.testing.assert_array_equal(variables["goal"].pose, session.snapshot().goal_pose)
+    assert variables["goal"].frame == session.tip
 
 
 def test_a_loaded_file_brings_its_method_a_shipped_scenario_leaves_it(
@@ -317,13 +335,18 @@ def test_a_pose_goal_survives_saving_and_loading(
     session = make_session(replace(scenario, robot=RobotChoice(name="planar3"), **SMALL_ARM))
     aim = session.robot.pose(np.array([0.3, 0.5, -0.4]), session.tip)
     session.handle(m.SetPoseGoal(aim))
+    assert session.snapshot().posture is None  # it is looked for in the next step
+    session.step()
+    session.handle(m.Restart())
     posture = session.snapshot().posture
+    assert posture is not None
     assert posture.found
     loaded = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))
     again = make_session(loaded).snapshot()
     assert again.goal is None
     assert again.goal_pose is not None
     np.testing.assert_allclose(again.goal_pose, aim, atol=1e-14)  # an angle in degrees loses a digit
+    assert again.posture is not None
     np.testing.assert_array_equal(again.posture.q, posture.q)
 
 
@@ -407,7 +430,7 @@ def test_a_file_that_is_there_is_replaced_only_if_asked(scenario: Scenario, tmp_
     assert Scenario.load(save_scenario(other, tmp_path, replace=True)).description == "another"
 
 
-@pytest.mark.parametrize("method", ["unswitched", "barrier"])
+@pytest.mark.parametrize("method", ["unswitched", "controller"])
 def test_a_box_is_seen_as_a_run_sees_it(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, method: str
 ) -> None:
@@ -430,9 +453,3 @@ def test_a_large_cloud_is_thinned() -> None:
     few, radius = thinned(points[:100])
     np.testing.assert_array_equal(few, points[:100])
     assert radius == CLOUD_RADIUS
-
-
-def ball() -> object:
-    from sidestep import Obstacles
-
-    return Obstacles([[0.8, 0.6, 0.0]], radii=0.05)

@@ -247,7 +247,7 @@ def test_a_loop_that_fails_holds_the_arm_and_says_why(
     make_session: Callable[..., Session], scenario: Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = make_session(scenario, method="unswitched")
-    failing = session._pursuit.step
+    failing = session._mover.step
     calls = 0
 
     def step(*arguments: object) -> object:
@@ -257,7 +257,7 @@ def test_a_loop_that_fails_holds_the_arm_and_says_why(
             raise np.linalg.LinAlgError("singular")
         return failing(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(session._pursuit, "step", step)
+    monkeypatch.setattr(session._mover, "step", step)
     sent = [message for _, message in paced(session, monkeypatch, 0.5)]
     (failure,) = [message for message in sent if isinstance(message, m.Failed)]
     assert failure.message == "the step at 0.004 s failed, the loop is paused: LinAlgError: singular"

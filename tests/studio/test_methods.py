@@ -1,12 +1,13 @@
 """The methods of the studio and their parameters."""
 
 import dataclasses
+from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from sidestep import presets
+from sidestep import Scenario, controller_settings_fields, presets
 from sidestep.bench.method import Method as BenchMethod
 from sidestep.scenario.scenario import (
     BarrierChoice,
@@ -26,18 +27,20 @@ from sidestep.scenario.settings import (
 from sidestep.studio.methods import METHODS, check_numbers
 from sidestep.studio.page.tuning import add_control, show_value, unit_for, value_of
 from sidestep.studio.parameters import Parameter
+from sidestep.studio.systems import as_file, settings_of
 
 
 def test_every_method_of_the_benchmark_is_there() -> None:
     assert {method.value for method in BenchMethod} <= set(METHODS)
     for method in BenchMethod:
-        assert METHODS[method.value].safe == method.safe
-        assert METHODS[method.value].guided == (method is BenchMethod.controller)
+        assert METHODS[method.value].controlled == method.safe
 
 
-def test_the_recommended_numbers_are_the_presets() -> None:
-    barriers = {p.field: p.default for p in METHODS["barrier"].parameters if p.place == "barriers"}
-    assert BarrierChoice(**barriers) == BarrierChoice()  # type: ignore[arg-type]
+def test_the_recommended_numbers_are_those_of_the_controller_and_the_thesis(scenario: Scenario) -> None:
+    method = METHODS["controller"]
+    settings = settings_of(as_file(method, method.defaults, scenario))
+    for entry in controller_settings_fields():
+        assert attrgetter(str(entry["name"]))(settings) == entry["default"], entry["name"]
     thesis = METHODS["thesis"].defaults
     own = {field.name: thesis[field.name] for field in dataclasses.fields(presets.Thesis)}
     assert presets.Thesis(**own) == presets.Thesis()
@@ -91,6 +94,9 @@ def test_every_parameter_has_a_range_around_its_default_and_a_sentence(name: str
     for parameter in parameters:
         assert parameter.allows(parameter.default)
         assert parameter.sentence.endswith(".")
+        if not parameter.options:
+            lower, upper = parameter.slider
+            assert parameter.lower <= lower <= parameter.default < upper <= parameter.upper  # type: ignore[operator]
 
 
 def test_an_unknown_parameter_is_refused() -> None:
@@ -125,7 +131,7 @@ def test_a_control_gives_back_the_value_it_shows(parameter: Parameter) -> None:
     for value in values:
         control = add_control(gui, parameter, value)
         assert value_of(control, parameter) == (
-            value if parameter.options else pytest.approx(value, rel=5e-3)
+            value if parameter.options else pytest.approx(value, rel=1e-12)
         )
         show_value(control, parameter, parameter.default)
         back = value_of(control, parameter)

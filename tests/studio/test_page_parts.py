@@ -18,6 +18,7 @@ from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
 from sidestep.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS
+from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page import colours, obstacle_panel
 from sidestep.studio.page import surface as surface_module
 from sidestep.studio.page.arm import reach, short_names
@@ -43,7 +44,7 @@ from sidestep.studio.page.surface import (
 from sidestep.studio.page.view import begins_anew, live_row
 from sidestep.studio.page.words import begun
 from sidestep.studio.session import Session
-from sidestep.studio.systems import build_system
+from sidestep.studio.systems import build_mover
 from sidestep.studio.things import ball, cloud, thing_of
 from sidestep.studio.truth import Truth, solid_poses
 
@@ -55,12 +56,12 @@ def test_the_surface_is_the_embedding_over_two_joints(make_session: MakeSession,
     snapshot, robot = session.snapshot(), session.robot
     method, body = METHODS["unswitched"], Body.fit(robot, components=1)
     numbers = method.defaults
-    system = build_system(method, robot, body, numbers, scenario)
+    system = build_mover(method, robot, body, numbers, scenario).system
     points, radii = seen(snapshot, bare=True)
     np.testing.assert_array_equal(points, session._obstacles().points)
     np.testing.assert_array_equal(radii, session._obstacles().radii)
     request = Request(
-        robot, body, method, numbers, (0, 1), snapshot.q, points, radii, scenario, snapshot.relaxed
+        robot, body, method, numbers, (0, 1), snapshot.q, points, radii, scenario, snapshot.activations
     )
     heights = heights_over(request, system)
     axis = np.linspace(-np.pi, np.pi, CELLS + 1)  # planar2 turns from -pi to pi
@@ -77,23 +78,25 @@ def test_the_surface_is_the_embedding_over_two_joints(make_session: MakeSession,
 def test_the_surface_is_of_the_system_that_the_loop_runs(
     make_session: MakeSession, scenario: Scenario
 ) -> None:
-    """Barriers that leave the goal free while obstacles are at rest, and do not while one moves."""
+    """Barriers that leave the goal free while obstacles are at rest, and do not while one may come near the arm."""
     session = make_session(scenario, method="reactive")
-    place = session.robot.pose(session.snapshot().posture.q, session.tip)
-    place[1, 3] += 0.12  # [m] the goal lies within the activation distance
+    goal = session.snapshot().goal
+    assert goal is not None
+    place = session.robot.pose(goal, session.tip)
+    place[1, 3] += 0.16  # [m] the goal lies within the activation distance
     session.handle(m.SetRunning(False))
     session.handle(m.DragThing("ball", place))
-    at_rest = session.snapshot()
-    np.testing.assert_array_equal(at_rest.relaxed, [at_rest.posture.q])
     body, method = Body.cover(session.robot, components=2), METHODS["reactive"]
     axis, rest = np.linspace(-np.pi, np.pi, CELLS + 1), np.zeros(2)
-    cell = [int(np.abs(axis - angle).argmin()) for angle in at_rest.posture.q]
+    cell = [int(np.abs(axis - angle).argmin()) for angle in goal]
     q = axis[cell]  # of the grid, next to the goal
     found = []
-    for velocity in (0.0, 0.5):
+    for velocity in (0.0, 2.0):  # [m/s] with which it could be at the arm in a second
         session.handle(m.ThrowThing("ball", np.array([0.0, velocity, 0.0])))
         now = session.snapshot()
-        system = build_system(method, session.robot, body, now.numbers["reactive"], scenario)
+        system = build_mover(
+            method, session.robot, body, now.numbers["reactive"], scenario, synchronous=True
+        ).system
         request = Request(
             session.robot,
             body,
@@ -103,11 +106,14 @@ def test_the_surface_is_of_the_system_that_the_loop_runs(
             now.q,
             *seen(now, bare=False),
             scenario,
-            now.relaxed,
+            now.activations,
         )
         height = heights_over(request, system)[cell[0], cell[1]]
         obstacles = session._obstacles()
-        psi = session._pursuit._moving_by(obstacles).acceleration(q, rest, q, obstacles).values
+        assert isinstance(session._mover, ControllerMover)
+        controller = session._mover._said  # at rest where it is, to the goal
+        assert controller is not None
+        psi = controller.system.acceleration(q, rest, q, obstacles, controller.activations).values
         assert height == pytest.approx(np.linalg.norm(psi), rel=1e-12)
         found.append((height, request))
     assert 2.0 * found[0][0] < found[1][0]
@@ -156,7 +162,16 @@ def test_a_surface_is_computed_again_only_when_it_would_look_different(
     def request(q: np.ndarray, points: np.ndarray) -> Request:
         radii = np.zeros(len(points))
         return Request(
-            session.robot, body, method, method.defaults, (0, 1), q, points, radii, scenario, snapshot.relaxed
+            session.robot,
+            body,
+            method,
+            method.defaults,
+            (0, 1),
+            q,
+            points,
+            radii,
+            scenario,
+            snapshot.activations,
         )
 
     points = seen(snapshot, bare=True)[0]
@@ -421,13 +436,11 @@ def test_the_slice_of_an_arm_of_many_joints_is_taken_where_the_others_are(
         METHODS["unswitched"],
         METHODS["unswitched"].defaults,
     )
-    system = build_system(method, robot, body, numbers, scenario)
+    system = build_mover(method, robot, body, numbers, scenario).system
     points, radii = np.array([[0.8, 0.3, 0.0]]), np.zeros(1)
 
     def request(q: np.ndarray, joints: tuple[int, int] = (1, 2)) -> Request:
-        return Request(
-            robot, body, method, numbers, joints, q, points, radii, scenario, np.zeros((0, len(q)))
-        )
+        return Request(robot, body, method, numbers, joints, q, points, radii, scenario, np.zeros(0))
 
     here = np.array([0.4, -0.2, 0.9])
     slices = request(here)

@@ -17,6 +17,7 @@ from sidestep.scenario.runner import run_scenario
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
 from sidestep.studio.export import save_scenario, scenario_now
+from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page.arm import link_meshes, short_names
 from sidestep.studio.session import Session
 from sidestep.studio.stage import DRAG_ACCELERATION, DRAG_SPEED
@@ -52,8 +53,8 @@ def test_the_arm_arrives_past_the_ball(make_session: MakeSession, scenario: Scen
     assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
     assert clearance > 0.0
     assert last.touched == 0
-    assert "goal" in last.words
-    assert last.status == ("ok", "ok")
+    assert last.words == "arrived"
+    assert last.status == "ok, arrived"
     assert last.time == pytest.approx(9.0, abs=1e-9)
 
 
@@ -188,29 +189,33 @@ def test_a_pose_out_of_reach_is_approached_and_said(make_session: MakeSession, s
     np.testing.assert_allclose(tip[:3, 3], aim[:3, 3] / 1.2, atol=0.01)  # [m] e(t) = (1 + 2 t) exp(-2 t)
     np.testing.assert_allclose(tip[:3, :3], aim[:3, :3], atol=0.01)
     assert last.words == (
-        "out of reach: the nearest posture found is 20.0 cm and 0° from the pose; at rest, 0.00 rad from there"
+        "the goal is out of reach: nearest posture 200 mm and 0° away; arriving, 0.00 rad from the goal"
     )
+    assert last.status == "ok, blocked"
+    assert last.posture is not None
     assert not last.posture.found
 
 
+@pytest.mark.parametrize("method", ["controller", "barrier", "reactive"])
 def test_a_goal_that_is_itself_blocked_is_said_and_the_arm_rests(
-    make_session: MakeSession, scenario: Scenario
+    make_session: MakeSession, scenario: Scenario, method: str
 ) -> None:
-    session = make_session(scenario)
+    session = make_session(scenario, method=method)
     goal = session.stage.state()[0] + np.array([1.0, 0.0])
     session.handle(m.SetJointGoal(goal))
     session.handle(m.DragThing("ball", session.robot.pose(goal, session.tip)))
     last = run(session, 6.0)
     found = re.fullmatch(
-        r"stopped (\d\.\d\d) rad from the goal, which is itself blocked: link2 against ball, (\d+) mm deep",
-        last.words,
+        r"at the goal 'link2' is (\d+) mm deep in ball; it goes on when that is free", last.words
     )
     assert found is not None
-    assert float(found[1]) == pytest.approx(np.abs(last.q - goal).max(), abs=0.006)  # of two digits
-    assert int(found[2]) > 50  # [mm] the ball's radius and more
+    assert int(found[1]) > 50  # [mm] the ball's radius and more
+    assert last.status == "limited, blocked"
     again = run(session, 3.0)
     np.testing.assert_allclose(again.q, last.q, atol=0.02)  # [rad] no sub-goals: none leads anywhere
     assert again.touched == 0
+    session.handle(m.DragThing("ball", pose_at([-0.9, 0.0, 0.0])))
+    assert run(session, 8.0).words == "arrived"
 
 
 def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, scenario: Scenario) -> None:
@@ -219,19 +224,19 @@ def test_methods_and_numbers_change_while_it_runs(make_session: MakeSession, sce
     session.handle(m.SetMethod("unswitched"))
     assert len(run(session, 0.1).values) == 1  # one density
     session.handle(m.SetNumbers("unswitched", {"stiffness": 4.0}))
-    assert session._pursuit.system.stiffness[0, 0] == 4.0
-    session.handle(m.SetMethod("barrier"))
-    assert session._pursuit.system.stiffness[0, 0] == session.snapshot().numbers["barrier"]["stiffness"]
+    assert session._mover.system.stiffness[0, 0] == 4.0
+    session.handle(m.SetMethod("controller"))
+    assert session._mover.system.stiffness[0, 0] == session.snapshot().numbers["controller"]["stiffness"]
     assert session.snapshot().numbers["unswitched"]["stiffness"] == 4.0
-    with pytest.raises(ValueError, match=r"barrier: activation is 9.0, allowed: \[0.02, 0.3\]"):
-        session.handle(m.SetNumbers("barrier", {"activation": 9.0}))
-    with pytest.raises(ValueError, match="no method is called 'magic'; known: barrier, "):
+    with pytest.raises(ValueError, match=r"controller: activation is 9.0, allowed: \[0.01, 1\]"):
+        session.handle(m.SetNumbers("controller", {"activation": 9.0}))
+    with pytest.raises(ValueError, match="no method is called 'magic'; known: controller, "):
         session.handle(m.SetMethod("magic"))
 
 
 def test_an_arm_stays_at_its_goal(make_session: MakeSession, scenario: Scenario) -> None:
     """What is left of the way no longer shrinks there: that is no dead end."""
-    session = make_session(replace(scenario, obstacles=()))
+    session = make_session(replace(scenario, obstacles=()), method="barrier")
     goal = session.snapshot().q + 1e-3
     session.handle(m.SetJointGoal(goal))
     friction = session.stage.end
@@ -240,16 +245,78 @@ def test_an_arm_stays_at_its_goal(make_session: MakeSession, scenario: Scenario)
         session.step()
         assert not session.snapshot().words.startswith("leaves")
     session.handle(m.SetJointGoal(goal + 0.5))
-    assert run(session, 0.7).words.startswith("leaves a dead end")
+    assert run(session, 0.7).words.startswith("leaves a local minimum")
 
 
-def test_a_guided_arm_arrives(make_session: MakeSession, scenario: Scenario) -> None:
-    session = make_session(scenario, method="controller")
-    last, clearance = record(session, 9.0)  # [s] with a way around by a sub-goal, 2.7 rad off
-    assert last.goal is not None
-    assert np.abs(last.q - last.goal).max() < 0.05  # [rad] the project's definition of arriving
-    assert clearance > 0.0
-    assert last.words.startswith("guide: ")
+COMING = """\
+format: 1
+name: coming
+method: controller
+robot: {name: planar2}
+start: {unit: rad, position: [-2.9, 0.0]}
+goal: {unit: rad, position: [-2.9, 0.0]}
+barriers: {ellipsoids: 2}
+obstacles:
+  - {name: ball, shape: {type: sphere, radius: 0.1}, position: [-0.5, -1.1, 0.0], velocity: [0, 0.5, 0]}
+simulation: {mode: torque, period: 0.002, duration: 5.0}
+"""  # it presses the arm against the limit of joint 1
+
+
+@pytest.mark.parametrize("drawn", [False, True])
+@pytest.mark.parametrize("method", ["controller", "barrier", "reactive"])
+def test_an_arm_steps_out_of_the_way_of_what_comes(
+    make_session: MakeSession, method: str, drawn: bool
+) -> None:
+    """But not without looking ahead. It does so as well while its goal is drawn about."""
+    session, words = make_session(Scenario.from_text(COMING), method=method), set()
+    for k in range(2000):
+        if drawn and k % 25 == 0:
+            session.handle(m.SetJointGoal(np.array([-2.9, 0.0]) + 1e-4 * (k % 7)))
+        session.step()
+        if k % 50 == 0:
+            words.add(session.snapshot().words)
+    looks = method != "reactive"
+    assert (session.snapshot().touched == 0) == looks
+    assert ("steps out of the way of what moves" in words) == looks
+
+
+def test_after_a_restart_it_does_not_step_aside_yet(make_session: MakeSession) -> None:
+    session = make_session(Scenario.from_text(COMING))
+    for _ in range(2000):
+        session.step()
+        if session.snapshot().words.startswith("steps out of the way"):
+            break
+    else:
+        raise AssertionError("it did not step aside")
+    session.handle(m.Restart())
+    session.step()
+    assert session.snapshot().words == "arrived"
+
+
+def test_the_controller_is_told_of_what_moves_otherwise_than_it_was_told(
+    make_session: MakeSession, scenario: Scenario
+) -> None:
+    session = make_session(scenario)
+    told: list[object] = []
+    mover = session._mover
+    assert isinstance(mover, ControllerMover)
+
+    def counted(seconds: float) -> int:
+        before = len(told)
+        for _ in range(round(seconds / session.period)):
+            known = mover._told
+            session.step()
+            if mover._told is not known:
+                told.append(mover._told)
+        return len(told) - before
+
+    assert counted(0.2) == 1
+    session.handle(m.ThrowThing("ball", np.array([0.0, 0.3, 0.1])))
+    assert counted(0.2) == 1  # it flies on as it was told
+    place = session.snapshot().poses[0] @ pose_at([0.2, 0.0, 0.0])
+    session.handle(m.DragThing("ball", place))
+    assert 20 < counted(1.0) < 1000  # it speeds up, slows down, and rests
+    assert counted(0.2) == 0
 
 
 def test_a_goal_outside_the_limits_is_refused(make_session: MakeSession, scenario: Scenario) -> None:
@@ -276,7 +343,7 @@ def test_restart_puts_everything_back(make_session: MakeSession, scenario: Scena
     assert not session.running
 
 
-@pytest.mark.parametrize("method", ["barrier", "thesis"])
+@pytest.mark.parametrize("method", ["controller", "barrier", "thesis"])
 def test_the_studio_moves_the_arm_as_a_run_does_and_again_after_a_restart(
     make_session: MakeSession, scenario: Scenario, method: str
 ) -> None:
@@ -316,7 +383,7 @@ def test_the_thesis_is_told_of_centres_and_barriers_of_balls(make_session: MakeS
     bare = replace(scenario, obstacles=tuple(replace(item, points="centre") for item in scenario.obstacles))
     session = make_session(bare, method="unswitched")
     assert session._obstacles().radii[0] == 0.0
-    session.handle(m.SetMethod("barrier"))
+    session.handle(m.SetMethod("controller"))
     assert session._obstacles().radii[0] == bare.obstacles[0].shape.radius
 
 

@@ -84,6 +84,21 @@ std::string Controller::Impl::explain() const {
     const std::string where = guide_status_ == GuideStatus::goal_in_collision ? "at the goal " : "where the arm is, ";
     return text + where + describe(plan.obstruction) + "; it goes on when that is free";
   }
+  if (!guide && target_blocked_) {
+    PlannerSettings exact;
+    exact.allowance = exact.pair_allowance = 0.0;
+    Obstruction obstruction;
+    std::shared_ptr<const Obstacles> shown;
+    {
+      const std::lock_guard lock(mutex_);
+      shown = shown_obstacles_;
+    }
+    Obstacles around = *shown;
+    around.advance(obstacle_age_);
+    if (RrtConnect(body_, exact).obstructed(target_, around, obstruction)) {
+      return text + "at the goal " + describe(obstruction) + "; it goes on when that is free";
+    }
+  }
   if (guide_status_ == GuideStatus::no_path) {
     text += "no path was found yet; it is looked for again; ";
   }

@@ -100,12 +100,13 @@ void Controller::Impl::look(const Snapshot& s) {
 Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& around,
                                          std::uint64_t attempt, std::uint64_t goal_number) {
   Obstruction obstruction;
+  const Eigen::VectorXd& rest = goal.settings.rest;
   PostureSearchSettings search;
   search.starts = attempt == 0 ? posture_starts : posture_starts_again;
   search.seed = settings.seed + attempt;
   search.another = attempt > 0;
   search.limit_room = settings.position_margin + settings.barriers.limit_activation;
-  const Posture posture = find_posture(arm.robot(), goal, near, search, [&](const Eigen::VectorXd& q) {
+  const Posture posture = find_posture(arm.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
     return ends_->obstructed(q, around, obstruction)
                ? -infinity
                : std::max(0.0, body_.nearest(q, around, 2.0 * search.room, posture_room_).clearance);

@@ -113,13 +113,6 @@ bool GeometricSystem::lower_activations(ConstVectorRef q, const Obstacles& obsta
   return true;
 }
 
-GeometricSystem GeometricSystem::relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const {
-  GeometricSystem relaxed = *this;
-  Workspace workspace(*this);
-  static_cast<void>(lower_activations(goal, obstacles, workspace, relaxed.activations_));
-  return relaxed;
-}
-
 GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
     : acceleration(Eigen::VectorXd::Zero(system.robot().num_coordinates())),
       harmonic(acceleration),

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 import sidestep
-from sidestep._core import GeometricSystem, Obstacles, instruction_set, rollout
-from sidestep.barriers import Barriers
+from sidestep._core import BarrierSettings, GeometricSystem, Obstacles, instruction_set, rollout
 from sidestep.bench.problems import Workspace
 from sidestep.bench.step import clear_place, cpu_model
 from sidestep.bench.step_times import StepTimes
@@ -131,7 +130,11 @@ def points_around(robot: Robot, body: Body, q: Array, num: int, rng: np.random.G
         surface = np.einsum("nij,nj->ni", factors[which], sphere)
         normals = np.einsum("nij,nj->ni", inverses[which], surface)
         normals /= np.linalg.norm(normals, axis=1)[:, None]
-        points = centres[which] + surface + rng.uniform(NEAREST, Barriers().activation, (DRAWN, 1)) * normals
+        points = (
+            centres[which]
+            + surface
+            + rng.uniform(NEAREST, BarrierSettings().activation, (DRAWN, 1)) * normals
+        )
         free = np.ones(DRAWN, dtype=bool)
         for centre, inverse in zip(centres, inverses, strict=True):
             # The distance to first order, which is that or less.

@@ -18,6 +18,7 @@ import numpy.typing as npt
 import sidestep
 from sidestep._core import (
     AccelerationFilter,
+    BarrierSettings,
     ClearanceBarrier,
     CollisionDensity,
     GeometricSystem,
@@ -28,7 +29,6 @@ from sidestep._core import (
     rollout,
     rollout_batch,
 )
-from sidestep.barriers import Barriers
 from sidestep.bench import peers_jax
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.bench.step import cpu_model
@@ -344,7 +344,7 @@ def _moving(robot: Robot) -> set[str]:
 def _distances(settings: PeerSettings) -> tuple[States, list[_Way]]:
     """How far the arm is from the balls, at the states of `_whole_arm`."""
     arm = _Arm.of(settings)
-    activation = Barriers().activation
+    activation = BarrierSettings().activation
     clearances = GeometricSystem([ClearanceBarrier(arm.robot, arm.body, activation=activation)])
     moving = sum(link in _moving(arm.robot) for link in arm.body.links)
     ways = [

@@ -37,7 +37,7 @@ def studio(
         str | None,
         typer.Option(
             help="How the arm is moved at first; the page lists the methods [default: as the scenario says; without "
-            "one, barrier]."
+            "one, controller]."
         ),
     ] = None,
     ellipsoids: Annotated[
@@ -102,7 +102,7 @@ def studio(
 def open_studio(
     scenario: Scenario,
     *,
-    method: str = "barrier",
+    method: str = "controller",
     ellipsoids: int | None = None,
     host: str = "127.0.0.1",
     port: int = 8890,

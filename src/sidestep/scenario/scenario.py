@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 import yaml
 
-from sidestep.barriers import Barriers
 from sidestep.scenario.settings import (
     MAX_LOOK_STEPS,
     EscapeChoice,
@@ -158,12 +157,23 @@ class SystemChoice:
 
 
 @dataclass(frozen=True)
-class BarrierChoice(Barriers):
-    """Numbers of the recommended system, see `sidestep.presets.Barriers`, and of its body.
+class BarrierChoice:
+    """Numbers of the controller's barriers, see `BarrierSettings`, and of its body.
 
     ellipsoids: of the covering body per link; left out: as many as it takes.
     """
 
+    stiffness: float = 4.0
+    damping: float = 4.0
+    activation: float = 0.1
+    strength: float = 0.1
+    power: float = 2.0
+    limit_activation: float = 0.1
+    limit_strength: float = 0.02
+    self_activation: float = 0.05
+    self_strength: float = 0.02
+    floor: float = 0.002
+    temperature: float = 0.002
     ellipsoids: int | None = None
 
 

@@ -22,7 +22,7 @@ def check_steps(place: str, period: float, span: str, length: float, most: int) 
 
 @dataclass(frozen=True)
 class EscapeChoice:
-    """Numbers of the sub-goals of the method "barrier", see `Escape`."""
+    """Numbers of the sub-goals where the arm is stuck, see `LocalMinimumSettings`."""
 
     patience: float = 0.6
     fraction: float = 0.05
@@ -32,7 +32,7 @@ class EscapeChoice:
 
 @dataclass(frozen=True)
 class EvasionChoice:
-    """Numbers of the look ahead of the method "barrier", where something moves, see `Evasion`."""
+    """Numbers of the look ahead where something moves, see `LookAheadSettings`."""
 
     horizon: float = 2.0
     period: float = 0.01
@@ -72,7 +72,7 @@ class RouteChoice:
 
 @dataclass(frozen=True)
 class GuideChoice:
-    """The guide of the method "guided"."""
+    """The planner of the method "controller"."""
 
     planner: PlannerChoice = field(default_factory=PlannerChoice)
     route: RouteChoice = field(default_factory=RouteChoice)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,27 +116,26 @@ def posture_at(
     near: Array,
     *,
     starts: int = 1,
-    free: Callable[[Array], bool] = lambda q: True,
 ) -> Posture:
     """A configuration within the limits with the frame at the pose, by damped least squares from q = near:
 
         q <- clip(q + J^T (J J^T + lambda^2 1)^-1 e),    e = (p* - p, log(R* R^T)),
 
-    (Nakamura and Hanafusa 1986), lambda shrinking with the error. Where that does not get there, or to one that is not
-    `free`, again from random configurations ever farther away, the same every time, up to `starts` in all. Without
-    success one that is not free, else the one from `near`, unless another is clearly nearer to the pose.
+    (Nakamura and Hanafusa 1986), lambda shrinking with the error. Where that does not get there, again from random
+    configurations ever farther away, the same every time, up to `starts` in all. Without success the one from `near`,
+    unless another is clearly nearer to the pose. Of obstacles it knows nothing: the search of a `Controller` does.
     """
     lower, upper = robot._finite_interval()
     rng = np.random.default_rng(0)
     near = np.clip(real_array(near, "near"), lower, upper)
     best = _descend(robot, frame, pose, near)
-    if best.found and free(best.q):
+    if best.found:
         return best
     for k in range(1, starts):
         spread = np.pi * k / (starts - 1)
         begin = rng.uniform(np.maximum(lower, near - spread), np.minimum(upper, near + spread))
         other = _descend(robot, frame, pose, begin)
-        if other.found and free(other.q):
+        if other.found:
             return other
         if np.hypot(other.distance, other.angle) < CLEARLY * np.hypot(best.distance, best.angle):
             best = other

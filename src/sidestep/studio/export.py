@@ -23,7 +23,7 @@ from sidestep.scenario.scenario import (
 )
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
-from sidestep.studio.pursuit import STILL
+from sidestep.studio.mover import STILL
 from sidestep.studio.systems import as_file
 from sidestep.studio.things import written_pose
 
@@ -87,10 +87,12 @@ def _vector(values: Array) -> Vector3:
 
 
 def _goal(snapshot: Snapshot) -> JointState | PoseChoice:
-    if snapshot.goal_pose is None:
-        return _state(snapshot.posture.q)
-    posture = _state(snapshot.posture.q) if snapshot.posture.found else None
-    return PoseChoice(snapshot.tip, *written_pose(snapshot.goal_pose), posture)
+    if snapshot.goal is not None:
+        return _state(snapshot.goal)
+    assert snapshot.goal_pose is not None
+    posture = snapshot.posture
+    found = _state(posture.q) if posture is not None and posture.found else None
+    return PoseChoice(snapshot.tip, *written_pose(snapshot.goal_pose), found)
 
 
 def save_scenario(scenario: Scenario, folder: Path, *, replace: bool = False) -> Path:

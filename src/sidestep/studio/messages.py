@@ -27,8 +27,8 @@ class SetJointGoal:
 
 @dataclass(frozen=True)
 class SetPoseGoal:
-    """The pose (4, 4) of the tip in the world to go to; thorough: a posture for it is searched from everywhere, not
-    only from the last one."""
+    """The pose (4, 4) of the tip in the world to go to; thorough: of the thesis's methods, a posture for it is searched
+    from everywhere, not only from the last one."""
 
     pose: Array
     thorough: bool = True
@@ -166,14 +166,11 @@ class Snapshot:
         edition: grows when obstacles come or go, or a scenario is loaded; `things` then changed.
         time: simulated [s]. q, v: (nv,). running: or paused.
         goal: (nv,) of a joint goal, else None; goal_pose: (4, 4) of a pose goal, else None, of the frame `tip`;
-            posture: where the arm is at the goal. goal_written: it is that of the scenario.
-        relaxed: (k, nv) where barriers are relaxed, see `Pursuit.places`.
+            posture: where the arm is led to, None where none is found yet. goal_written: it is that of the scenario.
         things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s];
             courses: by what they move.
         method: its name; numbers: its parameters by method and name.
-        words: what the arm does; status: names of the step's and the torque program's status.
-        nearest: (name of link or "", clearance [m] that the controller measures; inf where it does not).
-        values: psi (m,). metric: (nv, nv).
+        words, status, nearest, values, metric, activations: see `Account`; status is empty before the first step.
         torque_share, speed_share: largest of a joint over its limit.
         contacts: links that touch, each "link - obstacle"; touched: steps with contact since the start.
         timing: of the steps. rows: of a recording since the last snapshot.
@@ -187,9 +184,8 @@ class Snapshot:
     v: Array
     goal: Array | None
     goal_pose: Array | None
-    posture: Posture
+    posture: Posture | None
     goal_written: bool
-    relaxed: Array
     tip: str
     things: tuple[Thing, ...]
     poses: Array
@@ -198,10 +194,11 @@ class Snapshot:
     method: str
     numbers: dict[str, Numbers]
     words: str
-    status: tuple[str, str]
+    status: str
     nearest: tuple[str, float]
     values: Array
     metric: Array
+    activations: Array
     torque_share: float
     speed_share: float
     contacts: tuple[str, ...]

@@ -10,9 +10,9 @@ from sidestep import presets
 from sidestep.studio.parameters import (
     BARRIERS,
     DENSITY,
-    ESCAPE,
-    EVASION,
-    GUIDE,
+    LOCAL_MINIMUM,
+    LOOK_AHEAD,
+    PLANNER,
     SAFETY,
     TORQUE,
     Numbers,
@@ -30,21 +30,16 @@ class Method:
 
     Attributes:
         name: on the command line. label: on the page. sentence: what it is.
-        parameters: its numbers. covering: needs a covering body, otherwise a fitted one.
-        safe: the torque program keeps clearances as well. escapes: takes sub-goals where it is stuck.
-        evades: looks ahead where something moves, and steps out of its way.
-        guided: a guide searches a path in the background and leads the goal along it.
+        parameters: its numbers.
+        controlled: by the `Controller`, which needs a covering body and sees obstacles as they are; otherwise a
+            geometric system moves the arm, with a fitted body.
     """
 
     name: str
     label: str
     sentence: str
     parameters: tuple[Parameter, ...]
-    covering: bool
-    safe: bool
-    escapes: bool = False
-    evades: bool = False
-    guided: bool = False
+    controlled: bool = False
 
     @property
     def defaults(self) -> Numbers:
@@ -57,7 +52,6 @@ _SPRING = spring(
     "Higher is calmer and slower; lower overshoots the goal.",
 )
 _THRESHOLD = switch("threshold", "psi", 0.01, 5.0, 0.5, "Lower lets go of the goal farther from obstacles.")
-_BARRIERS = (*BARRIERS, *SAFETY, *TORQUE)
 _DENSITY = (*DENSITY, *TORQUE)
 
 
@@ -65,34 +59,27 @@ METHODS: dict[str, Method] = {
     method.name: method
     for method in (
         Method(
+            "controller",
+            "controller (recommended)",
+            "Everything: a path that is searched beside the loop, barriers for each part of the body, each joint limit "
+            "and each pair of links, a look ahead at what moves, and a program that keeps clearances and limits.",
+            (*BARRIERS, *PLANNER, *LOOK_AHEAD, *LOCAL_MINIMUM, *SAFETY, *TORQUE),
+            controlled=True,
+        ),
+        Method(
             "barrier",
-            "barriers (recommended)",
-            "A barrier for each part of the body, each joint limit and each pair of links; clearances are also "
-            "kept by the torque program. Where it is stuck it follows random sub-goals for a while; what comes at it "
-            "it sees ahead, and steps out of the way.",
-            (*BARRIERS, *ESCAPE, *EVASION, *SAFETY, *TORQUE),
-            covering=True,
-            safe=True,
-            escapes=True,
-            evades=True,
+            "controller without planner",
+            "The same without paths: where it is stuck it follows random sub-goals for a while.",
+            (*BARRIERS, *LOOK_AHEAD, *LOCAL_MINIMUM, *SAFETY, *TORQUE),
+            controlled=True,
         ),
         Method(
             "reactive",
-            "barriers without sub-goals",
-            "The same, but where it is stuck it stays, and it yields straight away from what comes.",
-            _BARRIERS,
-            covering=True,
-            safe=True,
-        ),
-        Method(
-            "controller",
-            "controller: barriers and planner",
-            "The same, led along a path of configurations that is searched in the background: to a pose by way of a "
-            "posture that has it, where the arm rests.",
-            (*BARRIERS, *GUIDE, *SAFETY, *TORQUE),
-            covering=True,
-            safe=True,
-            guided=True,
+            "controller, reactive alone",
+            "The same without sub-goals and look ahead: where it is stuck it stays, and it yields straight away from "
+            "what comes.",
+            (*BARRIERS, *SAFETY, *TORQUE),
+            controlled=True,
         ),
         Method(
             "thesis",
@@ -119,16 +106,12 @@ METHODS: dict[str, Method] = {
                 switch("slope", "1/m", 1.0, 100.0, presets.Thesis.slope, "Higher switches more abruptly."),
                 *_DENSITY,
             ),
-            covering=False,
-            safe=False,
         ),
         Method(
             "unswitched",
             "thesis: unswitched",
             "One summed density, pull and bending added without a switch (T2.12).",
             (*_SPRING, *_DENSITY),
-            covering=False,
-            safe=False,
         ),
         Method(
             "sigmoid",
@@ -140,32 +123,24 @@ METHODS: dict[str, Method] = {
                 switch("slope", "1/psi", 0.5, 50.0, 10.0, "Higher switches more abruptly."),
                 *_DENSITY,
             ),
-            covering=False,
-            safe=False,
         ),
         Method(
             "binary",
             "thesis: binary switch",
             "One summed density; where psi is above the threshold there is no pull to the goal (T5.5).",
             (*_SPRING, _THRESHOLD, *_DENSITY),
-            covering=False,
-            safe=False,
         ),
         Method(
             "harmonic_only",
             "spring alone: no avoidance",
             "The damped spring on the curved space without the bending of paths, for comparison: it touches.",
             (*_SPRING, *_DENSITY),
-            covering=False,
-            safe=False,
         ),
         Method(
             "geodesic_only",
             "geodesics alone: no goal",
             "Free fall along a geodesic of the curved space (T5.3), for comparison: it knows no goal.",
             _DENSITY,
-            covering=False,
-            safe=False,
         ),
         Method(
             WRITTEN,
@@ -173,8 +148,6 @@ METHODS: dict[str, Method] = {
             "Body, embedding, switch and numbers of the scenario that was loaded, as its file has them; without any "
             "in a file, one density without a switch. Choose another method to tune it here.",
             (),
-            covering=False,
-            safe=False,
         ),
     )
 }

@@ -8,44 +8,32 @@ from __future__ import annotations
 import time as clock
 from collections import deque
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Obstacles, Step, TorqueController, TorqueSolution, real_array
+from sidestep._core import Obstacles, real_array
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import (
-    POSTURE_STARTS,
-    coordinates,
-    goal_posture,
-    load_robot,
-    start_velocity,
-)
-from sidestep.scenario.parts import torque_program_of
+from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
-from sidestep.simulation.pose_aim import Posture, posture_at
-from sidestep.simulation.run import status_name
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS, Method, check_numbers, method_named
+from sidestep.studio.mover import STILL, Account, Mover
 from sidestep.studio.parameters import Numbers
-from sidestep.studio.pursuit import Pursuit
 from sidestep.studio.stage import Actor, Stage
-from sidestep.studio.systems import Recipe, as_file, build_system, numbers_of, recipe_of
+from sidestep.studio.systems import Recipe, build_mover, numbers_of, recipe_of
 from sidestep.studio.things import check_names, things_of
 from sidestep.studio.tip import at_tip, tip_of
-from sidestep.studio.words import in_words
+from sidestep.studio.words import named
 
 Array = npt.NDArray[np.float64]
 Prepare = Callable[[Robot, Recipe], Body]
 
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
-REST = 0.5  # [s] for which all joints have been slower than `SLOW`: the arm rests
-SLOW = 0.02  # [rad/s | m/s]
 
 
 class Session:
@@ -56,6 +44,7 @@ class Session:
         method: one of `METHODS`. numbers: of methods, by name; defaults for the rest.
         ellipsoids: of a covering body per link, where the scenario does not say; None: as many as it takes.
         prepare: gives the body of a robot by a recipe; may take long.
+        synchronous: motions are the same every time; the planner, say, holds the loop up.
 
     Raises:
         ValueError: that names what is wrong in the scenario, the method or its numbers.
@@ -74,11 +63,10 @@ class Session:
     running: bool
     edition: int
     _bodies: dict[str, Body]
-    _pursuit: Pursuit
-    _controller: TorqueController
-    _posture: Posture
-    _step: Step | None
-    _solution: TorqueSolution | None
+    _mover: Mover
+    _goal: tuple[
+        Array | None, Array
+    ]  # a pose (4, 4) or None, and the configuration, or one near that of the pose
     _contacts: tuple[str, ...]
     _times: deque[float]
     _rows: list[m.Row]
@@ -87,12 +75,13 @@ class Session:
         self,
         scenario: Scenario,
         *,
-        method: str = "barrier",
+        method: str = "controller",
         numbers: Mapping[str, Mapping[str, Any]] | None = None,
         ellipsoids: int | None = None,
         prepare: Prepare,
+        synchronous: bool = False,
     ) -> None:
-        self._prepare, self._usual_ellipsoids = prepare, ellipsoids
+        self._prepare, self._usual_ellipsoids, self._synchronous = prepare, ellipsoids, synchronous
         self._numbers = {name: method.defaults for name, method in METHODS.items()}
         self._method = method_named(method)
         self.edition = 0
@@ -105,15 +94,11 @@ class Session:
         """Does what a command says; raises ValueError or OSError, and stays as it was, where it cannot."""
         match command:
             case m.SetJointGoal(position):
-                self._set_goal(None, Posture(self.robot.check_configuration(position, "goal")))
+                self._set_goal(None, self.robot.check_configuration(position, "goal"))
             case m.SetPoseGoal(pose, thorough):
-                target = finite(pose, "the pose of the goal")
-                near = self.stage.state()[0] if self._pose is None else self._posture.q
-                starts = POSTURE_STARTS if thorough else 1
-                free = partial(self._pursuit.is_free, obstacles=self._obstacles())
-                self._set_goal(
-                    target, posture_at(self.robot, self.tip, target, near, starts=starts, free=free)
-                )
+                last = None if self._goal[0] is None else self._mover.posture
+                near = self.stage.state()[0] if last is None else last.q
+                self._set_goal(finite(pose, "the pose of the goal"), near, thorough=thorough)
             case m.AddThing(thing):
                 check_names([*(actor.thing for actor in self.stage.actors), thing])
                 self._set_actors([*self.stage.actors, Actor(thing)])
@@ -127,7 +112,6 @@ class Session:
                     self.stage.draw(self.actor(name), finite(place, f"the place of {name}"))
                 else:
                     self.stage.put(self.actor(name), finite(place, f"the place of {name}"))
-                    self._pursuit.obstacles_changed()
             case m.ThrowThing(name, velocity):
                 self.stage.throw(self.actor(name), finite(velocity, f"the velocity of {name}"))
             case m.SetMethod(name):
@@ -140,36 +124,32 @@ class Session:
                 self._numbers[name] = checked
             case m.SetRunning(running, until):
                 self.running, self._until = running, until
+                return
             case m.SetRecording(recording):
                 self._recording = recording
                 self._rows.clear()
             case m.Restart(until):
+                self._use(self._method, self._numbers[self._method.name])  # remembers nothing
                 self._begin()
                 self.running, self._until = until > 0.0, until
             case m.Load(scenario, asked):
                 self._load(scenario, self._method if asked is None else method_named(asked), {})
             case m.Seen() | m.Drawn():
                 return
-        if not self.running and self._step is not None:
-            self._look_again()
+        if not self.running:
+            self._mover.look(*self.stage.state(), self._obstacles())
+            self._contacts = self.stage.contacts()
 
     def step(self) -> None:
-        """One control period: obstacles, state, wanted acceleration, torque, physics.
+        """One control period: obstacles, state, torque, physics.
 
         Raises:
             RuntimeError: the physics diverged.
         """
         stage, begin = self.stage, clock.perf_counter()
         q, v = stage.begin(self.time)
-        if np.abs(v).max() > SLOW:
-            self._moved = self.time
-        obstacles = self._obstacles()
-        step, wanted = self._pursuit.step(q, v, obstacles)
-        mass, bias = stage.dynamics()
-        solution = self._controller.solve(
-            q, v, wanted, mass, bias, clearances=step if self._method.safe else None
-        )
-        finite = stage.end(solution.torque)
+        self._torque = self._mover.step(q, v, *stage.dynamics(), self._obstacles())
+        finite = stage.end(self._torque)
         self._times.append(clock.perf_counter() - begin)
         if not finite:
             raise RuntimeError(f"the physics diverged at {self.time:.3f} s; restart")
@@ -177,35 +157,22 @@ class Session:
         self._count += 1
         if self.time >= self._until - 0.5 * self.period:
             self.running = False
-        self._step, self._solution = step, solution
         if stage.data.ncon:
             self._contacts = stage.contacts()
             self._touched += bool(self._contacts)
         else:
             self._contacts = ()
         if self._recording and self._count % RECORD_EVERY == 0:
-            self._rows.append(m.Row(self.time, q, self._things, self._poses(), np.array(step.metric)))
+            self._rows.append(m.Row(self.time, q, self._things, self._poses(), self._mover.metric))
 
     def snapshot(self, *, real_time: float = 0.0) -> m.Snapshot:
         """The state now, and the rows recorded since the last snapshot."""
         q, v = self.stage.state()
         limits = self.robot.limits
         rows, self._rows = tuple(self._rows), []
-        obstacles = self._obstacles()
-        words, status = "at the start", ("", "")
-        nearest, values, metric, torque = ("", np.inf), np.zeros(0), np.eye(len(q)), 0.0
-        if self._step is not None and self._solution is not None:
-            step = self._step
-            diagnosis = step.diagnosis
-            there = None if self.time - self._moved < REST else self._pursuit.at_goal(obstacles)
-            words = in_words(diagnosis, there, owners=self._owners, things=self._things)
-            words = self._pursuit.in_words(words)
-            status = status_name(step.status), status_name(self._solution.status)
-            values, metric = np.array(step.values), np.array(step.metric)
-            clearances = np.asarray(step.clearances.values)
-            if len(clearances) and np.isfinite(clearances).any():
-                nearest = (diagnosis.name, float(clearances.min()))
-            torque = float((np.abs(self._solution.torque) / limits.effort).max())
+        account = self._mover.account() or Account("at the start", metric=np.eye(len(q)))
+        words = named(account.words, owners=self._owners, things=self._things)
+        pose, near = self._goal
         return m.Snapshot(
             scenario=self.scenario,
             edition=self.edition,
@@ -213,11 +180,10 @@ class Session:
             running=self.running,
             q=q.copy(),
             v=v.copy(),
-            goal=self._posture.q if self._pose is None else None,
-            goal_pose=self._pose,
-            posture=self._posture,
+            goal=near if pose is None else None,
+            goal_pose=pose,
+            posture=self._mover.posture,
             goal_written=self._goal_written,
-            relaxed=self._pursuit.places(obstacles),
             tip=self.tip,
             things=self._things,
             poses=self._poses(),
@@ -225,12 +191,8 @@ class Session:
             courses=tuple(actor.course for actor in self.stage.actors),
             method=self._method.name,
             numbers={name: dict(numbers) for name, numbers in self._numbers.items()},
-            words=words,
-            status=status,
-            nearest=nearest,
-            values=values,
-            metric=metric,
-            torque_share=torque,
+            **vars(account) | {"words": words},
+            torque_share=float((np.abs(self._torque) / limits.effort).max()),
             speed_share=float((np.abs(v) / limits.velocity).max()),
             contacts=self._contacts,
             touched=self._touched,
@@ -249,12 +211,6 @@ class Session:
 
     # --- parts ---
 
-    def _look_again(self) -> None:
-        """The system and the contacts as they are now, while time stands still."""
-        q, v = self.stage.state()
-        self._step = self._pursuit.look(q, v, self._obstacles())
-        self._contacts = self.stage.contacts()
-
     def _load(self, scenario: Scenario, method: Method, given: Mapping[str, Mapping[str, Any]]) -> None:
         robot = load_robot(scenario)
         bodies: dict[str, Body] = {}
@@ -262,17 +218,20 @@ class Session:
             robot, bodies = self.robot, dict(self._bodies)
         start = coordinates(scenario.start, robot, "start.position")
         velocity = start_velocity(scenario.start, robot)
-        posture = goal_posture(scenario, robot, start)
-        pose = None if isinstance(scenario.goal, JointState) else at_tip(scenario.goal, robot)
+        goal = scenario.goal
+        pose = None if isinstance(goal, JointState) else at_tip(goal, robot)
+        end = goal if isinstance(goal, JointState) else goal.posture
+        place = "goal.position" if pose is None else "goal.posture.position"
+        near = start if end is None else coordinates(end, robot, place)
         stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
         numbers = self._numbers_for(scenario, given)
-        parts = self._parts_of(method, numbers[method.name], scenario, robot, bodies)
-        self._pursuit, self._controller = parts
+        mover = self._mover_of(method, numbers[method.name], scenario, robot, bodies)
+        mover.set_goal(pose, near, thorough=True)
+        self._mover, self._goal, self._goal_written = mover, (pose, near), True
         self.scenario, self.robot, self.tip, self.stage = scenario, robot, tip_of(robot), stage
         self._method, self._numbers, self._bodies = method, numbers, bodies
         self.period = scenario.simulation.period
         self._start = start, velocity
-        self._set_goal(pose, posture, written=True)
         self._begin()
 
     def _numbers_for(self, scenario: Scenario, given: Mapping[str, Mapping[str, Any]]) -> dict[str, Numbers]:
@@ -281,7 +240,7 @@ class Session:
         numbers = {**self._numbers, asked: METHODS[asked].defaults | values}
         ellipsoids = {"ellipsoids": scenario.barriers.ellipsoids or self._usual_ellipsoids}
         for name, method in METHODS.items():
-            if method.covering:
+            if method.controlled:
                 numbers[name] = numbers[name] | ellipsoids
         for name, own in given.items():
             numbers[name] = check_numbers(method_named(name), own, numbers[name])
@@ -289,20 +248,17 @@ class Session:
 
     def _begin(self) -> None:
         self.time, self._count, self._touched = 0.0, 0, 0
-        self._moved = 0.0
         self.running, self._until = True, float("inf")
-        self._step = self._solution = None
         self._contacts = ()
+        self._torque = np.zeros(self.robot.num_coordinates)
         self._times = deque(maxlen=TIMED_STEPS)
         self._recording = False  # time goes back: a recording is of one motion
         self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(*self._start)
-        self._pursuit.forget()
-        self._pursuit.begin(self._pose, self._posture)
 
-    def _set_goal(self, pose: Array | None, posture: Posture, *, written: bool = False) -> None:
-        self._pose, self._posture, self._goal_written = pose, posture, written
-        self._pursuit.begin(pose, posture)
+    def _set_goal(self, pose: Array | None, q: Array, *, thorough: bool = True) -> None:
+        self._mover.set_goal(pose, q, thorough=thorough)
+        self._goal, self._goal_written = (pose, q), False
 
     def _set_actors(self, actors: list[Actor]) -> None:
         self.stage.set_things(actors)
@@ -310,28 +266,27 @@ class Session:
         self._look()
 
     def _use(self, method: Method, numbers: Numbers) -> None:
-        self._pursuit, self._controller = self._parts_of(
-            method, numbers, self.scenario, self.robot, self._bodies
-        )
-        self._method, self._numbers[method.name] = method, dict(numbers)
-        self._pursuit.begin(self._pose, self._posture)
+        mover = self._mover_of(method, numbers, self.scenario, self.robot, self._bodies)
+        (pose, near), found = self._goal, self._mover.posture
+        if pose is not None and found is not None and found.found:
+            near = found.q
+        mover.set_goal(pose, near, thorough=True)
+        self._mover, self._method, self._numbers[method.name] = mover, method, dict(numbers)
+        self._goal = pose, near
         self._look()
 
-    def _parts_of(
+    def _mover_of(
         self, method: Method, numbers: Numbers, scenario: Scenario, robot: Robot, bodies: dict[str, Body]
-    ) -> tuple[Pursuit, TorqueController]:
-        recipe, written = recipe_of(method, numbers, scenario), as_file(method, numbers, scenario)
-        controller = torque_program_of(written.torque, robot, scenario.simulation.period)
+    ) -> Mover:
+        recipe = recipe_of(method, numbers, scenario)
         if str(recipe) not in bodies:
             bodies[str(recipe)] = self._prepare(robot, recipe)
         body = bodies[str(recipe)]
-        system = build_system(method, robot, body, numbers, scenario)
-        return Pursuit(robot, tip_of(robot), method, body, system, written), controller
+        return build_mover(method, robot, body, numbers, scenario, synchronous=self._synchronous)
 
     def _look(self) -> None:
         """Lays out what is seen: points of each obstacle in its frame, and whose each point is."""
-        self._pursuit.obstacles_changed()
-        views = [actor.thing.seen(bare=not self._method.safe) for actor in self.stage.actors]
+        views = [actor.thing.seen(bare=not self._method.controlled) for actor in self.stage.actors]
         self._views = [points for points, _ in views]
         self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in views)])
         counts = [len(points) for points in self._views]
@@ -347,6 +302,7 @@ class Session:
             for view, actor in zip(self._views, actors, strict=True)
         ]
         velocities = np.array([actor.velocity for actor in actors])
+        velocities[np.linalg.norm(velocities, axis=1) < STILL] = 0.0
         return Obstacles(np.concatenate(points), self._radii, velocities[self._owners])
 
     def _poses(self) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from sidestep.barriers import Barriers
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.scenario import RobotChoice, SwitchChoice
@@ -18,40 +17,83 @@ WIDTH = 80  # [characters] that a window on the page shows
 
 
 def python_snippet(snapshot: Snapshot) -> str:
-    """Python that makes the system that moves the arm, as `system`, and its `goal`, and takes a step without obstacles.
+    """Python that makes the `controller` that moves the arm, and takes a step without obstacles.
 
-    Beside it are `escape` and `evasion`, or `motion`, where the method has sub-goals and flights, or a guide, and
-    `controller`, the torque program.
+    By one of the thesis's methods it is a `TorqueController`, which tracks the acceleration of a `system`.
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
-    lines = ["import sidestep as ss", "", f"robot = {_robot_code(written.robot, written)}"]
-    if method.covering:
-        lines[1:1] = ["from sidestep.presets import Barriers, barrier_system"]
-        count = written.barriers.ellipsoids
-        lines += [f"body = ss.Body.cover(robot{'' if count is None else f', components={count}'})"]
-        own = {entry.name: getattr(written.barriers, entry.name) for entry in dataclasses.fields(Barriers)}
-        lines += _call("numbers = Barriers", own)
-        lines += ["system = barrier_system(robot, body, numbers=numbers)"]
-    else:
-        lines += _written_code(written)
-    if method.escapes:
-        lines += _call("escape = ss.Escape", dataclasses.asdict(written.escape), "robot")
-    if method.evades:
-        lines += _call("evasion = ss.Evasion", dataclasses.asdict(written.evasion), "system")
-    if method.guided:
-        lines += [
-            *_call("planner = ss.PlannerSettings", dataclasses.asdict(written.guide.planner)),
-            *_call("route = ss.RouteSettings", dataclasses.asdict(written.guide.route)),
-            "motion = ss.GuidedMotion(robot, body, system=system, planner=planner, route=route)",
-        ]
+    code = _controller_code if method.controlled else _written_code
+    return "\n".join(["import sidestep as ss", "", *code(snapshot, written)]) + "\n"
+
+
+def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
+    barriers = dataclasses.asdict(written.barriers)
+    ellipsoids = barriers.pop("ellipsoids")
+    torque = dataclasses.asdict(written.torque)
+    parts = {
+        "barriers": ("BarrierSettings", barriers),
+        "safety": ("SafetySettings", torque.pop("safety")),
+        "search": ("PlannerSettings", dataclasses.asdict(written.guide.planner)),
+        "route": ("RouteSettings", dataclasses.asdict(written.guide.route)),
+        "look_ahead": ("LookAheadSettings", dataclasses.asdict(written.evasion)),
+        "local_minimum": ("LocalMinimumSettings", dataclasses.asdict(written.escape)),
+    }
+    left_out = {"controller": (), "barrier": ("search", "route")}.get(written.method, tuple(parts)[2:])
+    lines = [f"arm = {_arm_code(written, ellipsoids)}"]
+    for name in left_out:
+        del parts[name]
+    for name, (kind, values) in parts.items():
+        lines += _call(f"{name} = ss.{kind}", values)
+    planner = "None"
+    if "search" in parts:
+        lines += ["planner = ss.OnlinePlannerSettings()", "planner.search, planner.route = search, route"]
+        planner = "planner"
+    given = [
+        f"{name}={name if name in parts else None}"
+        for name in ("barriers", "safety", "look_ahead", "local_minimum")
+    ]
+    numbers = {"period": written.simulation.period, "output": "torque"} | torque
+    return [
+        *lines,
+        *_call("settings = ss.ControllerSettings", numbers, *given, f"planner={planner}"),
+        "controller = ss.Controller(arm, settings)",
+        "",
+        "# from any thread, at any time",
+        *_goal_code(snapshot),
+        "controller.set_goal(goal)",
+        "# what is seen: ss.Obstacles(points, radii, velocities), (n, 3), (n,), (n, 3) [m, m, m/s]",
+        "controller.set_obstacles(ss.Obstacles.none())",
+        "",
+        "# once a period: what is measured, perhaps with mass matrix and bias",
+        *_state_code(snapshot),
+        "command = controller.step(q, v)",
+        "# command.torque goes to the arm; controller.explain() says what it does, and why",
+    ]
+
+
+def _written_code(snapshot: Snapshot, written: Scenario) -> list[str]:
     torque = dataclasses.asdict(written.torque)
     safety = torque.pop("safety")
     period = f"period={written.simulation.period!r}"
-    lines += _call("safety = ss.SafetySettings", safety)
-    lines += _call("controller = ss.TorqueController", torque, "robot", period, "safety=safety")
-    lines += _goal_code(snapshot)
-    return "\n".join([*lines, *_step_code(snapshot)]) + "\n"
+    return [
+        f"robot = {_robot_code(written.robot, written)}",
+        *_system_code(written),
+        *_call("safety = ss.SafetySettings", safety),
+        *_call("controller = ss.TorqueController", torque, "robot", period, "safety=safety"),
+        *_goal_code(snapshot),
+        "",
+        "# what is seen: ss.Obstacles(points, radii), of (n, 3) and (n,) [m]",
+        "obstacles = ss.Obstacles.none()",
+        "# what is measured",
+        *_state_code(snapshot),
+        "step = system.acceleration(q, v, goal, obstacles)",
+        "# controller.solve(q, v, step.acceleration, mass_matrix, bias).torque",
+    ]
+
+
+def _state_code(snapshot: Snapshot) -> list[str]:
+    return [f"q = {snapshot.q.tolist()}", f"v = {snapshot.v.tolist()}"]
 
 
 def _call(head: str, values: dict[str, Any], *first: str) -> list[str]:
@@ -69,36 +111,13 @@ def _call(head: str, values: dict[str, Any], *first: str) -> list[str]:
     return [*lines, ")"]
 
 
-def _step_code(snapshot: Snapshot) -> list[str]:
-    method = METHODS[snapshot.method]
-    place = "goal" if snapshot.goal_pose is None else "posture"
-    lines = [
-        "",
-        "# what is seen: ss.Obstacles(points, radii), of (n, 3) and (n,) [m]",
-        "obstacles = ss.Obstacles.none()",
-        "# what is measured",
-        f"q = {snapshot.q.tolist()}",
-        f"v = {snapshot.v.tolist()}",
-    ]
-    if method.guided:
-        lines += [f"motion.set_goal({place})", "step = motion.step(q, v, obstacles)"]
-    else:
-        if method.escapes:
-            lines += [
-                "# where it is stuck: goal is escape.pursue(goal, q, step.goal_potential, period) for this step"
-            ]
-        if method.evades:
-            lines += [
-                "# where something moves, every delay, in another thread, with a copy.copy of the flight:",
-                "# flight = evasion.look(goal, q, v, obstacles, flight); from then on, if it is not None,",
-                "# goal is flight.refuge, its flight.acceleration(q, v, period) takes the place of the step's,",
-                "# and flight.advance(period) follows",
-            ]
-        if method.covering:
-            lines += [f"# among what is at rest: system.relaxed_at({place}, obstacles) leaves the goal free"]
-        lines += ["step = system.acceleration(q, v, goal, obstacles)"]
-    kept = ", clearances=step" if method.safe else ""
-    return [*lines, f"# controller.solve(q, v, step.acceleration, mass_matrix, bias{kept}).torque"]
+def _arm_code(written: Scenario, ellipsoids: int | None) -> str:
+    name = written.robot.name
+    if name is not None and ellipsoids is None:
+        return f"ss.Arm.load({name!r})"
+    robot = _robot_code(written.robot, written)
+    count = "" if ellipsoids is None else f", components={ellipsoids}"
+    return f"ss.Arm.from_robot(robot := {robot}, ss.Body.cover(robot{count}))"
 
 
 def _robot_code(robot: RobotChoice, scenario: Scenario) -> str:
@@ -118,24 +137,25 @@ def _robot_code(robot: RobotChoice, scenario: Scenario) -> str:
 
 
 def _goal_code(snapshot: Snapshot) -> list[str]:
-    posture = snapshot.posture.q.tolist()
-    if snapshot.goal_pose is None:
-        return ["# [rad | m]", f"goal = {posture}"]
-    numbers = snapshot.numbers[snapshot.method]
-    stiffness = numbers.get("stiffness", snapshot.scenario.system.stiffness)
-    pull = {
-        "position_stiffness": POSITION_SHARE * stiffness,
-        "orientation_stiffness": TURN_SHARE * stiffness,
-    }
-    rows = [f"    {row}," for row in snapshot.goal_pose.tolist()]
-    lines = ["pose = [", *rows, "]", *_call("goal = ss.PoseGoal", pull, "robot", repr(snapshot.tip), "pose")]
+    if snapshot.goal is not None:
+        return ["# [rad | m]", f"goal = {snapshot.goal.tolist()}"]
+    assert snapshot.goal_pose is not None
+    method = METHODS[snapshot.method]
+    posture = None if snapshot.posture is None else snapshot.posture.q.tolist()
+    pose = ["pose = [", *(f"    {row}," for row in snapshot.goal_pose.tolist()), "]"]
+    if method.controlled:
+        near = ["# near which a posture for it is looked for", f"rest = {posture}"]
+        return [*pose, *near, f"goal = ss.PoseGoal(arm.robot, {snapshot.tip!r}, pose, rest=rest)"]
+    stiffness = snapshot.numbers[method.name].get("stiffness", snapshot.scenario.system.stiffness)
+    pull = {"position_stiffness": POSITION_SHARE * stiffness, "orientation_stiffness": TURN_SHARE * stiffness}
     says = f"that has the pose: the goal until the tip is within {1e3 * ENTER[0]:g} mm and {ENTER[1]:g} rad"
-    if not snapshot.posture.found:
+    if snapshot.posture is None or not snapshot.posture.found:
         says = "the nearest found to the pose, which is out of reach: the goal"
-    return [*lines, f"# {says}", f"posture = {posture}"]
+    goal = _call("goal = ss.PoseGoal", pull, "robot", repr(snapshot.tip), "pose")
+    return [*pose, *goal, f"# {says}", f"posture = {posture}"]
 
 
-def _written_code(written: Scenario) -> list[str]:
+def _system_code(written: Scenario) -> list[str]:
     body, embedding, system = written.body, written.embedding, written.system
     density = f"density = ss.CollisionDensity(robot, body, average={embedding.density == 'average'})"
     lines, names = [density], "density"

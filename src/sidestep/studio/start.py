@@ -56,7 +56,7 @@ def scenario_of(choice: RobotChoice) -> Scenario:
     return Scenario(
         name="studio",
         robot=choice,
-        method="barrier",
+        method="controller",
         start=_state(start),
         goal=_state(goal),
         obstacles=(Obstacle(Shape("sphere", radius=BALL), position, name="ball", points="ball"),),

@@ -52,7 +52,7 @@ class Studio:
         self,
         scenario: Scenario,
         *,
-        method: str = "barrier",
+        method: str = "controller",
         numbers: Mapping[str, Mapping[str, Any]] | None = None,
         host: str = HOST,
         port: int = PORT,

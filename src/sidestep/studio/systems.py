@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
-from sidestep import presets
-from sidestep._core import GeometricSystem
+from sidestep._core import ControllerSettings
+from sidestep.arm import Arm
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import written_system
+from sidestep.scenario.parts import controller_settings_of, torque_program_of
 from sidestep.scenario.scenario import (
     BodyChoice,
     EmbeddingChoice,
@@ -22,7 +23,9 @@ from sidestep.scenario.scenario import (
     SystemChoice,
 )
 from sidestep.studio.methods import METHODS, WRITTEN, Method, in_range
+from sidestep.studio.mover import ControllerMover, Mover, SystemMover
 from sidestep.studio.parameters import Numbers, Value, set_in
+from sidestep.studio.tip import tip_of
 
 SWITCH = "system.switch"  # of several forms, with numbers of their own
 
@@ -41,8 +44,9 @@ def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> S
     """The scenario with a method and its numbers as a file has them; what the method has no numbers for stays."""
     if method.name == WRITTEN:
         return dataclasses.replace(scenario, method="written")
-    if method.covering:
-        written = dataclasses.replace(scenario, method=cast("MethodChoice", method.name))
+    if method.controlled:
+        held = dataclasses.replace(scenario.simulation, integrator="semi_implicit_euler")
+        written = dataclasses.replace(scenario, method=cast("MethodChoice", method.name), simulation=held)
     else:
         system = SystemChoice(switch=switch_of(method.name, numbers, len(scenario.start.position)))
         embedding = EmbeddingChoice(joint_limits=JointLimitChoice())
@@ -79,7 +83,7 @@ def switch_of(method: str, numbers: Mapping[str, Any], num_coordinates: int) -> 
 def recipe_of(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Recipe:
     """The body that a method needs."""
     written = as_file(method, numbers, scenario)
-    return Covering(written.barriers.ellipsoids) if method.covering else written.body
+    return Covering(written.barriers.ellipsoids) if method.controlled else written.body
 
 
 def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], None] | None = None) -> Body:
@@ -89,14 +93,33 @@ def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], 
     return Body.fit(robot, **dataclasses.asdict(recipe), progress=progress)
 
 
-def build_system(
-    method: Method, robot: Robot, body: Body, numbers: Mapping[str, Any], scenario: Scenario
-) -> GeometricSystem:
-    """The dynamical system of a method with a body of its recipe."""
-    written = as_file(method, numbers, scenario)
-    if method.covering:
-        return presets.barrier_system(robot, body, numbers=written.barriers)
-    return written_system(written.embedding, written.system, robot, body)
+def settings_of(written: Scenario, *, synchronous: bool = False) -> ControllerSettings:
+    """The settings of the controller that moves the arm in physics, of a scenario of `as_file`."""
+    torque = dataclasses.replace(written.simulation, mode="torque")
+    return controller_settings_of(dataclasses.replace(written, simulation=torque), synchronous=synchronous)
+
+
+def build_mover(
+    method: Method,
+    robot: Robot,
+    body: Body,
+    numbers: Mapping[str, Any],
+    scenario: Scenario,
+    *,
+    synchronous: bool = False,
+) -> Mover:
+    """What moves the arm by a method, with a body of its recipe.
+
+    Raises:
+        ValueError: names the number at fault.
+    """
+    written, tip = as_file(method, numbers, scenario), tip_of(robot)
+    if method.controlled:
+        settings = settings_of(written, synchronous=synchronous)
+        return ControllerMover(robot, Arm.from_robot(robot, body), settings, tip)
+    system = written_system(written.embedding, written.system, robot, body)
+    program = torque_program_of(written.torque, robot, written.simulation.period)
+    return SystemMover(robot, system, program, tip)
 
 
 def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
@@ -113,7 +136,7 @@ def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
             p.name: switched.get(p.name, p.default) if p.place == SWITCH else p.of(scenario)
             for p in method.parameters
         }
-        own = not method.covering and method.name != WRITTEN
+        own = not method.controlled and method.name != WRITTEN
         if own and in_range(method, numbers) and as_file(method, numbers, scenario) == scenario:
             return method.name, numbers
     return WRITTEN, {}

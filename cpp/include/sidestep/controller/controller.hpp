@@ -58,7 +58,8 @@ class Controller {
   /// From the next step on: a configuration (nv) [rad | m] within the limits, of joints without limits at the nearest turn.
   /// Throws std::invalid_argument that names the joint, its value and what is allowed; the goal before stays.
   void set_goal(const Eigen::VectorXd& position);
-  /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner.
+  /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner. A posture
+  /// for a pose is looked for near its `rest`, or near the arm where it has none.
   void set_goal(Goal goal);
   /// The arm comes to rest where it is, and goes on evading.
   void clear_goal();

@@ -133,9 +133,6 @@ class GeometricSystem {
   [[nodiscard]] bool lower_activations(ConstVectorRef q, const Obstacles& obstacles, Workspace& workspace,
                                        Eigen::Ref<Eigen::VectorXd> activations) const noexcept;
 
-  /// This system with activation distances that leave a goal (nv) [rad | m] free. Allocates.
-  GeometricSystem relaxed_at(const Eigen::VectorXd& goal, const Obstacles& obstacles) const;
-
   /// The activation distances (m) that a workspace begins with.
   const Eigen::VectorXd& activations() const noexcept { return activations_; }
 

@@ -70,7 +70,7 @@ class Guide {
   void set_obstacles(const Obstacles& obstacles);
 
   /// Where to be drawn to: position, velocity and acceleration (nv) of a JointGoal; and where barriers are to leave room, see
-  /// GeometricSystem::relaxed_at: at the first `num_places` columns of `places` (nv), the narrow places of the path that the
+  /// GeometricSystem::lower_activations: at the first `num_places` columns of `places` (nv), the narrow places of the path that the
   /// arm is about to pass, or the goal where there is none; at the goal as well where the arm `arrives`: there are some, and
   /// the end of the path is within the lead.
   struct Attractor {

@@ -28,7 +28,7 @@ GIZMO_SIZE = 0.22  # of the distance to the farthest link at rest
 class GoalControl:
     """Where the arm is sent: by sliders to a configuration, by the gizmo to a pose of the tip.
 
-    A pose goes to the system's own pose goal. The ghost then shows the posture for it.
+    The ghost shows where the arm is led to: of a pose the posture that was found for it last.
     """
 
     def __init__(
@@ -66,14 +66,16 @@ class GoalControl:
         self._factors = np.array([180.0 / np.pi if k in revolute else 1.0 for k in range(len(self.q))])
         self._pose: Array | None = None
         self.gizmo.on_update(self._dragged)
-        self._known: tuple[Array | None, Array | None] = (None, None)
+        self._known: tuple[Array | None, ...] = (None, None, None)
 
-    def show(self, goal: Array | None, pose: Array | None, posture: Posture) -> None:
-        """Shows the goal that the loop has, whoever set it; does nothing while it stays the same."""
-        if same(goal, self._known[0]) and same(pose, self._known[1]):
+    def show(self, goal: Array | None, pose: Array | None, posture: Posture | None) -> None:
+        """Shows the goal that the loop has, whoever set it; does nothing while it stays the same, or is not found."""
+        if posture is None:
             return
-        self._known = goal, pose
-        self.q = posture.q
+        now = goal, pose, posture.q
+        if all(map(same, now, self._known)):
+            return
+        self._known, self.q = now, posture.q
         if goal is not None:
             self._place_gizmo(self._robot.pose(goal, self._tip))
             self.kind.content = "**Goal: a configuration.** Move a slider, or drag the gizmo for a pose."

@@ -163,7 +163,7 @@ class ObstaclePanel:
         gizmo, camera = view.goal.gizmo, client.camera
         place = free_place(
             view.robot,
-            (last.q, last.posture.q),
+            (last.q, view.goal.q),
             [*others, *(ball for _, ball in self._sent)],
             (np.array(gizmo.position), GIZMO_ROOM * gizmo.scale),
             thing.size,

@@ -68,7 +68,7 @@ class Plots:
             self._rows.clear()
             for handle in self._handles:
                 handle.data = NOTHING
-        if not snapshot.status[0] or (self._rows and snapshot.time == self._rows[-1][0]):
+        if not snapshot.status or (self._rows and snapshot.time == self._rows[-1][0]):
             return None  # there was no step yet, or none since
         height = float(np.linalg.norm(snapshot.values))
         self._rows.append(

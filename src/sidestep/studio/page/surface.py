@@ -23,7 +23,7 @@ from sidestep.studio.page import colours
 from sidestep.studio.page.arm import short_names
 from sidestep.studio.page.camera import Viewpoint
 from sidestep.studio.parameters import Numbers
-from sidestep.studio.systems import build_system
+from sidestep.studio.systems import build_mover
 
 if TYPE_CHECKING:
     import viser
@@ -53,13 +53,13 @@ class Request:
     points: Array
     radii: Array
     scenario: Scenario
-    relaxed: Array  # (k, nv) places at which the barriers are relaxed, as in the loop
+    activations: Array  # (m,) clearances at which barriers begin, as in the loop; empty without any
 
     def differs(self, other: Request | None) -> bool:
         """Whether it would look different."""
         if other is None or self.joints != other.joints or not self.same_system(other):
             return True
-        if not np.array_equal(self.relaxed, other.relaxed):
+        if not np.allclose(self.activations, other.activations, rtol=0.0, atol=LEAST_MOVE):
             return True
         held = np.delete(self.q - other.q, self.joints)
         if np.abs(held).max(initial=0.0) > 5.0 * LEAST_MOVE or self.points.shape != other.points.shape:
@@ -111,10 +111,10 @@ class Surface:
             self.clear()
             return
         method = method_named(snapshot.method)
-        points, radii = seen(snapshot, bare=not method.safe)
+        points, radii = seen(snapshot, bare=not method.controlled)
         numbers, scenario = snapshot.numbers[method.name], snapshot.scenario
         request = Request(
-            robot, body, method, numbers, joints, snapshot.q, points, radii, scenario, snapshot.relaxed
+            robot, body, method, numbers, joints, snapshot.q, points, radii, scenario, snapshot.activations
         )
         if self._done is not None and (self._done.robot is not robot or self._done.joints != joints):
             self.clear()
@@ -181,10 +181,15 @@ class Surface:
 
     def _system_of(self, request: Request) -> GeometricSystem:
         if self._system is None or not self._system[0].same_system(request):
-            made = build_system(
-                request.method, request.robot, request.body, request.numbers, request.scenario
+            made = build_mover(
+                request.method,
+                request.robot,
+                request.body,
+                request.numbers,
+                request.scenario,
+                synchronous=True,
             )
-            self._system = request, made
+            self._system = request, made.system
         return self._system[1]
 
     def _show_surface(self, request: Request, heights: Array) -> None:
@@ -225,7 +230,8 @@ class Surface:
         line = np.array([*self.trail, on_surface(robot, joints, snapshot.q, self._heights)])
         self._segments("trail", np.stack([line[:-1], line[1:]], axis=1), colours.TRAIL, thickness=4.0)
         self._mark("state", line[-1], colours.TRAIL)
-        self._mark("goal", on_surface(robot, joints, snapshot.posture.q, self._heights), colours.GOAL)
+        if snapshot.posture is not None:
+            self._mark("goal", on_surface(robot, joints, snapshot.posture.q, self._heights), colours.GOAL)
 
     def _segments(self, name: str, ends: Array, colour: str, *, thickness: float) -> None:
         """Lines between pairs of points (n, 2, 3), new or in place of those there were."""
@@ -273,19 +279,18 @@ def scale(robot: Robot, joints: tuple[int, int]) -> float:
 
 
 def heights_over(request: Request, system: GeometricSystem) -> Array:
-    """|psi| (CELLS + 1, CELLS + 1) of a system, relaxed as in the loop: at rest, over the whole range of two joints,
-    the others as in `request.q`.
+    """|psi| (CELLS + 1, CELLS + 1) of a system with the barriers of the loop: at rest, over the whole range of two
+    joints, the others as in `request.q`.
     """
     lower, upper = ranges(request.robot, request.joints)
     obstacles = Obstacles(request.points, request.radii) if len(request.points) else Obstacles.none()
-    for place in request.relaxed:
-        system = system.relaxed_at(place, obstacles)
+    begin = request.activations if len(request.activations) == system.num_embedding_coordinates else None
     rest, q = np.zeros_like(request.q), np.array(request.q)
     heights = np.zeros((CELLS + 1, CELLS + 1))
     for i, first in enumerate(np.linspace(lower[0], upper[0], CELLS + 1)):
         for k, second in enumerate(np.linspace(lower[1], upper[1], CELLS + 1)):
             q[list(request.joints)] = first, second
-            heights[i, k] = np.linalg.norm(system.acceleration(q, rest, q, obstacles).values)
+            heights[i, k] = np.linalg.norm(system.acceleration(q, rest, q, obstacles, begin).values)
     return heights
 
 

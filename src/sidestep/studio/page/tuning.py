@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
@@ -89,8 +88,6 @@ class TuningPanel:
         control.on_update(lambda event: self._moved(event, parameter))
         self._controls[parameter.name] = control
         usual = label_of(parameter.default) if parameter.options else f"{parameter.default:g}"
-        if parameter.powers:
-            usual = f"10^{position(parameter, parameter.default):g}"
         add_note(self._server.gui, f"{parameter.sentence} Recommended: {usual}.")
 
     def _chose(self, event: Any) -> None:
@@ -117,7 +114,7 @@ class TuningPanel:
             download = event.client.gui.add_button("Download")
             close = event.client.gui.add_button("Close")
         download.on_click(
-            lambda _: event.client.send_file_download("system.py", code.encode(), save_immediately=True)
+            lambda _: event.client.send_file_download("controller.py", code.encode(), save_immediately=True)
         )
         close.on_click(lambda _: modal.close())
 
@@ -148,13 +145,11 @@ def add_control(gui: Any, parameter: Parameter, value: Any, *, joints: Collectio
     if parameter.options:
         options = tuple(dict.fromkeys(label_of(option) for option in (*parameter.options, value)))
         return gui.add_dropdown(label, options, initial_value=label_of(value))
-    lower, upper, shown = (position(parameter, end) for end in (parameter.lower, parameter.upper, value))
-    unit = (
-        f" [{unit_for(parameter.unit, joints)}]" if parameter.unit else " [10^]" if parameter.powers else ""
-    )
-    step: float = 1 if parameter.whole and not parameter.powers else (upper - lower) / STEPS
+    lower, upper = parameter.slider
+    unit = f" [{unit_for(parameter.unit, joints)}]" if parameter.unit else ""
+    step = 1 if parameter.whole else (upper - lower) / STEPS
     return gui.add_slider(
-        f"{label}{unit}", min=min(lower, shown), max=max(upper, shown), step=step, initial_value=shown
+        f"{label}{unit}", min=min(lower, value), max=max(upper, value), step=step, initial_value=value
     )
 
 
@@ -165,9 +160,8 @@ def show_value(control: Any, parameter: Parameter, value: Any) -> None:
             control.options = (*control.options, label_of(value))
         control.value = label_of(value)
         return
-    shown = position(parameter, value)
-    control.min, control.max = min(control.min, shown), max(control.max, shown)
-    control.value = shown
+    control.min, control.max = min(control.min, value), max(control.max, value)
+    control.value = value
 
 
 def value_of(control: Any, parameter: Parameter) -> Any:
@@ -176,15 +170,7 @@ def value_of(control: Any, parameter: Parameter) -> Any:
         known = {label_of(option): option for option in parameter.options}
         text = str(control.value)
         return known[text] if text in known else int(text) if text.isdigit() else text
-    value = float(f"{10.0**control.value:.3g}") if parameter.powers else float(control.value)
-    return parameter.kept(round(value) if parameter.whole else value)
-
-
-def position(parameter: Parameter, value: Any) -> float:
-    """Where a slider stands for a value: at it, or at its power of ten."""
-    if not parameter.powers:
-        return int(value) if parameter.whole else float(value)
-    return math.log10(max(value, 1e-12))
+    return parameter.kept(round(control.value) if parameter.whole else control.value)
 
 
 def label_of(option: Any) -> str:

@@ -248,8 +248,7 @@ class View:
             if snapshot.contacts
             else "touches nothing"
         )
-        system, torque = snapshot.status
-        status = [f"status: system {system}, torque program {torque}"] if system else []
+        status = [f"status: {snapshot.status}"] if snapshot.status else []
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
         least = f" (least so far {1e3 * self.least_clearance:.0f} mm)"
         state = f"{touch} · {snapshot.time:.1f} s · {speed}"

@@ -1,0 +1,197 @@
+"""What moves the arm: the `Controller`, or one of the thesis's systems with a torque program."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep._core import (
+    Controller,
+    ControllerSettings,
+    GeometricSystem,
+    Obstacles,
+    PoseGoal,
+    Step,
+    TorqueController,
+    TorqueSolution,
+)
+from sidestep.arm import Arm
+from sidestep.robot import Robot
+from sidestep.scenario.assembly import POSTURE_STARTS
+from sidestep.simulation.pose_aim import PoseAim, PoseTarget, Posture, posture_at
+from sidestep.simulation.run import status_name
+
+Array = npt.NDArray[np.float64]
+
+STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
+ASIDE = 1e-4  # [m] farther from where its velocity has brought it, an obstacle is told anew
+
+
+@dataclass(frozen=True, eq=False)
+class Account:
+    """What a mover says of its last step.
+
+    Attributes:
+        words: what the arm does. status: of the command.
+        nearest: (name of link or "", clearance [m] that is measured; inf where none is).
+        values: psi (m,). metric: (nv, nv). activations: (m,) clearances at which barriers begin; empty without any.
+    """
+
+    words: str
+    status: str = ""
+    nearest: tuple[str, float] = ("", float("inf"))
+    values: Array = field(default_factory=lambda: np.zeros(0))
+    metric: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    activations: Array = field(default_factory=lambda: np.zeros(0))
+
+
+class ControllerMover:
+    """A `Controller`, told what it sees where that is not as it was told before.
+
+    Args:
+        robot: the arm, arm: what is prepared of it. settings: of the controller. tip: the frame whose pose is a goal.
+
+    Raises:
+        ValueError: names the setting at fault.
+    """
+
+    def __init__(self, robot: Robot, arm: Arm, settings: ControllerSettings, tip: str) -> None:
+        self._robot, self._arm, self._settings, self._tip = robot, arm, settings, tip
+        self._controller = Controller(arm, settings)
+        self._told: Obstacles | None = None
+        self._said: Controller | None = None  # took the last step
+
+    def set_goal(self, pose: Array | None, q: Array, *, thorough: bool) -> None:
+        """Goes to q (nv,), or to a pose (4, 4) by a posture that is looked for near q."""
+        self._near = q
+        self._aim = q if pose is None else PoseTarget(self._robot, self._tip, pose, rest=q)
+        self._controller.set_goal(self._goal)
+        self._said = None
+
+    @property
+    def _goal(self) -> Array | PoseGoal:
+        return self._aim.goal if isinstance(self._aim, PoseTarget) else self._aim
+
+    def step(self, q: Array, v: Array, mass_matrix: Array, bias: Array, obstacles: Obstacles) -> Array:
+        """The torque (nv,) [Nm | N] of one period."""
+        if self._told is not None:
+            self._told.advance(self._settings.period)
+        if self._told is None or not alike(self._told, obstacles):
+            self._controller.set_obstacles(obstacles)
+            self._told = obstacles
+        self._said = self._controller
+        return self._controller.step(q, v, mass_matrix, bias).torque
+
+    def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
+        """Takes a step without time passing: of another controller, that does not plan ahead."""
+        settings = copy.copy(self._settings)
+        settings.synchronous = True
+        settings.planner = settings.look_ahead = settings.local_minimum = None
+        self._said = Controller(self._arm, settings)
+        self._said.set_goal(self._goal)
+        self._said.set_obstacles(obstacles)
+        self._said.step(q, v)
+
+    @property
+    def posture(self) -> Posture | None:
+        """Where the arm is led to; None where no posture for the pose is found yet."""
+        aim, found = self._aim, None if self._said is None else self._said.target
+        if not isinstance(aim, PoseTarget):
+            return Posture(aim)
+        if found is not None:
+            return Posture(found, *aim.errors(found))
+        near = Posture(self._near, *aim.errors(self._near))
+        return near if near.found else None
+
+    @property
+    def system(self) -> GeometricSystem:
+        """Of the controller, see `Controller.system`."""
+        return self._controller.system
+
+    @property
+    def metric(self) -> Array:
+        """(nv, nv) of the last step."""
+        return self._controller.geometric_step.metric
+
+    def account(self) -> Account | None:
+        """Of the last step; None before one."""
+        if self._said is None:
+            return None
+        command, step = self._said.command, self._said.geometric_step
+        link = "" if command.coordinate < 0 else self._said.labels[command.coordinate].name
+        return Account(
+            self._said.explain(),
+            f"{status_name(command.status)}, {status_name(command.activity)}",
+            (link, command.clearance),
+            step.values,
+            step.metric,
+            self._said.activations,
+        )
+
+
+class SystemMover:
+    """A geometric system, whose acceleration a torque program tracks; nothing keeps clearances.
+
+    Args:
+        robot: the arm. tip: the frame whose pose is a goal.
+    """
+
+    def __init__(self, robot: Robot, system: GeometricSystem, program: TorqueController, tip: str) -> None:
+        self.system = system
+        self._robot, self._program, self._tip = robot, program, tip
+        self._step: Step | None = None
+        self._solution: TorqueSolution | None = None
+
+    def set_goal(self, pose: Array | None, q: Array, *, thorough: bool) -> None:
+        """The same; thorough: the posture is looked for from everywhere, not only from q."""
+        self.posture = Posture(q)
+        self._aim: Array | PoseAim = q
+        if pose is not None:
+            starts = POSTURE_STARTS if thorough else 1
+            self.posture = posture_at(self._robot, self._tip, pose, q, starts=starts)
+            stiffness = float(self.system.stiffness[0, 0])
+            self._aim = PoseAim(self._robot, self._tip, pose, stiffness=stiffness, posture=self.posture)
+
+    def step(self, q: Array, v: Array, mass_matrix: Array, bias: Array, obstacles: Obstacles) -> Array:
+        """The torque (nv,) [Nm | N] of one period."""
+        self.look(q, v, obstacles)
+        assert self._step is not None
+        self._solution = self._program.solve(q, v, self._step.acceleration, mass_matrix, bias)
+        return self._solution.torque
+
+    def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
+        """A step of the system alone."""
+        goal = self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
+        self._step = self.system.acceleration(q, v, goal, obstacles)
+
+    @property
+    def metric(self) -> Array:
+        """(nv, nv) of the last step."""
+        assert self._step is not None
+        return self._step.metric
+
+    def account(self) -> Account | None:
+        """Of the last step; None before one."""
+        step, solution = self._step, self._solution
+        if step is None:
+            return None
+        status = f"system {status_name(step.status)}"
+        if solution is not None:
+            status += f", torque program {status_name(solution.status)}"
+        words = self.posture.in_words(step.diagnosis.describe())
+        return Account(words, status, values=step.values, metric=step.metric)
+
+
+Mover = ControllerMover | SystemMover
+
+
+def alike(told: Obstacles, seen: Obstacles) -> bool:
+    """Whether what was told, moved on along its velocities, is still what is seen."""
+    return (
+        np.array_equal(told.radii, seen.radii)
+        and float(np.abs(told.points - seen.points).max(initial=0.0)) <= ASIDE
+        and float(np.abs(told.velocities - seen.velocities).max(initial=0.0)) <= STILL
+    )
