@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -76,3 +77,26 @@ def test_a_fast_arm_minds_what_is_ahead_not_what_is_nearest(index: int) -> None:
     assert not outcome.collision
     assert not outcome.self_collision
     assert outcome.limits == {}
+
+
+def test_poses_are_reached_in_any_posture() -> None:
+    settings = BenchSettings(
+        problems=ProblemSettings(robot="fr3", obstacles=0, seed=2),
+        count=2,
+        motion=MotionSettings(duration=10.0, poses=True),
+    )
+    result = run_bench(settings)
+    for outcome in result.outcomes:
+        assert outcome.success
+        distance, angle = outcome.pose_error
+        assert distance < 1e-3
+        assert angle < np.radians(0.5)
+    assert (
+        max(outcome.error_rad for outcome in result.outcomes) > 0.05
+    )  # not by the posture it was drawn with
+    assert result.to_document()["poses"] is True
+
+
+def test_the_thesis_has_no_pose_goals() -> None:
+    with pytest.raises(ValueError, match="pose goals are for the methods 'controller' and 'reactive'"):
+        run_bench(replace(SETTINGS, motion=MotionSettings(duration=5.0, poses=True)))

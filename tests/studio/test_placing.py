@@ -9,11 +9,11 @@ import pytest
 
 from sidestep import ExactClearance, Robot
 from sidestep.pose import pose_at
+from sidestep.robot import tip_of
 from sidestep.studio.page.camera import HALF, RIGHT, UP, VIEW, Viewpoint
 from sidestep.studio.page.placing import CLEAR, Camera, free_place
 from sidestep.studio.start import ends
 from sidestep.studio.things import Thing, ball, box, cloud, scattered
-from sidestep.studio.tip import tip_of
 from sidestep.studio.truth import solid_poses
 
 DOWN = np.diag([1.0, -1.0, -1.0])  # axes of a camera that looks down

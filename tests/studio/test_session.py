@@ -13,6 +13,7 @@ import trimesh
 
 from sidestep import ExactClearance, Robot, Scenario
 from sidestep.pose import pose_at
+from sidestep.robot import tip_of
 from sidestep.scenario.runner import run_scenario
 from sidestep.scenario.scenario import RobotChoice
 from sidestep.studio import messages as m
@@ -23,7 +24,6 @@ from sidestep.studio.session import Session
 from sidestep.studio.stage import DRAG_ACCELERATION, DRAG_SPEED
 from sidestep.studio.start import BEND, ends, scenario_of, starting_scenario
 from sidestep.studio.things import ball, box
-from sidestep.studio.tip import tip_of
 from sidestep.studio.truth import solid_poses
 
 MakeSession = Callable[..., Session]

@@ -22,12 +22,14 @@ from sidestep._core import (
     rollout,
 )
 from sidestep.bench.problem import Problem, poses_over
-from sidestep.robot import Robot
+from sidestep.robot import Robot, tip_of
 from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation, SystemDriver
+from sidestep.simulation.pose_aim import PoseTarget
 
 Array = npt.NDArray[np.float64]
 
 CHUNK = 1.0  # [s] integrated between two looks at arrival
+POSE_TOLERANCE = 1e-3, math.radians(0.5)  # [m] and [rad] of a pose goal; the defaults of `ArrivalSettings`
 FIRST_CHUNK = 0.02  # [s] the same until there is a path: a look of the planner
 
 
@@ -39,6 +41,8 @@ class MotionSettings:
         period: control period [s]. duration: after it the arm has not arrived [s].
         tolerance: it has arrived once every joint is this close to the goal [rad | m].
         torque: under torque control in MuJoCo, with the real masses, instead of integrated.
+        poses: the goal is the pose that the tip (`tip_of`) has at the goal configuration, in any posture: within
+            `POSE_TOLERANCE`, in place of the tolerance.
 
     Raises:
         ValueError: a number that is not positive.
@@ -48,6 +52,7 @@ class MotionSettings:
     duration: float = 30.0
     tolerance: float = 0.05
     torque: bool = False
+    poses: bool = False
 
     def __post_init__(self) -> None:
         for name in ("period", "duration", "tolerance"):
@@ -71,6 +76,7 @@ class Motion:
         planning_seconds: the same until it was improved.
         ended: what the controller was about at the end, see `Activity`; empty without a controller.
         safe: clearances bound every command, as the controller's do.
+        pose_error: at the end, of a pose goal: [m] and [rad].
     """
 
     q: Array
@@ -85,6 +91,7 @@ class Motion:
     planning_seconds: float | None = None
     ended: str = ""
     safe: bool = False
+    pose_error: tuple[float, float] | None = None
 
     @property
     def first_motion_seconds(self) -> float:
@@ -113,6 +120,10 @@ class SystemMover:
 
     def move(self, problem: Problem, settings: MotionSettings) -> Motion:
         """Runs one problem."""
+        if settings.poses:
+            raise ValueError(
+                "pose goals are for the methods 'controller' and 'reactive'; the thesis has none"
+            )
         if settings.torque:
             program = TorqueController(self.robot, period=settings.period)
             return _under_torque(
@@ -134,7 +145,13 @@ class SystemMover:
                 steps=steps,
                 time_steps=True,
             )
-            columns.add(part.q[:-1], part.v[:-1], part.acceleration[:-1], part.step_seconds[:-1])
+            columns.add(
+                part.q[:-1],
+                part.v[:-1],
+                part.acceleration[:-1],
+                part.step_seconds[:-1],
+                columns.near(part.q[:-1]),
+            )
             q, v = part.q[-1], part.v[-1]
         return columns.motion(problem)
 
@@ -159,12 +176,15 @@ class ControllerMover:
                 **self.settings,
             ),
         )
-        controller.set_goal(problem.goal)
+        pose = None
+        if settings.poses:
+            tip = tip_of(self.robot)
+            pose = PoseTarget(self.robot, tip, self.robot.pose(problem.goal, tip))
+        controller.set_goal(problem.goal if pose is None else pose.goal)
         if settings.torque:
-            motion = _under_torque(
-                self.robot, ControllerDriver(controller, _Changing(problem)), problem, settings
-            )
-            return _told(motion, _planned(controller), controller)
+            driver = ControllerDriver(controller, _Changing(problem))
+            motion = _under_torque(self.robot, driver, problem, settings, pose)
+            return _told(motion, _planned(controller), controller, pose)
         columns = _Columns(problem, settings)
         q, v = problem.start, np.zeros_like(problem.start)
         seen = _Changing(problem)
@@ -173,13 +193,26 @@ class ControllerMover:
             obstacles = seen(columns.done * settings.period)
             if obstacles is not None:
                 controller.set_obstacles(obstacles)
-            part = integrate(controller, q, v, steps=steps, goal=problem.goal, tolerance=settings.tolerance)
-            columns.add(part.q, part.v, part.acceleration, part.step_seconds)
+            goal = problem.goal if pose is None else None
+            part = integrate(controller, q, v, steps=steps, goal=goal, tolerance=settings.tolerance)
+            near = columns.near(part.q) if pose is None else _at_pose(pose, part.q)
+            columns.add(part.q, part.v, part.acceleration, part.step_seconds, near)
             q, v = part.last_q, part.last_v
             if planned is None:
                 planned = _planned(controller)
         motion = columns.motion(problem)
-        return _told(motion, planned, controller)
+        return _told(motion, planned, controller, pose)
+
+
+def _at_pose(pose: PoseTarget, q: Array) -> npt.NDArray[np.bool_]:
+    """Which of the rows (T, nv) have the pose; from the last on, as long as it does not."""
+    near = np.zeros(len(q), dtype=bool)
+    for k in reversed(range(len(q))):
+        distance, angle = pose.errors(q[k])
+        near[k] = distance < POSE_TOLERANCE[0] and angle < POSE_TOLERANCE[1]
+        if not near[k]:
+            break
+    return near
 
 
 def _planned(controller: Controller) -> tuple[float, float] | None:
@@ -190,7 +223,12 @@ def _planned(controller: Controller) -> tuple[float, float] | None:
     return plan.search_seconds, plan.search_seconds + plan.improvement_seconds
 
 
-def _told(motion: Motion, planned: tuple[float, float] | None, controller: Controller) -> Motion:
+def _told(
+    motion: Motion,
+    planned: tuple[float, float] | None,
+    controller: Controller,
+    pose: PoseTarget | None = None,
+) -> Motion:
     """A motion with what its controller knows of it."""
     first, improved = (None, None) if planned is None else planned
     return replace(
@@ -199,6 +237,7 @@ def _told(motion: Motion, planned: tuple[float, float] | None, controller: Contr
         planning_seconds=improved,
         ended="arrived" if motion.arrived else controller.command.activity.name,
         safe=True,
+        pose_error=None if pose is None else pose.errors(motion.q[-1]),
     )
 
 
@@ -237,9 +276,13 @@ class _Columns:
         steps = (max(1, round(span / period)), self._total - self.done, *(n for n in changes if n > 0))
         return max(0, min(steps))
 
-    def add(self, q: Array, v: Array, a: Array, seconds: Array) -> None:
-        """Rows that came next."""
-        near = np.abs(q - self._goal).max(axis=1) < self._settings.tolerance
+    def near(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Which of the rows (T, nv) are at the goal configuration."""
+        found: npt.NDArray[np.bool_] = np.abs(q - self._goal).max(axis=1) < self._settings.tolerance
+        return found
+
+    def add(self, q: Array, v: Array, a: Array, seconds: Array, near: npt.NDArray[np.bool_]) -> None:
+        """Rows that came next, and which of them are at the goal."""
         keep = len(q)
         if near.any():
             keep, self.arrived = int(near.argmax()) + 1, True
@@ -269,15 +312,26 @@ class _Timed:
         return result
 
 
-def _under_torque(robot: Robot, driver: Driver, problem: Problem, settings: MotionSettings) -> Motion:
+def _under_torque(
+    robot: Robot,
+    driver: Driver,
+    problem: Problem,
+    settings: MotionSettings,
+    pose: PoseTarget | None = None,
+) -> Motion:
     simulation = Simulation(robot, problem.objects, timestep=settings.period, visuals=False)
     timed = _Timed(driver)
     run = simulation.run(
         timed,
         problem.start,
-        problem.goal,
+        problem.goal if pose is None else pose,
         settings.duration,
-        arrival=Arrival(position=settings.tolerance, speed=float("inf"), hold=0.0),
+        arrival=Arrival(
+            position=settings.tolerance if pose is None else POSE_TOLERANCE[1],
+            distance=POSE_TOLERANCE[0],
+            speed=float("inf"),
+            hold=0.0,
+        ),
     )
     return Motion(
         run.q,

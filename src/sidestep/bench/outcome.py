@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,7 @@ class Outcome:
         limits: worst excess of the limits that were broken at a sample, by name, in the limit's unit.
         diverged: the state was not finite any more; the motion ends there.
         way_out: of a collision of a safe method with what moves, see `find_way_out`; None elsewhere.
+        pose_error: at the end, where the goal was a pose: [m] and [rad].
     """
 
     index: int
@@ -54,6 +56,7 @@ class Outcome:
     limits: dict[str, float]
     diverged: bool
     way_out: WayOut | None = None
+    pose_error: tuple[float, float] | None = None
 
     @property
     def collision(self) -> bool:
@@ -93,7 +96,11 @@ class Outcome:
         if not arrives and self.arrived:
             found.append("it arrived at a goal that is blocked")
         if arrives and self.stuck:
-            found.append(f"stuck: {self.error_rad:.2f} rad from the goal after {self.time_s:.1f} s")
+            away = f"{self.error_rad:.2f} rad from the goal"
+            if self.pose_error is not None:
+                distance, angle = self.pose_error
+                away = f"{1e3 * distance:.1f} mm and {math.degrees(angle):.1f}° from the pose"
+            found.append(f"stuck: {away} after {self.time_s:.1f} s")
         found += [f"{name} limit exceeded by {value:.3g}" for name, value in self.limits.items()]
         return found
 
@@ -152,6 +159,7 @@ class Judge:
             limits=self._limits(motion, end),
             diverged=end < len(motion.q),
             way_out=way_out,
+            pose_error=motion.pose_error,
         )
 
     def _find_way_out(

@@ -75,6 +75,7 @@ class BenchResult:
             "robot": self.problems[0].robot,
             "method": self.settings.method.value,
             "torque": self.settings.motion.torque,
+            "poses": self.settings.motion.poses,
             "problems": len(outcomes),
             "success": sum(item.success for item in outcomes),
             "collision": sum(item.collision for item in outcomes),
@@ -104,7 +105,11 @@ class BenchResult:
                 "fastest_obstacle_m_s": max(
                     float(np.linalg.norm(item.velocities, axis=1).max(initial=0.0)) for item in self.problems
                 ),
-                **{key: value for key, value in asdict(self.settings.motion).items() if key != "torque"},
+                **{
+                    key: value
+                    for key, value in asdict(self.settings.motion).items()
+                    if key not in ("torque", "poses")
+                },
             },
             "jobs": self.settings.jobs,
             "cpu": cpu_name(),

@@ -36,6 +36,10 @@ def reach(
     torque: Annotated[
         bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
     ] = False,
+    poses: Annotated[
+        bool,
+        typer.Option("--poses", help="Goals are poses of the tip, within 1 mm and 0.5°, in any posture."),
+    ] = False,
     duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 30.0,
     period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
@@ -73,7 +77,7 @@ def reach(
         ),
         count=problems,
         method=method,
-        motion=MotionSettings(period=period, duration=duration, torque=torque),
+        motion=MotionSettings(period=period, duration=duration, torque=torque, poses=poses),
         jobs=jobs or default_jobs(),
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")

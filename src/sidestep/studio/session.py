@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sidestep._core import Obstacles, real_array
 from sidestep.body import Body
-from sidestep.robot import Robot
+from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
@@ -26,7 +26,7 @@ from sidestep.studio.parameters import Numbers
 from sidestep.studio.stage import Actor, Stage
 from sidestep.studio.systems import Recipe, build_mover, numbers_of, recipe_of
 from sidestep.studio.things import check_names, things_of
-from sidestep.studio.tip import at_tip, tip_of
+from sidestep.studio.tip import at_tip
 from sidestep.studio.words import named
 
 Array = npt.NDArray[np.float64]

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.robot import Robot
+from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
 from sidestep.scenario.scenario import JointState, Obstacle, RobotChoice, Shape
-from sidestep.studio.tip import tip_of
 
 Array = npt.NDArray[np.float64]
 

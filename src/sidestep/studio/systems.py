@@ -10,7 +10,7 @@ from typing import Any, cast
 from sidestep._core import ControllerSettings
 from sidestep.arm import Arm
 from sidestep.body import Body
-from sidestep.robot import Robot
+from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import written_system
 from sidestep.scenario.parts import controller_settings_of, torque_program_of
@@ -25,7 +25,6 @@ from sidestep.scenario.scenario import (
 from sidestep.studio.methods import METHODS, WRITTEN, Method, in_range
 from sidestep.studio.mover import ControllerMover, Mover, SystemMover
 from sidestep.studio.parameters import Numbers, Value, set_in
-from sidestep.studio.tip import tip_of
 
 SWITCH = "system.switch"  # of several forms, with numbers of their own
 

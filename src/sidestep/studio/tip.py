@@ -1,26 +1,15 @@
-"""The end of an arm, whose pose is a goal."""
+"""Where the tip of an arm is to be, for a pose goal of any frame that it carries."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.robot import Robot
+from sidestep.robot import Robot, tip_of
 from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.scenario import PoseChoice
 
 Array = npt.NDArray[np.float64]
-
-
-def tip_of(robot: Robot) -> str:
-    """The link whose pose is a goal: of those that the last joint of the arm carries, the tool centre point where one
-    is named so, else the last named."""
-    depth = {-1: 0}
-    for index, joint in enumerate(robot.joints):
-        depth[index] = depth[joint.parent] + 1
-    deepest = max(depth[frame.joint] for frame in robot.frames)
-    names = [frame.name for frame in robot.frames if depth[frame.joint] == deepest]
-    return next((name for name in names if name.endswith("tcp")), names[-1])
 
 
 def at_tip(choice: PoseChoice, robot: Robot) -> Array:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sidestep.body import Body
-from sidestep.robot import Robot
+from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
 from sidestep.simulation.clearance import Clearance
@@ -35,7 +35,6 @@ from sidestep.studio.page.tuning import TuningPanel
 from sidestep.studio.page.words import begun, in_box, stamped
 from sidestep.studio.systems import Recipe, make_body, numbers_of, recipe_of
 from sidestep.studio.things import Thing, thing_of
-from sidestep.studio.tip import tip_of
 
 if TYPE_CHECKING:
     import viser
