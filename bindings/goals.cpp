@@ -1,6 +1,9 @@
 #include <nanobind/stl/string.h>
 
+#include <limits>
+
 #include "dynamical_system.hpp"
+#include "sidestep/controller/posture_search.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
 
 namespace sidestep::python {
@@ -91,6 +94,35 @@ void bind_goals(nb::module_& m) {
       .def_prop_ro("frame", [](const PoseGoal& g) { return g.frame().name; })
       .def_prop_ro("pose", [](const PoseGoal& g) { return to_numpy_matrix(g.pose.matrix()); }, "(4, 4) in the world.")
       .def_prop_ro("position_only", [](const PoseGoal& g) { return g.settings.position_only; });
+
+  m.def(
+      "find_posture",
+      [](const Robot& robot, const PoseGoal& goal, const ArrayLike& near, int starts, std::uint64_t seed) {
+        const Eigen::VectorXd from = as_vector(near, "near", robot.num_coordinates());
+        if (!from.allFinite() || !goal.pose.matrix().allFinite()) {
+          throw nb::value_error("find_posture: near and the pose must be finite");
+        }
+        if (!goal.is_for(robot)) {
+          throw nb::value_error("find_posture: the pose goal is of another robot");
+        }
+        if (starts < 1) {
+          throw nb::value_error(("find_posture: starts is " + std::to_string(starts) + ", allowed: from 1").c_str());
+        }
+        PostureSearchSettings settings;
+        settings.starts = starts;
+        settings.seed = seed;
+        const Posture posture = find_posture(robot, goal, from, settings, [](const Eigen::VectorXd&) { return std::numeric_limits<double>::infinity(); });
+        return nb::make_tuple(to_numpy(posture.q), posture.position_error, posture.rotation_error);
+      },
+      nb::arg("robot"), nb::arg("goal"), nb::arg("near"), nb::kw_only(), nb::arg("starts") = 1, nb::arg("seed") = 0,
+      nb::sig("def find_posture(robot: Robot, goal: PoseGoal, near: numpy.typing.ArrayLike, *, starts: int = 1, seed: int = 0) "
+              "-> tuple[numpy.typing.NDArray[numpy.float64], float, float]"),
+      "A configuration within the limits with the frame at the pose, by damped least squares from q = near:\n"
+      "    q <- clip(q + J^T (J J^T + lambda^2 I)^-1 e),    e = (p* - p, log(R* R^T)),\n"
+      "lambda shrinking with the error (Nakamura and Hanafusa 1986); where that does not get there, from up to `starts`\n"
+      "configurations ever farther away, the same ones for one seed. Returns q (nv,), the distance [m] and the angle [rad]\n"
+      "that are left: below 1e-7 it is there, else it is the nearest that was found. Knows of no obstacles.\n"
+      "Raises ValueError on sizes, what is not finite, and a goal of another robot.");
 }
 
 }  // namespace sidestep::python

@@ -523,6 +523,16 @@ class PoseGoal:
     @property
     def position_only(self) -> bool: ...
 
+def find_posture(robot: Robot, goal: PoseGoal, near: numpy.typing.ArrayLike, *, starts: int = 1, seed: int = 0) -> tuple[numpy.typing.NDArray[numpy.float64], float, float]:
+    """
+    A configuration within the limits with the frame at the pose, by damped least squares from q = near:
+        q <- clip(q + J^T (J J^T + lambda^2 I)^-1 e),    e = (p* - p, log(R* R^T)),
+    lambda shrinking with the error (Nakamura and Hanafusa 1986); where that does not get there, from up to `starts`
+    configurations ever farther away, the same ones for one seed. Returns q (nv,), the distance [m] and the angle [rad]
+    that are left: below 1e-7 it is there, else it is the nearest that was found. Knows of no obstacles.
+    Raises ValueError on sizes, what is not finite, and a goal of another robot.
+    """
+
 class SpeedRegulator:
     """
     Regulates the speed along a motion by an acceleration beta v, beta <= 0, which leaves the path of a geodesic as

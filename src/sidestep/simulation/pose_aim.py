@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import JointGoal, PoseGoal, real_array
+from sidestep._core import JointGoal, PoseGoal, find_posture
 from sidestep.pose import rotation_vector
 from sidestep.robot import Robot
 
@@ -16,12 +16,7 @@ Array = npt.NDArray[np.float64]
 POSITION_SHARE, TURN_SHARE = 2.0, 0.5  # of the joint stiffness, per m^2 and per rad^2
 ENTER = 1e-3, 5e-3  # [m] and [rad] within which the pose itself draws: far inside of what counts as arrived
 LEAVE = 2e-2, 1e-1  # [m] and [rad] beyond which it is the posture again
-ITERATIONS = 50  # from a configuration nearby about ten are enough
-FRUITLESS = 8  # iterations in a row that come no nearer: the pose is out of reach from here
-DAMPING = 0.03  # [m | rad] of the inverse: directions in which an arm moves less than this are left alone
-LARGEST_STEP = 0.3  # [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
 ACCURACY = 1e-7  # [m] and [rad]; the frame is at the pose
-CLEARLY = 0.9  # of the error of a posture nearby: less is worth a way to quite another one
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,48 +112,10 @@ def posture_at(
     *,
     starts: int = 1,
 ) -> Posture:
-    """A configuration within the limits with the frame at the pose, by damped least squares from q = near:
-
-        q <- clip(q + J^T (J J^T + lambda^2 1)^-1 e),    e = (p* - p, log(R* R^T)),
-
-    (Nakamura and Hanafusa 1986), lambda shrinking with the error. Where that does not get there, again from random
-    configurations ever farther away, the same every time, up to `starts` in all. Without success the one from `near`,
-    unless another is clearly nearer to the pose. Of obstacles it knows nothing: the search of a `Controller` does.
+    """A configuration within the limits with the frame at the pose, near a given one: see `find_posture`, which begins
+    from up to `starts` configurations. Of obstacles it knows nothing: the search of a `Controller` does.
     """
-    lower, upper = robot._finite_interval()
-    rng = np.random.default_rng(0)
-    near = np.clip(real_array(near, "near"), lower, upper)
-    best = _descend(robot, frame, pose, near)
-    if best.found:
-        return best
-    for k in range(1, starts):
-        spread = np.pi * k / (starts - 1)
-        begin = rng.uniform(np.maximum(lower, near - spread), np.minimum(upper, near + spread))
-        other = _descend(robot, frame, pose, begin)
-        if other.found:
-            return other
-        if np.hypot(other.distance, other.angle) < CLEARLY * np.hypot(best.distance, best.angle):
-            best = other
-    return best
-
-
-def _descend(robot: Robot, frame: str, pose: Array, q: Array) -> Posture:
-    lower, upper = robot._finite_interval()
-    best, least, fruitless = Posture(q, np.inf, np.inf), np.inf, 0
-    for _ in range(ITERATIONS):
-        error = -_error(robot.pose(q, frame), pose)
-        size = float(np.linalg.norm(error))
-        fruitless = fruitless + 1 if size > 0.99 * least else 0
-        if size < least:
-            best, least = Posture(q, *_sizes(error)), size
-        if size < ACCURACY or fruitless == FRUITLESS:
-            break
-        J = robot.jacobian(q, frame)
-        damping = min(DAMPING, size) ** 2
-        step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
-        step *= min(1.0, LARGEST_STEP / float(np.abs(step).max(initial=1e-12)))
-        q = np.clip(q + step, lower, upper)
-    return best
+    return Posture(*find_posture(robot, PoseGoal(robot, frame, pose), near, starts=starts))
 
 
 def _error(pose: Array, goal: Array) -> Array:
