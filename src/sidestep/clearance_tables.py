@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from sidestep._core import ClearanceTable, JointType
+from sidestep.arm import shipped_arms
 from sidestep.body import cache
 from sidestep.body.file import write_bytes
 from sidestep.robot import Robot
@@ -30,6 +31,7 @@ SPACING = 0.1  # [rad | m] of control points, at most
 BEYOND = 2  # control points beyond a limit: with one a spline ends at the limit
 NEAR = 0.03  # [m] clearance below which the error is measured
 CHECKS = 400  # random configurations by which what is left of it is taken off everywhere
+STEP = 1e-6  # [m] control points are multiples of it, rounded down: far below the error of a table
 TURN = 2.0 * np.pi
 
 
@@ -63,13 +65,19 @@ def clearance_tables(robot: Robot, *, progress: Progress | None = None) -> Clear
     A pair whose distance at every point exceeds what it can lose halfway to the next, by the lever arms of the joints,
     touches nowhere. A coordinate needs limits, unless it turns all its joints at its own rate.
 
-    That takes seconds a pair, so the tables are kept beside the bodies in the user's cache; those of the robots whose
-    covers come with Sidestep come with it too. Warns about an entry that cannot be read or written.
+    That takes seconds a pair, so the tables are kept beside the bodies in the user's cache; a robot with kinematics,
+    meshes and position limits of one whose arm comes with Sidestep takes them from there. Warns about an entry that
+    cannot be read or written.
 
     Args:
         robot: with collision meshes.
         progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
     """
+    shipped = shipped_arms.with_clearances_of(robot)
+    if shipped is not None:
+        measured = {(table.first, table.second) for table in shipped.tables}
+        found = (pair for pair, _, _ in _pairs_of_two(robot, SelfCollision(robot)))
+        return ClearanceTables(tuple(shipped.tables), tuple(pair for pair in found if pair not in measured))
     path = stored_at(robot)
     stored = cache.read_stored(path, _read, "the cached clearance tables are unreadable and are made again")
     if stored is not None:
@@ -81,7 +89,8 @@ def clearance_tables(robot: Robot, *, progress: Progress | None = None) -> Clear
 
 def stored_at(robot: Robot) -> Path:
     """The file of the tables of a robot; its name is a hash of what they are made from."""
-    numbers = (robot.name, robot.fingerprint, ALGORITHM_VERSION, SPACING, BEYOND, NEAR, CHECKS)
+    ends = robot.limits.lower.tolist(), robot.limits.upper.tolist()  # which the fingerprint leaves out
+    numbers = (robot.name, robot.fingerprint, *ends, ALGORITHM_VERSION, SPACING, BEYOND, NEAR, CHECKS)
     return cache.cache_directory() / f"tables-{hashlib.sha256(repr(numbers).encode()).hexdigest()}.npz"
 
 
@@ -123,12 +132,7 @@ def _measure(robot: Robot, progress: Progress | None = None) -> ClearanceTables:
     check = SelfCollision(robot)
     tables: list[ClearanceTable] = []
     apart: list[Pair] = []
-    found: list[tuple[Pair, tuple[int, ...], list[_Axis]]] = []
-    for pair in check.pairs:
-        between = check.coordinates_between(*pair)
-        axes = [axis for c in between if (axis := _Axis.of(robot, c)) is not None]
-        if len(between) == 2 and len(axes) == 2:
-            found.append((pair, between, axes))
+    found = _pairs_of_two(robot, check)
     for done, (pair, between, axes) in enumerate(found):
         if progress is not None:
             progress(", ".join(pair), done, len(found))
@@ -149,6 +153,17 @@ def _measure(robot: Robot, progress: Progress | None = None) -> ClearanceTables:
         else:
             tables.append(_table(pair, axes, _continued(grid, axes), distance, _near(least, axes)))
     return ClearanceTables(tuple(tables), tuple(apart))
+
+
+def _pairs_of_two(robot: Robot, check: SelfCollision) -> list[tuple[Pair, tuple[int, ...], list[_Axis]]]:
+    """The pairs of links with two coordinates between that have control points."""
+    found: list[tuple[Pair, tuple[int, ...], list[_Axis]]] = []
+    for pair in check.pairs:
+        between = check.coordinates_between(*pair)
+        axes = [axis for c in between if (axis := _Axis.of(robot, c)) is not None]
+        if len(between) == 2 and len(axes) == 2:
+            found.append((pair, between, axes))
+    return found
 
 
 def _continued(grid: Array, axes: list[_Axis]) -> Array:
@@ -196,7 +211,8 @@ def _table(
     control = control - maximum_filter(found, size=4, mode=ends)
     table = _spline(pair, axes, control)
     checked = cells[rng.integers(len(cells), size=CHECKS)] if len(cells) else cells
-    return _spline(pair, axes, control - max((excess(table, cell) for cell in checked), default=0.0))
+    left = max((excess(table, cell) for cell in checked), default=0.0)
+    return _spline(pair, axes, STEP * np.floor((control - left) / STEP))
 
 
 def _near(least: Array, axes: list[_Axis]) -> Mask:
@@ -223,13 +239,13 @@ def _spline(pair: Pair, axes: list[_Axis], control: Array) -> ClearanceTable:
 
 
 def _write(path: Path, tables: ClearanceTables) -> None:
-    """As arrays of their own for every table, in micrometres: far below the error of a table."""
+    """As arrays of their own for every table, of whole numbers of `STEP`."""
     arrays: dict[str, npt.NDArray[np.generic]] = {"apart": np.array(tables.apart, dtype=str).reshape(-1, 2)}
     for k, table in enumerate(tables.tables):
         arrays[f"pair{k}"] = np.array((table.first, table.second))
         arrays[f"coordinates{k}"] = np.array(table.coordinates)
         arrays[f"axes{k}"] = np.array([table.begin, table.spacing, table.periodic], dtype=float)
-        arrays[f"control{k}"] = np.floor(1e6 * table.control).astype(np.int32)
+        arrays[f"control{k}"] = np.rint(table.control / STEP).astype(np.int32)
     content = io.BytesIO()
     np.savez_compressed(content, **arrays)  # type: ignore[arg-type]
     write_bytes(path, content.getvalue())
@@ -253,5 +269,5 @@ def _stored_table(stored: Mapping[str, npt.NDArray[Any]], k: int) -> ClearanceTa
         begin=begin,
         spacing=spacing,
         periodic=[bool(turn) for turn in periodic],
-        control=1e-6 * stored[f"control{k}"],
+        control=STEP * stored[f"control{k}"],
     )

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import ClearanceTable, Obstacles, SelfCollisionBarrier
+from sidestep.arm import shipped_arms
 from sidestep.body import Body, cache
 from sidestep.body.file import write_text
 from sidestep.clearance_tables import Progress, clearance_tables
@@ -28,7 +29,7 @@ NEAR = 0.002  # distance of meshes that counts as touching [m]
 SHARE = 0.95  # of samples in which the meshes are apart that the ellipsoids must be: otherwise they are no measure
 
 
-def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
+def barrier_pairs(robot: Robot, body: Body, *, progress: Progress | None = None) -> tuple[LinkPair, ...]:
     """The pairs of links that may touch, with the gap at which they do: (first, second, contact).
 
     Covering ellipsoids are larger than links: neighbours but one overlap while their meshes are apart. Where at most
@@ -38,18 +39,19 @@ def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
     below zero in more than 5 % of the samples, though they do not touch, are left out, and those that touch nowhere
     (`clearance_tables`).
 
-    That takes seconds, so the pairs are kept beside the bodies in the user's cache; those of the covers that come with
-    Sidestep come with it too. Warns about an entry that cannot be read or written.
+    That takes seconds, so the pairs are kept beside the bodies in the user's cache. Warns about an entry that cannot be
+    read or written.
 
     Args:
         robot: with collision meshes. body: a covering body of it.
+        progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
     """
     path = stored_at(robot, body)
     stored = cache.read_stored(
         path, _read_pairs, "the cached pairs of links are unreadable and are made again"
     )
     if stored is None:
-        stored = _find_pairs(robot, body)
+        stored = _find_pairs(robot, body, progress)
         text = json.dumps(stored, indent=1) + "\n"
         cache.write_stored(path, lambda file: write_text(file, text), "the pairs of links are not cached")
     apart = clearance_tables(robot).apart
@@ -57,16 +59,26 @@ def barrier_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
 
 
 def tables_and_pairs(
-    robot: Robot, body: Body, *, progress: Progress | None = None
+    robot: Robot,
+    body: Body,
+    *,
+    progress: Progress | None = None,
+    pair_progress: Progress | None = None,
 ) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
     """What tells how far links are apart: tables (`clearance_tables`), for other pairs covers (`barrier_pairs`).
 
+    Both are read from the arm that comes with Sidestep, where there is one of these meshes, position limits and cover.
+
     Args:
         robot: with collision meshes. body: a covering body of it.
-        progress: of the tables, as in `clearance_tables`.
+        progress: of the tables, as in `clearance_tables`. pair_progress: of the other pairs, as in `barrier_pairs`.
     """
+    shipped = shipped_arms.with_clearances_of(robot)
+    if shipped is not None and shipped_arms.has_body(shipped, body):
+        return tuple(shipped.tables), tuple(shipped.pairs)
     exact = clearance_tables(robot, progress=progress)
-    return exact.tables, tuple(pair for pair in barrier_pairs(robot, body) if pair[:2] not in exact.pairs)
+    pairs = barrier_pairs(robot, body, progress=pair_progress)
+    return exact.tables, tuple(pair for pair in pairs if pair[:2] not in exact.pairs)
 
 
 def _read_pairs(path: Path) -> tuple[LinkPair, ...]:
@@ -75,14 +87,15 @@ def _read_pairs(path: Path) -> tuple[LinkPair, ...]:
 
 def stored_at(robot: Robot, body: Body) -> Path:
     """The file of the pairs of a body; its name is a hash of what they are made from."""
-    numbers = (robot.name, robot.fingerprint, body.links, SAMPLES, FEW, TOUCHING, WAYS, NEAR, SHARE)
+    ends = robot.limits.lower.tolist(), robot.limits.upper.tolist()  # which the fingerprint leaves out
+    numbers = (robot.name, robot.fingerprint, *ends, body.links, SAMPLES, FEW, TOUCHING, WAYS, NEAR, SHARE)
     key = hashlib.sha256(repr(numbers).encode())
     for array in (body.means, np.array(body.covariances), body.levels):
         key.update(np.ascontiguousarray(array).tobytes())
     return cache.cache_directory() / f"pairs-{key.hexdigest()}.json"
 
 
-def _find_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
+def _find_pairs(robot: Robot, body: Body, progress: Progress | None) -> tuple[LinkPair, ...]:
     check = SelfCollision(robot)
     pairs = [pair for pair in check.pairs if set(body.links).issuperset(pair)]
     if not pairs:
@@ -97,6 +110,8 @@ def _find_pairs(robot: Robot, body: Body) -> tuple[LinkPair, ...]:
     found = np.array([gaps(q) for q in configurations])
     result = []
     for k, pair in enumerate(pairs):
+        if progress is not None:
+            progress(", ".join(pair), k, len(pairs))
         few = len(check.coordinates_between(*pair)) <= FEW
         looked = slice(0, SAMPLES if few else SAMPLES // 10)
         # Ellipsoids cover links: those of links that touch overlap.

@@ -13,14 +13,12 @@ import numpy.typing as npt
 from numpy.typing import ArrayLike
 
 from sidestep import _core
+from sidestep.arm.shipped_arms import SUFFIX, shipped_file
 
 if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without them
     from sidestep.arm.preparation import Progress
     from sidestep.body import Body
     from sidestep.robot import Robot
-
-SHIPPED = Path(__file__).parent / "shipped"  # made by benchmarks/ship_arms.py
-SUFFIX = ".arm"
 
 
 class Arm(_core.Arm):
@@ -81,8 +79,8 @@ class Arm(_core.Arm):
                 effort_limits, name, xacro_arguments: of a description, as in `Robot.from_urdf`; of a name
                 `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
             allowed: pairs of links that may touch: they get no clearance.
-            progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover" or
-                "tables", the item a link or a pair of links.
+            progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
+                "tables" or "pairs", the item a link or a pair of links.
             cache: whether a prepared arm is read from and written to the user's cache (SIDESTEP_CACHE_DIR overrides its
                 place).
 
@@ -156,32 +154,9 @@ class Arm(_core.Arm):
     @cached_property
     def body(self) -> Body:
         """The covering body, with what is proven and measured of each link (`link_covers`)."""
-        from sidestep.body import Body, LinkCover
+        from sidestep.body import Body
 
-        core = super().body
-        return Body(
-            links=core.links,
-            weights=core.weights,
-            means=core.means,
-            covariances=core.covariances,
-            levels=core.levels,
-            robot_name=self.name,
-            fingerprint=self.provenance.fingerprint,
-            link_covers=[
-                LinkCover(
-                    link=proof.link,
-                    num_components=core.links.count(proof.link),
-                    coverage=proof.coverage,
-                    mean_overshoot=proof.mean_overshoot,
-                    max_overshoot=proof.max_overshoot,
-                    volume_ratio=proof.volume_ratio,
-                    volume_of=proof.volume_of,
-                    interior_coverage=proof.interior_coverage,
-                    slimness=proof.slimness,
-                )
-                for proof in self.proof
-            ],
-        )
+        return Body.of_arm(_core.Arm(self))
 
     def mass_matrix(self, q: ArrayLike) -> npt.NDArray[np.float64]:
         """Joint-space inertia M(q) (nv, nv) [kg m^2, kg m, kg] at q (nv,); without rotor inertias.
@@ -235,19 +210,18 @@ class Arm(_core.Arm):
         progress: Progress | None,
         cache: bool,
     ) -> Arm:
-        from sidestep.robot.catalogue import recipe
-
-        recipe(name)  # raises, with the known names
-        _refuse_options(given, ("locked", "locked_beyond_limits"), f"robot {name!r}, which has its own")
-
         def describe() -> Robot:
             from sidestep.robot import Robot
 
             return Robot.named(name, **given)
 
-        shipped = SHIPPED / f"{name}{SUFFIX}"
-        if not given and not allowed and shipped.is_file():
+        shipped = shipped_file(name)
+        if shipped is not None and not given and not allowed:
             return cls(_core.Arm.read(shipped), description=describe)
+        from sidestep.robot.catalogue import recipe
+
+        recipe(name)  # raises, with the known names
+        _refuse_options(given, ("locked", "locked_beyond_limits"), f"robot {name!r}, which has its own")
         return cls._prepared(describe, name, allowed, progress, cache)
 
     @classmethod

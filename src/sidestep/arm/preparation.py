@@ -18,7 +18,7 @@ from sidestep.robot import Robot
 
 Pair: TypeAlias = tuple[str, str]
 Progress: TypeAlias = Callable[[str, str, int, int], None]
-"""Called as progress(stage, item, done, in_all); the stage is "cover" or "tables", the item a link or a pair."""
+"""Called as progress(stage, item, done, in_all): "cover" and a link, "tables" or "pairs" and a pair of links."""
 
 # Of the largest eigenvalue of the mass matrix: below it a coordinate moves no mass. A gripper's smallest is 1e-7 of it.
 _NO_MASS = 1e-12
@@ -56,7 +56,9 @@ def prepare(
         raise ValueError(
             "the body does not cover its links (it has no levels); Body.cover(robot) makes one that does"
         )
-    tables, pairs = tables_and_pairs(robot, body, progress=_of_stage("tables", progress))
+    tables, pairs = tables_and_pairs(
+        robot, body, progress=_of_stage("tables", progress), pair_progress=_of_stage("pairs", progress)
+    )
     may_touch = {frozenset(pair) for pair in allowed}
     return _core.Arm(
         robot=robot,

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sidestep import _core
+from sidestep.arm import shipped_arms
 from sidestep.body import cache as fit_cache
 from sidestep.body import file as body_file
 from sidestep.body.cover import MAX_COMPONENTS as MAX_COVER_COMPONENTS
-from sidestep.body.cover import CoverProgress, CoverSettings, LinkCover, cover_mixtures
+from sidestep.body.cover import CoverProgress, CoverSettings, LinkCover, cover_mixtures, density_fit
 from sidestep.body.fitting import Components, FitSettings, LinkFit, Progress, fit_links
 from sidestep.body.mixture import CovarianceType
 from sidestep.body.selection import MAX_COMPONENTS
@@ -35,7 +36,6 @@ class Body(_core.Body):
             (y - mu)^T Sigma^-1 (y - mu) <= level.
         robot_name, fingerprint: the robot it was fitted to; empty for a body made by hand.
         settings: what the fit was asked for, or None for a body made by hand.
-        link_fits: how well each link is described, in the order of the links; empty for a body made by hand.
         link_covers: how the ellipsoids cover each link; empty unless made by `cover`.
 
     Source: Bosc, section 3.1; T3.1 to T3.3.
@@ -44,7 +44,6 @@ class Body(_core.Body):
     robot_name: str
     fingerprint: str
     settings: FitSettings | CoverSettings | None
-    link_fits: tuple[LinkFit, ...]
     link_covers: tuple[LinkCover, ...]
 
     def __init__(
@@ -58,7 +57,7 @@ class Body(_core.Body):
         robot_name: str = "",
         fingerprint: str = "",
         settings: FitSettings | CoverSettings | None = None,
-        link_fits: Sequence[LinkFit] = (),
+        link_fits: Sequence[LinkFit] | Callable[[], Sequence[LinkFit]] = (),
         link_covers: Sequence[LinkCover] = (),
     ) -> None:
         super().__init__(
@@ -71,8 +70,15 @@ class Body(_core.Body):
         self.robot_name = robot_name
         self.fingerprint = fingerprint
         self.settings = settings
-        self.link_fits = tuple(link_fits)
+        self._link_fits = link_fits  # or what finds them when they are first asked for
         self.link_covers = tuple(link_covers)
+
+    @property
+    def link_fits(self) -> tuple[LinkFit, ...]:
+        """How well each link is described, in the order of the links; empty for a body made by hand."""
+        if callable(self._link_fits):
+            self._link_fits = self._link_fits()
+        return tuple(self._link_fits)
 
     @classmethod
     def fit(
@@ -153,6 +159,9 @@ class Body(_core.Body):
         Sigma_k is the covariance of the solid ellipsoid and pi_k its share of the volume, so that the same body
         has a density.
 
+        A robot with kinematics and meshes of one whose arm comes with Sidestep takes the cover from there, if nothing
+        else is asked for.
+
         Args:
             robot: the robot, with geometry.
             components: ellipsoids per link: one number for all, or {link: number}, such as more for a gripper
@@ -161,7 +170,8 @@ class Body(_core.Body):
             max_components: ellipsoids in all; fewer are used if every link overshoots little enough.
             seed: seed of the starts.
             progress: called as progress(link, done, in_all); not called when the cache answers.
-            cache: whether to read and write the user's cache (SIDESTEP_CACHE_DIR overrides its place).
+            cache: whether to take covers that come with Sidestep, and to read and write the user's cache
+                (SIDESTEP_CACHE_DIR overrides its place).
 
         Raises:
             ValueError: that names the argument at fault and what is allowed.
@@ -170,6 +180,9 @@ class Body(_core.Body):
             components = dict(components)
         settings = CoverSettings(components=components, max_components=max_components, seed=seed)
         settings.validate(robot)
+        shipped = shipped_arms.with_body_of(robot) if cache and settings == CoverSettings() else None
+        if shipped is not None:
+            return cls._shipped(shipped, robot, settings)
         stored = fit_cache.read(robot, settings) if cache else None
         if stored is not None:
             return cls._from_contents(stored)
@@ -232,9 +245,30 @@ class Body(_core.Body):
             robot_name=robot.name,
             fingerprint=robot.fingerprint,
             settings=self.settings,
-            link_fits=self.link_fits,
+            link_fits=self._link_fits,
             link_covers=self.link_covers,
         )
+
+    @classmethod
+    def of_arm(cls, arm: _core.Arm) -> Body:
+        """The body of a prepared arm, with what is proven and measured of each link (`link_covers`)."""
+        return cls(**_contents_of(arm), robot_name=arm.name)
+
+    @classmethod
+    def _shipped(cls, arm: _core.Arm, robot: Robot, settings: CoverSettings) -> Body:
+        """The cover of an arm that was made by these settings for the meshes of `robot`."""
+
+        def fits() -> list[LinkFit]:
+            body, owner = arm.body, np.asarray(arm.body.links)
+            return [
+                density_fit(
+                    robot, link, body.means[own], body.covariances[own], body.weights[own], settings.seed
+                )[0]
+                for link in dict.fromkeys(body.links)
+                for own in [owner == link]
+            ]
+
+        return cls(**_contents_of(arm), robot_name=robot.name, settings=settings, link_fits=fits)
 
     @classmethod
     def _from_contents(cls, contents: body_file.BodyContents) -> Body:
@@ -270,3 +304,30 @@ class Body(_core.Body):
                 for fit in self.link_fits
             ),
         )
+
+
+def _contents_of(arm: _core.Arm) -> dict[str, Any]:
+    """What arguments of `Body` an arm tells."""
+    body = arm.body
+    return {
+        "links": body.links,
+        "weights": body.weights,
+        "means": body.means,
+        "covariances": body.covariances,
+        "levels": body.levels,
+        "fingerprint": arm.provenance.fingerprint,
+        "link_covers": [
+            LinkCover(
+                link=proof.link,
+                num_components=body.links.count(proof.link),
+                coverage=proof.coverage,
+                mean_overshoot=proof.mean_overshoot,
+                max_overshoot=proof.max_overshoot,
+                volume_ratio=proof.volume_ratio,
+                volume_of=proof.volume_of,
+                interior_coverage=proof.interior_coverage,
+                slimness=proof.slimness,
+            )
+            for proof in arm.proof
+        ],
+    }

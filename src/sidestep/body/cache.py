@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 Contents = TypeVar("Contents")
 
 CACHE_VARIABLE = "SIDESTEP_CACHE_DIR"
-SHIPPED = Path(__file__).parent / "covers"  # made by benchmarks/ship_covers.py, under the names of the cache
 
 
 def cache_directory() -> Path:
@@ -50,10 +49,7 @@ def cache_path(robot: Robot, settings: FitSettings | CoverSettings) -> Path:
 
 
 def read(robot: Robot, settings: FitSettings | CoverSettings) -> body_file.BodyContents | None:
-    """The stored fit, the user's or one that comes with Sidestep, or None if there is none.
-
-    Warns about an entry that cannot be read.
-    """
+    """The stored fit, or None if there is none; warns about an entry that cannot be read."""
     return read_stored(
         cache_path(robot, settings),
         lambda stored: body_file.read(stored, robot),
@@ -71,18 +67,16 @@ def write(robot: Robot, settings: FitSettings | CoverSettings, contents: body_fi
 
 
 def read_stored(path: Path, reader: Callable[[Path], Contents], warning: str) -> Contents | None:
-    """What `reader` makes of the user's file, or of the one of that name that comes with Sidestep; None without both.
+    """What `reader` makes of the user's file; None without one.
 
     A file that `reader` refuses by an OSError, ValueError or TypeError gives `warning` and None.
     """
-    for stored in (path, SHIPPED / path.name):
-        try:
-            return reader(stored)
-        except FileNotFoundError:
-            continue
-        except (ValueError, TypeError, OSError) as error:
-            warnings.warn(f"{warning}: {stored}: {error}", RuntimeWarning, stacklevel=4)
-            break
+    try:
+        return reader(path)
+    except FileNotFoundError:
+        pass
+    except (ValueError, TypeError, OSError) as error:
+        warnings.warn(f"{warning}: {path}: {error}", RuntimeWarning, stacklevel=4)
     return None
 
 

@@ -122,7 +122,7 @@ class LinkCover:
         interior_coverage: share of the link's inside that lies in the union; gaps there cannot be reached
             without crossing the surface.
         slimness: shortest over longest semi-axis, least over the ellipsoids.
-        trade_off: what was tried on the way.
+        trade_off: what was tried on the way; unknown, and empty, of a cover from an arm file.
     """
 
     link: str
@@ -344,18 +344,27 @@ def cover_mixtures(
     for cover, ellipsoids in cover_links(robot, settings, progress):
         volumes = np.abs(np.linalg.det(ellipsoids.shapes))
         covariances = ellipsoids.shapes @ ellipsoids.shapes.transpose(0, 2, 1) / SOLID_LEVEL
-        points = sample_link(robot, cover.link, count=NUM_SAMPLES, seed=settings.seed)
-        mixture = Mixture(
-            weights=volumes / volumes.sum(),
-            means=ellipsoids.centres,
-            covariances=0.5 * (covariances + covariances.transpose(0, 2, 1)),
-            log_likelihood=0.0,
-            converged=True,
+        fit, mixture = density_fit(
+            robot,
+            cover.link,
+            ellipsoids.centres,
+            0.5 * (covariances + covariances.transpose(0, 2, 1)),
+            volumes / volumes.sum(),
+            settings.seed,
         )
-        mixture = replace(mixture, log_likelihood=_log_likelihood(points, mixture))
         levels = np.full(len(ellipsoids), SOLID_LEVEL * (1.0 + LEVEL_ROUNDING))
-        results.append((assess(cover.link, points, mixture, None), mixture, levels, cover))
+        results.append((fit, mixture, levels, cover))
     return tuple(results)
+
+
+def density_fit(
+    robot: Robot, link: str, means: Array, covariances: Array, weights: Array, seed: int
+) -> tuple[LinkFit, Mixture]:
+    """How well the density of one link's cover describes its surface, and the mixture: arrays as in `Mixture`."""
+    points = sample_link(robot, link, count=NUM_SAMPLES, seed=seed)
+    mixture = Mixture(weights, means, covariances, log_likelihood=0.0, converged=True)
+    mixture = replace(mixture, log_likelihood=_log_likelihood(points, mixture))
+    return assess(link, points, mixture, None), mixture
 
 
 def _log_likelihood(points: Array, mixture: Mixture) -> float:

@@ -139,7 +139,8 @@ def _draw_overshoot(body: Body, robot: Robot) -> Figure:
         }
         left.plot(1000.0 * measured.distances[order], 100.0 * share, label=cover.link, **style)
         tried = [(point.num_components, 1000.0 * point.mean_overshoot) for point in cover.trade_off]
-        right.plot(*zip(*tried, strict=True), marker="o", markersize=3, **style)
+        if tried:
+            right.plot(*zip(*tried, strict=True), marker="o", markersize=3, **style)
     left.set(xlabel="overshoot [mm]", ylabel="share of the union's boundary at most [%]", xlim=(0, None))
     right.set(xlabel="ellipsoids on the link", ylabel="mean overshoot [mm]", xlim=(0, None), ylim=(0, None))
     left.legend(fontsize=7)
