@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import sidestep as ss
 from sidestep import clearance_tables
 from sidestep.arm import shipped_arms
+from sidestep.body.cover import CERTIFICATE_TOLERANCE
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_overshoot import overshoot
 from sidestep.body.cover_refine import Ellipsoids
@@ -64,6 +65,10 @@ def test_it_is_taken_for_its_robot_and_holds_every_link(name: str) -> None:
         shapes = np.asarray(body.levels)[ks, None, None] * body.covariances[ks]
         depth = np.einsum("kni,kij,knj->kn", offsets, np.linalg.inv(shapes), offsets).min(axis=0)
         assert depth.max() <= 1.0 + 1e-9
+        surface = LinkSurface(np.asarray(mesh.triangles))
+        ellipsoids = Ellipsoids(body.means[ks], np.linalg.cholesky(shapes))
+        # Proven again on every triangle, of what the file holds.
+        assert certify(surface.triangles, ellipsoids, tolerance=CERTIFICATE_TOLERANCE * surface.size).complete
     assert len(shipped_arms.shipped_file(name).read_bytes()) < 1_000_000  # type: ignore[union-attr]
 
 
