@@ -8,10 +8,11 @@ import socket
 import stat
 import threading
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
 import pytest
@@ -28,6 +29,13 @@ from studio.looker import NO_CHROMIUM, PATIENCE
 
 TOO_LATE = 20.0  # [s]
 PROTOCOL = f"viser-v{viser.__version__}"
+Result = TypeVar("Result")
+
+
+def run_apart(work: Coroutine[Any, Any, Result]) -> Result:
+    """Runs a coroutine in a thread of its own: Playwright, once a test has started it, keeps a loop running in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()
 
 
 def token_of(studio: Studio) -> str:
@@ -51,7 +59,7 @@ def shake_hands(
         except InvalidStatus as error:
             return error.response.status_code
 
-    return asyncio.run(talk())
+    return run_apart(talk())
 
 
 def ask(studio: Studio, path: str, headers: tuple[tuple[str, str], ...]) -> tuple[int, bytes]:
@@ -66,6 +74,15 @@ def ask(studio: Studio, path: str, headers: tuple[tuple[str, str], ...]) -> tupl
         return answer.status, answer.read()
     finally:
         connection.close()
+
+
+def test_these_tests_run_beside_a_loop_that_runs_already(studio: Studio) -> None:
+    """As it does in this thread once a test has started a browser."""
+
+    async def ask_inside() -> bytes | int:
+        return shake_hands(studio, "/")
+
+    assert run_apart(ask_inside()) == 403
 
 
 def test_a_token_is_random_and_of_one_start(studio: Studio) -> None:
@@ -232,7 +249,7 @@ def test_servers_of_others_are_left_alone() -> None:
 
     guard = Guard("127.0.0.1")
     with placed(guard):
-        assert asyncio.run(run()) == 200
+        assert run_apart(run()) == 200
     assert heard == ["/"]
     assert not guard.placed
     assert websockets.asyncio.server.serve is before
