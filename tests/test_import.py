@@ -1,7 +1,67 @@
-"""Importing and leaving are silent."""
+"""Importing loads little and leaves silently; what is not installed is asked for in one line."""
 
+from __future__ import annotations
+
+import json
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import sidestep
+from sidestep.extras import MODULES
+
+PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+INSTALLED_ALWAYS = {"lazy_loader", "numpy", "sidestep"}  # of what a controller loads
+OPTIONAL = sorted(module for modules in MODULES.values() for module in modules)
+
+# Begins programs in which some packages are not installed.
+HIDE = """
+import sys
+
+class Hidden:
+    def __init__(self, finder, names):
+        self.finder, self.names = finder, names
+    def find_spec(self, name, path=None, target=None):
+        return None if name.partition(".")[0] in self.names else self.finder.find_spec(name, path, target)
+
+def hide(*names):
+    sys.meta_path[:] = [Hidden(finder, names) for finder in sys.meta_path]
+"""
+CONTROL = """
+import numpy as np
+import sidestep as ss
+
+arm = ss.Arm.load(sys.argv[1])
+controller = ss.Controller(arm)
+controller.set_goal(arm.neutral + 0.3)
+controller.set_obstacles(ss.Obstacles([[0.2, 0.9, 0.0]], radii=0.05))
+q, v = arm.neutral, np.zeros(arm.num_coordinates)
+for _ in range(20):
+    command = controller.step(q, v)
+    q, v = command.position, command.velocity
+assert np.isfinite(command.torque).all() and controller.explain()
+"""
+
+
+def run(code: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", HIDE + code, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+
+
+def last_line(done: subprocess.CompletedProcess[str]) -> str:
+    return done.stderr.strip().splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def arm_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("arms") / "planar3.arm"
+    sidestep.Arm.load("planar3").save(path)
+    return path
 
 
 def test_nothing_is_leaked_at_exit() -> None:
@@ -13,3 +73,177 @@ def test_nothing_is_leaked_at_exit() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.count(".") == 2
     assert done.stderr == ""
+
+
+def test_the_version_is_that_of_the_project_file() -> None:
+    assert sidestep.__version__ == PROJECT["version"]
+
+
+def test_a_running_controller_loads_numpy_and_the_core(arm_file: Path) -> None:
+    code = """
+import json
+before = set(sys.modules)
+exec(sys.argv[2])
+files = {name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items()}
+print(json.dumps(sorted({name.partition(".")[0] for name in set(sys.modules) - before})))
+"""
+    done = run(code, arm_file, CONTROL)
+    assert done.stderr == ""
+    loaded = {name for name in json.loads(done.stdout) if name not in sys.stdlib_module_names}
+    assert {name for name in loaded if not name.startswith("_")} == INSTALLED_ALWAYS
+
+
+def test_a_controller_runs_with_what_is_always_installed(arm_file: Path) -> None:
+    done = run("hide(*sys.argv[2].split(','))" + CONTROL, arm_file, ",".join(OPTIONAL))
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_few_packages_are_installed_always() -> None:
+    names = {re.split(r"[^\w-]", requirement)[0] for requirement in PROJECT["dependencies"]}
+    assert names == {"lazy-loader", "numpy", "platformdirs", "rich", "typer"}
+
+
+def test_the_extras_hold_what_the_errors_say() -> None:
+    """Each module that is looked for comes with a requirement of its extra, or of one that this extra holds."""
+    distribution = {
+        "PIL": "pillow",
+        "collada": "pycollada",
+        "jsonschema_rs": "jsonschema-rs",
+        "pinocchio": "pin",
+    }
+    distribution |= {"sklearn": "scikit-learn", "yaml": "pyyaml"}
+    inside = {"websockets"}  # of viser's own requirements
+
+    def requirements(extra: str) -> set[str]:
+        found = set()
+        for requirement in PROJECT["optional-dependencies"][extra]:
+            nested = re.fullmatch(r"sidestep\[(.+)\]", requirement)
+            held = nested[1].split(",") if nested else []
+            found |= set.union({re.split(r"[^\w-]", requirement)[0]}, *map(requirements, held))
+        return found
+
+    for extra, modules in MODULES.items():
+        asked = {distribution.get(module, module) for module in modules} - inside
+        assert asked <= requirements(extra)
+    assert (
+        requirements("prepare")
+        < requirements("simulation")
+        < requirements("studio")
+        < requirements("headless")
+    )
+    assert requirements("studio") < requirements("demo")
+
+
+@pytest.mark.parametrize(
+    ("hidden", "code", "extra"),
+    [
+        ("trimesh", "import sidestep as ss; ss.Robot.named('planar3').collision_mesh('link1')", "prepare"),
+        ("scipy", "import sidestep as ss; ss.Arm.load('planar3', cache=False)", "prepare"),
+        ("coal", "import sidestep as ss; ss.Arm.load('planar3', cache=False)", "prepare"),
+        ("coal", "import sidestep as ss; ss.SelfCollision", "prepare"),
+        ("scipy", "import sidestep as ss; ss.Body", "prepare"),
+        ("trimesh", "import sidestep as ss; ss.Sphere", "prepare"),
+        ("mujoco", "import sidestep as ss; ss.Simulation", "simulation"),
+        ("mujoco", "import sidestep.simulation.model", "simulation"),
+        ("yaml", "import sidestep as ss; ss.Scenario.load('thesis-6.2.3')", "simulation"),
+        ("trimesh", "import sidestep as ss; ss.run_scenario", "simulation"),
+        ("matplotlib", "from sidestep.report import write_report", "simulation"),
+        ("trimesh", "import sidestep.studio.stage", "studio"),
+        (
+            "viser",
+            "from sidestep.studio.studio import Studio, _server; _server('127.0.0.1', 0, None)",
+            "studio",
+        ),
+        ("playwright", "from sidestep.studio import headless; headless.check_browser()", "headless"),
+        (
+            "av",
+            "from pathlib import Path; from sidestep.studio import headless; "
+            "headless.check_files(None, Path('film.mp4'))",
+            "headless",
+        ),
+        ("pinocchio", "import sidestep as ss; ss.Robot.named('planar3').pinocchio", "bench"),
+    ],
+)
+def test_what_is_missing_is_asked_for_in_one_line(hidden: str, code: str, extra: str) -> None:
+    done = run(f"hide({hidden!r})\n{code}")
+    assert re.fullmatch(
+        rf"sidestep\.extras\.MissingExtraError: sidestep\.[\w.]+ needs the package '{hidden}', which is not installed: "
+        rf"pip install 'sidestep\[{extra}\]'",
+        last_line(done),
+    ), done.stderr
+
+
+def test_every_module_and_public_name_asks_for_its_extra() -> None:
+    """With nothing but what is always installed each module imports, or says what to install."""
+    code = """
+hide(*sys.argv[1].split(","))
+import importlib, pkgutil, sidestep
+from sidestep.extras import MissingExtraError
+
+for module in pkgutil.walk_packages(sidestep.__path__, "sidestep.", onerror=lambda name: None):
+    if module.name.rpartition(".")[2] in ("__main__", "peer_fabrics", "peers_jax"):
+        continue  # programs; the last two run by interpreters that need not have Sidestep
+    try:
+        importlib.import_module(module.name)
+    except MissingExtraError as error:
+        assert "pip install 'sidestep[" in str(error)
+    else:
+        print(module.name)
+for name in sidestep.__all__:
+    try:
+        getattr(sidestep, name)
+    except MissingExtraError:
+        continue
+    print(name)
+"""
+    done = run(code, ",".join(OPTIONAL))
+    assert done.stderr == ""
+    at_hand = set(done.stdout.split())
+    assert {
+        "sidestep.arm.arm",
+        "sidestep.cli",
+        "sidestep.robot.model",
+        "Arm",
+        "Controller",
+        "Obstacles",
+    } <= at_hand
+    assert {"PoseGoal", "Robot", "TorqueController", "robots"} <= at_hand
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--help",), ("robots",), ("run", "--help"), ("bench", "--help"), ("--version",)]
+)
+def test_the_command_line_works_with_what_is_always_installed(arguments: tuple[str, ...]) -> None:
+    code = "hide(*sys.argv[1].split(','))\nfrom sidestep.cli import main\nsys.argv[1:] = sys.argv[2:]\nmain()"
+    done = run(code, ",".join(OPTIONAL), *arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout != ""
+
+
+@pytest.mark.parametrize(
+    "command", [("run", "thesis-6.2.3"), ("studio",), ("scenarios",), ("bench", "reach")]
+)
+def test_a_command_asks_for_its_extra(command: tuple[str, ...]) -> None:
+    code = "hide(*sys.argv[1].split(','))\nfrom sidestep.cli import main\nsys.argv[1:] = sys.argv[2:]\nmain()"
+    done = run(code, ",".join(OPTIONAL), *command)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    extra = "studio" if command == ("studio",) else "simulation"
+    assert line.startswith("error: sidestep.")
+    assert line.endswith(f": pip install 'sidestep[{extra}]'")
+
+
+def test_imports_of_others_are_left_alone() -> None:
+    """They may try an import and go on without, or only look whether something is there."""
+    code = """
+hide("mujoco")
+import importlib.util, sidestep
+assert importlib.util.find_spec("mujoco") is None
+try:
+    import mujoco
+except ModuleNotFoundError as error:
+    assert type(error) is ModuleNotFoundError and str(error) == "No module named 'mujoco'"
+    print("as ever")
+"""
+    done = run(code)
+    assert (done.stdout, done.stderr) == ("as ever\n", "")

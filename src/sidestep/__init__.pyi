@@ -34,6 +34,7 @@ from ._core import LocalMinimumSettings as LocalMinimumSettings
 from ._core import LookAheadSettings as LookAheadSettings
 from ._core import MotionRecord as MotionRecord
 from ._core import MotionState as MotionState
+from ._core import Obstacles as Obstacles
 from ._core import Obstruction as Obstruction
 from ._core import OnlinePlannerSettings as OnlinePlannerSettings
 from ._core import PathPlanner as PathPlanner
@@ -82,7 +83,6 @@ from .control import acceleration_bounds as acceleration_bounds
 from .obstacles import Box as Box
 from .obstacles import Cylinder as Cylinder
 from .obstacles import MeshShape as MeshShape
-from .obstacles import Obstacles as Obstacles
 from .obstacles import Sphere as Sphere
 from .obstacles import load_point_cloud as load_point_cloud
 from .obstacles import merge_in_voxels as merge_in_voxels

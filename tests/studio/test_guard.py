@@ -33,7 +33,7 @@ Result = TypeVar("Result")
 
 
 def run_apart(work: Coroutine[Any, Any, Result]) -> Result:
-    """Runs a coroutine in a thread of its own: Playwright, once a test has started it, keeps a loop running in this one."""
+    """Runs a coroutine in another thread: in this one Playwright keeps a loop running, once a test has started it."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, work).result()
 

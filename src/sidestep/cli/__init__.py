@@ -18,6 +18,7 @@ from sidestep.cli import (
     run_command,
     studio_command,
 )
+from sidestep.extras import MissingExtraError
 
 app = typer.Typer(
     name="sidestep",
@@ -44,7 +45,7 @@ def main() -> None:
     """Entry point: exit code 0 on success, 1 when a run fails, 2 on bad input (one line on stderr)."""
     try:
         app()
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, MissingExtraError) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)
     except RuntimeError as error:  # the physics or the integration diverged

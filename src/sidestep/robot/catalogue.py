@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from sidestep.extras import install
 from sidestep.robot.planar import planar_arm
 
 Limits = tuple[float, ...]
@@ -161,7 +162,7 @@ def robots() -> tuple[RobotEntry, ...]:
 
 
 def _installed_file(package: str, file: str, robot: str) -> Path:
-    advice = f"robot {robot!r} needs the package {package!r}: pip install 'sidestep[robots]'"
+    advice = f"robot {robot!r} needs the package {package!r}: {install('robots')}"
     if package == "pybullet":
         advice += (
             " (its wheels exist for CPython up to 3.11 only; with another Python load your own iiwa URDF)"

@@ -157,10 +157,7 @@ def _qualified_names(root: ElementTree.Element) -> Iterator[str]:
 def _expand(
     text: str, label: str, folder: Path | None, package_dirs: tuple[Path, ...], arguments: dict[str, str]
 ) -> str:
-    try:
-        import xacro
-    except ImportError as error:
-        raise ImportError(f"{label} uses xacro: pip install xacro") from error
+    import xacro
 
     messages = io.StringIO()  # xacro prints its warnings; they go into the error, or nowhere
     with tempfile.TemporaryDirectory() as temporary:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import importlib.util
 import io
 import os
 import shutil
@@ -13,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,9 +88,8 @@ def find_chromium() -> str | None:
 
 
 def check_browser() -> str:
-    """The path of a Chromium; raises FileNotFoundError where it, or Playwright, is missing."""
-    if importlib.util.find_spec("playwright") is None:
-        raise FileNotFoundError("--headless needs Playwright: pip install 'sidestep[headless]'")
+    """The path of a Chromium; raises FileNotFoundError where there is none, MissingExtraError without Playwright."""
+    import_module("playwright")
     path = find_chromium()
     if path is None:
         raise FileNotFoundError(
@@ -102,7 +101,7 @@ def check_browser() -> str:
 
 @contextmanager
 def driver() -> Iterator[Any]:
-    """What starts browsers, of which a thread can have one: Playwright; FileNotFoundError, see `check_browser`."""
+    """What starts browsers, of which a thread can have one: Playwright; raises what `check_browser` raises."""
     check_browser()
     from playwright.sync_api import sync_playwright
 
@@ -155,7 +154,7 @@ def take_pictures(
 
     Raises:
         ValueError: neither a picture nor an animation is asked for, or its suffix is another.
-        FileNotFoundError: no Playwright or no Chromium. RuntimeError: the loop failed.
+        FileNotFoundError: no Chromium. MissingExtraError: no Playwright. RuntimeError: the loop failed.
     """
     from sidestep.studio import messages as m
 
@@ -216,7 +215,7 @@ def picture(studio: Studio, page: Page) -> bytes:
 
 def check_files(screenshot: Path | None, video: Path | None) -> None:
     """Raises ValueError when there is nothing to write, or no folder for it, or in another format than those known;
-    FileNotFoundError when what writes the format is not installed."""
+    MissingExtraError when what writes the format is not installed."""
     if screenshot is None and video is None:
         raise ValueError("--headless needs --screenshot FILE or --video FILE")
     if screenshot is not None and screenshot.suffix.lower() != ".png":
@@ -226,8 +225,8 @@ def check_files(screenshot: Path | None, video: Path | None) -> None:
     for option, file in (("--screenshot", screenshot), ("--video", video)):
         if file is not None and not file.resolve().parent.is_dir():
             raise ValueError(f"{option} is {file}; there is no folder {file.parent}")
-    if video is not None and video.suffix.lower() in CODECS and importlib.util.find_spec("av") is None:
-        raise FileNotFoundError(f"--video {video} needs PyAV: pip install 'sidestep[headless]'")
+    if video is not None and video.suffix.lower() in CODECS:
+        import_module("av")
 
 
 def save_animation(frames: list[Image.Image], path: Path) -> None:

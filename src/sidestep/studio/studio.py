@@ -190,11 +190,8 @@ def check_port(host: str, port: int) -> None:
 
 
 def _server(host: str, port: int, guard: g.Guard):  # type: ignore[no-untyped-def]
-    try:
-        import viser
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError("the studio needs viser: pip install 'sidestep[studio]'") from error
     import rich
+    import viser
 
     quiet = rich.get_console().quiet
     rich.get_console().quiet = True  # viser prints a banner of its own
