@@ -25,6 +25,8 @@ import sys
 class Hidden:
     def __init__(self, finder, names):
         self.finder, self.names = finder, names
+    def __getattr__(self, name):
+        return getattr(self.finder, name)
     def find_spec(self, name, path=None, target=None):
         return None if name.partition(".")[0] in self.names else self.finder.find_spec(name, path, target)
 
@@ -143,6 +145,11 @@ def test_the_extras_hold_what_the_errors_say() -> None:
         ("coal", "import sidestep as ss; ss.SelfCollision", "prepare"),
         ("scipy", "import sidestep as ss; ss.Body", "prepare"),
         ("trimesh", "import sidestep as ss; ss.Sphere", "prepare"),
+        (
+            "sklearn",
+            "import sidestep as ss; ss.Body.fit(ss.Robot.named('planar3'), components=1, cache=False)",
+            "thesis",
+        ),
         ("mujoco", "import sidestep as ss; ss.Simulation", "simulation"),
         ("mujoco", "import sidestep.simulation.model", "simulation"),
         ("yaml", "import sidestep as ss; ss.Scenario.load('thesis-6.2.3')", "simulation"),

@@ -12,25 +12,16 @@ from collections.abc import Iterator, Sequence
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-# The extras of pyproject.toml that add what Sidestep imports. Each holds those above it, `bench` excepted.
+# The extras of pyproject.toml that add what Sidestep imports.
 MODULES: dict[str, tuple[str, ...]] = {
-    "bench": ("pinocchio",),
-    "prepare": (
-        "coal",
-        "collada",
-        "jsonschema",
-        "jsonschema_rs",
-        "pypcd4",
-        "scipy",
-        "sklearn",
-        "threadpoolctl",
-        "trimesh",
-        "xacro",
-    ),
+    "prepare": ("coal", "collada", "jsonschema", "jsonschema_rs", "pypcd4", "scipy", "trimesh", "xacro"),
     "simulation": ("matplotlib", "mujoco", "PIL", "yaml"),
     "studio": ("viser", "websockets"),
     "headless": ("av", "playwright"),
+    "thesis": ("sklearn", "threadpoolctl"),
+    "bench": ("pinocchio",),
 }
+_CHAIN = ("prepare", "simulation", "studio", "headless")  # each holds those before it
 # The extra that holds all that a room needs; one that is not here needs what it imports.
 ROOMS = {
     "bench": "simulation",
@@ -40,7 +31,6 @@ ROOMS = {
     "scenario": "simulation",
     "studio": "studio",
 }
-_ORDER = tuple(MODULES)
 _EXTRA_OF = {module: extra for extra, modules in MODULES.items() for module in modules}
 _IMPORT_SYSTEM = ("_frozen_importlib", "importlib._bootstrap", "importlib")  # `importlib.util` only looks
 
@@ -78,10 +68,13 @@ class _Finder:
         importer = next(callers, "")
         if importer.partition(".")[0] != "sidestep":  # others may try an import and go on without
             return None
-        rooms = {caller.split(".")[1] for caller in (importer, *callers) if caller.startswith("sidestep.")}
-        wanted = max([extra, *(ROOMS[room] for room in rooms & ROOMS.keys())], key=_ORDER.index)
+        if extra in _CHAIN:
+            rooms = {
+                caller.split(".")[1] for caller in (importer, *callers) if caller.startswith("sidestep.")
+            }
+            extra = max([extra, *(ROOMS[room] for room in rooms & ROOMS.keys())], key=_CHAIN.index)
         raise MissingExtraError(
-            f"{importer} needs the package {name!r}, which is not installed: {install(wanted)}", name=name
+            f"{importer} needs the package {name!r}, which is not installed: {install(extra)}", name=name
         )
 
 

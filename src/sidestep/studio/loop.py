@@ -20,6 +20,7 @@ from multiprocessing.connection import Client, Connection, Listener
 from typing import Any
 
 from sidestep.body import Body
+from sidestep.extras import MissingExtraError
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
@@ -180,7 +181,7 @@ def serve(connection: Connection[Any, Any]) -> None:
             ellipsoids=beginning.ellipsoids,
             prepare=prepare,
         )
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, MissingExtraError) as error:
         connection.send(m.Failed(str(error), fatal=True))
         return
     gc.collect()
@@ -256,7 +257,7 @@ class _Pacer:
                     self._awaited = self._session.edition
                     self._hold_end = clock.perf_counter() + LONGEST_HOLD
                 self._said = ""
-            except (ValueError, OSError) as error:
+            except (ValueError, OSError, MissingExtraError) as error:
                 self._connection.send(m.Failed(str(error), refused=command))
             except Exception as error:
                 self._hold(f"{type(command).__name__} failed, the loop is paused", error)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sidestep.body import Body
+from sidestep.extras import MissingExtraError
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
@@ -111,7 +112,7 @@ class View:
         """Shows what is refused inside to the person who asked for it."""
         try:
             yield
-        except (ValueError, OSError) as error:
+        except (ValueError, OSError, MissingExtraError) as error:
             client.add_notification("Not possible", str(error), color="red", auto_close_seconds=8.0)
 
     def show(self, snapshot: m.Snapshot) -> m.Row:
