@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+import tomllib
 from pathlib import Path
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
@@ -23,6 +24,15 @@ def test_python_example_arrives() -> None:
 def test_two_set_up_commands() -> None:
     commands = [line for line in README.splitlines() if re.match(r"python3? -m venv ", line)]
     assert [line.split(" && ")[-1] for line in commands] == ["sidestep demo", "pytest"]
+
+
+def test_every_extra_is_explained() -> None:
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))[
+        "project"
+    ]
+    rows = [row for row in README.splitlines() if row.startswith("| `")]
+    named = [extra for row in rows for extra in re.findall(r"`([\w-]+)`", row.split("|")[1])]
+    assert sorted(named) == sorted(project["optional-dependencies"])
 
 
 def test_links_lead_somewhere() -> None:

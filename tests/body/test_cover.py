@@ -104,6 +104,7 @@ def test_distances_agree_with_every_triangle_examined() -> None:
     assert not surface.field.surely_inside(points)[outside].any()
 
 
+@pytest.mark.slow
 def test_every_link_of_a_planar_arm_is_proven_covered(planar: Robot, body: Body) -> None:
     assert body.num_components == 6
     for cover in body.link_covers:
@@ -126,6 +127,7 @@ def test_weights_are_shares_of_volume_and_levels_those_of_solids(body: Body) -> 
     np.testing.assert_allclose(body.levels, 5.0, rtol=1e-8)  # widened by 1e-9 against rounding
 
 
+@pytest.mark.slow
 def test_equal_seeds_give_equal_covers(planar: Robot, body: Body) -> None:
     again = Body.cover(planar, components=3, cache=False)
     np.testing.assert_array_equal(again.covariances, body.covariances)
@@ -165,6 +167,7 @@ def test_bad_settings_are_refused(planar: Robot, arguments: dict[str, Any], mess
         Body.cover(planar, cache=False, **arguments)
 
 
+@pytest.mark.slow
 def test_the_finger_of_the_fr3_is_covered_closely() -> None:
     from sidestep.body.cover import _LinkProblem
 
@@ -179,6 +182,7 @@ def test_the_finger_of_the_fr3_is_covered_closely() -> None:
     assert solution.measured.maximum < 5.4e-3
 
 
+@pytest.mark.slow
 def test_a_longer_search_covers_more_closely(planar: Robot) -> None:
     from sidestep.body.cover import _LinkProblem
 
@@ -237,6 +241,7 @@ def test_a_rearrangement_splits_one_ellipsoid_and_leaves_another_out_or_shifts_a
             assert not np.any(np.all(moved.centres == few.centres, axis=1))
 
 
+@pytest.mark.slow
 def test_a_named_link_gets_its_number_and_the_others_share_the_rest(planar: Robot) -> None:
     shared = Body.cover(planar, components={"link2": 2}, max_components=3, cache=False)
     assert {c.link: c.num_components for c in shared.link_covers} == {"link1": 1, "link2": 2}

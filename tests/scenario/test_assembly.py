@@ -156,6 +156,7 @@ def test_numbers_of_the_look_ahead_that_do_not_go_together_are_named() -> None:
         assemble(Scenario.from_text(text))
 
 
+@pytest.mark.slow
 def test_the_barrier_method_sees_real_sizes_covers_the_links_and_leaves_the_goal_free() -> None:
     scenario = Scenario.from_text(
         """
@@ -196,6 +197,7 @@ obstacles:
 """
 
 
+@pytest.mark.slow
 def test_a_pose_is_reached_from_a_posture_that_has_it() -> None:
     parts = assemble(Scenario.from_text(POSE.format(method="barrier", frame="tip", activation=0.12)))
     assert parts.pose is not None

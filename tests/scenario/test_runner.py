@@ -163,6 +163,7 @@ def test_a_pose_out_of_reach_is_said() -> None:
     assert (result.stop or "").startswith("the goal is out of reach: nearest posture ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["thesis-6.2.2", "thesis-6.2.3", "thesis-6.2.4"])
 def test_the_thesis_s_scenarios_arrive_by_the_barriers(name: str) -> None:
     result = run_scenario(replace(Scenario.load(name), method="barrier"))

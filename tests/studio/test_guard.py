@@ -271,6 +271,7 @@ def test_the_address_is_not_on_the_command_line_of_the_browser(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @NO_CHROMIUM
 def test_the_file_that_is_opened_leads_to_the_page(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, studio: Studio, chromium: Any
@@ -288,6 +289,7 @@ def test_the_file_that_is_opened_leads_to_the_page(
         page.close()
 
 
+@pytest.mark.slow
 @NO_CHROMIUM
 def test_another_page_in_the_same_browser_cannot_connect(
     studio: Studio, chromium: Any, serve_page: str

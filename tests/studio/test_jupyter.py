@@ -24,6 +24,7 @@ from studio.looker import NO_CHROMIUM, PATIENCE, differ, documented_code, until
 
 MISSING = [name for name in ("jupyterlab", "ipykernel") if importlib.util.find_spec(name) is None]
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif(bool(MISSING), reason=f"pip install {' '.join(MISSING)}"),
     NO_CHROMIUM,
 ]

@@ -16,7 +16,7 @@ import pytest
 from sidestep.studio.headless import Window, new_page
 from studio.looker import NO_CHROMIUM, PATIENCE, documented_code, last, until
 
-pytestmark = NO_CHROMIUM
+pytestmark = [NO_CHROMIUM, pytest.mark.slow]
 
 
 def run_cell(code: str, folder: Path) -> tuple[dict[str, Any], str]:

@@ -29,7 +29,7 @@ from sidestep.studio.studio import Studio
 from sidestep.studio.truth import solid_poses
 from studio.looker import ON_THE_PAGE, PANELS, Looker, differ, last, run_to, until
 
-pytestmark = ON_THE_PAGE
+pytestmark = [*ON_THE_PAGE, pytest.mark.slow]
 
 
 def test_the_arm_is_on_the_page(studio: Studio, looker: Looker) -> None:

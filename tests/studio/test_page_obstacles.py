@@ -17,7 +17,7 @@ from sidestep.studio.things import things_of
 from sidestep.studio.truth import solid_poses
 from studio.looker import ON_THE_PAGE, Looker, differ, last, run_to, until
 
-pytestmark = ON_THE_PAGE
+pytestmark = [*ON_THE_PAGE, pytest.mark.slow]
 
 
 def test_a_cloud_is_added_dragged_thrown_and_removed(studio: Studio, looker: Looker) -> None:
