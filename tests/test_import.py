@@ -81,15 +81,20 @@ def test_the_version_is_that_of_the_project_file() -> None:
     assert sidestep.__version__ == PROJECT["version"]
 
 
-def test_a_running_controller_loads_numpy_and_the_core(arm_file: Path) -> None:
+@pytest.mark.parametrize("shipped", [False, True])
+def test_a_running_controller_loads_numpy_and_the_core(arm_file: Path, shipped: bool) -> None:
     code = """
 import json
+from pathlib import Path
 before = set(sys.modules)
+if sys.argv[3] == "True":  # as if the arm came with Sidestep
+    import sidestep.arm.arm
+    path = Path(sys.argv[1])
+    sidestep.arm.arm.SHIPPED, sys.argv[1] = path.parent, path.stem
 exec(sys.argv[2])
-files = {name: getattr(module, "__file__", None) or "" for name, module in sys.modules.items()}
 print(json.dumps(sorted({name.partition(".")[0] for name in set(sys.modules) - before})))
 """
-    done = run(code, arm_file, CONTROL)
+    done = run(code, arm_file, CONTROL, str(shipped))
     assert done.stderr == ""
     loaded = {name for name in json.loads(done.stdout) if name not in sys.stdlib_module_names}
     assert {name for name in loaded if not name.startswith("_")} == INSTALLED_ALWAYS
