@@ -111,7 +111,9 @@ def published_tasks(given: argparse.Namespace, names: list[str]) -> Iterator[Tas
             np.clip([state[name] for name in robot.coordinate_names], robot.limits.lower, robot.limits.upper)
             for state in (problem.start, problem.goal)
         )
-        obstacles = obstacles_from_shapes(list(problem.shapes.values()), spacing=SPACING, radius=POINT_RADIUS)
+        obstacles = obstacles_from_shapes(
+            list(problem.shapes.values()), spacing=SPACING, radius=POINT_RADIUS, gaps_allowed=True
+        )
         yield Task(problem.set, problem.index, ours, start, goal, obstacles)
 
 

@@ -14,6 +14,7 @@
 #include "sidestep/embedding/link_pair.hpp"
 
 namespace sidestep {
+class Obstacles;
 class Robot;
 struct Body;
 }  // namespace sidestep
@@ -56,6 +57,9 @@ std::vector<LinkPair> link_pairs(const Pairs& pairs);
 /// Throws std::invalid_argument if the body was fitted to another robot than this. A body made by hand, and a robot
 /// of the core without geometry, have no fingerprint and are taken as they are.
 void check_fitted_to(const Robot& robot, const Body& body);
+
+/// Obstacles as they are; a shape, or a list of shapes and obstacles, by `sidestep.obstacles.obstacles_from_shapes`.
+Obstacles as_obstacles(nb::handle value);
 
 inline bool is_object(nb::handle) { return true; }
 

@@ -291,8 +291,15 @@ void bind_controller(nb::module_& m) {
           "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose. Raises\n"
           "ValueError that names the joint, its value and what is allowed; the goal before stays.")
       .def("clear_goal", &Controller::clear_goal, "The arm comes to rest where it is, and goes on evading.")
-      .def("set_obstacles", &Controller::set_obstacles, nb::arg("obstacles"),
-           "From the next step on. Points move on by their velocities until they are set again.")
+      .def(
+          "set_obstacles", [](Controller& self, nb::handle obstacles) { self.set_obstacles(as_obstacles(obstacles)); },
+          nb::arg("obstacles"),
+          nb::sig("def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | "
+                  "collections.abc.Sequence[Obstacles | sidestep.obstacles.Shape]) -> None"),
+          "From the next step on: points, a shape, or a list of both, see `sidestep.obstacles.obstacles_from_shapes`, which\n"
+          "covers shapes by balls without gaps. They move on by their velocities until they are set again.")
+      .def_prop_ro("obstacles", of_last_step([](const Controller& self) { return Obstacles(self.obstacles()); }),
+                   "A copy of what the last step saw; `name_of(command.point)` of it is the name of what is nearest.")
       .def(
           "step",
           [](Controller& self, const ArrayLike& q, const ArrayLike& v, nb::handle mass_matrix, nb::handle bias) {
@@ -324,7 +331,7 @@ void bind_controller(nb::module_& m) {
           "geometric_step",
           of_last_step([](const Controller& self) {
             return Step{self.command().system, self.workspace(),
-                        Explanation(self.system(), self.system().diagnose(self.workspace()))};
+                        Explanation(self.system(), self.system().diagnose(self.workspace()), self.obstacles())};
           }),
           "The Step of the geometric system in the last step, with its clearances, metric and diagnosis.")
       .def_prop_ro("system", [](const Controller& self) { return GeometricSystem(self.system()); },

@@ -80,8 +80,8 @@ void bind_diagnosis(nb::module_& m) {
       .def_prop_ro("rotation_error", [](const E& e) { return e.diagnosis.rotation_error; }, "[rad]; nan if not wanted.")
       .def_prop_ro("way_left", [](const E& e) { return e.diagnosis.way_left(); },
                    "How far the goal is, in words: '0.31 rad', '12.0 mm' of a sliding joint.")
-      .def("describe", [](const E& e) { return e.diagnosis.describe(e.label); }, "In one English sentence.")
-      .def("__str__", [](const E& e) { return e.diagnosis.describe(e.label); });
+      .def("describe", [](const E& e) { return e.words; }, "In one English sentence.")
+      .def("__str__", [](const E& e) { return e.words; });
 
   nb::class_<Recovery>(m, "Recovery",
                        "What is done with an arm inside a barrier. speed [m/s] with which it leaves, rate [1/s] at which it\n"
@@ -246,14 +246,14 @@ void bind_dynamical_system(nb::module_& m) {
           [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal,
              const Obstacles& obstacles, nb::handle activations) {
             const int nv = system.robot().num_coordinates();
-            Step step{StepStatus::ok, GeometricSystem::Workspace(system), {system, {}}};
+            Step step{StepStatus::ok, GeometricSystem::Workspace(system), {system, {}, obstacles}};
             if (!activations.is_none()) {
               step.result.activations = as_finite_vector(nb::cast<ArrayLike>(activations), "activations",
                                                          system.num_embedding_coordinates());
             }
             step.status = system.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv), as_goal(goal, nv),
                                               obstacles, step.result);
-            step.explanation = Explanation(system, system.diagnose(step.result));
+            step.explanation = Explanation(system, system.diagnose(step.result), obstacles);
             return step;
           },
           nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::arg("activations") = nb::none(),
@@ -271,7 +271,8 @@ void bind_dynamical_system(nb::module_& m) {
             const int nv = s.robot().num_coordinates();
             GeometricSystem::Workspace workspace(s);
             return Explanation(s, s.diagnose(as_vector(q, "q", nv), as_vector(v, "v", nv), as_goal(goal, nv), obstacles,
-                                             workspace));
+                                             workspace),
+                               obstacles);
           },
           nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"),
           nb::sig("def diagnose(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: "

@@ -28,14 +28,16 @@ Enum as_enum(nb::handle value, const char* name) {
   throw nb::value_error((std::string(name) + " is " + nb::repr(value).c_str() + ", must be one of: " + allowed).c_str());
 }
 
-/// A diagnosis with the label of the coordinate that dominates.
+/// A diagnosis with the label of the coordinate that dominates, and its sentence.
 struct Explanation {
   Diagnosis diagnosis;
   CoordinateLabel label;
+  std::string words;
 
-  Explanation(const GeometricSystem& system, const Diagnosis& d)
+  Explanation(const GeometricSystem& system, const Diagnosis& d, const Obstacles& obstacles)
       : diagnosis(d),
-        label(d.coordinate < 0 ? CoordinateLabel{} : system.labels()[static_cast<std::size_t>(d.coordinate)]) {}
+        label(d.coordinate < 0 ? CoordinateLabel{} : system.labels()[static_cast<std::size_t>(d.coordinate)]),
+        words(d.describe(label, obstacles)) {}
 };
 
 /// What Python gets from a step: the workspace as it was when the step ended.

@@ -1,8 +1,15 @@
 #include "sidestep/obstacles/obstacles.hpp"
 
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
+#include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "arguments.hpp"
 #include "module.hpp"
@@ -36,6 +43,30 @@ void bind_obstacles(nb::module_& m) {
       .def_prop_ro("points", [](const Obstacles& o) { return to_numpy_points(o.points()); })
       .def_prop_ro("radii", [](const Obstacles& o) { return to_numpy(o.radii()); })
       .def_prop_ro("velocities", [](const Obstacles& o) { return to_numpy_points(o.velocities()); })
+      .def_prop_ro("groups",
+                   [](const Obstacles& o) {
+                     std::vector<std::pair<std::optional<std::string>, Eigen::Index>> groups;
+                     for (const auto& [name, count] : o.groups()) {
+                       groups.emplace_back(name.empty() ? std::optional<std::string>() : std::optional(name), count);
+                     }
+                     return groups;
+                   },
+                   "Of what belongs together, in the order of the points: its name, None where it has none, and how many.")
+      .def("named", &Obstacles::named, nb::arg("names"), nb::arg("counts"),
+           "The same points with the names of what they belong to: the first counts[0] points to names[0], and so on;\n"
+           "an empty name is none. Raises ValueError unless counts and names are as many, and the counts add up to the number of points.")
+      .def(
+          "name_of",
+          [](const Obstacles& o, Eigen::Index point) {
+            if (point < 0 || point >= o.size()) {
+              throw nb::index_error(("point is " + std::to_string(point) + ", there are " + std::to_string(o.size()) +
+                                     " points").c_str());
+            }
+            const std::string_view name = o.name_of(point);
+            return name.empty() ? std::optional<std::string>() : std::optional<std::string>(name);
+          },
+          nb::arg("point"),
+          "Name of what a point belongs to, as messages call it; None where it has none. Raises IndexError.")
       .def(
           "advance",
           [](Obstacles& self, double duration) {
@@ -48,6 +79,13 @@ void bind_obstacles(nb::module_& m) {
           nb::arg("duration"),
           "Moves every point along its velocity for `duration` [s]. Raises ValueError, and moves none, where it, or\n"
           "where it takes a point, is not finite.");
+}
+
+Obstacles as_obstacles(nb::handle value) {
+  if (nb::isinstance<Obstacles>(value)) {
+    return nb::cast<Obstacles>(value);
+  }
+  return nb::cast<Obstacles>(nb::module_::import_("sidestep.obstacles").attr("obstacles_from_shapes")(value));
 }
 
 }  // namespace sidestep::python

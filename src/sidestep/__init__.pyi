@@ -81,8 +81,10 @@ from .control import TorqueSolution as TorqueSolution
 from .control import TorqueStatus as TorqueStatus
 from .control import acceleration_bounds as acceleration_bounds
 from .obstacles import Box as Box
+from .obstacles import Capsule as Capsule
 from .obstacles import Cylinder as Cylinder
 from .obstacles import MeshShape as MeshShape
+from .obstacles import Plane as Plane
 from .obstacles import Sphere as Sphere
 from .obstacles import load_point_cloud as load_point_cloud
 from .obstacles import merge_in_voxels as merge_in_voxels

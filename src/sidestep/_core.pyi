@@ -10,6 +10,8 @@ from typing import Final, overload
 import numpy
 import numpy.typing
 
+import sidestep.obstacles
+
 
 class JointType(enum.Enum):
     """
@@ -201,6 +203,23 @@ class Obstacles:
 
     @property
     def velocities(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def groups(self) -> list[tuple[str | None, int]]:
+        """
+        Of what belongs together, in the order of the points: its name, None where it has none, and how many.
+        """
+
+    def named(self, names: Sequence[str], counts: Sequence[int]) -> Obstacles:
+        """
+        The same points with the names of what they belong to: the first counts[0] points to names[0], and so on;
+        an empty name is none. Raises ValueError unless counts and names are as many, and the counts add up to the number of points.
+        """
+
+    def name_of(self, point: int) -> str | None:
+        """
+        Name of what a point belongs to, as messages call it; None where it has none. Raises IndexError.
+        """
 
     def advance(self, duration: float) -> None:
         """
@@ -2431,9 +2450,16 @@ class Controller:
     def clear_goal(self) -> None:
         """The arm comes to rest where it is, and goes on evading."""
 
-    def set_obstacles(self, obstacles: Obstacles) -> None:
+    def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | Sequence[Obstacles | sidestep.obstacles.Shape]) -> None:
         """
-        From the next step on. Points move on by their velocities until they are set again.
+        From the next step on: points, a shape, or a list of both, see `sidestep.obstacles.obstacles_from_shapes`, which
+        covers shapes by balls without gaps. They move on by their velocities until they are set again.
+        """
+
+    @property
+    def obstacles(self) -> Obstacles:
+        """
+        A copy of what the last step saw; `name_of(command.point)` of it is the name of what is nearest.
         """
 
     def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command:

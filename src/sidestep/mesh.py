@@ -1,4 +1,4 @@
-"""Triangle meshes: read from files, and made coarser."""
+"""Triangle meshes: read from files, made coarser, and as Coal takes them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
+if TYPE_CHECKING:  # they are imported where a mesh is made: they take longer to import than a robot to load
+    import coal
     import trimesh
 
 
@@ -43,3 +44,19 @@ def simplified(mesh: trimesh.Trimesh, cell: float) -> trimesh.Trimesh:
     corners = np.sort(faces, axis=1).T
     _, first = np.unique(np.ravel_multi_index(corners, 3 * (len(means),)), return_index=True)
     return trimesh.Trimesh(means, faces[np.sort(first)], process=False)
+
+
+def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
+    """The triangles of a mesh for Coal: hollow, exact."""
+    import coal
+
+    model = coal.BVHModelOBBRSS()
+    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for vertex in np.asarray(mesh.vertices, dtype=float):
+        vertices.append(vertex)
+    for a, b, c in np.asarray(mesh.faces).tolist():
+        triangles.append(coal.Triangle(a, b, c))
+    model.beginModel(len(triangles), len(vertices))
+    model.addSubModel(vertices, triangles)
+    model.endModel()
+    return model

@@ -1,5 +1,6 @@
 """The controller: every part together, with commands that are safe whatever it is told."""
 
+import re
 import subprocess
 import sys
 import threading
@@ -9,6 +10,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core, presets
+from sidestep.obstacles import pose_at
 
 PERIOD = 0.001
 
@@ -142,6 +144,52 @@ def test_what_blocks_a_goal_is_said_without_a_planner_as_well(robot: ss.Robot, a
     assert words[0] == words[1]
     assert words[0].startswith("at the goal link 'fr3_")
     assert "obstacle point 0" in words[0]
+
+
+def test_shapes_are_obstacles_and_words_have_their_names(robot: ss.Robot, arm: ss.Arm) -> None:
+    """A shape, or a list that mixes shapes and points: as its balls, with links and obstacles by name."""
+    goal = robot.neutral + np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    hand = robot.pose(goal, "fr3_hand")[:3, 3]
+    table = ss.Box((0.2, 0.3, 0.1), pose_at(hand), name="table")
+    ball = ss.Sphere(0.05, pose_at([-0.5, 0.0, 0.5]), velocity=[-0.1, 0.0, 0.0])
+    for planner in (ss.OnlinePlannerSettings(), None):
+        controller = ss.Controller(arm, settings(planner=planner))
+        controller.set_goal(goal)
+        controller.set_obstacles([ss.Obstacles([[-1.0, 0.0, 0.2]], 0.05), table, ball])
+        motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=10000)
+        assert motion.activities[-1] == ss.Activity.blocked
+        assert re.match(
+            r"at the goal link 'fr3_\w+' is \d+ mm deep in 'table'; it goes on", controller.explain()
+        )
+        seen = controller.obstacles
+        assert seen.groups == [("obstacle0", 1), ("table", len(table.balls()[0])), ("obstacle2", 1)]
+        np.testing.assert_allclose(seen.points[-1], [-0.5 - 0.1 * 9.999, 0.0, 0.5], atol=1e-9)
+        if controller.command.point >= 0:
+            assert seen.name_of(controller.command.point) == "table"
+    controller.clear_goal()
+    controller.set_obstacles(
+        ss.Sphere(0.2, pose_at(robot.pose(robot.neutral, "fr3_hand")[:3, 3]), name="cup")
+    )
+    command = controller.step(robot.neutral, np.zeros(7))
+    assert command.status == ss.SafetyStatus.clearance_lost
+    assert re.match(r"link 'fr3_\w+' and 'cup' overlap by \d+ mm", controller.explain())
+    assert controller.obstacles.name_of(command.point) == "cup"
+    with pytest.raises(TypeError, match="obstacles are of type float, must be a shape, Obstacles or a list"):
+        controller.set_obstacles(0.1)
+    assert controller.obstacles.groups == [("cup", 1)]
+
+
+def test_a_diagnosis_has_names(robot: ss.Robot, arm: ss.Arm) -> None:
+    controller = ss.Controller(arm, settings())
+    cup = ss.Sphere(0.2, pose_at(robot.pose(robot.neutral, "fr3_hand")[:3, 3]), name="cup")
+    controller.set_obstacles(cup)
+    controller.set_goal(robot.neutral + 0.1)
+    controller.step(robot.neutral, np.zeros(7))
+    words = controller.geometric_step.diagnosis.describe()
+    assert re.match(r"link fr3_\w+ is inside the barrier of 'cup', \d+ mm deep, and moves out", words)
+    seen = ss.obstacles_from_shapes(cup)
+    other = controller.system.diagnose(robot.neutral, np.zeros(7), robot.neutral + 0.1, seen).describe()
+    assert "'cup'" in other
 
 
 def test_a_posture_is_looked_for_near_the_rest_of_a_pose(robot: ss.Robot, arm: ss.Arm) -> None:

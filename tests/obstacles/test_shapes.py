@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from sidestep.obstacles import Box, Cylinder, MeshShape, Shape, Sphere, pose_at
+from sidestep.obstacles import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere, pose_at
 
 ROUNDING = 1e-9  # [m] samples are computed in double precision at the scale of a metre
 
@@ -37,11 +37,13 @@ def shape_named(name: str, l_shape: Path) -> Shape:
         "box": Box((0.31, 0.02, 0.17), pose=pose),
         "cylinder": Cylinder(0.06, 0.4, pose=pose),
         "thin cylinder": Cylinder(0.004, 0.4, pose=pose),
+        "capsule": Capsule(0.05, 0.3, pose=pose),
+        "plane": Plane([0.4, -0.2, 0.7], [0.3, -0.8, -0.5], extent=0.3),
         "mesh": MeshShape(l_shape, scale=0.001, pose=pose),
     }[name]
 
 
-NAMES = ["sphere", "box", "cylinder", "thin cylinder", "mesh"]
+NAMES = ["sphere", "box", "cylinder", "thin cylinder", "capsule", "plane", "mesh"]
 
 
 def dense_surface(shape: Shape, count: int = 20000) -> np.ndarray:
@@ -53,6 +55,12 @@ def dense_surface(shape: Shape, count: int = 20000) -> np.ndarray:
     if isinstance(shape, Cylinder):
         on_side = np.abs(local[:, 2]) < 0.5 * shape.length - ROUNDING
         local[on_side, :2] *= (shape.radius / np.linalg.norm(local[on_side, :2], axis=1))[:, None]
+    if isinstance(shape, Capsule):
+        out = local.copy()
+        out[:, 2] -= np.clip(local[:, 2], -0.5 * shape.length, 0.5 * shape.length)
+        local += out * (shape.radius / np.linalg.norm(out, axis=1) - 1.0)[:, None]
+    if isinstance(shape, Plane):  # its face alone
+        local = local[np.abs(local[:, 2]) < ROUNDING]
     return local @ shape.pose[:3, :3].T + shape.pose[:3, 3]
 
 
@@ -82,6 +90,11 @@ def test_samples_lie_on_the_surface(name: str, l_shape: Path) -> None:
         case Cylinder(radius=radius, length=length):
             radial = np.linalg.norm(samples[:, :2], axis=1) - radius
             off = np.abs(np.maximum(radial, np.abs(samples[:, 2]) - 0.5 * length))
+        case Capsule(radius=radius, length=length):
+            samples[:, 2] -= np.clip(samples[:, 2], -0.5 * length, 0.5 * length)
+            off = np.abs(np.linalg.norm(samples, axis=1) - radius)
+        case Plane(extent=extent):
+            off = np.maximum(np.abs(samples[:, 2]), np.abs(samples).max(axis=1) - extent)
         case _:
             off = np.abs(trimesh.proximity.closest_point_naive(shape.mesh(), shape.sample(0.02)[:200])[1])
     assert off.max() < ROUNDING
@@ -122,6 +135,46 @@ def test_bad_shapes_are_refused_with_the_value(tmp_path: Path, l_shape: Path) ->
     (tmp_path / "broken.obj").write_text("no mesh in here")
     with pytest.raises(ValueError, match=r"broken\.obj"):
         MeshShape(tmp_path / "broken.obj").mesh()
+
+
+def test_errors_say_which_shape_it_is(l_shape: Path) -> None:
+    with pytest.raises(ValueError, match=r"box 'table': size z is -1\.0, must be positive"):
+        Box((1.0, 1.0, -1.0), name="table")
+    with pytest.raises(
+        ValueError, match=r"sphere: velocity is \[0\.0, nan, 0\.0\], must be three finite numbers"
+    ):
+        Sphere(0.1, velocity=[0.0, np.nan, 0.0])
+    with pytest.raises(ValueError, match=r"capsule 'rod': length is 0, must be positive"):
+        Capsule(0.1, 0, name="rod")
+    with pytest.raises(ValueError, match=r"plane 'floor': normal is zero"):
+        Plane([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], name="floor")
+    with pytest.raises(ValueError, match=r"plane: point is \[0\.0, 0\.0\], must be three"):
+        Plane([0.0, 0.0], [0.0, 0.0, 1.0])
+    with pytest.raises(ValueError, match="plane: extent is inf"):
+        Plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], extent=np.inf)
+    with pytest.raises(ValueError, match=r"mesh 'part': velocity is 1\.0"):
+        MeshShape(l_shape, velocity=1.0, name="part")
+
+
+@pytest.mark.parametrize("normal", [[0, 0, 1], [0, 0, -2], [3, 0, 0], [0.1, -0.5, 0.2], [1e-9, 0.0, -1.0]])
+def test_a_plane_is_solid_against_its_normal(normal: list[float]) -> None:
+    plane = Plane([0.1, 0.2, 0.3], normal, extent=2.0)
+    unit = np.array(normal) / np.linalg.norm(normal)
+    np.testing.assert_allclose(plane.pose[:3, 2], unit, atol=1e-12)  # rounding
+    np.testing.assert_allclose((plane.mesh().vertices - plane.point) @ unit, 0.0, atol=1e-12)
+    centres, radii = plane.balls(0.004)
+    assert ((centres - plane.point) @ unit + radii).max() <= 0.004 + 1e-12
+    assert ((centres - plane.point) @ unit).max() < -1.9
+
+
+def test_the_square_of_a_plane_is_where_the_arm_is_not_where_the_point_is() -> None:
+    far = Plane([0.0, 30.0, -0.1], [0.0, 0.0, 1.0], extent=1.0)
+    np.testing.assert_allclose(far.pose[:3, 3], [0.0, 0.0, -0.1], atol=1e-12)
+    other = Plane([0.0, 30.0, -0.1], [0.0, 0.0, 1.0], around=[2.0, 3.0, 4.0])
+    np.testing.assert_allclose(other.pose[:3, 3], [2.0, 3.0, -0.1], atol=1e-12)
+    np.testing.assert_allclose(far.mesh().bounds, [[-1.0, -1.0, -0.1], [1.0, 1.0, -0.1]], atol=1e-12)
+    with pytest.raises(ValueError, match="plane 'floor': around is"):
+        Plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], around=[0.0], name="floor")
 
 
 def test_a_spacing_that_would_fill_the_memory_is_refused(l_shape: Path) -> None:

@@ -83,6 +83,7 @@ const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<c
 }
 
 const Command& Controller::command() const noexcept { return impl_->command; }
+const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacles(); }
 std::string Controller::explain() const { return impl_->explain(); }
 const Arm& Controller::arm() const noexcept { return impl_->arm; }
 const ControllerSettings& Controller::settings() const noexcept { return impl_->settings; }

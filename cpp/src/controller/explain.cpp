@@ -15,10 +15,10 @@ std::string millimetres(double metres) {
   return text;
 }
 
-std::string parties(const CoordinateLabel& label, int point) {
+std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
   switch (label.kind) {
     case CoordinateLabel::Kind::obstacle:
-      return "link '" + label.name + "' and obstacle point " + std::to_string(point);
+      return "link '" + label.name + "' and " + obstacle;
     case CoordinateLabel::Kind::self:
       return "links '" + label.name + "' and '" + label.other + "'";
     case CoordinateLabel::Kind::plane:
@@ -47,7 +47,7 @@ std::string Controller::Impl::explain() const {
   const auto diagnosis = system->diagnose(workspace);
   if (command.status == SafetyStatus::clearance_lost) {
     const CoordinateLabel& label = system->labels()[static_cast<std::size_t>(command.coordinate)];
-    text = parties(label, command.point) + " overlap by " + millimetres(command.clearance) + ", as far as the covering body says; ";
+    text = parties(label, obstacles().words_for(command.point)) + " overlap by " + millimetres(command.clearance) + ", as far as the covering body says; ";
     if (label.kind == CoordinateLabel::Kind::obstacle) {
       text += "if points lie on the arm itself, filter the arm out of the cloud; ";
     }
@@ -113,7 +113,7 @@ std::string Controller::Impl::explain() const {
   }
   const CoordinateLabel label =
       diagnosis.coordinate < 0 ? CoordinateLabel{} : system->labels()[static_cast<std::size_t>(diagnosis.coordinate)];
-  return text + diagnosis.describe(label);
+  return text + diagnosis.describe(label, obstacles());
 }
 
 }  // namespace sidestep

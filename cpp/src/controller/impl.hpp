@@ -31,6 +31,7 @@ class Controller::Impl {
 
   void set_goal(std::optional<Goal> goal);
   void set_obstacles(Obstacles obstacles);
+  const Obstacles& obstacles() const noexcept { return obstacle_orders_.current().obstacles; }
   const Command& step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
                       const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
   std::string explain() const;
@@ -110,7 +111,6 @@ class Controller::Impl {
   bool is_stale() const noexcept { return obstacle_age_ > settings.obstacle_timeout; }
   bool has_sub_goal() const noexcept { return followed_ != nullptr && followed_ != &reference_ && followed_ != goal_; }
   void keep_room() noexcept;
-  const Obstacles& obstacles() noexcept { return obstacle_orders_.current().obstacles; }
   bool has_goal() const noexcept { return goal_ != nullptr; }
   const PoseGoal* pose_goal() const noexcept { return goal_ == nullptr ? nullptr : std::get_if<PoseGoal>(goal_); }
 

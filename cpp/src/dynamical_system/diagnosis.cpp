@@ -28,11 +28,11 @@ struct Parties {
   std::string who, what;
 };
 
-Parties parties(const Diagnosis& d, const CoordinateLabel& label) {
+Parties parties(const Diagnosis& d, const CoordinateLabel& label, const Obstacles& obstacles) {
   const std::string away = std::isfinite(d.clearance) ? ", " + distance(d.clearance) : "";
   switch (label.kind) {
     case CoordinateLabel::Kind::obstacle:
-      return {"link " + label.name, "obstacle point " + std::to_string(d.point) + away};
+      return {"link " + label.name, obstacles.words_for(d.point) + away};
     case CoordinateLabel::Kind::self:
       return {"link " + label.name, "link " + label.other + away};
     case CoordinateLabel::Kind::plane:
@@ -88,8 +88,8 @@ std::string Diagnosis::way_left() const {
   return number("%.3f m", position_error) + number(" and %.2f rad", rotation_error);
 }
 
-std::string Diagnosis::describe(const CoordinateLabel& label) const {
-  const Parties p = parties(*this, label);
+std::string Diagnosis::describe(const CoordinateLabel& label, const Obstacles& obstacles) const {
+  const Parties p = parties(*this, label, obstacles);
   const bool known = coordinate >= 0;
   switch (state) {
     case MotionState::free:

@@ -28,7 +28,7 @@ std::string describe(const Obstruction& obstruction) {
   const std::string in = " is " + std::to_string(static_cast<int>(std::lround(1e3 * obstruction.depth))) + " mm deep in ";
   switch (obstruction.label.kind) {
     case CoordinateLabel::Kind::obstacle:
-      return "link '" + obstruction.label.name + "'" + in + "obstacle point " + std::to_string(obstruction.point);
+      return "link '" + obstruction.label.name + "'" + in + obstruction.obstacle;
     case CoordinateLabel::Kind::self:
       return "link '" + obstruction.label.name + "'" + in + "link '" + obstruction.label.other + "'";
     case CoordinateLabel::Kind::plane:

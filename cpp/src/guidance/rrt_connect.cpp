@@ -94,7 +94,8 @@ bool RrtConnect::obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles
     return false;
   }
   const BodyClearance::Nearest nearest = body_->nearest(worst, q, obstacles, 0.0, workspace_);
-  obstruction = {body_->label(worst), nearest.point, -nearest.clearance};
+  obstruction = {body_->label(worst), nearest.point, -nearest.clearance,
+                 nearest.point < 0 ? std::string() : obstacles.words_for(nearest.point)};
   return true;
 }
 

@@ -1,5 +1,6 @@
 #include "sidestep/obstacles/obstacles.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <stdexcept>
@@ -38,6 +39,55 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
   tree_ = PointTree(points_, radii_, velocities_);
 }
 
+Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const {
+  if (names.size() != counts.size()) {
+    throw std::invalid_argument("obstacles: " + std::to_string(names.size()) + " names and " +
+                                std::to_string(counts.size()) + " counts; the numbers must be equal");
+  }
+  std::vector<Eigen::Index> ends;
+  Eigen::Index total = 0;
+  for (std::size_t k = 0; k < counts.size(); ++k) {
+    if (counts[k] < 0 || counts[k] > size() - total) {
+      throw std::invalid_argument("obstacles: '" + names[k] + "' has count " + std::to_string(counts[k]) +
+                                  ", must be between 0 and " + std::to_string(size() - total) +
+                                  ", the number of points that are left");
+    }
+    total += counts[k];
+    ends.push_back(total);
+  }
+  if (total != size()) {
+    throw std::invalid_argument("obstacles: counts are of " + std::to_string(total) + " points, there are " +
+                                std::to_string(size()));
+  }
+  Obstacles copy = *this;
+  copy.names_ = std::make_shared<const Names>(Names{std::move(names), std::move(ends)});
+  return copy;
+}
+
+std::vector<std::pair<std::string, Eigen::Index>> Obstacles::groups() const {
+  std::vector<std::pair<std::string, Eigen::Index>> result;
+  if (!names_) {
+    if (size() > 0) {
+      result.emplace_back("", size());
+    }
+    return result;
+  }
+  Eigen::Index begin = 0;
+  for (std::size_t k = 0; k < names_->ends.size(); begin = names_->ends[k++]) {
+    result.emplace_back(names_->names[k], names_->ends[k] - begin);
+  }
+  return result;
+}
+
+std::string_view Obstacles::name_of(Eigen::Index point) const noexcept {
+  if (!names_ || point < 0 || point >= size()) {
+    return {};
+  }
+  // The first end beyond the point: points are counted from 0, and things without points end where the next begins.
+  const auto end = std::upper_bound(names_->ends.begin(), names_->ends.end(), point);
+  return names_->names[static_cast<std::size_t>(end - names_->ends.begin())];
+}
+
 bool Obstacles::advance(double duration) noexcept {
   if (!std::isfinite(duration)) {
     return false;
@@ -52,6 +102,18 @@ bool Obstacles::advance(double duration) noexcept {
   tree_.advance(duration);
   version_ = next_version();
   return true;
+}
+
+std::string Obstacles::words_for(Eigen::Index point) const {
+  const std::string_view name = name_of(point);
+  if (name.empty() && point < 0) {
+    return "an obstacle";
+  }
+  if (name.empty()) {
+    return "obstacle point " + std::to_string(point);
+  }
+  std::string quoted(1, '\'');
+  return quoted.append(name).append(1, '\'');
 }
 
 std::uint64_t Obstacles::next_version() noexcept {

@@ -144,7 +144,11 @@ class Arms:
 
 
 def _points(shapes: Sequence[Shape], spacing: float, radius: float) -> Obstacles:
-    return obstacles_from_shapes(shapes, spacing=spacing, radius=radius) if shapes else Obstacles.none()
+    return (
+        obstacles_from_shapes(shapes, spacing=spacing, radius=radius, gaps_allowed=True)
+        if shapes
+        else Obstacles.none()
+    )
 
 
 def _check_joints(problem: MotionBenchMakerProblem, robot: Robot) -> None:

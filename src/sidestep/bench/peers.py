@@ -33,11 +33,11 @@ from sidestep.bench import peers_jax
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.bench.step import cpu_model
 from sidestep.body import Body
+from sidestep.mesh import mesh_model
 from sidestep.presets import barrier_system
 from sidestep.reproduce import dense_analytic, torch_autograd
 from sidestep.reproduce.serial_chain import SerialChain
 from sidestep.robot import Robot
-from sidestep.simulation.solid import mesh_model
 
 Array = npt.NDArray[np.float64]
 Call = Callable[[Array, Array], Array]

@@ -69,6 +69,25 @@ def sphere(radius: float, spacing: float) -> Points:
     return np.concatenate(rings)
 
 
+def capsule(radius: float, length: float, spacing: float) -> Points:
+    """Covering points of a capsule along z, around the origin: a ball rolled over `length`."""
+    check_spacing(spacing, area=2.0 * np.pi * radius * (2.0 * radius + length))
+    number = max(3, int(np.ceil(2.0 * np.pi * radius / (GRID_STEP * spacing))))
+    rim = _ring(radius, number)
+    side = np.concatenate([np.column_stack([rim, np.full(number, z)]) for z in _line(length, spacing)])
+    ball = sphere(radius, spacing)  # a half-ball keeps its rings, and the rim of the side closes it
+    shift = np.array([0.0, 0.0, 0.5 * length])
+    return np.concatenate([side, ball[ball[:, 2] > 0.0] + shift, ball[ball[:, 2] < 0.0] - shift])
+
+
+def square(extent: float, spacing: float) -> Points:
+    """Covering points of the square of half an edge `extent` [m] in the plane z = 0."""
+    check_spacing(spacing, area=4.0 * extent**2)
+    line = _line(2.0 * extent, spacing)
+    flat = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.column_stack([flat, np.zeros(len(flat))])
+
+
 def triangles(mesh: trimesh.Trimesh, spacing: float) -> Points:
     """Covering points of a triangle mesh: its corners after subdivision, thinned to an even distance."""
     check_spacing(spacing, area=float(mesh.area))

@@ -34,6 +34,7 @@ from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
 from sidestep.mesh import read_mesh
 from sidestep.obstacles import load_point_cloud
+from sidestep.obstacles.shapes import EXTENT
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.degrees import degrees_hint
 from sidestep.scenario.parts import controller_settings_of, torque_program_of
@@ -263,6 +264,10 @@ def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, 
             return (solid("sphere", (radius,)),)
         case Shape(type="cylinder", radius=float(radius), length=float(length)):
             return (solid("cylinder", (radius, length)),)
+        case Shape(type="capsule", radius=float(radius), length=float(length)):
+            return (solid("capsule", (radius, length)),)
+        case Shape(type="plane"):
+            return (solid("plane", (shape.extent or EXTENT,)),)
         case Shape(type="box", size=(x, y, z)):
             return (solid("box", (x, y, z)),)
         case Shape(type="mesh", file=str(file)):

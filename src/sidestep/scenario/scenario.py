@@ -85,12 +85,13 @@ class BodyChoice:
 
 @dataclass(frozen=True)
 class Shape:
-    """A sphere, box, cylinder, mesh file or point file; sizes in metres."""
+    """A sphere, box, cylinder, capsule, plane, mesh file or point file; sizes in metres."""
 
-    type: Literal["sphere", "box", "cylinder", "mesh", "points"]
+    type: Literal["sphere", "box", "cylinder", "capsule", "plane", "mesh", "points"]
     radius: float | None = None
     length: float | None = None
     size: Vector3 | None = None
+    extent: float | None = None
     file: str | None = None
     scale: float | None = None
 
@@ -117,6 +118,7 @@ class Obstacle:
     free: bool = False
     points: Literal["centre", "ball", "surface"] = "centre"
     spacing: float = 0.03
+    excess: float = 0.002
 
 
 @dataclass(frozen=True)
@@ -284,10 +286,9 @@ class Scenario:
                 raise ScenarioError(
                     f"{file}: obstacles[{index}].points is 'ball'; a {item.shape.type} allows centre, surface"
                 )
-            if item.shape.type == "points" and item.free:
-                raise ScenarioError(
-                    f"{file}: obstacles[{index}].free is true; a point cloud can only be fixed"
-                )
+            if item.shape.type in ("plane", "points") and item.free:
+                kind = "plane" if item.shape.type == "plane" else "point cloud"
+                raise ScenarioError(f"{file}: obstacles[{index}].free is true; a {kind} can only be fixed")
         return dataclasses.replace(scenario, folder=folder or Path.cwd())
 
     def check_steps(self) -> None:

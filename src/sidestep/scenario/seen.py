@@ -9,7 +9,10 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import Obstacles
-from sidestep.obstacles.covering import box, check_spacing, cylinder, triangles
+from sidestep.obstacles import Box, Capsule, Cylinder, Plane
+from sidestep.obstacles.ball_cover import mesh_balls
+from sidestep.obstacles.covering import check_spacing, square
+from sidestep.obstacles.shapes import Balls
 from sidestep.pose import moved
 from sidestep.scenario.scenario import Obstacle
 from sidestep.simulation import SceneObject
@@ -19,11 +22,11 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What is seen of one solid: points (N, 3) in its frame, and the radius of each [m]."""
+    """What is seen of one solid: points (N, 3) in its frame, and the radii (N,) of them [m]."""
 
     thing: SceneObject
     points: Array
-    radius: float
+    radii: Array
 
 
 def view_of(item: Obstacle, thing: SceneObject, *, bare: bool) -> View:
@@ -31,30 +34,44 @@ def view_of(item: Obstacle, thing: SceneObject, *, bare: bool) -> View:
 
     Args:
         item: the obstacle it belongs to. thing: the solid.
-        bare: as the file asks by `points`; otherwise its real size: a ball as it is, other shapes as balls on the
-            surface that leave no gap.
+        bare: as the file asks by `points`; otherwise its real size: a ball as it is, other shapes as balls that cover
+            the surface without a gap and reach out of it by at most the file's `excess`.
     """
     if bare and item.points == "surface":
-        surface = thing.surface(subdivisions=3)
-        check_spacing(item.spacing, area=float(surface.area), length=float(max(surface.extents)))
-        count = max(12, round(surface.area / item.spacing**2))
-        points, _ = trimesh.sample.sample_surface_even(surface, count, seed=0)
-        return View(thing, np.asarray(points), 0.0)
+        points = _surface_points(item, thing)
+        return View(thing, points, np.zeros(len(points)))
     if bare or item.shape.type in ("sphere", "points"):
         centre = np.zeros((1, 3)) if thing.mesh is None else thing.mesh.bounds.mean(axis=0, keepdims=True)
         has_size = not bare or item.points == "ball"
-        return View(thing, centre, float(item.shape.radius or 0.0) if has_size else 0.0)
-    return View(thing, covering(item, thing), item.spacing)
+        return View(thing, centre, np.array([float(item.shape.radius or 0.0) if has_size else 0.0]))
+    return View(thing, *_balls(thing, item.excess))
 
 
-def covering(item: Obstacle, thing: SceneObject) -> Array:
-    """Centres (n, 3) of balls of radius `item.spacing` that cover the surface of a box, a cylinder or a mesh."""
-    shape = item.shape
-    if shape.type == "box" and shape.size is not None:
-        return box(shape.size, item.spacing)
-    if shape.type == "cylinder":
-        return cylinder(float(shape.radius or 0.0), float(shape.length or 0.0), item.spacing)
-    return triangles(thing.surface(), item.spacing)
+def _surface_points(item: Obstacle, thing: SceneObject) -> Array:
+    """Points (n, 3) on the surface, about `item.spacing` apart; of a plane on its face."""
+    if thing.kind == "plane":
+        return square(thing.size[0], item.spacing)
+    surface = thing.surface(subdivisions=3)
+    check_spacing(item.spacing, area=float(surface.area), length=float(max(surface.extents)))
+    count = max(12, round(surface.area / item.spacing**2))
+    points, _ = trimesh.sample.sample_surface_even(surface, count, seed=0)
+    return np.asarray(points)
+
+
+def _balls(thing: SceneObject, excess: float) -> Balls:
+    """Centres (n, 3) and radii (n,) of balls that cover a solid, in its frame [m]."""
+    if thing.mesh is not None:
+        return mesh_balls(thing.mesh, excess)
+    match thing.kind:
+        case "box":
+            return Box(thing.size).balls(excess)
+        case "cylinder":
+            return Cylinder(thing.size[0], thing.size[1]).balls(excess)
+        case "capsule":
+            return Capsule(thing.size[0], thing.size[1]).balls(excess)
+        case "plane":
+            return Plane(np.zeros(3), [0.0, 0.0, 1.0], extent=thing.size[0]).balls(excess)
+    raise AssertionError(f"a {thing.kind} is seen as it is")
 
 
 def seen_at(views: tuple[View, ...], time: float) -> Obstacles:
@@ -67,6 +84,7 @@ def seen_at(views: tuple[View, ...], time: float) -> Obstacles:
         begin, end = view.thing.moves_during
         moves = view.thing.motion == "moving" and begin <= time < end
         points.append(moved(view.points, pose))
-        radii.append(np.full(len(view.points), view.radius))
+        radii.append(view.radii)
         velocities.append(np.tile(view.thing.velocity if moves else np.zeros(3), (len(view.points), 1)))
-    return Obstacles(np.concatenate(points), np.concatenate(radii), np.concatenate(velocities))
+    seen = Obstacles(np.concatenate(points), np.concatenate(radii), np.concatenate(velocities))
+    return seen.named([view.thing.name for view in views], [len(view.points) for view in views])

@@ -8,7 +8,6 @@ the triangles of the collision meshes.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 
@@ -20,7 +19,7 @@ from sidestep._core import real_array
 from sidestep.pose import from_quaternion, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.link_parts import LinkParts, hulls_apart
-from sidestep.simulation.scene import SceneObject, check_scene
+from sidestep.simulation.scene import Scene, check_scene
 from sidestep.simulation.solid import POINT_RADIUS, Solid, mesh_solid, object_solid, penetration
 from sidestep.simulation.sweep import smallest_distance
 from sidestep.simulation.travel import (
@@ -90,9 +89,7 @@ class ExactClearance:
         ValueError: no link has a collision mesh, or two objects share a name.
     """
 
-    def __init__(
-        self, robot: Robot, objects: Sequence[SceneObject], *, include_immobile: bool = False
-    ) -> None:
+    def __init__(self, robot: Robot, objects: Scene, *, include_immobile: bool = False) -> None:
         self.robot = robot
         self.objects = check_scene(objects)
         joint_of = {frame.name: frame.joint for frame in robot.frames}
@@ -109,7 +106,7 @@ class ExactClearance:
         self._parts = LinkParts(robot, [link.name for link in self._links])
         self._objects = [object_solid(item) for item in self.objects]
 
-    def among(self, objects: Sequence[SceneObject]) -> ExactClearance:
+    def among(self, objects: Scene) -> ExactClearance:
         """The same robot among other objects; shares the links, which take long to prepare."""
         other = copy(self)
         other.objects = check_scene(objects)

@@ -9,7 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Controller, GeometricSystem, Obstacles
+from sidestep._core import Controller, GeometricSystem
+from sidestep.obstacles.scene import Seen
 from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.run import ObstacleSource, obstacles_over_time, status_name
 
@@ -48,16 +49,14 @@ class ControllerDriver:
 
     Args:
         controller: with its goal set.
-        obstacles: what it sees: points, which it moves along their velocities itself, or a function of time [s] that
-            gives them, or None where they are as it was told before.
+        obstacles: what it sees, as `Controller.set_obstacles` takes it: it moves them along their velocities itself; or
+            a function of time [s] that gives that, or None where it is as it was told before.
     """
 
-    def __init__(
-        self, controller: Controller, obstacles: Obstacles | Callable[[float], Obstacles | None]
-    ) -> None:
+    def __init__(self, controller: Controller, obstacles: Seen | Callable[[float], Seen | None]) -> None:
         self.controller = controller
-        self._see = obstacles if not isinstance(obstacles, Obstacles) else None
-        if isinstance(obstacles, Obstacles):
+        self._see = obstacles if callable(obstacles) else None
+        if not callable(obstacles):
             controller.set_obstacles(obstacles)
 
     def drive(

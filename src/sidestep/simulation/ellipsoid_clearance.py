@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +10,7 @@ from sidestep.body import Body
 from sidestep.pose import pose_at
 from sidestep.robot import Robot
 from sidestep.simulation.clearance import Clearance
-from sidestep.simulation.scene import SceneObject, check_scene
+from sidestep.simulation.scene import Scene, check_scene
 from sidestep.simulation.solid import object_solid
 
 Array = npt.NDArray[np.float64]
@@ -31,14 +29,16 @@ class EllipsoidClearance:
         ValueError: the body has no levels, or an object is a mesh.
     """
 
-    def __init__(self, robot: Robot, body: Body, objects: Sequence[SceneObject]) -> None:
+    def __init__(self, robot: Robot, body: Body, objects: Scene) -> None:
         if body.levels is None:
             raise ValueError("the body has no levels; Body.cover(robot) makes one that holds every link")
         self.robot = robot
         self.objects = check_scene(objects)
         for item in self.objects:
             if item.kind == "mesh":
-                raise ValueError(f"object {item.name!r} is a mesh; solids are needed: box, cylinder, sphere")
+                raise ValueError(
+                    f"object {item.name!r} is a mesh; solids are needed: box, capsule, cylinder, plane, sphere"
+                )
         moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
         self._ellipsoids: list[tuple[str, coal.Ellipsoid, Array, float]] = []
         for link, mean, covariance, level in zip(

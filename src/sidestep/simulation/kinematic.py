@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any, Literal
 
 import numpy as np
@@ -21,7 +21,7 @@ from sidestep.simulation.run import (
     obstacles_over_time,
     status_name,
 )
-from sidestep.simulation.scene import SceneObject, check_scene
+from sidestep.simulation.scene import Scene, check_scene
 
 Array = npt.NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def run_kinematically(
     duration: float,
     obstacles: ObstacleSource | None = None,
     *,
-    objects: Sequence[SceneObject] = (),
+    objects: Scene = (),
     timestep: float = 1e-3,
     integrator: Literal["semi_implicit_euler", "second_order", "runge_kutta_4"] = "semi_implicit_euler",
     start_velocity: Array | None = None,

@@ -10,9 +10,10 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.mesh import mesh_model
 from sidestep.robot import Robot
 from sidestep.simulation.convex_parts import convex_parts
-from sidestep.simulation.solid import hull_model, mesh_model
+from sidestep.simulation.solid import hull_model
 from sidestep.simulation.travel import interpolate_many, travel_per_joint
 
 Array = npt.NDArray[np.float64]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +14,7 @@ from sidestep._core import JointType
 from sidestep.pose import pose_at, pose_vector
 from sidestep.robot import Robot
 from sidestep.simulation.convex_parts import convex_parts
-from sidestep.simulation.scene import SceneObject, check_scene
+from sidestep.simulation.scene import Scene, SceneObject, check_scene
 
 Array = npt.NDArray[np.float64]
 
@@ -104,7 +103,7 @@ class SimulationModel:
 
 def build_model(
     robot: Robot,
-    objects: Sequence[SceneObject] = (),
+    objects: Scene = (),
     *,
     timestep: float = 1e-3,
     floor_height: float | None = None,
@@ -349,11 +348,20 @@ def _add_object(spec: mujoco.MjSpec, item: SceneObject, owners: dict[str, tuple[
         mesh_name = name
         if not _add_mesh(spec, name, item.mesh):
             raise ValueError(f"object {item.name!r}: its mesh is flat or empty, MuJoCo needs a volume")
-    types = {"sphere": "SPHERE", "box": "BOX", "cylinder": "CYLINDER", "mesh": "MESH"}
+    types = {
+        "sphere": "SPHERE",
+        "box": "BOX",
+        "cylinder": "CYLINDER",
+        "capsule": "CAPSULE",
+        "plane": "PLANE",
+        "mesh": "MESH",
+    }
     size = np.zeros(3)
-    if item.kind == "box":
+    if item.kind == "plane":
+        size[:] = item.size[0]  # of the drawing alone
+    elif item.kind == "box":
         size[:] = 0.5 * np.array(item.size)
-    elif item.kind == "cylinder":
+    elif item.kind in ("cylinder", "capsule"):
         size[:2] = item.size[0], 0.5 * item.size[1]
     elif item.kind == "sphere":
         size[0] = item.size[0]

@@ -10,12 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Obstacles
+from sidestep.obstacles import obstacles_from_shapes
+from sidestep.obstacles.scene import Seen
 from sidestep.robot import Robot
 from sidestep.simulation.pose_aim import PoseTarget
 from sidestep.simulation.scene import SceneObject
 
 Array = npt.NDArray[np.float64]
-ObstacleSource: TypeAlias = Obstacles | Callable[[float], Obstacles]
+ObstacleSource: TypeAlias = Seen | Callable[[float], Obstacles]
 
 
 @dataclass(frozen=True)
@@ -139,12 +141,14 @@ class ArrivalWatch:
 
 def obstacles_over_time(obstacles: ObstacleSource) -> Callable[[float], Obstacles]:
     """What the controller sees as a function of time [s]; points move along their velocities from time 0."""
-    if not isinstance(obstacles, Obstacles):
+    if callable(obstacles):
         return obstacles
-    points, radii, velocities = obstacles.points, obstacles.radii, obstacles.velocities
+    seen = obstacles_from_shapes(obstacles)
+    points, radii, velocities = seen.points, seen.radii, seen.velocities
     if not np.any(velocities):
-        return lambda time: obstacles
-    return lambda time: Obstacles(points + time * velocities, radii, velocities)
+        return lambda time: seen
+    names, counts = zip(*((name or "", count) for name, count in seen.groups), strict=True)
+    return lambda time: Obstacles(points + time * velocities, radii, velocities).named(names, counts)
 
 
 def status_name(status: object) -> str:

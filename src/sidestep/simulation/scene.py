@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
 
 from sidestep._core import Obstacles, real_array
-from sidestep.obstacles import Box, Cylinder, Shape, Sphere
+from sidestep.obstacles import Box, Capsule, Cylinder, Plane, Shape, Sphere
+from sidestep.obstacles.shapes import is_shape
 from sidestep.pose import checked_pose, pose_at
 
 Array = npt.NDArray[np.float64]
-Kind = Literal["sphere", "box", "cylinder", "mesh"]
+Kind = Literal["sphere", "box", "cylinder", "capsule", "plane", "mesh"]
 Motion = Literal["fixed", "free", "moving"]
 
-AWAY = 100.0  # [m] below its place, where an object waits that is not there: farther than any arm reaches
+AWAY = 100.0  # [m] below its place (a plane: behind), where waits what is not there: farther than arms reach
 
 _SIZE_MEANING: dict[str, tuple[int, str]] = {
     "sphere": (1, "(radius,)"),
     "box": (3, "the three side lengths"),
     "cylinder": (2, "(radius, length)"),
+    "capsule": (2, "(radius, length)"),
+    "plane": (1, "(extent,)"),
     "mesh": (0, "(), the mesh has its own size"),
 }
 
@@ -34,8 +37,10 @@ class SceneObject:
 
     Args:
         name: unique in a scene; contacts and clearances are reported under it.
-        kind: "sphere", "box", "cylinder" (axis: z) or "mesh".
-        size: sphere (radius,), box three side lengths, cylinder (radius, length), mesh () [m].
+        kind: "sphere", "box", "cylinder" (axis: z), "capsule" (a ball rolled along z), "plane" (all below z = 0 is
+            solid, see `Plane`) or "mesh".
+        size: sphere (radius,), box three side lengths, cylinder (radius, length), capsule (radius, length between the
+            centres of its half-balls), plane (extent,) of what is seen and drawn of it, mesh () [m].
         pose: (4, 4) pose of the object frame in the world at time 0.
         motion: "fixed"; "free" (a rigid body of `mass` that floats until something touches it); or
             "moving" (driven with `velocity` whatever it meets).
@@ -88,6 +93,8 @@ class SceneObject:
             raise ValueError(f"object {self.name!r}: present must be 0 <= from <= until, got {self.present}")
         if self.motion != "moving" and self.present != (0.0, float("inf")):
             raise ValueError(f"object {self.name!r}: only a moving object can come and go")
+        if self.kind == "plane" and self.motion == "free":
+            raise ValueError(f"object {self.name!r}: a plane has no mass, so that it cannot be free")
         if (self.kind == "mesh") != (self.mesh is not None):
             raise ValueError(f"object {self.name!r}: a mesh object needs `mesh`, and only it")
         for name, value in (("size", size), ("pose", pose), ("velocity", velocity)):
@@ -125,12 +132,22 @@ class SceneObject:
         name: str,
         shape: Shape,
         *,
-        motion: Motion = "fixed",
+        motion: Motion | None = None,
         mass: float = 0.1,
-        velocity: Sequence[float] | Array = (0.0, 0.0, 0.0),
+        velocity: Sequence[float] | Array | None = None,
         moves_during: tuple[float, float] = (0.0, float("inf")),
     ) -> SceneObject:
-        """The solid of an obstacle shape; spheres, boxes and cylinders stay exact, others become a mesh."""
+        """The solid of an obstacle shape; every shape stays exact, a plane a half-space.
+
+        Args:
+            name: of the object; the shape may have another.
+            shape: what the controller is told of as well.
+            motion: None: "moving" where there is a velocity, else "fixed".
+            mass: [kg], used when free.
+            velocity: (3,) [m/s]; None: the shape's own.
+            moves_during: (from, until) [s] in which a moving object moves.
+        """
+        velocity = np.asarray(shape.velocity if velocity is None else velocity, dtype=float)
         kind: Kind = "mesh"
         size: tuple[float, ...] = ()
         mesh: trimesh.Trimesh | None = None
@@ -140,6 +157,10 @@ class SceneObject:
             kind, size = "box", tuple(shape.size)
         elif isinstance(shape, Cylinder):
             kind, size = "cylinder", (shape.radius, shape.length)
+        elif isinstance(shape, Capsule):
+            kind, size = "capsule", (shape.radius, shape.length)
+        elif isinstance(shape, Plane):
+            kind, size = "plane", (shape.extent,)
         else:
             mesh = shape.mesh().copy()
             mesh.apply_transform(np.linalg.inv(shape.pose))
@@ -148,9 +169,9 @@ class SceneObject:
             kind,
             size=size,
             pose=shape.pose,
-            motion=motion,
+            motion=motion or ("moving" if np.any(velocity != 0.0) else "fixed"),
             mass=mass,
-            velocity=real_array(velocity, f"{name}: velocity"),
+            velocity=velocity,
             moves_during=moves_during,
             mesh=mesh,
         )
@@ -192,7 +213,7 @@ class SceneObject:
             start, end = self.moves_during
             pose[:3, 3] += self.velocity * max(0.0, min(time, end) - start)
             if not self.is_present(time):
-                pose[2, 3] -= AWAY
+                pose[:3, 3] -= AWAY * (pose[:3, 2] if self.kind == "plane" else np.array([0.0, 0.0, 1.0]))
         return pose
 
     def is_present(self, time: float) -> bool:
@@ -208,31 +229,76 @@ class SceneObject:
             surface = trimesh.creation.icosphere(subdivisions=subdivisions, radius=self.size[0])
         elif self.kind == "box":
             surface = trimesh.creation.box(extents=self.size)
-        else:
+        elif self.kind == "cylinder":
             surface = trimesh.creation.cylinder(radius=self.size[0], height=self.size[1], sections=24)
+        elif self.kind == "capsule":
+            surface = Capsule(self.size[0], self.size[1]).mesh()
+        else:
+            surface = Plane(np.zeros(3), [0.0, 0.0, 1.0], extent=self.size[0]).mesh()
         return surface
 
     @property
     def bounding_radius(self) -> float:
-        """Largest distance [m] of a point of the object from the origin of its frame."""
+        """Largest distance [m] of a point of the object from the origin of its frame; infinite for a plane."""
         if self.kind == "sphere":
             return self.size[0]
         if self.kind == "box":
             return 0.5 * float(np.linalg.norm(self.size))
         if self.kind == "cylinder":
             return float(np.hypot(self.size[0], 0.5 * self.size[1]))
+        if self.kind == "capsule":
+            return self.size[0] + 0.5 * self.size[1]
+        if self.kind == "plane":
+            return float("inf")
         return float(np.linalg.norm(self.surface().vertices, axis=1).max())
 
 
-def check_scene(objects: Iterable[SceneObject]) -> tuple[SceneObject, ...]:
-    """The objects as a tuple; raises ValueError when two share a name."""
-    scene = tuple(objects)
+Item: TypeAlias = SceneObject | Shape | Obstacles
+Scene: TypeAlias = Item | Iterable[Item]
+
+
+def check_scene(objects: Scene) -> tuple[SceneObject, ...]:
+    """The solids of what a controller sees, and others.
+
+    Args:
+        objects: solids; shapes, which are called by their names, or "obstacle0", "obstacle1", … by their place; and
+            `Obstacles`, a ball for each point, called "NAME.0", "NAME.1", ….
+
+    Raises:
+        ValueError: two share a name, or a point has no radius.
+        TypeError: an item is none of these.
+    """
+    items: list[Item] = [objects] if _is_item(objects) else list(objects)  # type: ignore[list-item, arg-type]
+    scene = tuple(solid for index, item in enumerate(items) for solid in _solids(item, f"obstacle{index}"))
     seen: set[str] = set()
     for item in scene:
         if item.name in seen:
             raise ValueError(f"two objects of the scene are named {item.name!r}; names must differ")
         seen.add(item.name)
     return scene
+
+
+def _is_item(value: object) -> bool:
+    return isinstance(value, SceneObject | Obstacles) or is_shape(value)
+
+
+def _solids(item: Item, unnamed: str) -> tuple[SceneObject, ...]:
+    if isinstance(item, SceneObject):
+        return (item,)
+    if isinstance(item, Obstacles):
+        if not (item.radii > 0.0).all():
+            raise ValueError(
+                f"{unnamed}: point {int(np.argmin(item.radii))} has no radius; a solid needs one, see SceneObject.balls"
+            )
+        return tuple(
+            replace(ball, name=f"{item.name_of(k) or unnamed}.{k}")
+            for k, ball in enumerate(SceneObject.balls(item))
+        )
+    if not is_shape(item):
+        raise TypeError(
+            f"{unnamed} is of type {type(item).__name__}, must be a SceneObject, a shape or Obstacles"
+        )
+    return (SceneObject.from_shape(item.name or unnamed, item),)
 
 
 def seen_obstacles(

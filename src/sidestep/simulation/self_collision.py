@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import real_array
+from sidestep.mesh import mesh_model
 from sidestep.robot import Robot, read_srdf
 from sidestep.simulation.link_parts import LinkParts, hulls_apart
-from sidestep.simulation.solid import mesh_model
 from sidestep.simulation.sweep import smallest_distance
 from sidestep.simulation.travel import interpolate, interpolate_many, travel_per_joint
 

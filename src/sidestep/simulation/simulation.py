@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -15,7 +15,7 @@ from sidestep.simulation.driver import Driver
 from sidestep.simulation.model import build_model
 from sidestep.simulation.pose_aim import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, SimulationRun
-from sidestep.simulation.scene import SceneObject, check_scene
+from sidestep.simulation.scene import Scene, check_scene
 
 Array = npt.NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Simulation:
     def __init__(
         self,
         robot: Robot,
-        objects: Sequence[SceneObject] = (),
+        objects: Scene = (),
         *,
         timestep: float = 1e-3,
         substeps: int = 1,

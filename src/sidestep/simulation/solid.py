@@ -10,6 +10,7 @@ import numpy.typing as npt
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
+from sidestep.mesh import mesh_model
 from sidestep.simulation.scene import SceneObject
 
 Array = npt.NDArray[np.float64]
@@ -50,20 +51,6 @@ class Solid:
     hull: coal.CollisionGeometry | None = None  # of objects: what is solid and holds it, if it has volume
 
 
-def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
-    """The triangles of a mesh for Coal: hollow, exact."""
-    model = coal.BVHModelOBBRSS()
-    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for vertex in np.asarray(mesh.vertices, dtype=float):
-        vertices.append(vertex)
-    for a, b, c in np.asarray(mesh.faces).tolist():
-        triangles.append(coal.Triangle(a, b, c))
-    model.beginModel(len(triangles), len(vertices))
-    model.addSubModel(vertices, triangles)
-    model.endModel()
-    return model
-
-
 def hull_model(points: Array) -> coal.Convex | None:
     """The convex hull of points (N, 3) for Coal: solid; None where they have no volume."""
     try:
@@ -94,7 +81,11 @@ def object_solid(item: SceneObject) -> Solid:
     if item.kind == "sphere":
         point = coal.Sphere(POINT_RADIUS)
         return Solid(item.name, point, item.size[0], None, origin, bound, point)
-    shape = coal.Box(*item.size) if item.kind == "box" else coal.Cylinder(*item.size)
+    if item.kind == "plane":
+        half_space = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        return Solid(item.name, half_space, 0.0, None, origin, bound, half_space)
+    primitives = {"box": coal.Box, "cylinder": coal.Cylinder, "capsule": coal.Capsule}
+    shape = primitives[item.kind](*item.size)
     return Solid(item.name, shape, 0.0, None, origin, bound, shape)
 
 

@@ -13,6 +13,8 @@ from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
+SAME_DIRECTION = 1e-12  # of the product of two quaternions: what rounding makes of a pose that does not turn
+
 
 def travel_per_joint(robot: Robot, link: str, points: Array, *, beyond: Collection[int] = ()) -> Array:
     """Bound (nv,) on how far points (N, 3) of a link, in its frame, move per unit of each joint coordinate, at
@@ -52,9 +54,15 @@ def travel_per_joint(robot: Robot, link: str, points: Array, *, beyond: Collecti
 
 def object_travel(poses: Array, radius: float) -> Array:
     """Bound (T - 1,) on the travel of any point of an object between samples: shift plus angle times
-    radius."""
-    shift = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+    radius. A half-space, of infinite radius, has to keep its direction."""
+    shift: Array = np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
     overlap = np.abs(np.einsum("ij,ij->i", poses[1:, 3:], poses[:-1, 3:]))
+    if not np.isfinite(radius):
+        if (overlap < 1.0 - SAME_DIRECTION).any():
+            raise ValueError(
+                "a plane turns between samples; clearance along a motion needs one that does not"
+            )
+        return shift
     turned: Array = shift + radius * 2.0 * np.arccos(np.clip(overlap, 0.0, 1.0))
     return turned
 

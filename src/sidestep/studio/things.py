@@ -97,12 +97,12 @@ class Thing:
     def seen(self, *, bare: bool) -> tuple[Array, Array]:
         """Points (n, 3) in its frame [m] and radii (n,) [m] that the controller is told of, as in `sidestep run`.
 
-        Balls are told as they are; other shapes as balls on the surface that leave no gap. With `bare`, as the scenario
-        file asks by `points`.
+        Balls are told as they are; other shapes as balls that cover the surface without a gap. With `bare`, as the
+        scenario file asks by `points`.
         """
         if self.cloud is None:
             view = self._bare_view if bare else self._full_view
-            return view.points, np.full(len(view.points), view.radius)
+            return view.points, view.radii
         has_size = not bare or self.obstacle.points == "ball"
         return self.cloud, np.full(
             len(self.cloud), float(self.obstacle.shape.radius or 0.0) if has_size else 0.0

@@ -40,6 +40,7 @@ class TripleBuffer {
 
   /// What the reader has, without taking over a newer one; its to change.
   T& current() noexcept { return slots_[current_]; }
+  const T& current() const noexcept { return slots_[current_]; }
 
   /// The newest value; valid until the next call.
   const T& get() noexcept {

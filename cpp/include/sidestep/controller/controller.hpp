@@ -76,6 +76,8 @@ class Controller {
 
   /// Of the last step.
   const Command& command() const noexcept;
+  /// What the last step saw; its name_of(command().point) is the name of what is nearest. For the thread of `step`.
+  const Obstacles& obstacles() const noexcept;
   /// One sentence: what the last command does and why, and what to do about it. For the thread of `step`; allocates.
   std::string explain() const;
 

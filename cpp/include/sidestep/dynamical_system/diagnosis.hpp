@@ -4,6 +4,7 @@
 #include <string>
 
 #include "sidestep/embedding/embedding.hpp"
+#include "sidestep/obstacles/obstacles.hpp"
 
 namespace sidestep {
 
@@ -60,8 +61,8 @@ struct Diagnosis {
   /// How far the goal is, for example "0.31 rad" or "12 mm".
   std::string way_left() const;
 
-  /// In one English sentence, given the label of the dominating coordinate.
-  std::string describe(const CoordinateLabel& label) const;
+  /// In one English sentence, given the label of the dominating coordinate and, for their names, the obstacles of the step.
+  std::string describe(const CoordinateLabel& label, const Obstacles& obstacles = Obstacles::none()) const;
 
  private:
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();

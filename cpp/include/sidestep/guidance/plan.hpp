@@ -25,9 +25,10 @@ struct Obstruction {
   CoordinateLabel label;  ///< kind, link, and the other link of a pair
   int point = -1;         ///< which obstacle point; -1 for a pair or a plane
   double depth = 0.0;     ///< how far the covering ellipsoids reach into each other or into the obstacle [m]
+  std::string obstacle;   ///< what messages call the obstacle, see Obstacles::words_for; empty for a pair or a plane
 };
 
-/// For example "link 'hand' is 31 mm deep in obstacle point 12".
+/// For example "link 'hand' is 31 mm deep in 'table'".
 std::string describe(const Obstruction& obstruction);
 
 /// A path, or why there is none.

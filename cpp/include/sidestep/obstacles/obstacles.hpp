@@ -2,6 +2,11 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "sidestep/obstacles/point_tree.hpp"
 
@@ -33,6 +38,20 @@ class Obstacles {
   const Eigen::VectorXd& radii() const noexcept { return radii_; }
   const Eigen::Matrix3Xd& velocities() const noexcept { return velocities_; }
 
+  /// The same points with the names of what they belong to: the first counts[0] points to names[0], and so on; an empty
+  /// name is none. Copies share the names. Throws std::invalid_argument unless there are as many counts as names, none negative, and
+  /// together as many as points.
+  Obstacles named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const;
+
+  /// Of what belongs together, in the order of the points: its name, empty where it has none, and how many.
+  std::vector<std::pair<std::string, Eigen::Index>> groups() const;
+
+  /// Name of what a point belongs to; empty where it has none or there is no such point.
+  std::string_view name_of(Eigen::Index point) const noexcept;
+
+  /// What messages call it: "'table'" by its name, or "obstacle point 3" where it has none; "an obstacle" if there is no such point.
+  std::string words_for(Eigen::Index point) const;
+
   /// The same points in the order and under the hierarchy that queries use; built at construction.
   const PointTree& tree() const noexcept { return tree_; }
 
@@ -48,10 +67,17 @@ class Obstacles {
 
   static std::uint64_t next_version() noexcept;
 
+  /// names[k] is of the points from ends[k - 1], from 0 for the first, to before ends[k].
+  struct Names {
+    std::vector<std::string> names;
+    std::vector<Eigen::Index> ends;
+  };
+
   Eigen::Matrix3Xd points_;
   Eigen::VectorXd radii_;
   Eigen::Matrix3Xd velocities_;
   PointTree tree_;
+  std::shared_ptr<const Names> names_;
   std::uint64_t version_ = next_version();
 };
 
