@@ -131,6 +131,24 @@ def test_random_shapes_are_covered_and_not_exceeded(kind: str) -> None:
         assert (distance_outside(shape, centres) + radii).max() <= excess + ROUNDING, shape
 
 
+def inner_points(shape: Shape, rng: np.random.Generator, count: int = 4000) -> np.ndarray:
+    points = rng.uniform(*shape.mesh().bounds, (count, 3))
+    return points[distance_outside(shape, points) < 0.0]
+
+
+@pytest.mark.parametrize("kind", ["sphere", "box", "cylinder", "capsule"])
+def test_the_inside_of_a_convex_solid_is_covered_too(kind: str) -> None:
+    """Else a goal in the middle of a table, or a shape that appears around an arm, would go unseen."""
+    rng = np.random.default_rng(7)
+    sampled = 0
+    for _ in range(12):
+        shape = random_shape(kind, rng)
+        inside = inner_points(shape, rng)
+        sampled += len(inside)
+        assert len(left_out(inside, *shape.balls(0.004))) == 0, shape
+    assert sampled > 5000
+
+
 # Numbers of balls with the default excess, 2 mm: a regression in them would cost control steps.
 COUNTS = {
     "table": (Box((1.0, 0.6, 0.04)), 9000),

@@ -27,9 +27,10 @@ def obstacles_from_shapes(
     """What the controller sees of solid shapes and of points: balls, without gaps.
 
     Every point of a shape's surface lies in one of its balls, so that nothing gets nearer to the solid than to the
-    balls. There are two ways:
+    balls; nor does an arm get inside. There are two ways:
 
-    - by default, few balls inside the solid that reach out of it by at most `excess`; a sphere is one ball, exact;
+    - by default, few balls inside the solid that reach out of it by at most `excess`; a sphere is one ball, exact. Of
+      spheres, boxes, cylinders and capsules they fill the inside as well (sampled, not proven);
     - with `spacing`, balls of one `radius` around points of the surface, such that every other point of the surface is
       within `spacing` of one. They reach out of the solid by `radius`. A sphere is one ball all the same.
 

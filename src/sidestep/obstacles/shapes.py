@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sidestep._core import real_array
 from sidestep.mesh import read_mesh
-from sidestep.obstacles import ball_cover, covering
-from sidestep.obstacles.ball_cover import EXCESS
+from sidestep.obstacles import covering, mesh_cover, solid_cover
+from sidestep.obstacles.ball_cover import EXCESS, check_excess
 from sidestep.pose import about_axis, checked_pose, moved, pose_at
 
 Points = NDArray[np.float64]
@@ -89,7 +89,7 @@ class Sphere:
 
     def balls(self, excess: float = EXCESS) -> Balls:
         """The ball itself, exact."""
-        ball_cover.check_excess(excess)
+        check_excess(excess)
         return self.centre[None, :], np.array([self.radius])
 
     def mesh(self) -> trimesh.Trimesh:
@@ -204,7 +204,7 @@ class Capsule:
 
     def balls(self, excess: float = EXCESS) -> Balls:
         """A row of balls along the axis."""
-        return _moved_balls(ball_cover.capsule_balls(self.radius, self.length, excess), self.pose)
+        return _moved_balls(solid_cover.capsule_balls(self.radius, self.length, excess), self.pose)
 
     def mesh(self) -> trimesh.Trimesh:
         """Triangles with corners on the capsule: an approximation from inside."""
@@ -329,15 +329,15 @@ class MeshShape:
 
 
 # The balls of a solid in its own frame are found once: obstacles are told many times a second.
-_box_balls = lru_cache(maxsize=256)(ball_cover.box_balls)
-_plane_balls = lru_cache(maxsize=256)(ball_cover.plane_balls)
-_cylinder_balls = lru_cache(maxsize=256)(ball_cover.cylinder_balls)
+_box_balls = lru_cache(maxsize=256)(solid_cover.box_balls)
+_plane_balls = lru_cache(maxsize=256)(solid_cover.plane_balls)
+_cylinder_balls = lru_cache(maxsize=256)(solid_cover.cylinder_balls)
 
 
 @lru_cache(maxsize=64)
 def _mesh_balls(file: Path, changed: int, scale: tuple[float, float, float], excess: float) -> Balls:
     """Of a mesh file that changed last at a time [ns]."""
-    return ball_cover.mesh_balls(_scaled_mesh(file, np.array(scale)), excess)
+    return mesh_cover.mesh_balls(_scaled_mesh(file, np.array(scale)), excess)
 
 
 def _scaled_mesh(path: Path, scale: NDArray[np.float64]) -> trimesh.Trimesh:

@@ -10,8 +10,8 @@ import trimesh
 
 from sidestep._core import Obstacles
 from sidestep.obstacles import Box, Capsule, Cylinder, Plane
-from sidestep.obstacles.ball_cover import mesh_balls
 from sidestep.obstacles.covering import check_spacing, square
+from sidestep.obstacles.mesh_cover import mesh_balls
 from sidestep.obstacles.shapes import Balls
 from sidestep.pose import moved
 from sidestep.scenario.scenario import Obstacle
