@@ -9,7 +9,9 @@ import pytest
 from sidestep._core import Controller, DistanceSwitch, GeometricSystem, Obstacles
 from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
-from sidestep.scenario.assembly import assemble
+from sidestep.scenario.assembly import assemble, solids
+from sidestep.scenario.seen import seen_at, view_of
+from sidestep.simulation import SceneObject
 
 BASE = """\
 format: 1
@@ -253,3 +255,30 @@ def test_a_cloud_in_millimetres_is_scaled_and_its_holes_are_left_out(tmp_path: P
         parts = assemble(parse(text, tmp_path))
     assert isinstance(parts.seen, Obstacles)
     np.testing.assert_allclose(parts.seen.points, [[1.0, 0.1, 0.2], [0.9, 0.3, 0.2]], rtol=1e-15)
+
+
+def seen_by_a_controller(text: str) -> tuple[SceneObject, Obstacles]:
+    scenario = with_obstacle(text)
+    (item,) = scenario.obstacles
+    (thing,) = solids(scenario, item, item.name or "obstacle0")
+    return thing, seen_at((view_of(item, thing, bare=False),), 0.0)
+
+
+def test_capsules_and_planes_are_solids_and_balls_with_their_names() -> None:
+    rod, seen = seen_by_a_controller(
+        "{name: rod, shape: {type: capsule, radius: 0.05, length: 0.3}, position: [0.9, 0.1, 0.2]}"
+    )
+    assert (rod.kind, rod.size) == ("capsule", (0.05, 0.3))
+    assert seen.groups == [("rod", len(seen))]
+    np.testing.assert_allclose(seen.points[:, :2], [[0.9, 0.1]] * len(seen), atol=1e-12)
+    assert seen.radii.max() <= 0.052 + 1e-12
+    wall, seen = seen_by_a_controller(
+        "{name: wall, excess: 0.01, shape: {type: plane, extent: 1.5}, position: [0, 2, 0], rotation_deg: [90, 0, 0]}"
+    )
+    assert (wall.kind, wall.size, wall.motion) == ("plane", (1.5,), "fixed")
+    assert seen.groups == [("wall", len(seen))]
+    # its z axis is -y of the world: solid beyond y = 2, and balls reach out of it by the excess at most
+    assert (seen.points[:, 1] - seen.radii).min() == pytest.approx(1.99, abs=2e-3)
+    assert (seen.points[:, 1] - seen.radii).min() >= 1.99 - 1e-9
+    with pytest.raises(ScenarioError, match="free is true; a plane can only be fixed"):
+        with_obstacle("{name: wall, free: true, shape: {type: plane}, position: [0, 2, 0]}")

@@ -80,7 +80,11 @@ def test_every_value_of_a_file_arrives() -> None:
         ("radius: 0.05", "radius: .nan", "obstacles[0].shape.radius is nan; it must be a finite number"),
         ("radius: 0.05", "radius: 5e-2", "is '5e-2'; it must be of type number (YAML reads it as text"),
         ("radius: 0.05", "radius: 1, size: 2", "unknown key 'size' (value 2); allowed: type, radius"),
-        ("type: sphere", "type: ball", "shape.type is 'ball'; allowed: sphere, box, cylinder, mesh, points"),
+        (
+            "type: sphere",
+            "type: ball",
+            "shape.type is 'ball'; allowed: sphere, box, cylinder, capsule, plane, mesh, points",
+        ),
         ("[0.9, 0.1, 0.0]", "[0.9, 0.1]", "position is [0.9, 0.1] with 2 values; it must have at least 3"),
         ("components: 3", "components: cic", "allowed: an integer from 1, one per link name, 'aic', 'bic'"),
         ("components: 3", "components: 0", "body.components is 0; it must be at least 1"),
