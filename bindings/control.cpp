@@ -9,6 +9,7 @@
 
 #include "arguments.hpp"
 #include "module.hpp"
+#include "settings.hpp"
 #include "sidestep/control/acceleration_bounds.hpp"
 #include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/control/quadratic_program.hpp"
@@ -227,35 +228,7 @@ void bind_safety(nb::module_& m) {
                    "No larger margins than these (m,) [m] are kept: inf, or half the activation distance of a Barrier of\n"
                    "what is not seen, such as self-collision.");
 
-  const SafetySettings defaults;
-  nb::class_<SafetySettings>(
-      m, "SafetySettings",
-      "What is kept of clearances. margin [m]: the clearance that is kept, or `Clearances.margins` if less; rate [1/s]: close to the margin the closing\n"
-      "speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest\n"
-      "one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;\n"
-      "max_rows (at most 256): when more clearances are active, those are kept of which the room is smallest after a stop. Raises\n"
-      "ValueError that names the setting.")
-      .def(
-          "__init__",
-          [](SafetySettings* self, double margin, double rate, double braking_fraction, double correction,
-             int max_rows) {
-            const SafetySettings settings{margin, rate, braking_fraction, correction, max_rows};
-            settings.validate();
-            new (self) SafetySettings(settings);
-          },
-          nb::kw_only(), nb::arg("margin") = defaults.margin, nb::arg("rate") = defaults.rate,
-          nb::arg("braking_fraction") = defaults.braking_fraction, nb::arg("correction") = defaults.correction,
-          nb::arg("max_rows") = defaults.max_rows)
-      .def_ro("margin", &SafetySettings::margin)
-      .def_ro("rate", &SafetySettings::rate)
-      .def_ro("braking_fraction", &SafetySettings::braking_fraction)
-      .def_ro("correction", &SafetySettings::correction)
-      .def_ro("max_rows", &SafetySettings::max_rows)
-      .def("__repr__", [](const SafetySettings& s) {
-        return "SafetySettings(margin=" + std::to_string(s.margin) + ", rate=" + std::to_string(s.rate) +
-               ", braking_fraction=" + std::to_string(s.braking_fraction) + ", correction=" +
-               std::to_string(s.correction) + ", max_rows=" + std::to_string(s.max_rows) + ")";
-      });
+  bind_settings<SafetySettings>(m, "SafetySettings", "What every command keeps of clearances, of which the margin may be less: `Clearances.margins`.");
 }
 
 void bind_torque_controller(nb::module_& m) {

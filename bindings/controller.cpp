@@ -4,71 +4,19 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <array>
-#include <deque>
-#include <functional>
-#include <limits>
 
 #include "arguments.hpp"
 #include "dynamical_system.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
+#include "settings.hpp"
 #include "sidestep/controller/motion.hpp"
 
 namespace sidestep::python {
 namespace {
 
-std::string listed(const nb::object& names) { return nb::cast<std::string>(nb::str(", ").attr("join")(names)); }
-
-/// Sets a field from Python; refuses what is no number of its kind.
 template <class Settings>
-void set_field(Settings& settings, const Field<Settings>& field, nb::handle value) {
-  std::visit(
-      [&](auto member) {
-        using Value = std::remove_reference_t<decltype(settings.*member)>;
-        if (!nb::try_cast<Value>(value, settings.*member)) {
-          throw nb::type_error((std::string(field.name) + " is " + nb::repr(value).c_str() + ", must be a number [" +
-                                field.unit + "]").c_str());
-        }
-      },
-      field.member);
-}
-
-template <class Settings>
-nb::object get_field(const Settings& settings, const Field<Settings>& field) {
-  return std::visit([&](auto member) { return nb::cast(settings.*member); }, field.member);
-}
-
-/// What the type stubs say of a field: kept for as long as the module.
-const char* kept(std::string text) {
-  static std::deque<std::string> texts;
-  texts.push_back(std::move(text));
-  return texts.back().c_str();
-}
-
-/// A property for every field.
-template <class Settings, class Class>
-void field_properties(Class& c) {
-  for (const Field<Settings>& field : fields<Settings>()) {
-    const char* type = std::array{"float", "int", "bool", "int"}[field.member.index()];
-    const std::string name = field.name;
-    c.def_prop_rw(
-        field.name, [field](const Settings& s) { return get_field(s, field); },
-        [field](Settings& s, nb::handle value) { set_field(s, field, value); },
-        nb::for_getter(nb::sig(kept("def " + name + "(self) -> " + type))),
-        nb::for_setter(nb::sig(kept("def " + name + "(self, value: " + type + ", /) -> None"))));
-  }
-}
-
-/// A part of the settings: a struct of its own, or None for one that is left out.
-struct Part {
-  const char* name;
-  std::function<nb::object(const ControllerSettings&)> get;
-  std::function<void(ControllerSettings&, nb::handle)> set;
-};
-
-template <class Settings>
-void describe_fields(nb::list& rows, const std::string& group) {
+void describe_fields(nb::list& rows, const std::string& group, bool optional = false) {
   const Settings defaults{};
   for (const Field<Settings>& field : fields<Settings>()) {
     nb::dict row;
@@ -78,34 +26,9 @@ void describe_fields(nb::list& rows, const std::string& group) {
     row["least"] = field.least;
     row["most"] = field.most;
     row["trades"] = field.trades;
+    row["optional"] = optional;
     rows.append(row);
   }
-}
-
-/// A class with a keyword and a property for every field.
-template <class Settings>
-nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const char* doc) {
-  nb::class_<Settings> c(m, name, doc);
-  c.def("__init__", [name](Settings* self, const nb::kwargs& values) {
-    new (self) Settings();
-    for (const auto& [key, value] : values) {
-      const auto wanted = nb::cast<std::string>(key);
-      nb::list known;
-      bool found = false;
-      for (const Field<Settings>& field : fields<Settings>()) {
-        known.append(field.name);
-        if (wanted == field.name) {
-          set_field(*self, field, value);
-          found = true;
-        }
-      }
-      if (!found) {
-        throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + listed(known)).c_str());
-      }
-    }
-  }, nb::sig("def __init__(self, **values: float) -> None"));
-  field_properties<Settings>(c);
-  return c;
 }
 
 /// A part that may be left out, as a property.
@@ -116,89 +39,38 @@ void optional_part(Class& c, const char* name, std::optional<Value> Owner::*memb
       [member](Owner& s, std::optional<Value> value) { s.*member = std::move(value); }, nb::arg("value").none());
 }
 
-const std::vector<Part>& parts() {
-  const auto of = [](auto member) {
-    return std::pair{std::function<nb::object(const ControllerSettings&)>(
-                         [member](const ControllerSettings& s) { return nb::cast(s.*member); }),
-                     std::function<void(ControllerSettings&, nb::handle)>([member](ControllerSettings& s, nb::handle value) {
-                       using Value = std::remove_reference_t<decltype(s.*member)>;
-                       s.*member = nb::cast<Value>(value);
-                     })};
-  };
-  static const std::vector<Part> all = [&] {
-    std::vector<Part> result;
-    const auto add = [&](const char* name, auto member) {
-      auto [get, set] = of(member);
-      result.push_back({name, get, set});
-    };
-    add("barriers", &ControllerSettings::barriers);
-    add("safety", &ControllerSettings::safety);
-    add("arrival", &ControllerSettings::arrival);
-    add("planner", &ControllerSettings::planner);
-    add("look_ahead", &ControllerSettings::look_ahead);
-    add("local_minimum", &ControllerSettings::local_minimum);
-    return result;
-  }();
-  return all;
-}
-
 void bind_settings_tree(nb::module_& m) {
+  using S = ControllerSettings;
   bind_settings<BarrierSettings>(m, "BarrierSettings", "The spring that pulls to the goal, and the barriers that bend its way.");
   bind_settings<ArrivalSettings>(m, "ArrivalSettings", "When a goal counts as reached.");
-  auto planner = bind_settings<OnlinePlannerSettings>(m, "OnlinePlannerSettings", "The planner that runs beside the loop.");
-  planner.def_rw("search", &OnlinePlannerSettings::search).def_rw("route", &OnlinePlannerSettings::route);
+  bind_settings<OnlinePlannerSettings>(
+      m, "OnlinePlannerSettings", "The planner that runs beside the loop: how it searches, and how its paths are followed.",
+      {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "RouteSettings", &OnlinePlannerSettings::route)})
+      .def_rw("search", &OnlinePlannerSettings::search)
+      .def_rw("route", &OnlinePlannerSettings::route);
   bind_settings<EvasionSettings>(m, "LookAheadSettings", "Trajectories out of the way of what moves, see Controller.");
   bind_settings<EscapeSettings>(m, "LocalMinimumSettings", "Sub-goals where the arm is stuck and there is no path.");
 
-  nb::enum_<ControllerSettings::Output>(m, "Output", "What a controller's program solves for.")
-      .value("automatic", ControllerSettings::Output::automatic, "Torque where the arm has inertias and effort limits.")
-      .value("torque", ControllerSettings::Output::torque)
-      .value("acceleration", ControllerSettings::Output::acceleration);
+  nb::enum_<S::Output>(m, "Output", "What a controller's program solves for.")
+      .value("automatic", S::Output::automatic, "Torque where the arm has inertias and effort limits.")
+      .value("torque", S::Output::torque)
+      .value("acceleration", S::Output::acceleration);
 
-  nb::class_<ControllerSettings> c(
+  auto c = bind_settings<S>(
       m, "ControllerSettings",
-      "All settings of a Controller, see `controller_settings_fields`. Every part is on by default; `planner=None`,\n"
-      "`look_ahead=None` and `local_minimum=None` leave a part out, for comparisons.");
-  c.def("__init__", [](ControllerSettings* self, const nb::kwargs& values) {
-    new (self) ControllerSettings();
-    for (const auto& [key, value] : values) {
-      const auto wanted = nb::cast<std::string>(key);
-      nb::list known;
-      bool found = false;
-      for (const auto& field : fields<ControllerSettings>()) {
-        known.append(field.name);
-        if (wanted == field.name) {
-          set_field(*self, field, value);
-          found = true;
-        }
-      }
-      for (const Part& part : parts()) {
-        known.append(part.name);
-        if (wanted == part.name) {
-          part.set(*self, value);
-          found = true;
-        }
-      }
-      known.append("output");
-      if (wanted == "output") {
-        self->output = as_enum<ControllerSettings::Output>(value, "output");
-        found = true;
-      }
-      if (!found) {
-        throw nb::type_error(("ControllerSettings has no setting '" + wanted + "'; it has: " + listed(known)).c_str());
-      }
-    }
-    self->validate();
-  }, nb::sig("def __init__(self, **values: float | str | Output | BarrierSettings | SafetySettings | ArrivalSettings | "
-             "OnlinePlannerSettings | LookAheadSettings | LocalMinimumSettings | None) -> None"));
-  field_properties<ControllerSettings>(c);
-  c.def_rw("barriers", &ControllerSettings::barriers)
-      .def_rw("safety", &ControllerSettings::safety)
-      .def_rw("arrival", &ControllerSettings::arrival)
-      .def_rw("output", &ControllerSettings::output)
-      .def("validate", &ControllerSettings::validate,
-           "Raises ValueError that names the setting, its value and what is allowed.")
-      .def("__copy__", [](const ControllerSettings& s) { return ControllerSettings(s); });
+      "All settings of a Controller. Every part is on by default; `planner=None`, `look_ahead=None` and `local_minimum=None`\n"
+      "leave a part out, for comparisons.",
+      {part("barriers", "BarrierSettings", &S::barriers), part("safety", "SafetySettings", &S::safety),
+       part("arrival", "ArrivalSettings", &S::arrival), part("planner", "OnlinePlannerSettings | None", &S::planner),
+       part("look_ahead", "LookAheadSettings | None", &S::look_ahead),
+       part("local_minimum", "LocalMinimumSettings | None", &S::local_minimum),
+       {"output", "Output | str", [](S& s, nb::handle value) { s.output = as_enum<S::Output>(value, "output"); }}});
+  c.def_rw("barriers", &S::barriers)
+      .def_rw("safety", &S::safety)
+      .def_rw("arrival", &S::arrival)
+      .def_rw("output", &S::output)
+      .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.")
+      .def("__copy__", [](const S& s) { return S(s); });
   optional_part(c, "planner", &ControllerSettings::planner);
   optional_part(c, "look_ahead", &ControllerSettings::look_ahead);
   optional_part(c, "local_minimum", &ControllerSettings::local_minimum);
@@ -211,15 +83,16 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<BarrierSettings>(rows, "barriers.");
         describe_fields<SafetySettings>(rows, "safety.");
         describe_fields<ArrivalSettings>(rows, "arrival.");
-        describe_fields<OnlinePlannerSettings>(rows, "planner.");
-        describe_fields<PlannerSettings>(rows, "planner.search.");
-        describe_fields<RouteSettings>(rows, "planner.route.");
-        describe_fields<EvasionSettings>(rows, "look_ahead.");
-        describe_fields<EscapeSettings>(rows, "local_minimum.");
+        describe_fields<OnlinePlannerSettings>(rows, "planner.", true);
+        describe_fields<PlannerSettings>(rows, "planner.search.", true);
+        describe_fields<RouteSettings>(rows, "planner.route.", true);
+        describe_fields<EvasionSettings>(rows, "look_ahead.", true);
+        describe_fields<EscapeSettings>(rows, "local_minimum.", true);
         return rows;
       },
       nb::sig("def controller_settings_fields() -> list[dict[str, float | str]]"),
-      "Every setting of the tree: name (dotted), unit, default, least and most allowed, and what it trades.");
+      "Every setting of the tree: name (dotted), unit, default, least and most allowed, what it trades, and whether the part\n"
+      "that its name begins with is optional, so that None leaves it out.");
 }
 
 void bind_command(nb::module_& m) {

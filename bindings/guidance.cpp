@@ -12,6 +12,7 @@
 #include "arguments.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
+#include "settings.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
 #include "sidestep/guidance/guide.hpp"
 #include "sidestep/guidance/rrt_connect.hpp"
@@ -82,69 +83,9 @@ void bind_plan(nb::module_& m) {
               "[s] to look for a wider one, and to make it short.");
 }
 
-void bind_settings(nb::module_& m) {
-  nb::class_<PlannerSettings>(
-      m, "PlannerSettings",
-      "How a PathPlanner searches. floor [m]: clearance that the first path keeps; margin [m]: that a wider one would.\n"
-      "allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance\n"
-      "[m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.\n"
-      "fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees, of joints\n"
-      "that count by their reach over the mean of all. max_nodes, max_iterations, max_seconds: the budget. shortcuts:\n"
-      "attempts to shorten. Raises ValueError that names the setting at fault.")
-      .def(
-          "__init__",
-          [](PlannerSettings* self, double margin, double floor, double allowance, double pair_allowance, double slack,
-             double fade, double range, int max_nodes, int max_iterations, double max_seconds, int shortcuts) {
-            const PlannerSettings s{margin, floor,     allowance,      pair_allowance, slack,    fade,
-                                    range,  max_nodes, max_iterations, max_seconds,    shortcuts};
-            s.validate();
-            new (self) PlannerSettings(s);
-          },
-          nb::kw_only(), nb::arg("margin") = PlannerSettings{}.margin, nb::arg("floor") = PlannerSettings{}.floor,
-          nb::arg("allowance") = PlannerSettings{}.allowance,
-          nb::arg("pair_allowance") = PlannerSettings{}.pair_allowance, nb::arg("slack") = PlannerSettings{}.slack,
-          nb::arg("fade") = PlannerSettings{}.fade, nb::arg("range") = PlannerSettings{}.range,
-          nb::arg("max_nodes") = PlannerSettings{}.max_nodes,
-          nb::arg("max_iterations") = PlannerSettings{}.max_iterations,
-          nb::arg("max_seconds") = PlannerSettings{}.max_seconds, nb::arg("shortcuts") = PlannerSettings{}.shortcuts)
-      .def_ro("margin", &PlannerSettings::margin)
-      .def_ro("floor", &PlannerSettings::floor)
-      .def_ro("allowance", &PlannerSettings::allowance)
-      .def_ro("pair_allowance", &PlannerSettings::pair_allowance)
-      .def_ro("slack", &PlannerSettings::slack)
-      .def_ro("fade", &PlannerSettings::fade)
-      .def_ro("range", &PlannerSettings::range)
-      .def_ro("max_nodes", &PlannerSettings::max_nodes)
-      .def_ro("max_iterations", &PlannerSettings::max_iterations)
-      .def_ro("max_seconds", &PlannerSettings::max_seconds)
-      .def_ro("shortcuts", &PlannerSettings::shortcuts);
-
-  nb::class_<RouteSettings>(
-      m, "RouteSettings",
-      "How fast the attractor of a Guide passes a path. speed [rad/s]: fastest |dq*/dt|; speed_share: of the joints'\n"
-      "velocity limits that it may ask for; acceleration [rad/s^2]: at which it slows down ahead. wide [m]: clearance\n"
-      "from which it goes at full speed; slowest: share of the speed that is left where there is none. lead [rad]:\n"
-      "|q - q*| at which it waits for the arm. delay [s]: an arm leaves a corner by this times the change of velocity;\n"
-      "corners are passed so slowly that there is room for it. Raises ValueError that names the setting at fault.")
-      .def(
-          "__init__",
-          [](RouteSettings* self, double speed, double speed_share, double acceleration, double wide, double slowest,
-             double lead, double delay) {
-            const RouteSettings s{speed, speed_share, acceleration, wide, slowest, lead, delay};
-            s.validate();
-            new (self) RouteSettings(s);
-          },
-          nb::kw_only(), nb::arg("speed") = RouteSettings{}.speed, nb::arg("speed_share") = RouteSettings{}.speed_share,
-          nb::arg("acceleration") = RouteSettings{}.acceleration, nb::arg("wide") = RouteSettings{}.wide,
-          nb::arg("slowest") = RouteSettings{}.slowest, nb::arg("lead") = RouteSettings{}.lead,
-          nb::arg("delay") = RouteSettings{}.delay)
-      .def_ro("speed", &RouteSettings::speed)
-      .def_ro("speed_share", &RouteSettings::speed_share)
-      .def_ro("acceleration", &RouteSettings::acceleration)
-      .def_ro("wide", &RouteSettings::wide)
-      .def_ro("slowest", &RouteSettings::slowest)
-      .def_ro("lead", &RouteSettings::lead)
-      .def_ro("delay", &RouteSettings::delay);
+void bind_planner_settings(nb::module_& m) {
+  bind_settings<PlannerSettings>(m, "PlannerSettings", "How a PathPlanner searches.");
+  bind_settings<RouteSettings>(m, "RouteSettings", "How fast the attractor of a Guide passes a path.");
 }
 
 /// What Python gets from a step of a guide.
@@ -252,7 +193,7 @@ void bind_guide(nb::module_& m) {
 
 void bind_guidance(nb::module_& m) {
   bind_plan(m);
-  bind_settings(m);
+  bind_planner_settings(m);
   bind_guide(m);
 
   nb::class_<ClearanceReport>(m, "BodyClearance", "The smallest clearance of a body, and of what.")

@@ -19,6 +19,13 @@ INTRODUCTION = """# Reference
 Every public name of `sidestep`; `python docs/make_reference.py` writes this page. `help(sidestep.NAME)` has arguments,
 shapes, units, frames and errors.
 """
+SETTINGS = """
+## Settings of the controller
+
+The tree of `ControllerSettings`; units are those of turning joints, for sliding ones rad is m. `planner`, `look_ahead`
+and `local_minimum` may be None (in scenario files null), which leaves the part out. A setting without unit has "-".
+
+"""
 
 
 def first_sentence(name: str) -> str:
@@ -29,6 +36,19 @@ def first_sentence(name: str) -> str:
     paragraph = re.split(r"\n\s*\n|\n    ", text)[0]
     line = " ".join(paragraph.split())
     return re.split(r"(?<=[a-z\])])\. (?=[A-Z])", line)[0].rstrip(",;:").replace("|", r"\|")
+
+
+def settings_table() -> list[str]:
+    """The tree of the controller's settings, a row each, as the core states it."""
+    rows = ["| setting | default | unit | allowed | what it trades |\n|---|---|---|---|---|"]
+    for field in sidestep.controller_settings_fields():
+        least, most = (f"{field[end]:g}" for end in ("least", "most"))
+        allowed = "on, off" if isinstance(field["default"], bool) else f"{least} to {most}"
+        default = (
+            {True: "on", False: "off"}.get(field["default"]) if allowed == "on, off" else field["default"]
+        )
+        rows.append(f"| `{field['name']}` | {default} | {field['unit']} | {allowed} | {field['trades']} |")
+    return rows
 
 
 def page() -> str:
@@ -44,6 +64,7 @@ def page() -> str:
         parts.append(f"\n## {HEADING.get(module, module.replace('_', ' ').capitalize())}\n")
         parts.append("| name | what it is |\n|---|---|")
         parts += [f"| `{name}` | {first_sentence(name)} |" for name in sorted(members)]
+    parts.append(SETTINGS + "\n".join(settings_table()))
     return "\n".join(parts) + "\n"
 
 

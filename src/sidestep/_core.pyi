@@ -1239,11 +1239,15 @@ class Clearances:
 
 class SafetySettings:
     """
-    What is kept of clearances. margin [m]: the clearance that is kept, or `Clearances.margins` if less; rate [1/s]: close to the margin the closing
-    speed is at most rate times the room left; braking_fraction [-]: the deceleration planned with over the largest
-    one that the limits allow; correction [-]: fraction of an excess of closing speed taken away per period;
-    max_rows (at most 256): when more clearances are active, those are kept of which the room is smallest after a stop. Raises
-    ValueError that names the setting.
+    What every command keeps of clearances, of which the margin may be less: `Clearances.margins`.
+
+        margin [m], default 0.005, allowed 0 to 0.5: clearance that every command keeps: covers tracking error, delay and noise of points
+        rate [1/s], default 20.0, allowed 0.5 to 200: how quickly a clearance may close on its margin: larger comes close quicker
+        braking_fraction, default 0.5, allowed 0.05 to 1: share of the hardest deceleration that is counted on
+        correction, default 0.5, allowed 0.01 to 1: share of an excess of closing speed that one period takes away
+        max_rows, default 32, allowed 1 to 256: clearances that bound one command: the most critical ones
+
+    Raises ValueError that names the setting, its value and what is allowed.
     """
 
     def __init__(self, *, margin: float = 0.005, rate: float = 20.0, braking_fraction: float = 0.5, correction: float = 0.5, max_rows: int = 32) -> None: ...
@@ -1251,19 +1255,32 @@ class SafetySettings:
     @property
     def margin(self) -> float: ...
 
+    @margin.setter
+    def margin(self, value: float, /) -> None: ...
+
     @property
     def rate(self) -> float: ...
+
+    @rate.setter
+    def rate(self, value: float, /) -> None: ...
 
     @property
     def braking_fraction(self) -> float: ...
 
+    @braking_fraction.setter
+    def braking_fraction(self, value: float, /) -> None: ...
+
     @property
     def correction(self) -> float: ...
+
+    @correction.setter
+    def correction(self, value: float, /) -> None: ...
 
     @property
     def max_rows(self) -> int: ...
 
-    def __repr__(self) -> str: ...
+    @max_rows.setter
+    def max_rows(self, value: int, /) -> None: ...
 
 class TorqueStatus(enum.Enum):
     """How a control step ended, from best to worst."""
@@ -1571,56 +1588,104 @@ class Plan:
 
 class PlannerSettings:
     """
-    How a PathPlanner searches. floor [m]: clearance that the first path keeps; margin [m]: that a wider one would.
-    allowance [m]: how deep an ellipsoid, larger than its link, may be in something at start or goal; pair_allowance
-    [m]: two in each other. slack [m]: kept everywhere is the margin less this, or less a quarter where that is more.
-    fade [m]: motion within which an end's smaller margin fades. range [rad]: longest edge of the trees, of joints
-    that count by their reach over the mean of all. max_nodes, max_iterations, max_seconds: the budget. shortcuts:
-    attempts to shorten. Raises ValueError that names the setting at fault.
+    How a PathPlanner searches.
+
+        margin [m], default 0.06, allowed 0.001 to 0.5: clearance of a wide way, which is preferred
+        floor [m], default 0.005, allowed 0.0001 to 0.5: clearance that every way keeps: smaller finds narrower ways
+        allowance [m], default 0.02, allowed 0 to 0.2: how deep an ellipsoid may be in something at start or goal
+        pair_allowance [m], default 0.02, allowed 0 to 0.2: the same of two links below their contact
+        slack [m], default 0.002, allowed 1e-05 to 0.1: what an edge may come nearer than its margin: larger is quicker
+        fade [m], default 0.3, allowed 0.01 to 10: way on which what an end may come nearer fades
+        range [rad], default 1.0, allowed 0.01 to 10: longest edge of the search trees
+        max_nodes, default 10000, allowed 2 to 1e+07: of both trees: the budget of a search
+        max_iterations, default 40000, allowed 1 to 1e+08: of a search: its budget
+        max_seconds [s], default inf, allowed 1e-09 to inf: of a search; motions then do not repeat
+        shortcuts, default 100, allowed 0 to 100000: attempts to shorten a path: more are shorter and later
+
+    Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.0, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = float('inf'), shortcuts: int = 100) -> None: ...
+    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.0, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = ..., shortcuts: int = 100) -> None: ...
 
     @property
     def margin(self) -> float: ...
 
+    @margin.setter
+    def margin(self, value: float, /) -> None: ...
+
     @property
     def floor(self) -> float: ...
+
+    @floor.setter
+    def floor(self, value: float, /) -> None: ...
 
     @property
     def allowance(self) -> float: ...
 
+    @allowance.setter
+    def allowance(self, value: float, /) -> None: ...
+
     @property
     def pair_allowance(self) -> float: ...
+
+    @pair_allowance.setter
+    def pair_allowance(self, value: float, /) -> None: ...
 
     @property
     def slack(self) -> float: ...
 
+    @slack.setter
+    def slack(self, value: float, /) -> None: ...
+
     @property
     def fade(self) -> float: ...
+
+    @fade.setter
+    def fade(self, value: float, /) -> None: ...
 
     @property
     def range(self) -> float: ...
 
+    @range.setter
+    def range(self, value: float, /) -> None: ...
+
     @property
     def max_nodes(self) -> int: ...
+
+    @max_nodes.setter
+    def max_nodes(self, value: int, /) -> None: ...
 
     @property
     def max_iterations(self) -> int: ...
 
+    @max_iterations.setter
+    def max_iterations(self, value: int, /) -> None: ...
+
     @property
     def max_seconds(self) -> float: ...
+
+    @max_seconds.setter
+    def max_seconds(self, value: float, /) -> None: ...
 
     @property
     def shortcuts(self) -> int: ...
 
+    @shortcuts.setter
+    def shortcuts(self, value: int, /) -> None: ...
+
 class RouteSettings:
     """
-    How fast the attractor of a Guide passes a path. speed [rad/s]: fastest |dq*/dt|; speed_share: of the joints'
-    velocity limits that it may ask for; acceleration [rad/s^2]: at which it slows down ahead. wide [m]: clearance
-    from which it goes at full speed; slowest: share of the speed that is left where there is none. lead [rad]:
-    |q - q*| at which it waits for the arm. delay [s]: an arm leaves a corner by this times the change of velocity;
-    corners are passed so slowly that there is room for it. Raises ValueError that names the setting at fault.
+    How fast the attractor of a Guide passes a path.
+
+        speed [rad/s], default 2.0, allowed 0.01 to 20: largest speed of the reference along the path
+        speed_share, default 0.7, allowed 0.01 to 1: of the joints' velocity limits that the reference may ask for
+        acceleration [rad/s^2], default 4.0, allowed 0.01 to 100: at which the reference slows down ahead
+        wide [m], default 0.03, allowed 0.001 to 1: clearance from which the reference goes at full speed
+        slowest, default 0.35, allowed 0.01 to 1: share of the speed that is left where there is no clearance
+        lead [rad], default 0.4, allowed 0.01 to 3: distance at which the reference waits for the arm: larger is faster and cuts corners
+        delay [s], default 0.18, allowed 0.001 to 3: by which the arm follows a corner; 1 / (e sqrt(stiffness)) of a critical spring
+
+    Raises ValueError that names the setting, its value and what is allowed.
     """
 
     def __init__(self, *, speed: float = 2.0, speed_share: float = 0.7, acceleration: float = 4.0, wide: float = 0.03, slowest: float = 0.35, lead: float = 0.4, delay: float = 0.18) -> None: ...
@@ -1628,23 +1693,44 @@ class RouteSettings:
     @property
     def speed(self) -> float: ...
 
+    @speed.setter
+    def speed(self, value: float, /) -> None: ...
+
     @property
     def speed_share(self) -> float: ...
+
+    @speed_share.setter
+    def speed_share(self, value: float, /) -> None: ...
 
     @property
     def acceleration(self) -> float: ...
 
+    @acceleration.setter
+    def acceleration(self, value: float, /) -> None: ...
+
     @property
     def wide(self) -> float: ...
+
+    @wide.setter
+    def wide(self, value: float, /) -> None: ...
 
     @property
     def slowest(self) -> float: ...
 
+    @slowest.setter
+    def slowest(self, value: float, /) -> None: ...
+
     @property
     def lead(self) -> float: ...
 
+    @lead.setter
+    def lead(self, value: float, /) -> None: ...
+
     @property
     def delay(self) -> float: ...
+
+    @delay.setter
+    def delay(self, value: float, /) -> None: ...
 
 class GuideStatus(enum.Enum):
     """What a guided motion is about."""
@@ -1976,9 +2062,25 @@ class Arm:
         """
 
 class BarrierSettings:
-    """The spring that pulls to the goal, and the barriers that bend its way."""
+    """
+    The spring that pulls to the goal, and the barriers that bend its way.
 
-    def __init__(self, **values: float) -> None: ...
+        stiffness [1/s^2], default 4.0, allowed 0.01 to 100: of the spring to the goal: larger is faster and brakes later
+        damping [1/s], default 4.0, allowed 0.1 to 50: of the spring: 2 sqrt(stiffness) does not overshoot; larger is slower
+        activation [m], default 0.1, allowed 0.01 to 1: clearance to obstacles at which barriers begin: larger turns earlier and gentler, smaller passes narrower gaps
+        strength, default 0.1, allowed 0.0001 to 10: of obstacle barriers: larger turns the motion away earlier
+        power, default 2.0, allowed 2 to 6: of all barriers: larger stays flat longer and rises steeper
+        floor [m], default 0.002, allowed 0.0001 to 0.02: clearance below which the arm counts as inside and is pushed out
+        temperature [m], default 0.002, allowed 0.0001 to 0.02: smoothing over points and ellipsoids: larger is smoother and less exact
+        limit_activation [rad], default 0.1, allowed 0.01 to 1: way to a position limit at which its barrier begins; of a sliding joint at most a twentieth of its range
+        limit_strength, default 0.02, allowed 0.0001 to 10: of position limits' barriers
+        self_activation [m], default 0.05, allowed 0.005 to 0.5: clearance between links at which their barrier begins
+        self_strength, default 0.02, allowed 0.0001 to 10: of the barriers between links
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, stiffness: float = 4.0, damping: float = 4.0, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, limit_activation: float = 0.1, limit_strength: float = 0.02, self_activation: float = 0.05, self_strength: float = 0.02) -> None: ...
 
     @property
     def stiffness(self) -> float: ...
@@ -2047,9 +2149,19 @@ class BarrierSettings:
     def self_strength(self, value: float, /) -> None: ...
 
 class ArrivalSettings:
-    """When a goal counts as reached."""
+    """
+    When a goal counts as reached.
 
-    def __init__(self, **values: float) -> None: ...
+        joint [rad], default 0.01, allowed 1e-06 to 1: largest joint error that counts as arrived
+        sliding [m], default 0.001, allowed 1e-06 to 1: the same of sliding joints
+        position [m], default 0.001, allowed 1e-06 to 1: distance from a pose goal that counts as arrived
+        rotation [rad], default 0.0087, allowed 1e-06 to 3: angle from a pose goal that counts as arrived
+        speed [rad/s], default 0.05, allowed 1e-06 to 100: largest joint speed that counts as arrived
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, joint: float = 0.01, sliding: float = 0.001, position: float = 0.001, rotation: float = 0.0087, speed: float = 0.05) -> None: ...
 
     @property
     def joint(self) -> float: ...
@@ -2082,9 +2194,17 @@ class ArrivalSettings:
     def speed(self, value: float, /) -> None: ...
 
 class OnlinePlannerSettings:
-    """The planner that runs beside the loop."""
+    """
+    The planner that runs beside the loop: how it searches, and how its paths are followed.
 
-    def __init__(self, **values: float) -> None: ...
+        period [s], default 0.02, allowed 0.001 to 10: between two looks of the planner at the scene: shorter reacts earlier
+        patience [s], default 1.0, allowed 0.05 to 60: without progress until another path is looked for
+        retry [s], default 1.0, allowed 0.05 to 600: until a failed search is repeated in the same scene
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, search: PlannerSettings = ..., route: RouteSettings = ...) -> None: ...
 
     @property
     def period(self) -> float: ...
@@ -2117,9 +2237,19 @@ class OnlinePlannerSettings:
     def route(self, arg: RouteSettings, /) -> None: ...
 
 class LookAheadSettings:
-    """Trajectories out of the way of what moves, see Controller."""
+    """
+    Trajectories out of the way of what moves, see Controller.
 
-    def __init__(self, **values: float) -> None: ...
+        horizon [s], default 2.0, allowed 0.1 to 30: how far is looked ahead: longer sees what is fast, and takes more time
+        period [s], default 0.01, allowed 0.0005 to 0.2: of the steps of predicted motions: longer is quicker and coarser
+        delay [s], default 0.1, allowed 0.005 to 5: from one look to the next, from when on what it found is followed
+        clearance [m], default 0.004, allowed -0.1 to 0.5: that a predicted motion has to keep from obstacles
+        tries, default 500, allowed 1 to 100000: trajectories that are drawn in one look
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 500) -> None: ...
 
     @property
     def horizon(self) -> float: ...
@@ -2152,9 +2282,18 @@ class LookAheadSettings:
     def tries(self, value: int, /) -> None: ...
 
 class LocalMinimumSettings:
-    """Sub-goals where the arm is stuck and there is no path."""
+    """
+    Sub-goals where the arm is stuck and there is no path.
 
-    def __init__(self, **values: float) -> None: ...
+        patience [s], default 0.6, allowed 0.05 to 60: without progress until a sub-goal is taken
+        fraction, default 0.05, allowed 0.0001 to 0.99: progress is a squared distance to the goal that falls by this share
+        leg [s], default 2.0, allowed 0.1 to 60: longest way to the first sub-goal; n times that to the n-th
+        spread [rad], default 1.7, allowed 0.01 to 20: how far each joint of the first sub-goal may be; n times that of the n-th
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 2.0, spread: float = 1.7) -> None: ...
 
     @property
     def patience(self) -> float: ...
@@ -2192,11 +2331,25 @@ class Output(enum.Enum):
 
 class ControllerSettings:
     """
-    All settings of a Controller, see `controller_settings_fields`. Every part is on by default; `planner=None`,
-    `look_ahead=None` and `local_minimum=None` leave a part out, for comparisons.
+    All settings of a Controller. Every part is on by default; `planner=None`, `look_ahead=None` and `local_minimum=None`
+    leave a part out, for comparisons.
+
+        period [s], default 0.001, allowed 0.0001 to 0.1: between two calls of step; limits and clearances hold at samples so far apart
+        position_margin [rad], default 0.0, allowed 0 to 1: by which position limits are moved inwards
+        stop_time [s], default 0.1, allowed 0.005 to 10: time constant of the damped stop
+        stop_damping, default 0.25, allowed 0.001 to 10: of a stop where the mass matrix is unusable, as a share of effort limit / velocity limit
+        torque_weight, default 1e-06, allowed 0 to 1000: price of torque against tracking: larger saves torque and sags
+        slack_weight, default 1000.0, allowed 1 to 1e+06: price of leaving velocity and acceleration limits against tracking
+        safety_weight, default 1000.0, allowed 1 to 1e+06: price of leaving clearances against that of other limits
+        obstacle_timeout [s], default inf, allowed 0.001 to inf: age from which obstacles are stale and the arm stops
+        local_activation, default True, allowed 0 to 1: barriers leave room at goals and narrow places among what rests; without it the arm creeps there
+        synchronous, default False, allowed 0 to 1: planner, look-ahead and posture search run inside step: motions repeat bit for bit, steps take longer
+        seed, default 0, allowed 0 to 1.84467e+19: of every random draw
+
+    Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, **values: float | str | Output | BarrierSettings | SafetySettings | ArrivalSettings | OnlinePlannerSettings | LookAheadSettings | LocalMinimumSettings | None) -> None: ...
+    def __init__(self, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, safety_weight: float = 1000.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
 
     @property
     def period(self) -> float: ...
@@ -2315,7 +2468,8 @@ class ControllerSettings:
 
 def controller_settings_fields() -> list[dict[str, float | str]]:
     """
-    Every setting of the tree: name (dotted), unit, default, least and most allowed, and what it trades.
+    Every setting of the tree: name (dotted), unit, default, least and most allowed, what it trades, and whether the part
+    that its name begins with is optional, so that None leaves it out.
     """
 
 class SafetyStatus(enum.IntEnum):

@@ -151,10 +151,10 @@ def test_impossible_wishes_name_the_place(old: str, new: str, message: str) -> N
 
 
 def test_numbers_of_the_look_ahead_that_do_not_go_together_are_named() -> None:
-    text = POSE.format(method="barrier", frame="tip", activation=0.12) + "evasion: {delay: 3.0}\n"
-    with pytest.raises(
-        ScenarioError, match=r"method: evasion: delay is 3\.0*, must be no longer than the horizon"
-    ):
+    text = POSE.format(method="barrier", frame="tip", activation=0.12).replace(
+        "controller: {", "controller: {look_ahead: {delay: 3.0}, "
+    )
+    with pytest.raises(ScenarioError, match=r"method: .*delay is 3\.0*, must be no longer than the horizon"):
         assemble(Scenario.from_text(text))
 
 
@@ -168,7 +168,7 @@ method: barrier
 robot: {name: planar2}
 start: {unit: rad, position: [1.0, 0.3]}
 goal: {unit: rad, position: [-1.0, 0.3]}
-barriers: {ellipsoids: 2}
+body: {ellipsoids: 2}
 obstacles:
   - {name: ball, shape: {type: sphere, radius: 0.05}, position: [1.1, 0.0, 0.0]}
 """
@@ -193,7 +193,8 @@ method: {method}
 robot: {{name: planar3}}
 start: {{unit: rad, position: [0.2, 0.3, 0.4]}}
 goal: {{frame: {frame}, position: [0.5, 0.6, 0.0], rotation_deg: [0, 0, 90]}}
-barriers: {{activation: {activation}, ellipsoids: 2}}
+body: {{ellipsoids: 2}}
+controller: {{barriers: {{activation: {activation}}}}}
 obstacles:
   - {{name: crate, shape: {{type: box, size: [0.1, 0.1, 0.1]}}, position: [-0.9, 0.0, 0.0]}}
 """
@@ -236,7 +237,7 @@ def test_a_barrier_sees_a_box_without_gaps() -> None:
             "barrier",
             "tip",
             0.001,
-            "method: controller: barriers.activation is 0.001 m, allowed: 0.01 to 1 m",
+            "controller.barriers.activation is 0.001; it must be at least 0.01",
         ),
     ],
 )

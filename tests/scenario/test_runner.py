@@ -129,7 +129,7 @@ method: {method}
 robot: {{name: planar3}}
 start: {{unit: rad, position: [0.2, 0.3, 0.4]}}
 goal: {{frame: tip, position: [{x}, 0.6, 0.0], rotation_deg: [0, 0, 90]}}
-barriers: {{ellipsoids: 2}}
+body: {{ellipsoids: 2}}
 simulation: {{mode: {mode}, duration: {duration}}}
 """
 

@@ -2,15 +2,21 @@
 
 import dataclasses
 import json
-import re
+from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
+import yaml
 
-from sidestep import Escape, Evasion, PlannerSettings, RouteSettings, SafetySettings, TorqueController
-from sidestep.scenario import Scenario, ScenarioError, schema_text, settings, shipped_scenarios
+import sidestep as ss
+from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
 from sidestep.scenario import scenario as module
+from sidestep.scenario.parts import controller_settings_of, torque_program_of
+from sidestep.scenario.settings import OPTIONAL, program_from
+from sidestep.scenario.validation import check_document
 
 BASE = """\
 format: 1
@@ -105,9 +111,42 @@ def test_every_value_of_a_file_arrives() -> None:
             "unknown key 'unit' (value 'rad'); allowed: frame, pos",
         ),
         (GOAL, POSE.replace("[1, 0.5, 0]", "[1, 0.5]"), "goal.position is [1, 0.5] with 2 values; it must"),
-        ("body:", "barriers: {flor: 1}\nbody:", "unknown key 'flor' (value 1); allowed: stiffness, damping"),
-        ("body:", "barriers: {power: 1}\nbody:", "barriers.power is 1; it must be at least 2"),
-        ("body:", "barriers: {ellipsoids: 0}\nbody:", "barriers.ellipsoids is 0; it must be at least 1"),
+        (
+            "body:",
+            "controller: {barriers: {flor: 1}}\nbody:",
+            "unknown key 'flor' (value 1); allowed: stiffness",
+        ),
+        (
+            "body:",
+            "controller: {barriers: {power: 1}}\nbody:",
+            "controller.barriers.power is 1; it must be at l",
+        ),
+        (
+            "body:",
+            "controller: {barriers: null}\nbody:",
+            "controller.barriers is None; it must be of type obj",
+        ),
+        (
+            "body:",
+            "controller: {period: 0.01}\nbody:",
+            "unknown key 'period' (value 0.01); allowed: position_m",
+        ),
+        ("body:", "controller: {local_activation: 1}\nbody:", "is 1; it must be of type boolean"),
+        ("body: {", "body: {ellipsoids: 0, ", "body.ellipsoids is 0; it must be at least 1"),
+        (
+            "body:",
+            "barriers: {floor: 0.01, ellipsoids: 2}\nbody:",
+            "has keys of release 0.1.0; write barriers as controller.barriers, barriers.ellipsoids as body.ell",
+        ),
+        ("body:", "escape: {leg: 3}\nbody:", "write escape as controller.local_minimum"),
+        ("body:", "evasion: {}\nbody:", "write evasion as controller.look_ahead"),
+        (
+            "body:",
+            "guide: {route: {speed: 1}}\nbody:",
+            "guide as controller.planner, guide.route as controller.planner.route",
+        ),
+        ("body:", "torque: {safety: {}}\nbody:", "torque as controller, torque.safety as controller.safety"),
+        ("body:", "method: guided\nbody:", "write method: guided as method: controller"),
         ("body:", "method: magic\nbody:", "allowed: written, controller, barrier, reactive"),
         (BASE, "- 1", "a scenario is a mapping of keys to values, got list"),
         (BASE, "", "a scenario is a mapping of keys to values, got NoneType"),
@@ -148,11 +187,18 @@ LAUGHS = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
         (BASE.replace("small", "!!bool maybe"), "'maybe' is no bool"),
         (BASE.replace("0.002", "1.0e-12"), "simulation.period is 1e-12 with a duration of 15.0 s, which"),
         (BASE.replace("0.002", "5.0e-324"), "at most 2000000 are allowed: a period from 7.5e-06 s"),
-        (BASE + "evasion: {period: 1.0e-12}\n", "evasion.period is 1e-12 with a horizon of 2.0 s, which"),
-        (BASE + "evasion: {horizon: 1.0e+12}\n", "takes 1e+14 steps; at most 10000 are allowed"),
         (
-            BASE + "evasion: {tries: 100000000000}\n",
-            "evasion.tries is 100000000000; it must be at most 100000",
+            BASE + "controller: {look_ahead: {period: 0.0005, horizon: 30}}\n",
+            "controller.look_ahead.period is 0.0005 with a horizon of 30.0 s, which takes 6e+04 steps; at most 1",
+        ),
+        (
+            BASE + "controller: {look_ahead: {period: 1.0e-12}}\n",
+            "controller.look_ahead.period is 1e-12; it must be at least 0.0005",
+        ),
+        (BASE + "controller: {look_ahead: {horizon: 1.0e+12}}\n", "it must be at most 30"),
+        (
+            BASE + "controller: {look_ahead: {tries: 100000000000}}\n",
+            "look_ahead.tries is 100000000000; it must be at most 100000",
         ),
         (BASE.replace("components: 3", "components: 1000000000"), "it must be at most 200"),
         (
@@ -190,16 +236,15 @@ def test_a_ball_of_points_is_refused_for_a_box() -> None:
 
 
 def test_a_pose_and_the_numbers_of_barriers_arrive_and_survive_saving(tmp_path: Path) -> None:
-    numbers = "barriers: {activation: 0.15, floor: 0.003, temperature: 0.001234567890123, ellipsoids: 2}"
+    numbers = "controller: {barriers: {activation: 0.15, floor: 0.003, temperature: 0.001234567890123}}"
     posture = POSE.replace("45]", "45], posture: {unit: deg, position: [10, 20]}")
     scenario = parse(BASE.replace(GOAL, f"{posture}\nmethod: controller\n{numbers}"))
     assert scenario.goal == module.PoseChoice(
         "tip", (1.0, 0.5, 0.0), (0.0, 0.0, 45.0), module.JointState("deg", (10.0, 20.0))
     )
     assert scenario.method == "controller"
-    assert scenario.barriers == module.BarrierChoice(
-        activation=0.15, floor=0.003, temperature=0.001234567890123, ellipsoids=2
-    )
+    barriers = {"activation": 0.15, "floor": 0.003, "temperature": 0.001234567890123}
+    assert scenario.controller == {"barriers": barriers}
     scenario.save(tmp_path / "copy.yaml")
     assert Scenario.load(tmp_path / "copy.yaml") == scenario
 
@@ -268,7 +313,6 @@ def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
         "body": module.BodyChoice(),
         "embedding": module.EmbeddingChoice(),
         "system": module.SystemChoice(),
-        "barriers": module.BarrierChoice(),
         "simulation": module.SimulationChoice(),
     }
     for key, value in parts.items():
@@ -276,69 +320,111 @@ def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
             if field.name != "switch":
                 stated = schema["properties"][key]["properties"][field.name]["default"]
                 assert stated == getattr(value, field.name), f"{key}.{field.name}"
-    nested = {
-        ("escape",): settings.EscapeChoice,
-        ("evasion",): settings.EvasionChoice,
-        ("guide", "planner"): settings.PlannerChoice,
-        ("guide", "route"): settings.RouteChoice,
-        ("torque",): settings.TorqueChoice,
-        ("torque", "safety"): settings.SafetyChoice,
-    }
-    for place, kind in nested.items():
-        part = schema
-        for name in place:
-            part = part["properties"][name]
-        plain = [field for field in dataclasses.fields(kind) if field.default is not dataclasses.MISSING]
-        numbers = {field.name: field.default for field in plain}
-        assert {name: part["properties"][name]["default"] for name in numbers} == numbers
     assert schema["properties"]["system"]["properties"]["switch"]["default"] == {"type": "none"}
     defaults = {f.name: f.default for f in dataclasses.fields(module.Obstacle)}
     for name in ("free", "points", "spacing"):
         assert schema["$defs"]["obstacle"]["properties"][name]["default"] == defaults[name]
 
 
-def core_defaults(kind: type) -> dict[str, object]:
-    """The defaults of the arguments of a class of the core, as it says them itself."""
-    (text, _, values), *_ = kind.__init__.__nb_signature__  # type: ignore[misc]
-    names = re.findall(r"(\w+): [^=,]*? = \\(\d+)", text)
-    return {name: values[int(index)] for name, index in names}
+@pytest.mark.parametrize("field", ss.controller_settings_fields(), ids=lambda field: field["name"])
+def test_the_schema_states_the_settings_of_the_core(field: dict[str, Any]) -> None:
+    part = json.loads(schema_text())["$defs"]["controller"]
+    *parts, own = field["name"].split(".")
+    if field["name"] in ("period", "synchronous"):  # of the simulation
+        assert own not in part["properties"]
+        return
+    for name in parts:
+        part = part["properties"][name]
+        assert part["additionalProperties"] is False
+    stated = part["properties"][own]
+    assert field["trades"] in stated["description"]
+    assert stated.get("default", np.inf) == field["default"]
+    if not isinstance(field["default"], bool):
+        assert stated["minimum"] == field["least"]
+        assert stated.get("maximum", np.inf) == pytest.approx(field["most"])
+    lowest: Any = (
+        field["least"] if isinstance(field["default"], float) else type(field["default"])(field["least"])
+    )
+    for name in reversed(field["name"].split(".")):
+        lowest = {name: lowest}
+    check_document({**yaml.safe_load(BASE), "controller": lowest}, file="file.yaml")
 
 
-@pytest.mark.parametrize(
-    ("choice", "kind"),
-    [
-        (settings.EscapeChoice, Escape),
-        (settings.EvasionChoice, Evasion),
-        (settings.PlannerChoice, PlannerSettings),
-        (settings.RouteChoice, RouteSettings),
-        (settings.TorqueChoice, TorqueController),
-        (settings.SafetyChoice, SafetySettings),
-    ],
-)
-def test_the_numbers_of_a_file_have_the_defaults_of_the_core(choice: type, kind: type) -> None:
-    core = core_defaults(kind)
-    own = {f.name: f.default for f in dataclasses.fields(choice) if f.default is not dataclasses.MISSING}
-    assert len(own) > 3
-    assert own == {name: core[name] for name in own}
-
-
-def test_the_numbers_beside_the_system_arrive_and_survive_saving(tmp_path: Path) -> None:
+def test_the_section_controller_is_the_settings_of_the_core(tmp_path: Path) -> None:
     text = (
         BASE
         + """
-escape: {patience: 1.5}
-evasion: {tries: 30, delay: 0.2}
-guide: {planner: {margin: 0.08, max_nodes: 500}, route: {speed: 1.25}}
-torque: {slack_weight: 50.5, safety: {margin: 0.012345678901234, max_rows: 8}}
+method: controller
+controller:
+  slack_weight: 50.5
+  stop_time: 0.1
+  local_activation: false
+  look_ahead: {tries: 30, delay: 0.2}
+  local_minimum: null
+  planner: {patience: 2, search: {margin: 0.08, max_nodes: 500}, route: {speed: 1.25}}
+  safety: {margin: 0.012345678901234, max_rows: 8}
 """
     )
     mine = Scenario.from_text(text, folder=tmp_path)
-    assert mine.escape == settings.EscapeChoice(patience=1.5)
-    assert mine.evasion == settings.EvasionChoice(tries=30, delay=0.2)
-    assert mine.guide.planner == settings.PlannerChoice(margin=0.08, max_nodes=500)
-    assert mine.guide.route == settings.RouteChoice(speed=1.25)
-    assert mine.torque.safety == settings.SafetyChoice(margin=0.012345678901234, max_rows=8)
     mine.save(tmp_path / "mine.yaml")
     assert Scenario.load(tmp_path / "mine.yaml") == mine
-    with pytest.raises(ScenarioError, match=r"escape\.fraction is 1\.5"):
-        Scenario.from_text(BASE + "\nescape: {fraction: 1.5}\n")
+    given: dict[str, Any] = {
+        "slack_weight": 50.5,
+        "local_activation": False,
+        "look_ahead.tries": 30,
+        "look_ahead.delay": 0.2,
+        "planner.patience": 2.0,
+        "planner.search.margin": 0.08,
+        "planner.search.max_nodes": 500,
+        "planner.route.speed": 1.25,
+        "safety.margin": 0.012345678901234,
+        "safety.max_rows": 8,
+        "period": 0.002,  # of the simulation
+        "synchronous": True,
+    }
+    settings = controller_settings_of(mine)
+    assert settings.local_minimum is None
+    assert settings.output.name == "acceleration"
+    for field in ss.controller_settings_fields():
+        name = str(field["name"])
+        if not name.startswith("local_minimum."):
+            assert attrgetter(name)(settings) == given.get(name, field["default"]), name
+
+
+@pytest.mark.parametrize(
+    ("method", "missing"),
+    [
+        ("controller", set()),
+        ("barrier", {"planner"}),
+        ("reactive", {"planner", "look_ahead", "local_minimum"}),
+    ],
+)
+def test_methods_are_the_controller_without_parts(method: str, missing: set[str]) -> None:
+    text = BASE + f"method: {method}\ncontroller: {{look_ahead: {{tries: 30}}}}\n"
+    settings = controller_settings_of(parse(text))
+    assert {name for name in OPTIONAL if getattr(settings, name) is None} == missing
+    if settings.look_ahead is not None:
+        assert settings.look_ahead.tries == 30
+
+
+def test_the_thesis_s_torque_program_has_the_numbers_of_the_section() -> None:
+    text = "controller: {slack_weight: 50.5, planner: null, safety: {margin: 0.02}, barriers: {power: 3}}"
+    scenario = parse(BASE + text)
+    numbers = program_from(scenario.controller)
+    safety = numbers.pop("safety")
+    assert numbers["slack_weight"] == 50.5
+    assert numbers["stop_time"] == ss.ControllerSettings().stop_time
+    assert (safety.margin, safety.rate) == (0.02, ss.SafetySettings().rate)
+    assert torque_program_of(scenario, ss.Robot.named("planar2")).num_coordinates == 2
+
+
+def test_what_python_gives_a_section_is_checked_by_the_core() -> None:
+    scenario = dataclasses.replace(parse(BASE), method="controller")
+    for section, message in (
+        ({"barrier": {}}, "has no setting 'barrier'; it has: period, "),
+        ({"safety": {"margin": -1.0}}, r"safety\S* ?margin is -1"),
+        ({"barriers": None}, "barriers is None, must be BarrierSettings"),
+        ({"stop_time": "1"}, r"stop_time is '1', must be a number \[s\]"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            controller_settings_of(dataclasses.replace(scenario, controller=section))

@@ -16,7 +16,6 @@ from sidestep import Scenario
 from sidestep.scenario import shipped_scenarios
 from sidestep.scenario.assembly import assemble
 from sidestep.scenario.scenario import (
-    BarrierChoice,
     BodyChoice,
     EmbeddingChoice,
     JointLimitChoice,
@@ -140,7 +139,7 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
         replace(mine, body=replace(mine.body, components=7)),  # not on the list
         replace(mine, body=replace(mine.body, seed=1)),
         replace(mine, embedding=replace(mine.embedding, joint_limits=None)),
-        replace(mine, torque=replace(mine.torque, stop_time=50.0)),  # out of its range
+        replace(mine, controller={**mine.controller, "stop_time": 50.0}),  # out of its range
         replace(mine, system=replace(mine.system, stiffness=50.0)),  # out of its range
     ):
         assert numbers_of(other) == (WRITTEN, {})
@@ -150,12 +149,14 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
 
 
 CLASSES = {  # of the snippet, by places in a scenario file
-    "barriers": "BarrierSettings",
-    "escape": "LocalMinimumSettings",
-    "evasion": "LookAheadSettings",
-    "guide.planner": "PlannerSettings",
-    "guide.route": "RouteSettings",
-    "torque.safety": "SafetySettings",
+    "controller.barriers": "BarrierSettings",
+    "controller.local_minimum": "LocalMinimumSettings",
+    "controller.look_ahead": "LookAheadSettings",
+    "controller.planner": "OnlinePlannerSettings",
+    "controller.planner.search": "PlannerSettings",
+    "controller.planner.route": "RouteSettings",
+    "controller.arrival": "ArrivalSettings",
+    "controller.safety": "SafetySettings",
     "system": "GeometricSystem",
     "embedding.joint_limits": "JointLimitPotential",
     "body": "fit",
@@ -188,7 +189,7 @@ def test_every_number_is_in_the_file_and_in_the_snippet(
             assert given["CollisionDensity"]["average"] == (value == "average")
         elif parameter.name == "combine":
             assert ("ss.Sum(" in code) == (value == "sum")
-        elif parameter.place == "torque":
+        elif parameter.place == "controller":
             kind = "ControllerSettings" if METHODS[name].controlled else "TorqueController"
             assert given[kind][parameter.field] == value
         elif parameter.place in CLASSES:
@@ -248,11 +249,11 @@ def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
 def test_numbers_beyond_their_sliders_are_kept_and_others_can_be_moved(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
 ) -> None:
-    stiff = replace(scenario, barriers=BarrierChoice(stiffness=50.0, ellipsoids=2))
+    stiff = replace(scenario, controller={"barriers": {"stiffness": 50.0}}, body=BodyChoice(ellipsoids=2))
     session = make_session(stiff)
     assert session.snapshot().numbers["controller"]["stiffness"] == 50.0
     kept = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="kept"), tmp_path))
-    assert kept.barriers == stiff.barriers
+    assert (kept.controller, kept.body) == (stiff.controller, stiff.body)
     moved = {**session.snapshot().numbers["controller"], "damping": 5.0}
     session.handle(m.SetNumbers("controller", moved))
     assert session.snapshot().numbers["controller"] == moved
@@ -326,7 +327,7 @@ def test_a_loaded_file_brings_its_method_a_shipped_scenario_leaves_it(
     last = session.snapshot()
     assert last.method == "reactive"
     assert last.numbers["reactive"] == {**METHODS["reactive"].defaults, **SPRING, "ellipsoids": 2}
-    assert saved.barriers.ellipsoids == 2
+    assert saved.body.ellipsoids == 2
 
 
 def test_a_pose_goal_survives_saving_and_loading(

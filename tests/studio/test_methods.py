@@ -10,19 +10,10 @@ import pytest
 from sidestep import Scenario, controller_settings_fields, presets
 from sidestep.bench.method import Method as BenchMethod
 from sidestep.scenario.scenario import (
-    BarrierChoice,
     BodyChoice,
     EmbeddingChoice,
     JointLimitChoice,
     SystemChoice,
-)
-from sidestep.scenario.settings import (
-    EscapeChoice,
-    EvasionChoice,
-    PlannerChoice,
-    RouteChoice,
-    SafetyChoice,
-    TorqueChoice,
 )
 from sidestep.studio.methods import METHODS, check_numbers
 from sidestep.studio.page.tuning import add_control, show_value, unit_for, value_of
@@ -53,13 +44,6 @@ def every_parameter() -> dict[str, Parameter]:
 @pytest.mark.parametrize(
     ("kind", "place"),
     [
-        (BarrierChoice, "barriers"),
-        (EscapeChoice, "escape"),
-        (EvasionChoice, "evasion"),
-        (PlannerChoice, "guide.planner"),
-        (RouteChoice, "guide.route"),
-        (SafetyChoice, "torque.safety"),
-        (TorqueChoice, "torque"),
         (SystemChoice, "system"),
         (EmbeddingChoice, "embedding"),
         (JointLimitChoice, "embedding.joint_limits"),
@@ -67,24 +51,35 @@ def every_parameter() -> dict[str, Parameter]:
     ],
 )
 def test_every_number_of_a_scenario_file_can_be_set(kind: type, place: str) -> None:
-    parts = {"safety", "switch", "joint_limits"}  # with numbers of their own
+    parts = {"switch", "joint_limits"}  # with numbers of their own
     constant = {"seed"}  # as docs/studio.md says
     for field in dataclasses.fields(kind):
         if field.name not in parts | constant:
             assert f"{place}.{field.name}" in every_parameter()
 
 
+def test_every_setting_of_the_controller_can_be_set() -> None:
+    constant = {"period", "synchronous", "seed", "obstacle_timeout", "planner.search.max_seconds"}
+    stated = {f"controller.{field['name']}": field for field in controller_settings_fields()}
+    found = {name: p for name, p in every_parameter().items() if name.startswith("controller.")}
+    assert set(found) == set(stated) - {f"controller.{name}" for name in constant}
+    for name, parameter in found.items():
+        assert parameter.default == stated[name]["default"]
+        assert (parameter.lower, parameter.upper) == (stated[name]["least"], stated[name]["most"])
+        assert parameter.sentence.lower() == f"{stated[name]['trades']}.".lower()
+
+
 def test_another_value_of_a_parameter_is_of_its_kind() -> None:
     known = every_parameter()
     nodes, count, kind = (
-        known["guide.planner.max_nodes"],
-        known["barriers.ellipsoids"],
+        known["controller.planner.search.max_nodes"],
+        known["body.ellipsoids"],
         known["system.damping_form"],
     )
     assert (nodes.allows(500), nodes.allows(500.5), nodes.allows(True), nodes.allows("500")) == (1, 0, 0, 0)
     assert (count.allows(None), count.allows(2), count.allows(5), count.allows(True)) == (1, 1, 0, 0)
     assert (kind.allows("metric"), kind.allows("flat")) == (True, False)
-    assert not known["barriers.stiffness"].allows(float("nan"))
+    assert not known["controller.barriers.stiffness"].allows(float("nan"))
 
 
 @pytest.mark.parametrize("name", list(METHODS))

@@ -255,7 +255,7 @@ method: controller
 robot: {name: planar2}
 start: {unit: rad, position: [-2.9, 0.0]}
 goal: {unit: rad, position: [-2.9, 0.0]}
-barriers: {ellipsoids: 2}
+body: {ellipsoids: 2}
 obstacles:
   - {name: ball, shape: {type: sphere, radius: 0.1}, position: [-0.5, -1.1, 0.0], velocity: [0, 0.5, 0]}
 simulation: {mode: torque, period: 0.002, duration: 5.0}

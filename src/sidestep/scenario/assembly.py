@@ -129,9 +129,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
     if not written:
         settings = _at("method", scenario, partial(controller_settings_of, scenario))
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
-    program = _at(
-        "torque", scenario, partial(torque_program_of, scenario.torque, robot, scenario.simulation.period)
-    )
+    program = _at("controller", scenario, partial(torque_program_of, scenario, robot))
     mover: Controller | GeometricSystem
     pose: PoseTarget | None = None
     if written:
@@ -297,7 +295,7 @@ def _mesh(path: Path, scale: float) -> trimesh.Trimesh:
 def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
     choice = scenario.body
     if scenario.method != "written":
-        return Body.cover(robot, components=scenario.barriers.ellipsoids, progress=progress)
+        return Body.cover(robot, components=choice.ellipsoids, progress=progress)
     return Body.fit(
         robot,
         components=choice.components,

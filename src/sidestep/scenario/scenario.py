@@ -13,14 +13,7 @@ from typing import Any, Literal
 
 import yaml
 
-from sidestep.scenario.settings import (
-    MAX_LOOK_STEPS,
-    EscapeChoice,
-    EvasionChoice,
-    GuideChoice,
-    TorqueChoice,
-    check_steps,
-)
+from sidestep.scenario.settings import MAX_LOOK_STEPS, Section, check_steps, section_of, value_in
 from sidestep.scenario.validation import MAX_CHARACTERS, ScenarioError, check_document, parse_yaml
 
 Vector3 = tuple[float, float, float]
@@ -76,11 +69,15 @@ class PoseChoice:
 
 @dataclass(frozen=True)
 class BodyChoice:
-    """How the Gaussian mixtures of the links are fitted."""
+    """How the Gaussian mixtures of the links are fitted; of the controller, how many ellipsoids cover each link.
+
+    ellipsoids: left out: as many as it takes.
+    """
 
     components: int | Literal["aic", "bic"] | dict[str, int] = 4
     covariance: Literal["spherical", "diagonal", "full"] = "full"
     seed: int = 0
+    ellipsoids: int | None = None
 
 
 @dataclass(frozen=True)
@@ -159,27 +156,6 @@ class SystemChoice:
 
 
 @dataclass(frozen=True)
-class BarrierChoice:
-    """Numbers of the controller's barriers, see `BarrierSettings`, and of its body.
-
-    ellipsoids: of the covering body per link; left out: as many as it takes.
-    """
-
-    stiffness: float = 4.0
-    damping: float = 4.0
-    activation: float = 0.1
-    strength: float = 0.1
-    power: float = 2.0
-    limit_activation: float = 0.1
-    limit_strength: float = 0.02
-    self_activation: float = 0.05
-    self_strength: float = 0.02
-    floor: float = 0.002
-    temperature: float = 0.002
-    ellipsoids: int | None = None
-
-
-@dataclass(frozen=True)
 class SimulationChoice:
     """How the run is simulated: mode, control period [s], longest time [s], integrator, tolerance [rad]; a pose also
     has to be reached within 1 cm."""
@@ -200,8 +176,9 @@ class Scenario:
         method: "written": body, embedding and system as this file says; in place of them the `Controller`, which sees
             the real size of the obstacles: "controller", "barrier" (without planner), "reactive" (without planner, look
             ahead and sub-goals).
-        robot, start, goal, body, obstacles, embedding, system, barriers, escape, evasion, guide, torque, simulation:
-            the parts, see their classes.
+        robot, start, goal, body, obstacles, embedding, system, simulation: the parts, see their classes.
+        controller: what differs from the defaults of `ControllerSettings`, as a mapping of its tree where None leaves a
+            part out: {"barriers": {"activation": 0.2}, "planner": None}. Method "written": of the torque program.
         description, source: what happens, and where it comes from.
         folder: what relative file names refer to; not part of the file.
     """
@@ -217,11 +194,7 @@ class Scenario:
     obstacles: tuple[Obstacle, ...] = ()
     embedding: EmbeddingChoice = field(default_factory=EmbeddingChoice)
     system: SystemChoice = field(default_factory=SystemChoice)
-    barriers: BarrierChoice = field(default_factory=BarrierChoice)
-    escape: EscapeChoice = field(default_factory=EscapeChoice)
-    evasion: EvasionChoice = field(default_factory=EvasionChoice)
-    guide: GuideChoice = field(default_factory=GuideChoice)
-    torque: TorqueChoice = field(default_factory=TorqueChoice)
+    controller: Section = field(default_factory=dict)
     simulation: SimulationChoice = field(default_factory=SimulationChoice)
     folder: Path = field(default_factory=Path.cwd, compare=False, repr=False)
 
@@ -264,7 +237,8 @@ class Scenario:
         document = parse_yaml(text, file=file)
         check_document(document, file=file)
         document.pop("format")
-        scenario: Scenario = _build(cls, document)
+        section = section_of(document.pop("controller", {}))
+        scenario: Scenario = dataclasses.replace(_build(cls, document), controller=section)
         try:
             scenario.check_steps()
         except ValueError as error:
@@ -293,9 +267,10 @@ class Scenario:
 
     def check_steps(self) -> None:
         """Raises ValueError where a run, or a look ahead in it, would take more steps than anybody waits for."""
-        run, look = self.simulation, self.evasion
+        run = self.simulation
         check_steps("simulation", run.period, "duration", run.duration, MAX_STEPS)
-        check_steps("evasion", look.period, "horizon", look.horizon, MAX_LOOK_STEPS)
+        period, horizon = (value_in(self.controller, f"look_ahead.{name}") for name in ("period", "horizon"))
+        check_steps("controller.look_ahead", period, "horizon", horizon, MAX_LOOK_STEPS)
 
     def to_document(self) -> dict[str, Any]:
         """The scenario as plain dictionaries and lists, as in the file, without what equals the default."""

@@ -1,14 +1,172 @@
-"""What a scenario file says of the parts beside the system: sub-goals, flights, guide, torque program.
+"""The section `controller` of a scenario file: the tree of `ControllerSettings`, as the core states it.
 
-Their defaults are those of the core (`Escape`, `Evasion`, `PlannerSettings`, `RouteSettings`, `TorqueController`,
-`SafetySettings`), which say what each is.
+A section is a mapping like that in a file, without what is at its default; None leaves an optional part out. Names have
+dots between their parts, as in `controller_settings_fields`, from where units, ranges, defaults and sentences come.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import copy
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeAlias
 
-MAX_LOOK_STEPS = 10_000  # of one flight, of which a look draws hundreds
+from sidestep._core import ControllerSettings, SafetySettings, controller_settings_fields
+
+Section: TypeAlias = dict[str, Any]
+
+MAX_LOOK_STEPS = 10_000  # of one predicted trajectory, of which a look draws hundreds
+ELSEWHERE = ("period", "synchronous")  # said by `simulation`, or by what runs the controller
+FIELDS: dict[str, dict[str, Any]] = {str(field["name"]): field for field in controller_settings_fields()}
+OPTIONAL = tuple(dict.fromkeys(name.partition(".")[0] for name, field in FIELDS.items() if field["optional"]))
+ABLATIONS = {  # methods that are the controller without these parts
+    "controller": (),
+    "barrier": ("planner",),
+    "reactive": OPTIONAL,
+}
+_OF_CONTROLLER_ALONE = (*ELSEWHERE, "obstacle_timeout", "local_activation", "seed")
+PROGRAM = tuple(name for name in FIELDS if "." not in name and name not in _OF_CONTROLLER_ALONE)
+
+
+def section_schema() -> dict[str, Any]:
+    """The JSON schema of the section."""
+    usual = ControllerSettings()
+    whole = _object("The settings of the Controller; of method written, those of its torque program.")
+    for name, field in FIELDS.items():
+        if name in ELSEWHERE:
+            continue
+        *parts, own = name.split(".")
+        place, thing = whole, usual
+        for part in parts:
+            thing = getattr(thing, part)
+            place = place["properties"].setdefault(part, _object(str(type(thing).__doc__).split("\n")[0]))
+        place["properties"][own] = _number(field)
+    for name in OPTIONAL:
+        whole["properties"][name]["type"] = ["object", "null"]
+        whole["properties"][name]["description"] += " null leaves it out."
+    return whole
+
+
+def _object(description: str) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "additionalProperties": False,
+        "default": {},
+        "description": description,
+        "properties": {},
+    }
+
+
+def _number(field: Mapping[str, Any]) -> dict[str, Any]:
+    default, unit = field["default"], field["unit"]
+    kind = {bool: "boolean", int: "integer", float: "number"}[type(default)]
+    schema: dict[str, Any] = {
+        "type": kind,
+        "description": f"{field['trades']}{'' if unit == '-' else f' [{unit}]'}",
+    }
+    if math.isfinite(default):
+        schema["default"] = default
+    if kind == "boolean":
+        return schema
+    exact = int if kind == "integer" else float
+    schema["minimum"] = exact(field["least"])
+    if math.isfinite(field["most"]):
+        schema["maximum"] = min(exact(field["most"]), exact(2**64 - 1))
+    return schema
+
+
+def section_of(values: Mapping[str, Any], within: str = "") -> Section:
+    """The section with these values, which the schema allows; numbers are of the kind of their defaults."""
+    section: Section = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            value = section_of(value, f"{within}{key}.")
+            if not value:
+                continue
+        elif value is not None:
+            usual = FIELDS[within + key]["default"]
+            value = type(usual)(value)
+            if value == usual:
+                continue
+        section[key] = value
+    return section
+
+
+def value_in(section: Mapping[str, Any], name: str) -> Any:
+    """The value of a setting; its default where the section does not have it, or leaves its part out."""
+    part: Any = section
+    for key in name.split("."):
+        part = part.get(key) if isinstance(part, Mapping) else None
+    return FIELDS[name]["default"] if part is None else part
+
+
+def with_values(section: Mapping[str, Any], values: Mapping[str, Any]) -> Section:
+    """The section with other values by name; parts that are left out stay out."""
+    changed: Section = copy.deepcopy(dict(section))
+    for name, value in values.items():
+        *parts, own = name.split(".")
+        place: Section | None = changed
+        for part in parts:
+            place = None if place is None else place.setdefault(part, {})
+        if place is not None:
+            place[own] = value
+    return section_of(changed)
+
+
+def left_out(section: Mapping[str, Any], method: str) -> tuple[str, ...]:
+    """The parts that the controller of a method does without."""
+    return tuple(name for name in OPTIONAL if name in ABLATIONS[method] or section.get(name, {}) is None)
+
+
+def settings_from(section: Mapping[str, Any], method: str, **elsewhere: Any) -> ControllerSettings:
+    """The settings of a method with a section, and those that are said elsewhere.
+
+    Raises:
+        ValueError: names the setting, its value and what is allowed.
+    """
+    settings: ControllerSettings = _made(
+        ControllerSettings(), {**section, **dict.fromkeys(left_out(section, method)), **elsewhere}
+    )
+    return settings
+
+
+def program_from(section: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of a `TorqueController`, but for robot and period.
+
+    Raises:
+        ValueError: names the setting, its value and what is allowed.
+    """
+    numbers = {name: value_in(section, name) for name in PROGRAM}
+    return numbers | {"safety": _made(SafetySettings(), section.get("safety", {}))}
+
+
+def _made(usual: Any, values: Mapping[str, Any]) -> Any:
+    """Settings of the class of `usual` with these values, mappings for their parts."""
+    given = {
+        key: _made(getattr(usual, key), value)
+        if isinstance(value, Mapping) and hasattr(usual, key)
+        else value
+        for key, value in values.items()
+    }
+    try:
+        return type(usual)(**given)
+    except TypeError as error:
+        raise ValueError(str(error)) from error
+
+
+def parts_of(settings: Any, within: str = "") -> Iterator[tuple[str, Any, dict[str, Any], list[str]]]:
+    """Parts before what has them: name, settings, their own numbers, and the names of their parts.
+
+    The whole is called ""; what is left out is None.
+    """
+    names = [name.removeprefix(within) for name in FIELDS if name.startswith(within)]
+    parts = list(dict.fromkeys(name.partition(".")[0] for name in names if "." in name))
+    for part in parts:
+        thing = getattr(settings, part)
+        if thing is not None:
+            yield from parts_of(thing, f"{within}{part}.")
+    own = {name: getattr(settings, name) for name in names if "." not in name}
+    yield within.removesuffix("."), settings, own, parts
 
 
 def check_steps(place: str, period: float, span: str, length: float, most: int) -> None:
@@ -18,85 +176,3 @@ def check_steps(place: str, period: float, span: str, length: float, most: int) 
             f"{place}.period is {period} with a {span} of {length} s, which takes {length / period:.3g} steps; "
             f"at most {most} are allowed: a period from {length / most:.3g} s"
         )
-
-
-@dataclass(frozen=True)
-class EscapeChoice:
-    """Numbers of the sub-goals where the arm is stuck, see `LocalMinimumSettings`."""
-
-    patience: float = 0.6
-    fraction: float = 0.05
-    leg: float = 2.0
-    spread: float = 1.7
-
-
-@dataclass(frozen=True)
-class EvasionChoice:
-    """Numbers of the look ahead where something moves, see `LookAheadSettings`."""
-
-    horizon: float = 2.0
-    period: float = 0.01
-    delay: float = 0.1
-    clearance: float = 0.004
-    tries: int = 500
-
-
-@dataclass(frozen=True)
-class PlannerChoice:
-    """How the guide searches a path, see `PlannerSettings`; its budget is in numbers that are the same everywhere."""
-
-    margin: float = 0.06
-    floor: float = 0.005
-    allowance: float = 0.02
-    pair_allowance: float = 0.02
-    slack: float = 0.002
-    fade: float = 0.3
-    range: float = 1.0
-    max_nodes: int = 10000
-    max_iterations: int = 40000
-    shortcuts: int = 100
-
-
-@dataclass(frozen=True)
-class RouteChoice:
-    """How the guide's attractor passes a path, see `RouteSettings`."""
-
-    speed: float = 2.0
-    speed_share: float = 0.7
-    acceleration: float = 4.0
-    wide: float = 0.03
-    slowest: float = 0.35
-    lead: float = 0.4
-    delay: float = 0.18
-
-
-@dataclass(frozen=True)
-class GuideChoice:
-    """The planner of the method "controller"."""
-
-    planner: PlannerChoice = field(default_factory=PlannerChoice)
-    route: RouteChoice = field(default_factory=RouteChoice)
-
-
-@dataclass(frozen=True)
-class SafetyChoice:
-    """What the torque program keeps of clearances, see `SafetySettings`."""
-
-    margin: float = 0.005
-    rate: float = 20.0
-    braking_fraction: float = 0.5
-    correction: float = 0.5
-    max_rows: int = 32
-
-
-@dataclass(frozen=True)
-class TorqueChoice:
-    """Weights and limits of the torque program, see `TorqueController`."""
-
-    torque_weight: float = 1e-6
-    slack_weight: float = 1e3
-    safety_weight: float = 1e3
-    position_margin: float = 0.0
-    stop_time: float = 0.1
-    stop_damping: float = 0.25
-    safety: SafetyChoice = field(default_factory=SafetyChoice)

@@ -7,21 +7,19 @@ import numpy as np
 from sidestep._core import Obstacles
 from sidestep.scenario.result import ScenarioResult, tolerance_units
 from sidestep.scenario.scenario import Scenario
+from sidestep.scenario.settings import OPTIONAL, left_out
 from sidestep.simulation import SimulationRun
 from sidestep.simulation.evaluation import POSE_TOLERANCE
 from sidestep.simulation.joint_words import in_words
-
-METHODS = {
-    "controller": "controller",
-    "barrier": "controller without planner",
-    "reactive": "barriers alone",
-}
 
 
 def method_in_words(scenario: Scenario) -> str:
     """How the arm is moved."""
     if scenario.method != "written":
-        return METHODS[scenario.method]
+        missing = left_out(scenario.controller, scenario.method)
+        if missing == OPTIONAL:
+            return "barriers alone"
+        return f"controller without {' and '.join(missing).replace('_', ' ')}" if missing else "controller"
     return f"as written, switch: {scenario.system.switch.type.replace('_', ' ')}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Hashable
 from functools import cache
@@ -21,6 +22,17 @@ MAX_VALUES = 50_000  # aliases written out; ten per obstacle, of which no physic
 MAX_CHARACTERS = 4_000_000
 MAX_NUMBER = 1e30  # in size: its square and cube are still numbers
 SHOWN = 100  # characters of a value in an error
+MOVED = {  # keys of release 0.1.0, and what is in their place
+    "barriers": "controller.barriers",
+    "barriers.ellipsoids": "body.ellipsoids",
+    "escape": "controller.local_minimum",
+    "evasion": "controller.look_ahead",
+    "guide": "controller.planner",
+    "guide.planner": "controller.planner.search",
+    "guide.route": "controller.planner.route",
+    "torque": "controller",
+    "torque.safety": "controller.safety",
+}
 _BASE: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C where PyYAML has it
 
 
@@ -30,8 +42,13 @@ class ScenarioError(ValueError):
 
 @cache
 def schema_text() -> str:
-    """The published JSON schema of scenario files."""
-    return (resources.files("sidestep.scenario") / "schema.json").read_text(encoding="utf-8")
+    """The published JSON schema of scenario files, with the section `controller` as the core states its settings."""
+    from sidestep.scenario.settings import section_schema
+
+    text = (resources.files("sidestep.scenario") / "schema.json").read_text(encoding="utf-8")
+    schema = json.loads(text)
+    schema["$defs"]["controller"] = section_schema()
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def parse_yaml(text: str, *, file: str) -> dict[str, Any]:
@@ -73,9 +90,20 @@ def check_document(document: dict[str, Any], *, file: str) -> None:
             raise ScenarioError(
                 f"{file}: {_dotted(place)} is {shown(value)}; at most {MAX_NUMBER:g} in size is allowed"
             )
+    moved = [f"{old} as {new}" for old, new in MOVED.items() if _has(document, old)]
+    if document.get("method") == "guided":
+        moved.append("method: guided as method: controller")
+    if moved:
+        raise ScenarioError(f"{file}: has keys of release 0.1.0; write {', '.join(moved)}")
     error = mismatch(document, schema_text())
     if error is not None:
         raise ScenarioError(f"{file}: {_explain(error)}")
+
+
+def _has(document: Any, name: str) -> bool:
+    """Whether there is something at a place, keys with dots between them."""
+    key, _, rest = name.partition(".")
+    return isinstance(document, dict) and key in document and (not rest or _has(document[key], rest))
 
 
 def shown(value: Any) -> str:

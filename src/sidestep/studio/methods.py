@@ -8,6 +8,7 @@ from typing import Any
 
 from sidestep import presets
 from sidestep.studio.parameters import (
+    ARRIVAL,
     BARRIERS,
     DENSITY,
     LOCAL_MINIMUM,
@@ -63,14 +64,14 @@ METHODS: dict[str, Method] = {
             "controller (recommended)",
             "Everything: a path that is searched beside the loop, barriers for each part of the body, each joint limit "
             "and each pair of links, a look ahead at what moves, and a program that keeps clearances and limits.",
-            (*BARRIERS, *PLANNER, *LOOK_AHEAD, *LOCAL_MINIMUM, *SAFETY, *TORQUE),
+            (*BARRIERS, *PLANNER, *LOOK_AHEAD, *LOCAL_MINIMUM, *ARRIVAL, *SAFETY, *TORQUE),
             controlled=True,
         ),
         Method(
             "barrier",
             "controller without planner",
             "The same without paths: where it is stuck it follows random sub-goals for a while.",
-            (*BARRIERS, *LOOK_AHEAD, *LOCAL_MINIMUM, *SAFETY, *TORQUE),
+            (*BARRIERS, *LOOK_AHEAD, *LOCAL_MINIMUM, *ARRIVAL, *SAFETY, *TORQUE),
             controlled=True,
         ),
         Method(
@@ -78,7 +79,7 @@ METHODS: dict[str, Method] = {
             "controller, reactive alone",
             "The same without sub-goals and look ahead: where it is stuck it stays, and it yields straight away from "
             "what comes.",
-            (*BARRIERS, *SAFETY, *TORQUE),
+            (*BARRIERS, *ARRIVAL, *SAFETY, *TORQUE),
             controlled=True,
         ),
         Method(

@@ -7,44 +7,38 @@ those that the controller itself states, of the thesis's methods those here.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from sidestep import presets
-from sidestep._core import controller_settings_fields
 from sidestep.scenario.scenario import (
-    BarrierChoice,
     BodyChoice,
     EmbeddingChoice,
     JointLimitChoice,
     Scenario,
     SystemChoice,
 )
-from sidestep.scenario.settings import (
-    EscapeChoice,
-    EvasionChoice,
-    PlannerChoice,
-    RouteChoice,
-    SafetyChoice,
-    TorqueChoice,
-)
+from sidestep.scenario.settings import FIELDS, PROGRAM, value_in, with_values
 
 Value: TypeAlias = float | int | str | None
 Numbers: TypeAlias = dict[str, Any]  # values by the names of parameters; as a file has them
 
 AROUND = 10.0  # times the default, and that part of it, are the ends of a slider, within the range
 FOLDERS = {  # on the page, by places in a scenario file
-    "barriers": "Pull and barriers",
+    "controller.barriers": "Pull and barriers",
     "system": "Pull to the goal",
     "system.switch": "Switch",
     "embedding": "Curved space",
     "embedding.joint_limits": "Curved space",
-    "escape": "Sub-goals",
-    "evasion": "Look ahead",
-    "guide.planner": "Search of paths",
-    "guide.route": "Following a path",
-    "torque": "Limits and weights",
-    "torque.safety": "Clearances of every command",
+    "controller.local_minimum": "Sub-goals",
+    "controller.look_ahead": "Look ahead",
+    "controller.planner": "Search of paths",
+    "controller.planner.search": "Search of paths",
+    "controller.planner.route": "Following a path",
+    "controller.arrival": "Arrival",
+    "controller": "Limits and weights",
+    "controller.safety": "Clearances of every command",
     "body": "Body",
 }
 
@@ -54,7 +48,7 @@ class Parameter:
     """A number of a method, or a choice.
 
     Attributes:
-        name: in `Numbers`. place: of the class in a scenario file that has it, and field: its name there.
+        name: in `Numbers`. place: of the part of a scenario file that has it, and field: its name there.
         unit: "" without one. lower, upper: the range of a number. default: as recommended, or stated in the thesis.
         sentence: what it trades.
         options: of a choice, which has no range. whole: whole numbers alone.
@@ -95,7 +89,7 @@ class Parameter:
     def allows(self, value: Any) -> bool:
         """Whether a value is in range, or among the options."""
         if self.options:
-            return value in self.options and not isinstance(value, bool)
+            return any(value == option and type(value) is type(option) for option in self.options)
         if not isinstance(value, int | float) or isinstance(value, bool):
             return False
         return self.lower <= value <= self.upper and (not self.whole or value == int(value))
@@ -104,8 +98,16 @@ class Parameter:
         """The value as a file has it."""
         return value if self.options else int(value) if self.whole else float(value)
 
+    @property
+    def setting(self) -> str:
+        """The name of a number of the controller in its tree."""
+        return f"{self.place}.{self.field}".removeprefix("controller.")
+
     def of(self, scenario: Scenario) -> Value:
         """What a scenario says; the default where it does not have the part."""
+        if self.place.partition(".")[0] == "controller":
+            stated: Value = value_in(scenario.controller, self.setting)
+            return stated
         part: Any = scenario
         for name in self.place.split("."):
             part = getattr(part, name)
@@ -116,8 +118,12 @@ class Parameter:
 
 
 def set_in(thing: Any, place: str, values: dict[str, Value]) -> Any:
-    """A dataclass with other values of the fields of the part at a place in it, names with dots between them."""
+    """A scenario with other values of the fields of the part at a place in it, names with dots between them."""
     name, _, rest = place.partition(".")
+    if name == "controller":
+        within = f"{rest}." if rest else ""
+        section = with_values(thing.controller, {f"{within}{key}": value for key, value in values.items()})
+        return dataclasses.replace(thing, controller=section)
     part = getattr(thing, name)
     inner = set_in(part, rest, values) if rest else dataclasses.replace(part, **values)
     return dataclasses.replace(thing, **{name: inner})
@@ -144,26 +150,37 @@ def _choice(
     return Parameter(field, place, field, "", 0.0, 0.0, default, sentence, options=options, **more)
 
 
-_STATED: dict[str, dict[str, Any]] = {str(entry["name"]): entry for entry in controller_settings_fields()}
+CONSTANT = ("period", "synchronous", "seed", "obstacle_timeout", "planner.search.max_seconds")  # no sliders
 
 
-def _stated(group: str, kind: type, place: str, prefix: str) -> tuple[Parameter, ...]:
-    """The numbers of a class of a file as the controller states them; group: where it has them, names with dots."""
-    make, found = _number(kind, place, prefix), []
-    for entry in dataclasses.fields(kind):
-        stated = _STATED.get(f"{group}{entry.name}")
-        if stated is not None:
-            unit = "" if stated["unit"] == "-" else stated["unit"].replace("^2", "²")
-            trades = f"{stated['trades'][0].upper()}{stated['trades'][1:]}."
-            found.append(make(entry.name, unit, stated["least"], stated["most"], trades))
+def _stated(names: Iterable[str], prefix: str = "") -> tuple[Parameter, ...]:
+    """Settings of the controller, as it states them itself."""
+    found = []
+    for setting in names:
+        if setting in CONSTANT:
+            continue
+        stated, (place, _, field) = FIELDS[setting], f"controller.{setting}".rpartition(".")
+        default, lower, upper = stated["default"], stated["least"], stated["most"]
+        name = field if field.startswith(prefix) else f"{prefix}{field}"
+        unit = "" if stated["unit"] == "-" else stated["unit"].replace("^2", "²")
+        sentence = f"{stated['trades'][0].upper()}{stated['trades'][1:]}."
+        whole, options = type(default) is int, (True, False) if isinstance(default, bool) else ()
+        found.append(
+            Parameter(name, place, field, unit, lower, upper, default, sentence, options=options, whole=whole)
+        )
     return tuple(found)
 
 
+def _part(name: str, prefix: str) -> tuple[Parameter, ...]:
+    return _stated((field for field in FIELDS if field.rpartition(".")[0] == name), prefix)
+
+
 BARRIERS: tuple[Parameter, ...] = (
-    *_stated("barriers.", BarrierChoice, "barriers", ""),
+    *_part("barriers", ""),
+    *_stated(name for name in FIELDS if "." not in name and name not in PROGRAM),
     _choice(
-        BarrierChoice,
-        "barriers",
+        BodyChoice,
+        "body",
         "ellipsoids",
         (None, 1, 2, 3, 4, 6, 8, 12),
         "Of the body per link: more fit it closer, and cost time in every step.",
@@ -171,13 +188,15 @@ BARRIERS: tuple[Parameter, ...] = (
     ),
 )
 PLANNER = (
-    *_stated("planner.search.", PlannerChoice, "guide.planner", "planner_"),
-    *_stated("planner.route.", RouteChoice, "guide.route", "route_"),
+    *_part("planner", "planner_"),
+    *_part("planner.search", "planner_"),
+    *_part("planner.route", "route_"),
 )
-LOOK_AHEAD = _stated("look_ahead.", EvasionChoice, "evasion", "evasion_")
-LOCAL_MINIMUM = _stated("local_minimum.", EscapeChoice, "escape", "escape_")
-SAFETY = _stated("safety.", SafetyChoice, "torque.safety", "safety_")
-TORQUE = _stated("", TorqueChoice, "torque", "torque_")
+LOOK_AHEAD = _part("look_ahead", "look_ahead_")
+LOCAL_MINIMUM = _part("local_minimum", "local_minimum_")
+ARRIVAL = _part("arrival", "arrival_")
+SAFETY = _part("safety", "safety_")
+TORQUE = _stated(PROGRAM, "torque_")
 
 _y = _number(SystemChoice, "system")
 

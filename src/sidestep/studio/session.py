@@ -238,7 +238,7 @@ class Session:
         """The numbers of all methods: as they are, those of the scenario for its method, and those given."""
         asked, values = numbers_of(scenario)
         numbers = {**self._numbers, asked: METHODS[asked].defaults | values}
-        ellipsoids = {"ellipsoids": scenario.barriers.ellipsoids or self._usual_ellipsoids}
+        ellipsoids = {"ellipsoids": scenario.body.ellipsoids or self._usual_ellipsoids}
         for name, method in METHODS.items():
             if method.controlled:
                 numbers[name] = numbers[name] | ellipsoids

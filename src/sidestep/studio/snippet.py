@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.scenario import RobotChoice, SwitchChoice
+from sidestep.scenario.settings import parts_of, program_from
 from sidestep.simulation.pose_aim import ENTER, POSITION_SHARE, TURN_SHARE
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
-from sidestep.studio.systems import as_file
+from sidestep.studio.systems import as_file, fit_arguments, settings_of
 
 WIDTH = 80  # [characters] that a window on the page shows
 
@@ -28,35 +30,16 @@ def python_snippet(snapshot: Snapshot) -> str:
 
 
 def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
-    barriers = dataclasses.asdict(written.barriers)
-    ellipsoids = barriers.pop("ellipsoids")
-    torque = dataclasses.asdict(written.torque)
-    parts = {
-        "barriers": ("BarrierSettings", barriers),
-        "safety": ("SafetySettings", torque.pop("safety")),
-        "search": ("PlannerSettings", dataclasses.asdict(written.guide.planner)),
-        "route": ("RouteSettings", dataclasses.asdict(written.guide.route)),
-        "look_ahead": ("LookAheadSettings", dataclasses.asdict(written.evasion)),
-        "local_minimum": ("LocalMinimumSettings", dataclasses.asdict(written.escape)),
-    }
-    left_out = {"controller": (), "barrier": ("search", "route")}.get(written.method, tuple(parts)[2:])
-    lines = [f"arm = {_arm_code(written, ellipsoids)}"]
-    for name in left_out:
-        del parts[name]
-    for name, (kind, values) in parts.items():
-        lines += _call(f"{name} = ss.{kind}", values)
-    planner = "None"
-    if "search" in parts:
-        lines += ["planner = ss.OnlinePlannerSettings()", "planner.search, planner.route = search, route"]
-        planner = "planner"
-    given = [
-        f"{name}={name if name in parts else None}"
-        for name in ("barriers", "safety", "look_ahead", "local_minimum")
-    ]
-    numbers = {"period": written.simulation.period, "output": "torque"} | torque
+    lines = [f"arm = {_arm_code(written, written.body.ellipsoids)}"]
+    for name, thing, own, parts in parts_of(settings_of(written)):
+        given = [f"{part}={part if getattr(thing, part) is not None else None}" for part in parts]
+        if not name:
+            given.append(f"output={thing.output.name!r}")
+        finite = {key: value for key, value in own.items() if math.isfinite(value)}
+        head = f"{name.rpartition('.')[2] or 'settings'} = ss.{type(thing).__name__}"
+        lines += _call(head, finite, *given)
     return [
         *lines,
-        *_call("settings = ss.ControllerSettings", numbers, *given, f"planner={planner}"),
         "controller = ss.Controller(arm, settings)",
         "",
         "# from any thread, at any time",
@@ -73,8 +56,8 @@ def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
 
 
 def _written_code(snapshot: Snapshot, written: Scenario) -> list[str]:
-    torque = dataclasses.asdict(written.torque)
-    safety = torque.pop("safety")
+    torque = program_from(written.controller)
+    safety = next(own for _, _, own, _ in parts_of(torque.pop("safety"), "safety."))
     period = f"period={written.simulation.period!r}"
     return [
         f"robot = {_robot_code(written.robot, written)}",
@@ -169,7 +152,7 @@ def _system_code(written: Scenario) -> list[str]:
         "damping_form": system.damping_form,
     }
     return [
-        *_call("body = ss.Body.fit", dataclasses.asdict(body), "robot"),
+        *_call("body = ss.Body.fit", fit_arguments(body), "robot"),
         *lines,
         f"psi = {together}",
         f"switch = {_switch_code(system.switch)}",

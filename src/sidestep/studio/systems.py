@@ -50,7 +50,11 @@ def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> S
         system = SystemChoice(switch=switch_of(method.name, numbers, len(scenario.start.position)))
         embedding = EmbeddingChoice(joint_limits=JointLimitChoice())
         written = dataclasses.replace(
-            scenario, method="written", body=BodyChoice(), embedding=embedding, system=system
+            scenario,
+            method="written",
+            body=dataclasses.replace(BodyChoice(), ellipsoids=scenario.body.ellipsoids),
+            embedding=embedding,
+            system=system,
         )
     places: dict[str, dict[str, Value]] = {}
     for parameter in method.parameters:
@@ -82,14 +86,20 @@ def switch_of(method: str, numbers: Mapping[str, Any], num_coordinates: int) -> 
 def recipe_of(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Recipe:
     """The body that a method needs."""
     written = as_file(method, numbers, scenario)
-    return Covering(written.barriers.ellipsoids) if method.controlled else written.body
+    body = written.body
+    return Covering(body.ellipsoids) if method.controlled else dataclasses.replace(body, ellipsoids=None)
 
 
 def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], None] | None = None) -> Body:
     """The body, from the cache or made now."""
     if isinstance(recipe, Covering):
         return Body.cover(robot, components=recipe.ellipsoids, progress=progress)
-    return Body.fit(robot, **dataclasses.asdict(recipe), progress=progress)
+    return Body.fit(robot, **fit_arguments(recipe), progress=progress)
+
+
+def fit_arguments(choice: BodyChoice) -> dict[str, Any]:
+    """The arguments of `Body.fit` for a body of a scenario file."""
+    return {name: value for name, value in dataclasses.asdict(choice).items() if name != "ellipsoids"}
 
 
 def settings_of(written: Scenario, *, synchronous: bool = False) -> ControllerSettings:
@@ -117,7 +127,7 @@ def build_mover(
         settings = settings_of(written, synchronous=synchronous)
         return ControllerMover(robot, Arm.from_robot(robot, body), settings, tip)
     system = written_system(written.embedding, written.system, robot, body)
-    program = torque_program_of(written.torque, robot, written.simulation.period)
+    program = torque_program_of(written, robot)
     return SystemMover(robot, system, program, tip)
 
 

@@ -175,4 +175,6 @@ def value_of(control: Any, parameter: Parameter) -> Any:
 
 def label_of(option: Any) -> str:
     """An option of a list as text."""
+    if isinstance(option, bool):
+        return "on" if option else "off"
     return AS_IT_TAKES if option is None else str(option)

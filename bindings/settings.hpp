@@ -1,0 +1,126 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "sidestep/controller/settings.hpp"
+
+// Python classes of settings structs: their keywords, properties, signature and documentation are made from `fields`.
+namespace sidestep::python {
+
+namespace nb = nanobind;
+
+/// A text that Python keeps for as long as the module.
+const char* kept(std::string text);
+
+/// "name [unit], default 0.1, 0.01 to 1: what it trades".
+std::string described(const std::string& name, const char* unit, const std::string& by_default, double least, double most,
+                      const char* trades);
+
+template <class Settings>
+nb::object get_field(const Settings& settings, const Field<Settings>& field) {
+  return std::visit([&](auto member) { return nb::cast(settings.*member); }, field.member);
+}
+
+/// Sets a field from Python; refuses what is no number of its kind.
+template <class Settings>
+void set_field(Settings& settings, const Field<Settings>& field, nb::handle value) {
+  std::visit(
+      [&](auto member) {
+        using Value = std::remove_reference_t<decltype(settings.*member)>;
+        if (!nb::try_cast<Value>(value, settings.*member)) {
+          throw nb::type_error((std::string(field.name) + " is " + nb::repr(value).c_str() + ", must be a number [" +
+                                field.unit + "]").c_str());
+        }
+      },
+      field.member);
+}
+
+/// The Python type of a field.
+template <class Settings>
+std::string type_of(const Field<Settings>& field) {
+  return std::array{"float", "int", "bool", "int"}[field.member.index()];
+}
+
+/// A member that is no number: settings of their own, or a choice.
+template <class Settings>
+struct Part {
+  std::string name, type;
+  std::function<void(Settings&, nb::handle)> set;
+};
+
+/// A part that is a class of its own, perhaps one that may be left out; type: of Python.
+template <class Settings, class Value>
+Part<Settings> part(const char* name, const std::string& type, Value Settings::*member) {
+  return {name, type, [name, type, member](Settings& settings, nb::handle value) {
+            if (!nb::try_cast<Value>(value, settings.*member)) {
+              throw nb::type_error((std::string(name) + " is " + nb::repr(value).c_str() + ", must be " + type).c_str());
+            }
+          }};
+}
+
+/// A class with a keyword and a property for every field, and a keyword for every part.
+template <class Settings>
+nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::string& summary,
+                                   std::vector<Part<Settings>> parts = {}) {
+  std::string keywords, text = summary + "\n";
+  const Settings defaults{};
+  for (const Field<Settings>& field : fields<Settings>()) {
+    const std::string by_default = nb::repr(get_field(defaults, field)).c_str();
+    const bool literal = std::isfinite(value_of(field, defaults));
+    keywords += std::string(", ") + field.name + ": " + type_of(field) + " = " + (literal ? by_default : "...");
+    text += "\n" + described(field.name, field.unit, by_default, field.least, field.most, field.trades);
+  }
+  for (const Part<Settings>& each : parts) {
+    keywords += ", " + each.name + ": " + each.type + " = ...";
+  }
+  nb::class_<Settings> c(m, name, kept(text + "\n\nRaises ValueError that names the setting, its value and what is allowed."));
+  c.def("__init__", [name, parts](Settings* self, const nb::kwargs& values) {
+    new (self) Settings();
+    for (const auto& [key, value] : values) {
+      const auto wanted = nb::cast<std::string>(key);
+      std::string known;
+      bool found = false;
+      for (const Field<Settings>& field : fields<Settings>()) {
+        known += (known.empty() ? "" : ", ") + std::string(field.name);
+        if (wanted == field.name) {
+          set_field(*self, field, value);
+          found = true;
+        }
+      }
+      for (const Part<Settings>& each : parts) {
+        known += ", " + each.name;
+        if (wanted == each.name) {
+          each.set(*self, value);
+          found = true;
+        }
+      }
+      if (!found) {
+        throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + known).c_str());
+      }
+    }
+    if constexpr (requires { self->validate(); }) {
+      self->validate();
+    }
+  }, nb::sig(kept("def __init__(self, *" + keywords + ") -> None")));
+  for (const Field<Settings>& field : fields<Settings>()) {
+    const std::string own = field.name;
+    c.def_prop_rw(
+        field.name, [field](const Settings& s) { return get_field(s, field); },
+        [field](Settings& s, nb::handle value) { set_field(s, field, value); },
+        nb::for_getter(nb::sig(kept("def " + own + "(self) -> " + type_of(field)))),
+        nb::for_setter(nb::sig(kept("def " + own + "(self, value: " + type_of(field) + ", /) -> None"))));
+  }
+  return c;
+}
+
+}  // namespace sidestep::python
