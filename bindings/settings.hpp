@@ -83,7 +83,10 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
   for (const Part<Settings>& each : parts) {
     keywords += ", " + each.name + ": " + each.type + " = ...";
   }
-  nb::class_<Settings> c(m, name, kept(text + "\n\nRaises ValueError that names the setting, its value and what is allowed."));
+  constexpr bool checked = requires(const Settings& settings) { settings.validate(); };
+  text += checked ? "\n\nRaises ValueError that names the setting, its value and what is allowed."
+                  : "\n\nA Controller refuses what is not allowed.";
+  nb::class_<Settings> c(m, name, kept(text));
   c.def("__init__", [name, parts](Settings* self, const nb::kwargs& values) {
     new (self) Settings();
     for (const auto& [key, value] : values) {
@@ -108,7 +111,7 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
         throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + known).c_str());
       }
     }
-    if constexpr (requires { self->validate(); }) {
+    if constexpr (checked) {
       self->validate();
     }
   }, nb::sig(kept("def __init__(self, *" + keywords + ") -> None")));

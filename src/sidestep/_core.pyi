@@ -1597,8 +1597,8 @@ class PlannerSettings:
         slack [m], default 0.002, allowed 1e-05 to 0.1: what an edge may come nearer than its margin: larger is quicker
         fade [m], default 0.3, allowed 0.01 to 10: way on which what an end may come nearer fades
         range [rad], default 1.0, allowed 0.01 to 10: longest edge of the search trees
-        max_nodes, default 10000, allowed 2 to 1e+07: of both trees: the budget of a search
-        max_iterations, default 40000, allowed 1 to 1e+08: of a search: its budget
+        max_nodes, default 10000, allowed 2 to 1e+06: of both trees: the budget of a search
+        max_iterations, default 40000, allowed 1 to 2e+09: of a search: its budget
         max_seconds [s], default inf, allowed 1e-09 to inf: of a search; motions then do not repeat
         shortcuts, default 100, allowed 0 to 100000: attempts to shorten a path: more are shorter and later
 
@@ -2077,7 +2077,7 @@ class BarrierSettings:
         self_activation [m], default 0.05, allowed 0.005 to 0.5: clearance between links at which their barrier begins
         self_strength, default 0.02, allowed 0.0001 to 10: of the barriers between links
 
-    Raises ValueError that names the setting, its value and what is allowed.
+    A Controller refuses what is not allowed.
     """
 
     def __init__(self, *, stiffness: float = 4.0, damping: float = 4.0, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, limit_activation: float = 0.1, limit_strength: float = 0.02, self_activation: float = 0.05, self_strength: float = 0.02) -> None: ...
@@ -2158,7 +2158,7 @@ class ArrivalSettings:
         rotation [rad], default 0.0087, allowed 1e-06 to 3: angle from a pose goal that counts as arrived
         speed [rad/s], default 0.05, allowed 1e-06 to 100: largest joint speed that counts as arrived
 
-    Raises ValueError that names the setting, its value and what is allowed.
+    A Controller refuses what is not allowed.
     """
 
     def __init__(self, *, joint: float = 0.01, sliding: float = 0.001, position: float = 0.001, rotation: float = 0.0087, speed: float = 0.05) -> None: ...
@@ -2201,7 +2201,7 @@ class OnlinePlannerSettings:
         patience [s], default 1.0, allowed 0.05 to 60: without progress until another path is looked for
         retry [s], default 1.0, allowed 0.05 to 600: until a failed search is repeated in the same scene
 
-    Raises ValueError that names the setting, its value and what is allowed.
+    A Controller refuses what is not allowed.
     """
 
     def __init__(self, *, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, search: PlannerSettings = ..., route: RouteSettings = ...) -> None: ...

@@ -130,10 +130,10 @@ def test_escape_leads_an_arm_out_of_a_local_minimum():
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ({"patience": 0.0}, "patience is 0.000000, must be positive"),
-        ({"spread": -1.0}, "spread is -1.000000, must be positive"),
-        ({"leg": np.nan}, "leg is nan, must be positive"),
-        ({"fraction": 1.0}, "fraction is 1.000000, must be between 0 and 1"),
+        ({"patience": 0.0}, "escape: patience is 0 s, allowed: 0.05 to 60 s"),
+        ({"spread": -1.0}, "escape: spread is -1 rad, allowed: 0.01 to 20 rad"),
+        ({"leg": np.nan}, "escape: leg is nan s, allowed: 0.1 to 60 s"),
+        ({"fraction": 1.0}, "escape: fraction is 1, allowed: 0.0001 to 0.99"),
     ],
 )
 def test_bad_settings_are_named(robot, setting, message):

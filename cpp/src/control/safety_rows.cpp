@@ -77,12 +77,21 @@ double demanded_deceleration(double room, double u, const ClosingLimits& limits,
   return std::min({at_once, returning, for_a_stop, limits.hardest});
 }
 
+template <>
+const std::vector<Field<SafetySettings>>& fields() {
+  using S = SafetySettings;
+  static const std::vector<Field<S>> all{
+      {"margin", &S::margin, "m", 0.0, 0.5, "clearance that every command keeps: covers tracking error, delay and noise of points"},
+      {"rate", &S::rate, "1/s", 0.5, 200.0, "how quickly a clearance may close on its margin: larger comes close quicker"},
+      {"braking_fraction", &S::braking_fraction, "-", 0.05, 1.0, "share of the hardest deceleration that is counted on"},
+      {"correction", &S::correction, "-", 0.01, 1.0, "share of an excess of closing speed that one period takes away"},
+      {"max_rows", &S::max_rows, "-", 1.0, 256.0, "clearances that bound one command: the most critical ones"},
+  };
+  return all;
+}
+
 void SafetySettings::validate() const {
-  require(margin >= 0.0 && margin < infinity, "safety: margin", margin, "finite and >= 0");
-  require_positive(rate, "safety: rate");
-  require(braking_fraction > 0.0 && braking_fraction <= 1.0, "safety: braking_fraction", braking_fraction, "in (0, 1]");
-  require(correction > 0.0 && correction <= 1.0, "safety: correction", correction, "in (0, 1]");
-  require(max_rows >= 0 && max_rows <= 256, "safety: max_rows", max_rows, "from 0 to 256");
+  check_fields("safety: ", *this);
 }
 
 SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)

@@ -38,11 +38,20 @@ bool arrived(const Goal& goal, ConstVectorRef q, double potential) noexcept {
 
 }  // namespace
 
+template <>
+const std::vector<Field<EscapeSettings>>& fields() {
+  using S = EscapeSettings;
+  static const std::vector<Field<S>> all{
+      {"patience", &S::patience, "s", 0.05, 60.0, "without progress until a sub-goal is taken"},
+      {"fraction", &S::fraction, "-", 1e-4, 0.99, "progress is a squared distance to the goal that falls by this share"},
+      {"leg", &S::leg, "s", 0.1, 60.0, "longest way to the first sub-goal; n times that to the n-th"},
+      {"spread", &S::spread, "rad", 0.01, 20.0, "how far each joint of the first sub-goal may be; n times that of the n-th"},
+  };
+  return all;
+}
+
 void EscapeSettings::validate() const {
-  require(patience > 0.0 && std::isfinite(patience), "escape: patience", patience, "positive and finite");
-  require(leg > 0.0 && std::isfinite(leg), "escape: leg", leg, "positive and finite");
-  require(spread > 0.0 && std::isfinite(spread), "escape: spread", spread, "positive and finite");
-  require(fraction > 0.0 && fraction < 1.0, "escape: fraction", fraction, "between 0 and 1");
+  check_fields("escape: ", *this);
 }
 
 Escape::Escape(const Robot& robot, EscapeSettings settings)

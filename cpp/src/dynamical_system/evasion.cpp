@@ -36,8 +36,6 @@ const EvasionSettings& validated(const EvasionSettings& settings) {
   return settings;
 }
 
-constexpr double most_periods = 1e5;
-constexpr int most_tries = 100'000;
 constexpr double rounding = 1e-6;
 
 int whole_periods(double duration, double period) noexcept {
@@ -52,19 +50,23 @@ AccelerationFilterSettings filter_settings(double period) {
 
 }  // namespace
 
-void EvasionSettings::validate() const {
-  const auto finite = [](double value, const char* name) {
-    require(value > 0.0 && std::isfinite(value), name, value, "positive and finite");
+template <>
+const std::vector<Field<EvasionSettings>>& fields() {
+  using S = EvasionSettings;
+  static const std::vector<Field<S>> all{
+      {"horizon", &S::horizon, "s", 0.1, 30.0, "how far is looked ahead: longer sees what is fast, and takes more time"},
+      {"period", &S::period, "s", 0.0005, 0.2, "of the steps of predicted motions: longer is quicker and coarser"},
+      {"delay", &S::delay, "s", 0.005, 5.0, "from one look to the next, from when on what it found is followed"},
+      {"clearance", &S::clearance, "m", -0.1, 0.5, "that a predicted motion has to keep from obstacles"},
+      {"tries", &S::tries, "-", 1.0, 1e5, "trajectories that are drawn in one look"},
   };
-  finite(horizon, "evasion: horizon");
-  finite(period, "evasion: period");
-  finite(delay, "evasion: delay");
+  return all;
+}
+
+void EvasionSettings::validate() const {
+  check_fields("evasion: ", *this);
   require(delay <= horizon, "evasion: delay", delay, "no longer than the horizon");
   require(period <= delay, "evasion: period", period, "no longer than the delay");
-  require(horizon <= most_periods * period, "evasion: horizon", horizon, "at most 100,000 periods");
-  require(std::isfinite(clearance), "evasion: clearance", clearance, "finite");
-  require(tries >= 1, "evasion: tries", tries, ">= 1");
-  require(tries <= most_tries, "evasion: tries", tries, "at most 100,000");
 }
 
 Evasion::Stepper::Stepper(const Robot& robot, double period) : period(period), filter(robot, filter_settings(period)) {}

@@ -34,21 +34,23 @@ double corner_speed(const Eigen::VectorXd& q, const Eigen::VectorXd& turn, doubl
 
 }  // namespace
 
-void RouteSettings::validate() const {
-  const auto positive = [](double value, const char* what) {
-    require(value > 0.0 && value < infinity, what, value, "positive and finite");
+template <>
+const std::vector<Field<RouteSettings>>& fields() {
+  using S = RouteSettings;
+  static const std::vector<Field<S>> all{
+      {"speed", &S::speed, "rad/s", 0.01, 20.0, "largest speed of the reference along the path"},
+      {"speed_share", &S::speed_share, "-", 0.01, 1.0, "of the joints' velocity limits that the reference may ask for"},
+      {"acceleration", &S::acceleration, "rad/s^2", 0.01, 100.0, "at which the reference slows down ahead"},
+      {"wide", &S::wide, "m", 0.001, 1.0, "clearance from which the reference goes at full speed"},
+      {"slowest", &S::slowest, "-", 0.01, 1.0, "share of the speed that is left where there is no clearance"},
+      {"lead", &S::lead, "rad", 0.01, 3.0, "distance at which the reference waits for the arm: larger is faster and cuts corners"},
+      {"delay", &S::delay, "s", 0.001, 3.0, "by which the arm follows a corner; 1 / (e sqrt(stiffness)) of a critical spring"},
   };
-  positive(speed, "route: speed");
-  positive(speed_share, "route: speed_share");
-  positive(acceleration, "route: acceleration");
-  positive(wide, "route: wide");
-  positive(slowest, "route: slowest");
-  positive(lead, "route: lead");
-  positive(delay, "route: delay");
-  if (slowest > 1.0 || speed_share > 1.0) {
-    throw std::invalid_argument("route: slowest is " + std::to_string(slowest) + " and speed_share " +
-                                std::to_string(speed_share) + ", shares must be at most 1");
-  }
+  return all;
+}
+
+void RouteSettings::validate() const {
+  check_fields("route: ", *this);
 }
 
 Route make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,

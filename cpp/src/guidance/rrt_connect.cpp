@@ -23,7 +23,6 @@ constexpr double around_node = 2.4;      // how far each joint of such a sample 
 constexpr double octaves = 2.5;          // of the lengths of steps from a node that was trapped, below the range
 constexpr double domain = 3.0;           // of the range: how far samples may be from a node that was trapped
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
-constexpr int most_nodes = 1'000'000;    // of a planner: the trees have room for them from the beginning
 constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
 
 double seconds() {
@@ -40,27 +39,30 @@ std::vector<Eigen::VectorXd> to_root(const SearchTree& tree, int node) {
 
 }  // namespace
 
-void PlannerSettings::validate() const {
-  const auto positive = [](double value, const char* what) {
-    require(value > 0.0, what, value, "positive");
+template <>
+const std::vector<Field<PlannerSettings>>& fields() {
+  using S = PlannerSettings;
+  static const std::vector<Field<S>> all{
+      {"margin", &S::margin, "m", 0.001, 0.5, "clearance of a wide way, which is preferred"},
+      {"floor", &S::floor, "m", 1e-4, 0.5, "clearance that every way keeps: smaller finds narrower ways"},
+      {"allowance", &S::allowance, "m", 0.0, 0.2, "how deep an ellipsoid may be in something at start or goal"},
+      {"pair_allowance", &S::pair_allowance, "m", 0.0, 0.2, "the same of two links below their contact"},
+      {"slack", &S::slack, "m", 1e-5, 0.1, "what an edge may come nearer than its margin: larger is quicker"},
+      {"fade", &S::fade, "m", 0.01, 10.0, "way on which what an end may come nearer fades"},
+      {"range", &S::range, "rad", 0.01, 10.0, "longest edge of the search trees"},
+      {"max_nodes", &S::max_nodes, "-", 2.0, 1e6, "of both trees: the budget of a search"},
+      {"max_iterations", &S::max_iterations, "-", 1.0, 2e9, "of a search: its budget"},
+      {"max_seconds", &S::max_seconds, "s", 1e-9, infinity, "of a search; motions then do not repeat"},
+      {"shortcuts", &S::shortcuts, "-", 0.0, 1e5, "attempts to shorten a path: more are shorter and later"},
   };
-  positive(slack, "planner: slack");
-  positive(fade, "planner: fade");
-  positive(range, "planner: range");
-  positive(max_seconds, "planner: max_seconds");
-  require(max_nodes >= 2 && max_nodes <= most_nodes, "planner: max_nodes", max_nodes, "from 2 to 1,000,000");
-  positive(max_iterations, "planner: max_iterations");
-  if (!(floor >= 0.0) || !(margin >= floor) || !std::isfinite(margin)) {
+  return all;
+}
+
+void PlannerSettings::validate() const {
+  check_fields("planner: ", *this);
+  if (!(margin >= floor)) {
     throw std::invalid_argument("planner: floor is " + std::to_string(floor) + " m and margin " + std::to_string(margin) +
-                                " m; 0 <= floor <= margin is needed");
-  }
-  for (const double depth : {allowance, pair_allowance}) {
-    if (!(depth >= 0.0) || !std::isfinite(depth)) {
-      throw std::invalid_argument("planner: allowance is " + std::to_string(depth) + " m, must be finite and >= 0");
-    }
-  }
-  if (shortcuts < 0) {
-    throw std::invalid_argument("planner: shortcuts is " + std::to_string(shortcuts) + ", must not be negative");
+                                " m; allowed: floor <= margin");
   }
 }
 

@@ -316,7 +316,7 @@ BOOST_AUTO_TEST_CASE(settings_of_safety_rows_are_checked) {
   BOOST_TEST(message_of([](S&) {}).empty());
   BOOST_TEST(message_of([](S& s) { s.margin = -0.01; }).find("margin is -0.01") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.rate = 0.0; }).find("rate is 0") != std::string::npos);
-  BOOST_TEST(message_of([](S& s) { s.braking_fraction = 1.5; }).find("in (0, 1]") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.braking_fraction = 1.5; }).find("allowed: 0.05 to 1") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.correction = 0.0; }).find("correction") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.max_rows = -1; }).find("max_rows") != std::string::npos);
 }

@@ -5,6 +5,7 @@
 
 #include "sidestep/control/acceleration_bounds.hpp"
 #include "sidestep/embedding/clearances.hpp"
+#include "sidestep/fields.hpp"
 #include "sidestep/kinematics/robot.hpp"
 
 namespace sidestep {
@@ -98,6 +99,8 @@ struct SafetySettings {
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;
 };
+template <>
+const std::vector<Field<SafetySettings>>& fields();
 
 /// What the torque adds to the knowledge of how hard the arm can brake: the Cholesky factor of M, and the bias.
 struct BrakingTorque {

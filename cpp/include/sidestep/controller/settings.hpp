@@ -3,13 +3,12 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <string>
-#include <variant>
 #include <vector>
 
 #include "sidestep/control/safety_rows.hpp"
 #include "sidestep/dynamical_system/escape.hpp"
 #include "sidestep/dynamical_system/evasion.hpp"
+#include "sidestep/fields.hpp"
 #include "sidestep/guidance/route.hpp"
 #include "sidestep/guidance/rrt_connect.hpp"
 
@@ -68,35 +67,9 @@ struct ControllerSettings {
   void validate() const;
 };
 
-/// One number of a settings struct: all that its users need to know.
-template <class Settings>
-struct Field {
-  const char* name;
-  std::variant<double Settings::*, int Settings::*, bool Settings::*, std::uint64_t Settings::*> member;
-  const char* unit;    ///< for example "m"; "-" for none
-  double least, most;  ///< allowed, both ends included; infinity where there is no bound
-  const char* trades;  ///< one sentence: what it is, and what larger and smaller values trade
-};
-
-/// The fields of a settings struct, in the order of its documentation. The one place where unit, range and meaning stand:
-/// `validate`, the Python classes, the schema of scenario files and the reference are made from it. Defaults are those of
-/// the struct.
-template <class Settings>
-const std::vector<Field<Settings>>& fields();
 template <> const std::vector<Field<BarrierSettings>>& fields();
 template <> const std::vector<Field<ArrivalSettings>>& fields();
-template <> const std::vector<Field<SafetySettings>>& fields();
-template <> const std::vector<Field<PlannerSettings>>& fields();
-template <> const std::vector<Field<RouteSettings>>& fields();
 template <> const std::vector<Field<OnlinePlannerSettings>>& fields();
-template <> const std::vector<Field<EvasionSettings>>& fields();
-template <> const std::vector<Field<EscapeSettings>>& fields();
 template <> const std::vector<Field<ControllerSettings>>& fields();
-
-/// The value of a field as a number.
-template <class Settings>
-double value_of(const Field<Settings>& field, const Settings& settings) {
-  return std::visit([&](auto member) { return static_cast<double>(settings.*member); }, field.member);
-}
 
 }  // namespace sidestep

@@ -7,6 +7,7 @@
 
 #include "sidestep/dynamical_system/goal.hpp"
 #include "sidestep/dynamical_system/progress_monitor.hpp"
+#include "sidestep/fields.hpp"
 #include "sidestep/kinematics/robot.hpp"
 
 namespace sidestep {
@@ -21,6 +22,8 @@ struct EscapeSettings {
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;
 };
+template <>
+const std::vector<Field<EscapeSettings>>& fields();
 
 /// Leads an arm out of local minima without a map: when it is stuck, it follows a random configuration for a while,
 /// then its goal again, as the random walks of Barraquand and Latombe (1991) do for potential fields.

@@ -12,6 +12,7 @@
 #include "sidestep/dynamical_system/flight.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/fields.hpp"
 #include "sidestep/interruption.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
@@ -28,6 +29,8 @@ struct EvasionSettings {
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;
 };
+template <>
+const std::vector<Field<EvasionSettings>>& fields();
 
 /// Leads an arm out of the way of what moves, in time: a barrier yields straight away from it, until a joint is at its
 /// limit or at its fastest, where a step aside would have let it pass.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include "sidestep/fields.hpp"
 #include "sidestep/guidance/body_clearance.hpp"
 
 namespace sidestep {
@@ -18,6 +19,8 @@ struct RouteSettings {
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
 };
+template <>
+const std::vector<Field<RouteSettings>>& fields();
 
 /// A path with the speed at which the attractor may pass every point of it: slower in narrow places, at corners, and
 /// before the end.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "sidestep/fields.hpp"
 #include "sidestep/guidance/body_clearance.hpp"
 #include "sidestep/guidance/path_smoothing.hpp"
 #include "sidestep/guidance/plan.hpp"
@@ -29,6 +30,8 @@ struct PlannerSettings {
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
 };
+template <>
+const std::vector<Field<PlannerSettings>>& fields();
 
 /// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
 /// LaValle 2000) with dynamic domains (Yershova et al. 2005). Deterministic in (start, goal, obstacles, seed) unless the time

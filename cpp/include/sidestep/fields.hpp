@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace sidestep {
+
+/// One number of a settings struct: all that its users need to know.
+template <class Settings>
+struct Field {
+  const char* name;
+  std::variant<double Settings::*, int Settings::*, bool Settings::*, std::uint64_t Settings::*> member;
+  const char* unit;    ///< for example "m"; "-" for none
+  double least, most;  ///< allowed, both ends included; infinity where there is no bound
+  const char* trades;  ///< one sentence: what it is, and what larger and smaller values trade
+};
+
+/// The fields of a settings struct, in the order of its documentation. The one place where unit, range and meaning stand:
+/// `validate`, the Python classes, the schema of scenario files and the reference are made from it. Defaults are those of
+/// the struct.
+template <class Settings>
+const std::vector<Field<Settings>>& fields();
+
+/// The value of a field as a number.
+template <class Settings>
+double value_of(const Field<Settings>& field, const Settings& settings) {
+  return std::visit([&](auto member) { return static_cast<double>(settings.*member); }, field.member);
+}
+
+/// Throws std::invalid_argument "<setting> is <value>, allowed: <least> to <most>" unless the value is in the range.
+void check_range(const std::string& setting, double value, double least, double most, const char* unit);
+
+/// The same of every field; group: what comes before its name, such as "safety: ".
+template <class Settings>
+void check_fields(const char* group, const Settings& settings) {
+  for (const Field<Settings>& field : fields<Settings>()) {
+    check_range(std::string(group) + field.name, value_of(field, settings), field.least, field.most, field.unit);
+  }
+}
+
+}  // namespace sidestep
