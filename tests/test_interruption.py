@@ -14,6 +14,8 @@ import pytest
 import sidestep as ss
 from support import planar_problems
 
+pytestmark = pytest.mark.slow
+
 LONG = {
     "rollout": "ss.rollout(system, q, 0 * q, q + 1, none, steps=20_000_000)",
     "rollout_batch": "ss.rollout_batch(system, rows[:4], 0 * rows[:4], rows[:4], none, steps=5_000_000, threads=2)",

@@ -21,6 +21,7 @@ def fr3(arm: Robot) -> ProblemGenerator:
     return ProblemGenerator(ProblemSettings(robot="fr3", seed=0, moving=0.5), robot=arm)
 
 
+@pytest.mark.slow
 def test_a_problem_depends_on_seed_and_index_alone(fr3: ProblemGenerator) -> None:
     first = fr3.problem(3)
     fr3.problem(1)
@@ -57,6 +58,7 @@ def test_what_is_promised_holds(fr3: ProblemGenerator) -> None:
             assert closest.distance >= (0.02 if closest.link == "fr3_link0" else 0.03)
 
 
+@pytest.mark.slow
 def test_the_straight_line_is_judged_between_its_ends(fr3: ProblemGenerator) -> None:
     for index in range(4):
         problem = fr3.problem(index)

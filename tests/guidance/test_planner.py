@@ -69,6 +69,7 @@ def test_an_edge_does_not_skip_a_thin_obstacle(planner: ss.PathPlanner) -> None:
     assert planner.is_edge_free(a, b, ss.Obstacles([[1.6, 0.0, 0.0]]), margin=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     importlib.util.find_spec("ompl") is None, reason="OMPL is not installed (pip install ompl)"
 )

@@ -94,6 +94,7 @@ def test_a_moving_obstacle_changes_the_equations():
         assert abs(ignored - numeric) > 0.2 * abs(numeric)
 
 
+@pytest.mark.slow
 def test_the_unswitched_system_stalls_although_a_way_exists():
     system = GeometricSystem([planar.density(thickness=planar.HIGH)], stiffness=1.0, damping=1.5)
 
@@ -164,6 +165,7 @@ def test_a_bounded_wall_only_delays_a_geodesic():
     assert height / speed < beyond - flat + 0.6 / speed < (height + 0.7) / speed
 
 
+@pytest.mark.slow
 def test_the_switch_adds_energy():
     switched = avoidance.energy(avoidance.move(BinarySwitch(0.5), duration=4.0, period=1e-4))
     assert switched.max() > 4.0 * switched[0]

@@ -8,6 +8,8 @@ import pytest
 from sidestep.reproduce import PARTS, Figure, Table, performance, torch_autograd
 from sidestep.reproduce import planar as toy
 
+pytestmark = pytest.mark.slow
+
 EXPECTED = {
     *(f"figure-{key}" for key in ("2.1", "3.1", "3.2", "3.3", "3.4", "3.5", "3.7")),
     *(f"figure-5.{n}" for n in (1, 3, 4, 5, 6, 7, 8, 9)),

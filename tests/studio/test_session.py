@@ -262,6 +262,7 @@ simulation: {mode: torque, period: 0.002, duration: 5.0}
 """  # it presses the arm against the limit of joint 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drawn", [False, True])
 @pytest.mark.parametrize("method", ["controller", "barrier", "reactive"])
 def test_an_arm_steps_out_of_the_way_of_what_comes(
