@@ -46,6 +46,7 @@ def test_03_arm_goes_around() -> None:
     assert number_after("around: smallest clearance", output) > 0.1
 
 
+@pytest.mark.slow
 def test_04_torque_control_arrives_within_limits() -> None:
     output = run("04")
     assert "reached: True" in output

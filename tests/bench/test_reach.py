@@ -37,6 +37,7 @@ def test_every_problem_is_counted_once(serial: dict[str, int]) -> None:
     json.dumps(serial, allow_nan=False)
 
 
+@pytest.mark.slow
 def test_processes_do_not_change_the_outcome(serial: dict[str, object]) -> None:
     parallel = run_bench(replace(SETTINGS, jobs=2)).to_document(failures=True)
     for document in (serial, parallel):
@@ -66,6 +67,7 @@ def test_nothing_to_run_is_refused() -> None:
         replace(SETTINGS, count=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [4, 15, 23])
 def test_a_fast_arm_minds_what_is_ahead_not_what_is_nearest(index: int) -> None:
     # At full speed a UR10 needs 0.3 m to stop. Rows of the nearest alone let it touch within 0.7 s: itself (4), or

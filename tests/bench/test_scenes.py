@@ -66,6 +66,7 @@ def test_the_report_counts_them(result: SceneResult) -> None:
     json.dumps(document, allow_nan=False)
 
 
+@pytest.mark.slow
 def test_processes_do_not_change_the_outcome(result: SceneResult) -> None:
     parallel = run_scenes(replace(SETTINGS, jobs=2), read_motion_bench_maker(PLANAR))
     for one, other in zip(result.outcomes, parallel.outcomes, strict=True):

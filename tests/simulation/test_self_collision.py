@@ -48,6 +48,7 @@ def test_what_always_touches_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
     assert SelfCollision(robot, samples=5).left_out["link1", "link3"] == "always"
 
 
+@pytest.mark.slow
 def test_the_minimum_of_a_motion_is_that_of_dense_samples(fr3: SelfCollision) -> None:
     rng = np.random.default_rng(3)
     for _ in range(3):
