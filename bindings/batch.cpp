@@ -21,30 +21,6 @@ Eigen::MatrixXd as_rows(nb::handle value, const char* name, Eigen::Index nv) {
 }  // namespace
 
 void bind_batch(nb::module_& m) {
-  nb::class_<BatchEvaluation> batch(m, "BatchEvaluation", "One step at each of N states.");
-  matrix_property(batch, "accelerations", &BatchEvaluation::accelerations, "(N, nv) [rad/s^2]");
-  matrix_property(batch, "values", &BatchEvaluation::values, "psi (N, m); NaN where the step fell back");
-  batch.def_ro("statuses", &BatchEvaluation::statuses, "One StepStatus per state.");
-
-  m.def(
-      "evaluate_batch",
-      [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goals,
-         const Obstacles& obstacles, int threads) {
-        const int nv = system.robot().num_coordinates();
-        const Eigen::MatrixXd positions = as_rows(q, "q", nv), velocities = as_rows(v, "v", nv),
-                              targets = as_rows(goals, "goals", nv);
-        const HeldObstacles held(obstacles);
-        return interruptible([&](const Interrupted& interrupted) {
-          return evaluate_batch(system, positions, velocities, targets, held, threads, interrupted);
-        });
-      },
-      nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goals"), nb::arg("obstacles"), nb::kw_only(),
-      nb::arg("threads") = 0,
-      "One step at each of N states q, v (N, nv) towards goals (N, nv), on several threads (0: one per processor).\n"
-      "A system with one embedding coordinate that is no clearance (CollisionDensity, JointLimitPotential, their Sum), with\n"
-      "neither distance switch nor speed regulator nor one-sided pull, takes eight states side by side: as single steps within\n"
-      "rounding (1e-12 relative), in a third of the time.\n"
-      "Raises ValueError on wrong shapes.");
   m.def(
       "rollout_batch",
       [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, const ArrayLike& goals,
@@ -71,8 +47,7 @@ void bind_batch(nb::module_& m) {
               "integrator: Integrator | str = 'semi_implicit_euler', filter: AccelerationFilter | None = None, "
               "threads: int = 0) -> list[Rollout]"),
       "The motions from N states q, v (N, nv) towards goals (N, nv) as `rollout` gives them, on several threads\n"
-      "(0: one per processor). Those that `evaluate_batch` would take side by side are, without a filter and but for\n"
-      "runge_kutta_4: each step is then that of `rollout` within rounding. Raises ValueError on wrong shapes.");
+      "(0: one per processor). Raises ValueError on wrong shapes.");
 }
 
 }  // namespace sidestep::python

@@ -101,31 +101,6 @@ void bind_diagnosis(nb::module_& m) {
       .def_ro("rebound", &Recovery::rebound);
 }
 
-void bind_speed_regulator(nb::module_& m) {
-  const SpeedRegulatorSettings defaults;
-  nb::class_<SpeedRegulator>(
-      m, "SpeedRegulator",
-      "Regulates the speed along a motion by an acceleration beta v, beta <= 0, which leaves the path of a geodesic as\n"
-      "it is: the smooth maximum rho of all ratios of speed to allowed speed obeys drho/dt <= rate (1 - rho)/min(rho, 1).\n"
-      "joint_fraction [-]: of the joint velocity limits that is allowed; rate [1/s]: how quickly that is approached;\n"
-      "closing_speed [m/s] and closing_slope [1/s]: the motion of the arm may shrink a clearance h by at most\n"
-      "closing_speed + closing_slope max(h, 0) per second, for what is within the reach of its barrier. Raises\n"
-      "ValueError that names the setting.")
-      .def(
-          "__init__",
-          [](SpeedRegulator* self, double joint_fraction, double rate, double closing_speed, double closing_slope) {
-            new (self) SpeedRegulator({joint_fraction, rate, closing_speed, closing_slope});
-          },
-          nb::kw_only(), nb::arg("joint_fraction") = defaults.joint_fraction, nb::arg("rate") = defaults.rate,
-          nb::arg("closing_speed") = defaults.closing_speed, nb::arg("closing_slope") = defaults.closing_slope,
-          nb::sig("def __init__(self, *, joint_fraction: float = 0.9, rate: float = 10.0, "
-                  "closing_speed: float = float('inf'), closing_slope: float = 1.0) -> None"))
-      .def_prop_ro("joint_fraction", [](const SpeedRegulator& r) { return r.settings().joint_fraction; })
-      .def_prop_ro("rate", [](const SpeedRegulator& r) { return r.settings().rate; })
-      .def_prop_ro("closing_speed", [](const SpeedRegulator& r) { return r.settings().closing_speed; })
-      .def_prop_ro("closing_slope", [](const SpeedRegulator& r) { return r.settings().closing_slope; });
-}
-
 void bind_step(nb::module_& m) {
   nb::enum_<StepStatus>(m, "StepStatus", "What a step of the system says about its result.")
       .value("ok", StepStatus::ok, "The equations hold.")
@@ -153,10 +128,6 @@ void bind_step(nb::module_& m) {
       .def_prop_ro("jacobian",
                    [](const Step& s) { return to_numpy_matrix(s.result.jacobian_transposed.transpose()); },
                    "dpsi/dq (m, nv).")
-      .def_prop_ro("speed_ratio", [](const Step& s) { return s.result.speed.ratio; },
-                   "rho of the SpeedRegulator: largest speed over the one allowed; 0 without one.")
-      .def_prop_ro("speed_drag", [](const Step& s) { return s.result.speed.drag; },
-                   "beta <= 0 [1/s] of the SpeedRegulator, which adds beta v.")
       .def_prop_ro("clearances", [](const Step& s) { return s.result.clearances; },
                    "Clearances of the coordinates that are barriers of them (m).")
       .def_prop_ro("metric", [](const Step& s) { return to_numpy_matrix(s.result.metric.matrix()); },
@@ -185,7 +156,6 @@ void bind_dynamical_system(nb::module_& m) {
              "argmin_a |a + dU|^2 / 2 + sum_k max(0, J_k a)^2 / 2: only what makes a psi rise is held back.");
   bind_switches(m);
   bind_goals(m);
-  bind_speed_regulator(m);
   bind_step(m);
 
   nb::class_<GeometricSystem> system(
@@ -197,7 +167,6 @@ void bind_dynamical_system(nb::module_& m) {
       "space.\n"
       "stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive\n"
       "semi-definite. damping_form, pull_form: a DampingForm, a PullForm, or their names. switch: None (unswitched) or one of the switches.\n"
-      "speed: a SpeedRegulator, which adds beta v to the acceleration.\n"
       "recovery: what a barrier does with an arm inside it, by default Recovery().\n"
       "Raises ValueError that names the setting at fault.");
   system
@@ -205,7 +174,7 @@ void bind_dynamical_system(nb::module_& m) {
           "__init__",
           [](GeometricSystem* self, std::vector<std::shared_ptr<const Embedding>> embeddings, const ArrayLike& stiffness,
              const ArrayLike& damping, nb::handle damping_form, nb::handle combination, nb::handle flat,
-             nb::handle pull_form, const Recovery* recovery, const SpeedRegulator* speed) {
+             nb::handle pull_form, const Recovery* recovery) {
             if (embeddings.empty() == flat.is_none()) {
               throw nb::value_error(
                   "give either embeddings, which know their robot, or an empty list and robot=... for flat space");
@@ -220,19 +189,15 @@ void bind_dynamical_system(nb::module_& m) {
             if (recovery != nullptr) {
               settings.recovery = *recovery;
             }
-            if (speed != nullptr) {
-              settings.speed = *speed;
-            }
             new (self) GeometricSystem(robot, std::move(embeddings), std::move(settings));
           },
           nb::arg("embeddings"), nb::kw_only(), nb::arg("stiffness") = 0.5, nb::arg("damping") = 1.5,
           nb::arg("damping_form") = "plain", nb::arg("switch") = nb::none(), nb::arg("robot") = nb::none(),
-          nb::arg("pull_form") = "metric", nb::arg("recovery") = nb::none(), nb::arg("speed") = nb::none(),
+          nb::arg("pull_form") = "metric", nb::arg("recovery") = nb::none(),
           nb::sig("def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, "
                   "damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', "
                   "switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch "
-                  "| None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None, "
-                  "speed: SpeedRegulator | None = None) -> None"))
+                  "| None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None) -> None"))
       .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
       .def_prop_ro("labels", [](const GeometricSystem& s) { return s.labels(); },
                    "What every embedding coordinate is about, as CoordinateLabel.")

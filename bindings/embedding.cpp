@@ -124,7 +124,7 @@ void bind_embedding(nb::module_& m) {
       "strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer\n"
       "and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between\n"
       "neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More\n"
-      "costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What\n"
+      "costs time; it is for who wants to see them. What\n"
       "approaches is seen from as far as the arm needs to stop. window [temperatures]: points that are farther than\n"
       "the nearest by more do not count, each of which would change the mean by window exp(-window) temperature at most,\n"
       "2e-7 m; fewer cost less. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.")

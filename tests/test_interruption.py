@@ -18,9 +18,7 @@ pytestmark = pytest.mark.slow
 
 LONG = {
     "rollout": "ss.rollout(system, q, 0 * q, q + 1, none, steps=20_000_000)",
-    "rollout_batch": "ss.rollout_batch(system, rows[:4], 0 * rows[:4], rows[:4], none, steps=5_000_000, threads=2)",
-    "rollout_batch side by side": "ss.rollout_batch(dense, rows[:4], 0 * rows[:4], rows[:4], ball, steps=5_000_000)",
-    "evaluate_batch": "ss.evaluate_batch(near, rows, 0 * rows, rows, ball, threads=1)",
+    "rollout_batch": "ss.rollout_batch(system, rows, 0 * rows, rows, none, steps=5_000_000, threads=2)",
     "plan": "planner.plan([0, 0, 0], [1.5, 0, 0], wall)",
     "guide": "guide.set_goal([1.5, 0, 0]), guide.set_obstacles(wall), guide.step([0, 0, 0], 0.0)",
     "finish": "run.finish()",
@@ -38,10 +36,7 @@ from sidestep._core import refine_cover
 robot = ss.Robot.named("planar3")
 body = ss.Body(**planar_problems.BODY)
 q, none = np.array([0.1, 0.2, 0.3]), ss.Obstacles.none()
-ball = ss.Obstacles([[0.5, 1.2, 0.0]], 0.1)
-system, dense = ss.GeometricSystem([], robot=robot), ss.GeometricSystem([ss.CollisionDensity(robot, body)])
-near = ss.GeometricSystem([ss.ClearanceBarrier(robot, body)])
-rows = np.tile(q, ({rows}, 1))
+system, rows = ss.GeometricSystem([], robot=robot), np.tile(q, (4, 1))
 angles = np.linspace(0.0, 2.0 * np.pi, 400)
 wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linspace(0.45, 1.6, 40)], 0.05)
 settings = ss.PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000)
@@ -80,9 +75,7 @@ print("goes on", flush=True)
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGINT cannot be sent to one process there")
 @pytest.mark.parametrize("name", LONG)
 def test_ctrl_c_ends_what_takes_long(name):
-    source = PROGRAM.replace("{work}", LONG[name]).replace(
-        "{rows}", "3_000_000" if name == "evaluate_batch" else "8"
-    )
+    source = PROGRAM.replace("{work}", LONG[name])
     with subprocess.Popen(
         [sys.executable, "-c", source], stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent
     ) as process:

@@ -19,7 +19,7 @@ endfunction()
 
 set(counts "")
 set(failed FALSE)
-foreach(kind density block barriers filtered cloud)
+foreach(kind density barriers filtered cloud)
   count_instructions(${kind} ${steps} once)
   math(EXPR twice_steps "2 * ${steps}")
   count_instructions(${kind} ${twice_steps} twice)

@@ -1,6 +1,6 @@
 // Takes the given number of steps of one kind and nothing else, for instructions.cmake to count their instructions:
-//   instructions_benchmark density|block|barriers|filtered|cloud STEPS
-// density: Table 6.1 of the thesis; block: the same at eight states side by side, as one step; barriers: the covered arm among ten balls; filtered: the same with the filter; cloud:
+//   instructions_benchmark density|barriers|filtered|cloud STEPS
+// density: Table 6.1 of the thesis; barriers: the covered arm among ten balls; filtered: the same with the filter; cloud:
 // the covered arm above a table of 10,000 points, with the filter.
 #include <cstdio>
 #include <cstdlib>
@@ -10,7 +10,6 @@
 #include "scenes.hpp"
 #include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
-#include "sidestep/dynamical_system/step_block.hpp"
 #include "sidestep/embedding/clearance_barrier.hpp"
 #include "sidestep/embedding/collision_density.hpp"
 #include "sidestep/embedding/joint_limit_barrier.hpp"
@@ -18,12 +17,11 @@
 
 int main(int argc, char** argv) {
   using namespace sidestep;
-  const bool block = argc == 3 && std::strcmp(argv[1], "block") == 0;
-  const bool density = block || (argc == 3 && std::strcmp(argv[1], "density") == 0);
+  const bool density = argc == 3 && std::strcmp(argv[1], "density") == 0;
   const bool cloud = argc == 3 && std::strcmp(argv[1], "cloud") == 0;
   const bool filtered = cloud || (argc == 3 && std::strcmp(argv[1], "filtered") == 0);
   if (argc != 3 || !(density || filtered || std::strcmp(argv[1], "barriers") == 0)) {
-    std::fprintf(stderr, "usage: %s density|block|barriers|filtered|cloud STEPS\n", argv[0]);
+    std::fprintf(stderr, "usage: %s density|barriers|filtered|cloud STEPS\n", argv[0]);
     return 2;
   }
   const benchmarks::Scene scene =
@@ -66,20 +64,6 @@ int main(int argc, char** argv) {
   }
   int failures = 0;
   const int steps = std::atoi(argv[2]);
-  if (block) {
-    StepBlock side_by_side(system);
-    for (int k = 0; k < steps; ++k) {
-      for (int i = 0; i < block_states; ++i) {
-        const benchmarks::State& state = states[static_cast<std::size_t>(k + i) % states.size()];
-        StepBlock::set(side_by_side.q, i, state.q);
-        StepBlock::set(side_by_side.v, i, state.v);
-        StepBlock::set(side_by_side.goal, i, goal);
-      }
-      side_by_side.update(scene.obstacles);
-      failures += side_by_side.statuses[0] != StepStatus::ok;
-    }
-    return failures == 0 ? 0 : 1;
-  }
   for (int k = 0; k < steps; ++k) {
     const benchmarks::State& state = states[static_cast<std::size_t>(k) % states.size()];
     failures += is_fallback(system.acceleration(state.q, state.v, goal, scene.obstacles, workspace));

@@ -5,7 +5,6 @@
 
 #include "scenes.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
-#include "sidestep/dynamical_system/step_block.hpp"
 #include "sidestep/embedding/collision_density.hpp"
 #include "timing.hpp"
 
@@ -40,30 +39,10 @@ int run(const benchmarks::Scene& scene, bool last) {
     failures += system.acceleration(state.q, state.v, goal, scene.obstacles, workspace) != StepStatus::ok;
     checksum += workspace.acceleration[0];
   };
-  StepBlock block(system);
-  const auto steps = [&](std::size_t k) {
-    for (int i = 0; i < block_states; ++i) {
-      const benchmarks::State& state = states[(k * block_states + static_cast<std::size_t>(i)) % num_states];
-      StepBlock::set(block.q, i, state.q);
-      StepBlock::set(block.v, i, state.v);
-      StepBlock::set(block.goal, i, goal);
-    }
-    block.update(scene.obstacles);
-    for (const StepStatus status : block.statuses) {
-      failures += status != StepStatus::ok;
-    }
-    checksum += block.acceleration[0].of[0];
-  };
   std::printf("    {\n      \"joints\": %d, \"robot\": \"%s\", \"gaussians\": %d, \"points\": 1,\n", nv,
               scene.robot.name().c_str(), scene.body.num_components());
   report("single", 1, benchmarks::time_calls(step, num_steps, 1), false);
   report("batched", 100, benchmarks::time_calls(step, num_steps, 100), false);
-  benchmarks::Timing side_by_side = benchmarks::time_calls(steps, num_steps / block_states, 100);
-  for (double* time : {&side_by_side.median, &side_by_side.p95, &side_by_side.p99, &side_by_side.p999, &side_by_side.max}) {
-    *time /= block_states;
-  }
-  side_by_side.throughput *= block_states;
-  report("side_by_side", 100 * block_states, side_by_side, false);
   std::printf("      \"checksum\": %.6g, \"failures\": %zu\n    }%s\n", checksum, failures, last ? "" : ",");
   return failures == 0 ? 0 : 1;
 }

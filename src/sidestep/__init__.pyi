@@ -1,7 +1,6 @@
 from ._core import Activity as Activity
 from ._core import ArrivalSettings as ArrivalSettings
 from ._core import BarrierSettings as BarrierSettings
-from ._core import BatchEvaluation as BatchEvaluation
 from ._core import BinarySwitch as BinarySwitch
 from ._core import ClearanceBarrier as ClearanceBarrier
 from ._core import ClearanceTable as ClearanceTable
@@ -53,7 +52,6 @@ from ._core import RouteSettings as RouteSettings
 from ._core import SafetyStatus as SafetyStatus
 from ._core import SelfCollisionBarrier as SelfCollisionBarrier
 from ._core import SigmoidSwitch as SigmoidSwitch
-from ._core import SpeedRegulator as SpeedRegulator
 from ._core import Step as Step
 from ._core import StepStatus as StepStatus
 from ._core import Sum as Sum
@@ -61,7 +59,6 @@ from ._core import Unswitched as Unswitched
 from ._core import __version__ as __version__
 from ._core import christoffel_symbols as christoffel_symbols
 from ._core import controller_settings_fields as controller_settings_fields
-from ._core import evaluate_batch as evaluate_batch
 from ._core import geodesic_acceleration as geodesic_acceleration
 from ._core import integrate as integrate
 from ._core import is_fallback as is_fallback

@@ -34,8 +34,6 @@ def test_motions_count_together(system):
 def test_threads_are_bounded(system, threads):
     message = f"threads is {threads}, must be from 0 to 1024"
     with pytest.raises(ValueError, match=message):
-        ss.evaluate_batch(system, Q, Q, Q, ss.Obstacles.none(), threads=threads)
-    with pytest.raises(ValueError, match=message):
         ss.rollout_batch(system, Q, Q, Q, ss.Obstacles.none(), steps=2, threads=threads)
 
 

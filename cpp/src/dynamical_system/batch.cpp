@@ -4,16 +4,13 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <cstring>
 #include <exception>
-#include <limits>
 #include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
 #include "rollout_rows.hpp"
-#include "sidestep/dynamical_system/step_block.hpp"
 
 namespace sidestep {
 namespace {
@@ -100,118 +97,7 @@ void share(Eigen::Index num, int threads, const Interrupted& interrupted, Work&&
   }
 }
 
-/// Runs work(block, first, halted) on every thread, where `first` is that of every block of states.
-template <class Work>
-void share_blocks(const GeometricSystem& system, Eigen::Index num, int threads, const Interrupted& interrupted, Work&& work) {
-  const Eigen::Index blocks = (num + block_states - 1) / block_states;
-  share(blocks, threads, interrupted, [&](auto&& next, const Interrupted& halted) {
-    StepBlock block(system);
-    for (Eigen::Index k = next(); k < blocks; k = next()) {
-      work(block, k * block_states, halted);
-    }
-  });
-}
-
-/// Copies states [first, first + num) of column `from`, and the last of them for what is left of the block.
-void copy(const Eigen::MatrixXd& from, Eigen::Index column, Eigen::Index first, Eigen::Index num, BlockRow& to) {
-  const double* const states = from.data() + column * from.rows() + first;
-  if (num == block_states) {
-    std::memcpy(to.of, states, sizeof to.of);
-    return;
-  }
-  for (Eigen::Index i = 0; i < block_states; ++i) {
-    to.of[i] = states[std::min(i, num - 1)];
-  }
-}
-
-/// Fills a block with the states from `first` on and returns how many there are.
-Eigen::Index load(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-                  const Eigen::MatrixXd& goals) {
-  const Eigen::Index num = std::min<Eigen::Index>(block_states, q.rows() - first);
-  for (Eigen::Index j = 0; j < q.cols(); ++j) {
-    const auto row = static_cast<std::size_t>(j);
-    copy(q, j, first, num, block.q[row]);
-    copy(v, j, first, num, block.v[row]);
-    copy(goals, j, first, num, block.goal[row]);
-  }
-  return num;
-}
-
-/// The states from `first` on, as many as a block holds.
-void evaluate(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-              const Eigen::MatrixXd& goals, const Obstacles& obstacles, BatchEvaluation& result) {
-  const Eigen::Index num = load(block, first, q, v, goals);
-  block.update(obstacles);
-  for (Eigen::Index j = 0; j < q.cols(); ++j) {
-    std::copy_n(block.acceleration[static_cast<std::size_t>(j)].of, num, &result.accelerations(first, j));
-  }
-  std::copy_n(block.value.of, num, &result.values(first, 0));
-  std::copy_n(block.statuses.begin(), num, result.statuses.begin() + first);
-}
-
-/// Motions [first, first + num) of `result`, side by side.
-void roll_out(StepBlock& block, Eigen::Index first, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-              const Eigen::MatrixXd& goals, const Obstacles& start_obstacles, const RolloutSettings& settings,
-              const Interrupted& halted, std::vector<Rollout>& result) {
-  const Eigen::Index num = load(block, first, q, v, goals);
-  ObstaclesInMotion obstacles(start_obstacles);
-  const auto motions = result.begin() + first;
-  std::generate_n(motions, num, [&] { return make_rollout(block.system(), settings); });
-  using Numbers = Eigen::Array<double, block_states, 1>;
-  for (Eigen::Index k = 0; k <= settings.steps; ++k) {
-    if (halted()) {
-      throw Interruption();
-    }
-    block.update(obstacles.now());
-    for (Eigen::Index i = 0; i < num; ++i) {
-      Rollout& motion = motions[i];
-      StepBlock::get(block.q, static_cast<int>(i), motion.q.row(k));
-      StepBlock::get(block.v, static_cast<int>(i), motion.v.row(k));
-      StepBlock::get(block.acceleration, static_cast<int>(i), motion.acceleration.row(k));
-      motion.values(k, 0) = block.value.of[i];
-      motion.switch_weights.row(k).setConstant(block.switch_weight.of[i]);
-      motion.statuses.push_back(block.statuses[static_cast<std::size_t>(i)]);
-    }
-    for (std::size_t j = 0; j < block.q.size(); ++j) {
-      Eigen::Map<Numbers> position(block.q[j].of), velocity(block.v[j].of);
-      const Eigen::Map<Numbers> acceleration(block.acceleration[j].of);
-      hold(settings.integrator, settings.period, acceleration, position, velocity);
-    }
-    obstacles.advance(settings.period);
-  }
-}
-
 }  // namespace
-
-BatchEvaluation evaluate_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-                               const Eigen::MatrixXd& goals, const Obstacles& obstacles, int threads,
-                               const Interrupted& interrupted) {
-  check(system, q, v, goals);
-  BatchEvaluation result{Eigen::MatrixXd(q.rows(), q.cols()),
-                         Eigen::MatrixXd(q.rows(), system.num_embedding_coordinates()),
-                         std::vector<StepStatus>(static_cast<std::size_t>(q.rows()))};
-  if (StepBlock::takes(system)) {
-    share_blocks(system, q.rows(), threads, interrupted, [&](StepBlock& block, Eigen::Index first, const Interrupted&) {
-      evaluate(block, first, q, v, goals, obstacles, result);
-    });
-    return result;
-  }
-  share(q.rows(), threads, interrupted, [&](auto&& next, const Interrupted&) {
-    GeometricSystem::Workspace workspace(system);
-    for (Eigen::Index k = next(); k < q.rows(); k = next()) {
-      const Eigen::VectorXd position = q.row(k), velocity = v.row(k), goal = goals.row(k);
-      const StepStatus status = system.acceleration(position, velocity, goal, obstacles, workspace);
-      result.statuses[static_cast<std::size_t>(k)] = status;
-      result.accelerations.row(k) = workspace.acceleration;
-      if (is_fallback(status)) {
-        result.values.row(k).setConstant(std::numeric_limits<double>::quiet_NaN());
-      } else {
-        result.values.row(k) = workspace.values;
-      }
-    }
-  });
-  return result;
-}
 
 std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
                                    const Eigen::MatrixXd& goals, const Obstacles& obstacles,
@@ -222,14 +108,6 @@ std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::M
   }
   check_records(system, settings, q.rows());
   std::vector<Rollout> result(static_cast<std::size_t>(q.rows()));
-  if (StepBlock::takes(system) && !settings.filter && !settings.time_steps &&
-      settings.integrator != Integrator::runge_kutta_4) {
-    share_blocks(system, q.rows(), threads, settings.interrupted,
-                 [&](StepBlock& block, Eigen::Index first, const Interrupted& halted) {
-      roll_out(block, first, q, v, goals, obstacles, settings, halted, result);
-    });
-    return result;
-  }
   share(q.rows(), threads, settings.interrupted, [&](auto&& next, const Interrupted& halted) {
     RolloutSettings own = settings;
     own.interrupted = halted;

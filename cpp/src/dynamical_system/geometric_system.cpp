@@ -194,10 +194,6 @@ StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v,
   if (!falls_freely) {
     acceleration += sized(w.recovery, nv);
   }
-  if (settings_.speed) {
-    w.speed = (*settings_.speed)(v, w.acceleration, robot_.limits(), w.clearances);
-    acceleration += w.speed.drag * velocity;
-  }
   if (!all_finite(acceleration)) {
     return fall_back(StepStatus::not_finite, v, w);
   }

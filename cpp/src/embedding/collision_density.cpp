@@ -17,10 +17,6 @@ kernels::AddDensity add_density() noexcept {
   return SIDESTEP_KERNEL_IN_USE(kernels::add_density);
 }
 
-kernels::AddDensityBlock add_density_block() noexcept {
-  return SIDESTEP_KERNEL_IN_USE(kernels::add_density_block);
-}
-
 kernels::DensityPoints points_of(const Obstacles& obstacles, bool average) noexcept {
   return {static_cast<int>(obstacles.size()), average ? 1.0 / static_cast<double>(obstacles.size()) : 1.0,
           obstacles.points().data(), obstacles.radii().data(),
@@ -127,16 +123,6 @@ void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
   gradient.finish();
   out.values[0] += sum(sums.value);
   out.curvatures[0] += sum(sums.curvature);
-}
-
-void CollisionDensity::add_block(EmbeddingBlock& out, const KinematicBlock& states,
-                                 const Obstacles& obstacles) const noexcept {
-  if (obstacles.size() == 0) {
-    return;
-  }
-  add_density_block()(gaussians_->blocks.data(), static_cast<int>(gaussians_->blocks.size()),
-                      {states.parents().data(), states.coordinates().data()}, states.links(),
-                      points_of(obstacles, average_), {out.value.of, out.curvature.of, out.gradient.front().of});
 }
 
 void CollisionDensity::lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,

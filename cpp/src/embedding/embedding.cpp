@@ -7,9 +7,6 @@ bool Embedding::touches(const KinematicState& /*state*/, const Obstacles& /*obst
   return false;
 }
 
-void Embedding::add_block(EmbeddingBlock& /*out*/, const KinematicBlock& /*states*/,
-                          const Obstacles& /*obstacles*/) const noexcept {}
-
 CoordinateLabel Embedding::label(int /*k*/) const { return {}; }
 
 void Embedding::write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept {

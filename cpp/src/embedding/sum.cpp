@@ -36,16 +36,6 @@ void Sum::add_to(EmbeddingView out, const KinematicState& state, const Obstacles
   }
 }
 
-bool Sum::takes_blocks() const noexcept {
-  return std::all_of(terms_.begin(), terms_.end(), [](const auto& term) { return term->takes_blocks(); });
-}
-
-void Sum::add_block(EmbeddingBlock& out, const KinematicBlock& states, const Obstacles& obstacles) const noexcept {
-  for (const auto& term : terms_) {
-    term->add_block(out, states, obstacles);
-  }
-}
-
 void Sum::lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,
                           const Obstacles& obstacles) const noexcept {
   for (const auto& term : terms_) {

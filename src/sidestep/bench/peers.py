@@ -24,10 +24,8 @@ from sidestep._core import (
     GeometricSystem,
     JointType,
     Obstacles,
-    evaluate_batch,
     instruction_set,
     rollout,
-    rollout_batch,
 )
 from sidestep.bench import peers_jax
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
@@ -48,8 +46,6 @@ TABLE_POINT = (0.4, 0.2, 0.5)  # [m] beside the arm
 STIFFNESS, DAMPING = 0.5, 1.5  # the thesis's
 BALLS = 10
 MOTION = 1_000  # steps; the states that every way is asked at
-BATCH = 100  # states of them in one call
-MOTIONS, MOTION_STEPS = 64, 100  # side by side, on one thread
 FEWEST = 3  # calls of a way, however long they take
 WARM_UP = 10  # calls that do not count, if they take less than a tenth of the time
 
@@ -167,39 +163,6 @@ def _in_cpp(
     return np.concatenate(times)
 
 
-def _side_by_side(
-    system: GeometricSystem, states: States, goal: Array, obstacles: Obstacles, seconds: float
-) -> Array:
-    """Microseconds of each step of motions that begin at states all along one, all of a call's by one clock."""
-    starts = states[:: len(states) // MOTIONS][:MOTIONS]
-    q, v = (np.array([state[k] for state in starts]) for k in range(2))
-    goals = np.tile(goal, (MOTIONS, 1))
-    times: list[float] = []
-    end = time.perf_counter() + seconds
-    while not times or time.perf_counter() < end:
-        begin = time.perf_counter()
-        rollout_batch(system, q, v, goals, obstacles, steps=MOTION_STEPS, threads=1)
-        times.append(1e6 * (time.perf_counter() - begin) / (MOTIONS * (MOTION_STEPS + 1)))
-    return np.array(times)
-
-
-def _in_batches(
-    system: GeometricSystem, states: States, goal: Array, obstacles: Obstacles, seconds: float, size: int
-) -> Array:
-    """Microseconds of each of the states, `size` of them in one call from Python."""
-    q_rows, v_rows = (np.array([state[k] for state in states]) for k in range(2))
-    goals = np.tile(goal, (size, 1))
-    times: list[float] = []
-    end = time.perf_counter() + seconds
-    while not times or time.perf_counter() < end:
-        for first in range(0, len(states) - size + 1, size):
-            q, v = q_rows[first : first + size], v_rows[first : first + size]
-            begin = time.perf_counter()
-            evaluate_batch(system, q, v, goals, obstacles, threads=1)
-            times.append(1e6 * (time.perf_counter() - begin) / size)
-    return np.array(times)
-
-
 def _table(settings: PeerSettings) -> tuple[States, list[_Way]]:
     """T5.4 with one Gaussian per link and one point: the setting of the thesis's Table 6.1."""
     robot = Robot.named(TABLE_ROBOT)
@@ -226,20 +189,10 @@ def _table(settings: PeerSettings) -> tuple[States, list[_Way]]:
             measured=lambda: _in_cpp(system, start, goal, obstacles, settings.seconds),
         ),
         _Way(
-            "Sidestep, C++, side by side",
-            f"{work}, integration and records of {MOTIONS} motions of {MOTION_STEPS} steps, one thread",
-            measured=lambda: _side_by_side(system, states, goal, obstacles, settings.seconds),
-        ),
-        _Way(
             "Sidestep, Python",
             f"{work}, one call",
             lambda q, v: system.acceleration(q, v, goal, obstacles).acceleration,
             check=True,
-        ),
-        _Way(
-            "Sidestep, Python, batch",
-            f"{work} of {len(states)} states, one call",
-            measured=lambda: _in_batches(system, states, goal, obstacles, settings.seconds, len(states)),
         ),
         _Way(
             "NumPy, dense analytic",
@@ -349,12 +302,10 @@ def _distances(settings: PeerSettings) -> tuple[States, list[_Way]]:
     moving = sum(link in _moving(arm.robot) for link in arm.body.links)
     ways = [
         _Way(
-            "Sidestep, Python, batch",
+            "Sidestep, C++",
             f"clearances of {moving} ellipsoids with derivatives, where below {100.0 * activation:.0f} cm or soon so, "
-            f"kinematics and the acceleration; {BATCH} states in a call",
-            measured=lambda: _in_batches(
-                clearances, arm.states, arm.goal, arm.obstacles, settings.seconds, BATCH
-            ),
+            "kinematics and the acceleration, around each step of a motion",
+            measured=lambda: _in_cpp(clearances, arm.start, arm.goal, arm.obstacles, settings.seconds),
         ),
         _Way(
             "Coal",

@@ -47,7 +47,7 @@ const std::vector<Field<EvasionSettings>>& fields();
 ///
 /// A flight is no motion of the system: its barriers would push it off its way, straight away from what comes. It goes
 /// where it was seen to go, kept off obstacles and itself, and within limits, by the filter or the torque controller, which
-/// have to be there. A limit of the closing speed (SpeedRegulator) does not hold in it. Where nothing moves, nothing is
+/// have to be there. Where nothing moves, nothing is
 /// looked at.
 ///
 /// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.

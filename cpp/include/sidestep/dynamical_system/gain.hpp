@@ -23,10 +23,6 @@ class Gain {
     }
   }
 
-  /// Whether `data` holds the diagonal alone, or all of the matrix.
-  bool is_diagonal() const noexcept { return is_diagonal_; }
-  const double* data() const noexcept { return is_diagonal_ ? diagonal_.data() : matrix_.data(); }
-
  private:
   Eigen::MatrixXd matrix_;
   Eigen::VectorXd diagonal_;

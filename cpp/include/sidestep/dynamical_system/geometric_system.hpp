@@ -2,14 +2,12 @@
 
 #include <Eigen/Core>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "sidestep/dynamical_system/diagnosis.hpp"
 #include "sidestep/dynamical_system/gain.hpp"
 #include "sidestep/dynamical_system/goal.hpp"
 #include "sidestep/dynamical_system/recovery.hpp"
-#include "sidestep/dynamical_system/speed_regulator.hpp"
 #include "sidestep/dynamical_system/switch.hpp"
 #include "sidestep/embedding/embedding.hpp"
 #include "sidestep/geometry/graph_metric.hpp"
@@ -29,7 +27,6 @@ struct GeometricSystemSettings {
   Switch combination = Unswitched{};
   double fallback_rate = 10.0;                    ///< [1/s] the damped stop of the fallback is q̈ = −rate v
   Recovery recovery = {};                         ///< what a barrier does with an arm inside it
-  std::optional<SpeedRegulator> speed = {};       ///< adds β v to the acceleration; none if empty
   PullForm pull_form = PullForm::metric;
 };
 
@@ -54,8 +51,7 @@ constexpr bool is_fallback(StepStatus status) noexcept {
 ///
 ///     harmonic   h = −G⁻¹ ∂U − D (v − v*)         (T5.4; ∂U = K (q − q*) and v* = 0 for a configuration at rest)
 ///     geodesic   g = −G⁻¹ Jᵀ d²ψ/dt²              (T5.3 in closed form)
-///     a = h + g, or weighted joint by joint as the Switch says, plus the push of recovery.hpp out of barriers and β v of
-///     the SpeedRegulator, if there is one.
+///     a = h + g, or weighted joint by joint as the Switch says, plus the push of recovery.hpp out of barriers.
 ///
 /// Immutable; a Workspace per thread holds everything that changes. Several embeddings are stacked: each has its own
 /// coordinates. None at all gives flat space.
@@ -76,7 +72,6 @@ class GeometricSystem {
     Eigen::VectorXd recovery;             ///< the push out of barriers (nv) [rad/s²]; zero outside
     int inside = -1;                      ///< the coordinate deepest below its floor; -1: none
     Eigen::VectorXd switch_weights;       ///< s (nv): 1 is harmonic
-    SpeedRegulator::Result speed = {};    ///< ρ and β
     Eigen::VectorXd values, curvatures;   ///< ψ and d²ψ/dt² (m)
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
     Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)

@@ -19,7 +19,7 @@ namespace sidestep {
 ///     d²ψ/dt² = ẏᵀ (∇²_y N) ẏ + ∇_y N · ÿ.
 ///
 /// Links that no joint moves are left out: they add a value that the arm cannot change.
-/// Gaussians are taken side by side, or the states of a block, with the widest registers of the machine. Cost: O(points × Gaussians + joints).
+/// Gaussians are taken side by side, with the widest registers of the machine. Cost: O(points × Gaussians + joints).
 class CollisionDensity final : public Embedding {
  public:
   /// `average` divides by the number of points (as the thesis's code does, its text does not).
@@ -33,9 +33,6 @@ class CollisionDensity final : public Embedding {
 
   int num_coordinates() const noexcept override { return 1; }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
-
-  bool takes_blocks() const noexcept override { return true; }
-  void add_block(EmbeddingBlock& out, const KinematicBlock& states, const Obstacles& obstacles) const noexcept override;
 
   /// Distances between Gaussian means and the surfaces of the obstacle points.
   void lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,

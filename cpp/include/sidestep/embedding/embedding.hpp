@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "sidestep/embedding/clearances.hpp"
-#include "sidestep/kinematics/kinematic_block.hpp"
 #include "sidestep/kinematics/kinematic_state.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
@@ -22,14 +21,6 @@ struct EmbeddingView {
   ClearanceView clearances;                         ///< for barriers of clearances; others leave it as it is
   /// Activation distances (m) in place of the embedding's own, see Barrier; empty: its own.
   Eigen::Map<const Eigen::VectorXd> activations{nullptr, 0};
-};
-
-/// The same for a single coordinate at the states of a block, for each of which it has a number.
-struct EmbeddingBlock {
-  BlockRow value, curvature;
-  std::vector<BlockRow> gradient;  ///< (nv)
-
-  explicit EmbeddingBlock(int nv) : gradient(static_cast<std::size_t>(nv)) {}
 };
 
 /// What one coordinate of an embedding stands for. Fixed at construction, for messages and for what acts on clearances.
@@ -63,12 +54,6 @@ class Embedding {
 
   /// Adds to `out`, which the caller has zeroed. No allocation.
   virtual void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept = 0;
-
-  /// Whether `add_block` does the same for a block of states: only where there is one coordinate, and it is no clearance.
-  virtual bool takes_blocks() const noexcept { return false; }
-
-  /// Adds to `out`, which the caller has zeroed, the same as `add_to` within rounding. No allocation.
-  virtual void add_block(EmbeddingBlock& out, const KinematicBlock& states, const Obstacles& obstacles) const noexcept;
 
   /// What coordinate k stands for. Allocates: to be asked at construction, not in the loop.
   virtual CoordinateLabel label(int k) const;

@@ -19,13 +19,8 @@ class JointLimitPotential final : public Embedding {
 
   int num_coordinates() const noexcept override { return 1; }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
-  bool takes_blocks() const noexcept override { return true; }
-  void add_block(EmbeddingBlock& out, const KinematicBlock& states, const Obstacles& obstacles) const noexcept override;
 
  private:
-  /// Adds the terms of joint j.
-  void add_joint(Eigen::Index j, double q, double v, double& value, double& slope, double& curvature) const noexcept;
-
   Eigen::VectorXd lower_, upper_;
   double slope_, height_;
 };

@@ -16,8 +16,6 @@ class Sum final : public Embedding {
 
   int num_coordinates() const noexcept override { return terms_.front()->num_coordinates(); }
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
-  bool takes_blocks() const noexcept override;
-  void add_block(EmbeddingBlock& out, const KinematicBlock& states, const Obstacles& obstacles) const noexcept override;
   void lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,
                        const Obstacles& obstacles) const noexcept override;
   bool measures_distances() const noexcept override;

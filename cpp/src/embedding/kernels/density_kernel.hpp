@@ -50,26 +50,4 @@ void add_density_avx2(const GaussianBlock& gaussians, const double* const* links
 void add_density_avx512(const GaussianBlock& gaussians, const double* const* links, const DensityPoints& points,
                         DensitySums& sums) noexcept;
 
-/// Joints in the order in which parents come first; -1: the base.
-struct JointTree {
-  const int *parents, *coordinates;
-};
-
-/// Rows of `most_lanes` numbers, one of each state side by side, that the density, its second time derivative and its gradient
-/// (a row for each coordinate) are added to.
-struct DensityRows {
-  double *value, *curvature, *gradient;
-};
-
-/// The density at `most_lanes` states side by side. `links`: see UpdateLinkBlock. The Gaussians of the last joint come first.
-using AddDensityBlock = void (*)(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
-                                 const DensityPoints& points, const DensityRows& rows) noexcept;
-
-void add_density_block_baseline(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
-                                const DensityPoints& points, const DensityRows& rows) noexcept;
-void add_density_block_avx2(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
-                            const DensityPoints& points, const DensityRows& rows) noexcept;
-void add_density_block_avx512(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
-                              const DensityPoints& points, const DensityRows& rows) noexcept;
-
 }  // namespace sidestep::kernels

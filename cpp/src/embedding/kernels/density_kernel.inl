@@ -20,14 +20,6 @@ struct SideBySide {
   Lanes operator()(const double (&row)[most_lanes]) const noexcept { return load(row + first); }
 };
 
-/// One of them in every lane.
-struct InEveryLane {
-  const GaussianBlock& gaussians;
-  int which;
-
-  Lanes operator()(const double (&row)[most_lanes]) const noexcept { return all(row[which]); }
-};
-
 inline void store(double (&rows)[3][most_lanes], int first, const Vectors& v) noexcept { store_rows(rows[0] + first, v); }
 
 #if defined(__AVX2__)
@@ -98,33 +90,11 @@ class GatheredLinks {
   Vectors rotation_[3], position_, velocity_[2], bias_[2];
 };
 
-/// The same link in as many states as there are lanes, from rows of KinematicBlock, which are read where they are needed.
-class LinkRows {
- public:
-  explicit LinkRows(const double* rows) noexcept : rows_(rows) {}
-
-  Vectors rotation(int column) const noexcept { return at(3 * column); }
-  Vectors position() const noexcept { return at(position_at); }
-  Vectors screw_angular() const noexcept { return at(screw_at); }
-  Vectors screw_linear() const noexcept { return at(screw_at + 3); }
-  Vectors angular() const noexcept { return at(velocity_at); }
-  Vectors linear() const noexcept { return at(velocity_at + 3); }
-  Vectors bias_angular() const noexcept { return at(bias_at); }
-  Vectors bias_linear() const noexcept { return at(bias_at + 3); }
-
- private:
-  Vectors at(int number) const noexcept { return load_rows(rows_ + number * most_lanes); }
-
-  const double* rows_;
-};
-
-template <class Links>
-Vectors from_world(const Links& link, const Vectors& v) noexcept {
+Vectors from_world(const GatheredLinks& link, const Vectors& v) noexcept {
   return {link.rotation(0).dot(v), link.rotation(1).dot(v), link.rotation(2).dot(v)};
 }
 
-template <class Links>
-Vectors to_world(const Links& link, const Vectors& v) noexcept {
+Vectors to_world(const GatheredLinks& link, const Vectors& v) noexcept {
   return link.rotation(0) * v.x + link.rotation(1) * v.y + link.rotation(2) * v.z;
 }
 
@@ -132,8 +102,7 @@ Vectors to_world(const Links& link, const Vectors& v) noexcept {
 struct Peak {
   Lanes xx, yy, zz, xy, xz, yz, scale;
 
-  template <class Gaussians>
-  Peak(const Gaussians& lanes, double radius) noexcept {
+  Peak(const SideBySide& lanes, double radius) noexcept {
     const GaussianBlock& g = lanes.gaussians;
     if (!(radius > 0.0)) {
       const auto entry = [&](int i) noexcept { return lanes(g.precision[i]); };
@@ -166,8 +135,8 @@ struct Seen {
   Lanes exponent, scale;      // of the density
   Lanes slope, bend;          // eᵀ P ẏ and ẏᵀ P ẏ
 
-  template <class Links, class Gaussians>
-  void place(const Links& link, const Vectors& mean, const Gaussians& gaussians, const DensityPoints& points, int n) noexcept {
+  void place(const GatheredLinks& link, const Vectors& mean, const SideBySide& gaussians, const DensityPoints& points,
+             int n) noexcept {
     // The point seen from the link: y and ẏ there.
     x = all(points.positions + 3 * n);
     const Vectors motion = link.linear() + cross(link.angular(), x);
@@ -198,13 +167,12 @@ struct Added {
   Lanes value = {}, curvature = {};
   Vectors force = {}, moment = {};  // the wrench about the world origin
 
-  /// `together`: points at a time.
-  template <int together, class Links, class Gaussians>
-  void add(const Links& link, const Gaussians& gaussians, const DensityPoints& points) noexcept {
+  void add(const GatheredLinks& link, const SideBySide& gaussians, const DensityPoints& points) noexcept {
+    constexpr int together = 4;  // points at a time
     const GaussianBlock& g = gaussians.gaussians;
     const Vectors mean{gaussians(g.mean[0]), gaussians(g.mean[1]), gaussians(g.mean[2])};
     for (int start = 0; start < points.num; start += together) {
-      const int number = together > 1 && points.num - start < together ? points.num - start : together;
+      const int number = points.num - start < together ? points.num - start : together;
       Seen seen[together];
       Lanes densities[together];
       for (int i = 0; i < number; ++i) {
@@ -231,63 +199,11 @@ void add_density(const GaussianBlock& gaussians, const double* const* numbers, c
                  DensitySums& sums) noexcept {
   for (int first = 0; first < gaussians.num; first += width) {
     Added added{load(sums.value + first), load(sums.curvature + first)};
-    added.add<4>(GatheredLinks(numbers + first), SideBySide{gaussians, first}, points);
+    added.add(GatheredLinks(numbers + first), SideBySide{gaussians, first}, points);
     store(sums.value + first, added.value);
     store(sums.curvature + first, added.curvature);
     store(sums.force, first, added.force);
     store(sums.moment, first, added.moment);
-  }
-}
-
-/// Takes wrenches on links, of the last joint first, down to the base and adds what joints feel of them.
-class Descent {
- public:
-  Descent(const JointTree& joints, const double* links, double* gradient) noexcept
-      : joints_(joints), links_(links), gradient_(gradient) {}
-
-  void add(int joint, const Vectors& force, const Vectors& moment) noexcept {
-    go_down_to(joint);
-    if (joint_ != joint) {  // on another branch, or the first
-      go_down_to(-1);
-      joint_ = joint;
-      force_ = moment_ = Vectors{};
-    }
-    force_ += force;
-    moment_ += moment;
-  }
-  void finish() noexcept { go_down_to(-1); }
-
- private:
-  void go_down_to(int joint) noexcept {
-    for (; joint_ > joint; joint_ = joints_.parents[joint_]) {
-      const LinkRows link(links_ + joint_ * link_numbers * most_lanes);
-      double* const sum = gradient_ + joints_.coordinates[joint_] * most_lanes;
-      store(sum, load(sum) + link.screw_angular().dot(moment_) + link.screw_linear().dot(force_));
-    }
-  }
-
-  const JointTree& joints_;
-  const double* links_;
-  double* gradient_;
-  int joint_ = -1;
-  Vectors force_ = {}, moment_ = {};
-};
-
-void add_density_block(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
-                       const DensityPoints& points, const DensityRows& rows) noexcept {
-  for (int first = 0; first < most_lanes; first += width) {
-    Added total{load(rows.value + first), load(rows.curvature + first)};
-    Descent gradient(joints, links + first, rows.gradient + first);
-    for (const GaussianBlock* block = blocks; block != blocks + num; ++block) {
-      for (int i = 0; i < block->num; ++i) {
-        total.force = total.moment = Vectors{};
-        total.add<1>(LinkRows(links + first + block->joints[i] * link_numbers * most_lanes), InEveryLane{*block, i}, points);
-        gradient.add(block->joints[i], total.force, total.moment);
-      }
-    }
-    gradient.finish();
-    store(rows.value + first, total.value);
-    store(rows.curvature + first, total.curvature);
   }
 }
 

@@ -13,10 +13,5 @@ void add_density_avx2(const GaussianBlock& gaussians, const double* const* links
   add_density(gaussians, links, points, sums);
 }
 
-void add_density_block_avx2(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
-                            const DensityPoints& points, const DensityRows& rows) noexcept {
-  add_density_block(blocks, num, joints, links, points, rows);
-}
-
 }  // namespace sidestep::kernels
 #endif

@@ -14,9 +14,4 @@ void add_density_baseline(const GaussianBlock& gaussians, const double* const* l
   add_density(gaussians, links, points, sums);
 }
 
-void add_density_block_baseline(const GaussianBlock* blocks, int num, const JointTree& joints, const double* links,
-                                const DensityPoints& points, const DensityRows& rows) noexcept {
-  add_density_block(blocks, num, joints, links, points, rows);
-}
-
 }  // namespace sidestep::kernels

@@ -31,12 +31,4 @@ void update_links_baseline(const JointModel* joints, int num, const double* q, c
 void update_links_avx2(const JointModel* joints, int num, const double* q, const double* v, double* links,
                        int stride) noexcept;
 
-/// The same for `most_lanes` states side by side: where one state has a number, q, v and links, which are without gaps, have a
-/// row of one for each.
-using UpdateLinkBlock = void (*)(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
-
-void update_link_block_baseline(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
-void update_link_block_avx2(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
-void update_link_block_avx512(const JointModel* joints, int num, const double* q, const double* v, double* links) noexcept;
-
 }  // namespace sidestep::kernels

@@ -1,5 +1,4 @@
-// Included inside an anonymous namespace. How a link moves with its joint, for one state or for several side by side: a
-// `Number` is a double, or one of each state; a `Vector` three of them, with +, * and the two cross products.
+// Included inside an anonymous namespace, after kinematics_kernel.inl's Vector. How a link moves with its joint.
 
 // Beyond this angle [rad] the multiples of π/2 below are no longer exact.
 constexpr double largest_angle = 1e5;

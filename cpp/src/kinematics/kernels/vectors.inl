@@ -18,18 +18,9 @@ inline Vectors cross(const Vectors& a, const Vectors& b) noexcept {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// a × b + c × d.
-inline Vectors sum_of_crosses(const Vectors& a, const Vectors& b, const Vectors& c, const Vectors& d) noexcept {
-  return cross(a, b) + cross(c, d);
-}
-
 inline Vectors all(const double* v) noexcept { return {all(v[0]), all(v[1]), all(v[2])}; }
 
-/// Three numbers of which those of each lane stand in a row of `most_lanes`.
-inline Vectors load_rows(const double* rows) noexcept {
-  return {load(rows), load(rows + most_lanes), load(rows + 2 * most_lanes)};
-}
-
+/// A row of `most_lanes` numbers for each of the three.
 inline void store_rows(double* rows, const Vectors& v) noexcept {
   store(rows, v.x);
   store(rows + most_lanes, v.y);
