@@ -13,6 +13,8 @@
 #include "dynamical_system.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
+#include "sidestep/dynamical_system/escape.hpp"
+#include "sidestep/dynamical_system/evasion.hpp"
 #include "sidestep/dynamical_system/progress_monitor.hpp"
 #include "sidestep/dynamical_system/rollout.hpp"
 
@@ -181,10 +183,7 @@ void bind_rollout(nb::module_& m) {
   result.def_prop_ro("time", [](const Rollout& r) { return to_numpy(r.time); }, "[s]")
       .def_ro("statuses", &Rollout::statuses, "One StepStatus per row.")
       .def_prop_ro("step_seconds", [](const Rollout& r) { return to_numpy(r.step_seconds); },
-                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.")
-      .def_ro("filter_statuses", &Rollout::filter_statuses, "One TorqueStatus per row; empty without a filter.")
-      .def_prop_ro("safety_slack", [](const Rollout& r) { return to_numpy(r.safety_slack); },
-                   "(steps + 1,) largest shortfall of a clearance's constraint [m/s^2]; empty without a filter.");
+                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.");
   matrix_property(result, "q", &Rollout::q, "(steps + 1, nv) [rad]");
   matrix_property(result, "v", &Rollout::v, "(steps + 1, nv) [rad/s]");
   matrix_property(result, "acceleration", &Rollout::acceleration, "(steps + 1, nv) [rad/s^2]");
@@ -194,47 +193,28 @@ void bind_rollout(nb::module_& m) {
   m.def(
       "rollout",
       [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal, const Obstacles& obstacles,
-         double period, int steps, nb::handle integrator, bool time_steps, const AccelerationFilter* filter, Escape* escape,
-         Evasion* evasion) {
+         double period, int steps, nb::handle integrator, bool time_steps) {
         const int nv = system.robot().num_coordinates();
         const Eigen::VectorXd start = as_vector(q, "q", nv);
         const Eigen::VectorXd velocity = as_vector(v, "v", nv);
         const Goal target = as_goal(goal, nv);
         RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"), time_steps};
-        if (filter != nullptr) {
-          settings.filter = *filter;
-        }
-        settings.escape = escape;
-        settings.evasion = evasion;
         const HeldObstacles held(obstacles);
-        std::optional<Exclusive> escapes, evades;
-        if (escape != nullptr) {
-          escapes.emplace(escape, "the escape");
-        }
-        if (evasion != nullptr) {
-          evades.emplace(evasion, "the evasion");
-        }
         return interruptible([&](const Interrupted& interrupted) {
-          const InterruptedWhile look(evasion, interrupted);
           settings.interrupted = interrupted;
           return rollout(system, start, velocity, target, held, settings);
         });
       },
       nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
       nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
-      nb::arg("time_steps") = false, nb::arg("filter") = nb::none(),
-      nb::arg("escape") = nb::none(), nb::arg("evasion") = nb::none(),
+      nb::arg("time_steps") = false,
       nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
               "goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, "
               "steps: int, "
-              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, "
-              "filter: AccelerationFilter | None = None, escape: Escape | None = None, "
-              "evasion: Evasion | None = None) -> Rollout"),
-      "Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.\n"
-      "period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;\n"
-      "filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;\n"
-      "escape: sub-goals where the motion is stuck; evasion: flights out of the way of what moves, with a filter. Both keep their state\n"
-      "from one call to the next.");
+              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout"),
+      "Integrates the system alone from q, v (nv,) towards a goal, obstacles and goal moving at their velocities; nothing holds\n"
+      "limits or clearances: what has to keep them is a Controller, see `integrate`.\n"
+      "period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.");
 }
 
 }  // namespace sidestep::python

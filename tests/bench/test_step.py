@@ -25,7 +25,7 @@ def document() -> dict[str, object]:
 
 def test_measures_every_row(document: dict[str, list[dict[str, object]]]) -> None:
     rows = document["results"]
-    assert len(rows) == 2 * len(step_module.TABLE_ROBOTS) + 2 * 5 + 1
+    assert len(rows) == 2 * len(step_module.TABLE_ROBOTS) + 2 * 4 + 1
     assert len({(row["name"], row["language"]) for row in rows}) == len(rows)
     for row in rows:
         assert row["steps"] >= 20
@@ -36,9 +36,8 @@ def test_measures_every_row(document: dict[str, list[dict[str, object]]]) -> Non
             assert row["undisturbed_max_us"] <= row["max_us"]
     assert [row["joints"] for row in rows[:6:2]] == [2, 3, 7]
     assert {row["points"] for row in rows[6:-1]} == {5}
-    assert [row["name"].split(", ", 3)[3] for row in rows[6:11]] == [
+    assert [row["name"].split(", ", 3)[3] for row in rows[6:10]] == [
         "without filter",
-        "with filter",
         "controller",
         "controller, acceleration",
         "without filter",

@@ -149,59 +149,6 @@ def test_the_program_that_was_solved_can_be_solved_elsewhere() -> None:
     assert held > 50
 
 
-def test_a_rollout_applies_the_filter() -> None:
-    s = scene("fr3", 1)
-    # Flat space's task pulls through the ball; the embedding measures clearances and is too weak to bend anything.
-    weak = ss.GeometricSystem(
-        [_core.ClearanceBarrier(s.robot, _body_of(s), strength=1e-9, floor=0.09)],
-        stiffness=100.0,
-        damping=20.0,
-    )
-    plain = ss.rollout(weak, s.start, 0.0 * s.start, s.goal, s.obstacles, steps=1500)
-    kept = ss.rollout(
-        weak, s.start, 0.0 * s.start, s.goal, s.obstacles, steps=1500, filter=ss.AccelerationFilter(s.robot)
-    )
-    lowest = [
-        min(
-            float(np.min(weak.acceleration(q, v, s.goal, s.obstacles).clearances.values))
-            for q, v in zip(m.q[::5], m.v[::5], strict=True)
-        )
-        for m in (plain, kept)
-    ]
-    assert lowest[0] < 0.0
-    assert lowest[1] > MARGIN - SAMPLING
-    limits = s.robot.limits
-    assert np.all(np.abs(kept.v) <= limits.velocity * (1.0 + 1e-12))
-    assert np.all(np.abs(kept.acceleration) <= limits.acceleration * (1.0 + 1e-12))
-    assert len(kept.filter_statuses) == 1501
-    assert kept.safety_slack.shape == (1501,)
-    assert ss.TorqueStatus.limited in kept.filter_statuses
-    assert plain.filter_statuses == []
-    assert plain.safety_slack.shape == (0,)
-
-
-def _body_of(s: Scene) -> _core.Body:
-    links = [next(f.name for f in s.robot.frames if f.joint == j) for j in range(len(s.robot.joints))]
-    return _core.Body(
-        links=links,
-        weights=np.ones(len(links)),
-        means=np.zeros((len(links), 3)),
-        covariances=[np.diag([0.060, 0.048, 0.072]) ** 2] * len(links),
-        levels=np.ones(len(links)),
-    )
-
-
-def test_what_a_rollout_refuses() -> None:
-    s = scene("planar3", 0)
-    arguments = (s.system, s.start, 0.0 * s.start, s.goal, s.obstacles)
-    with pytest.raises(ValueError, match=r"a period of 0\.002"):
-        ss.rollout(*arguments, steps=2, filter=ss.AccelerationFilter(s.robot, period=0.002))
-    with pytest.raises(ValueError, match="use semi_implicit_euler or second_order"):
-        ss.rollout(*arguments, steps=2, filter=ss.AccelerationFilter(s.robot), integrator="runge_kutta_4")
-    with pytest.raises(ValueError, match="for 7 coordinates, the system has 3"):
-        ss.rollout(*arguments, steps=2, filter=ss.AccelerationFilter(ss.Robot.named("fr3")))
-
-
 def test_what_is_reported() -> None:
     robot = ss.Robot.named("planar2")
     clearances = ss.Clearances(

@@ -30,57 +30,46 @@ def ball(centre=CENTRE, speed=SPEED):
     return ss.Obstacles(centre, RADIUS, speed)
 
 
-def run(system, robot, evasion, obstacles, steps):
-    guard = ss.AccelerationFilter(robot, period=PERIOD)
-    at_rest = np.zeros_like(GOAL)
-    return ss.rollout(
-        system, GOAL, at_rest, GOAL, obstacles, period=PERIOD, steps=steps, filter=guard, evasion=evasion
+def run(robot, obstacles, steps, *, seed=0, look_ahead=True):
+    settings = ss.ControllerSettings(
+        period=PERIOD, synchronous=True, planner=None, local_minimum=None, output="acceleration", seed=seed
     )
+    if not look_ahead:
+        settings.look_ahead = None
+    controller = ss.Controller(ss.Arm.from_robot(robot), settings)
+    controller.set_goal(GOAL)
+    controller.set_obstacles(obstacles)
+    return ss.integrate(controller, GOAL, np.zeros(2), steps=steps)
 
 
 def exact_clearance(robot, motion):
     objects = balls(CENTRE, RADIUS, SPEED)
     exact = ExactClearance(robot, objects)
-    return exact.decided_minimum(motion.q, poses_over(objects, motion.time), tolerance=1e-3).lower_bound
+    time = PERIOD * np.arange(len(motion.q))
+    return exact.decided_minimum(motion.q, poses_over(objects, time), tolerance=1e-3).lower_bound
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_an_arm_steps_aside_in_time(system, robot, seed):
-    assert exact_clearance(robot, run(system, robot, None, ball(), 2500)) < 0.0
-    evasion = ss.Evasion(system, seed=seed)
-    motion = run(system, robot, evasion, ball(), 2500)
+def test_an_arm_steps_aside_in_time(robot, seed):
+    assert exact_clearance(robot, run(robot, ball(), 2500, look_ahead=False)) < 0.0
+    motion = run(robot, ball(), 2500, seed=seed)
     assert exact_clearance(robot, motion) > 0.0
-    assert evasion.count > 0
-    assert np.abs(motion.q[-1] - GOAL).max() < np.abs(motion.q - GOAL).max() / 2.0
+    assert np.abs(motion.last_q - GOAL).max() < np.abs(motion.q - GOAL).max() / 2.0
     limits = robot.limits
     assert np.all(np.abs(motion.v) <= limits.velocity + 1e-9)  # rounding
     assert np.all(np.abs(motion.acceleration) <= limits.acceleration + 1e-9)
-    again = run(system, robot, ss.Evasion(system, seed=seed), ball(), 2500)
+    again = run(robot, ball(), 2500, seed=seed)
     np.testing.assert_array_equal(motion.q, again.q)
 
 
-def test_what_rests_or_passes_by_changes_nothing(system, robot):
+def test_what_rests_or_passes_by_changes_nothing(robot):
     for obstacles in (
         ball(speed=np.zeros((1, 3))),
         ball(centre=np.array([[0.0, 3.0, 0.0]])),
         ss.Obstacles.none(),
     ):
-        evasion = ss.Evasion(system)
-        with_it, without = (run(system, robot, leader, obstacles, 300) for leader in (evasion, None))
+        with_it, without = (run(robot, obstacles, 300, look_ahead=look) for look in (True, False))
         np.testing.assert_array_equal(with_it.q, without.q)
-        assert evasion.count == 0
-
-
-def test_a_motion_in_parts_is_the_same(system, robot):
-    whole = run(system, robot, ss.Evasion(system, seed=1), ball(), 1500)
-    evasion, guard = ss.Evasion(system, seed=1), ss.AccelerationFilter(robot, period=PERIOD)
-    q, v = GOAL, np.zeros(2)
-    for k in range(0, 1500, 25):
-        seen = ball(CENTRE + k * PERIOD * SPEED)
-        part = ss.rollout(system, q, v, GOAL, seen, period=PERIOD, steps=25, filter=guard, evasion=evasion)
-        np.testing.assert_allclose(part.q, whole.q[k : k + 26], atol=1e-9)  # rounding of where the ball is
-        q, v = part.q[-1], part.v[-1]
-    assert evasion.count > 0
 
 
 def test_what_a_look_finds_is_followed_one_look_later_and_without_jumps(system, robot):
@@ -137,28 +126,6 @@ def test_steps_are_made_to_go_into_the_delay(system):
     np.testing.assert_allclose(kept.position, found.position, rtol=1e-12)
 
 
-def test_a_flight_minds_obstacles_also_where_the_goal_is_none(system, robot):
-    """Outside the limits: the system falls back, and the arm is hit where it brakes, unless it flies."""
-    guard, beyond = ss.AccelerationFilter(robot, period=PERIOD), np.array([-4.0, 0.0])
-    clearances = {}
-    for name, evasion in (("hit", None), ("flown", ss.Evasion(system, seed=1))):
-        motion = ss.rollout(
-            system,
-            GOAL,
-            np.zeros(2),
-            beyond,
-            ball(),
-            period=PERIOD,
-            steps=2000,
-            filter=guard,
-            evasion=evasion,
-        )
-        clearances[name] = exact_clearance(robot, motion)
-        flown = np.array([status == ss.StepStatus.ok for status in motion.statuses])
-        assert flown.any() == (name == "flown")
-    assert clearances["hit"] < 0.0 < clearances["flown"]
-
-
 def test_an_arm_that_can_only_brake_is_taken_to_do_so(system):
     at_rest = np.zeros(2)
     beyond = ss.JointGoal(np.array([-4.0, 0.0]))  # outside the limits
@@ -204,23 +171,6 @@ def test_settings_are_checked(system, change, message):
 def test_what_does_not_go_together_is_named(system):
     evasion, other = ss.Evasion(system), ss.Robot.named("planar3")
     flat, q = ss.GeometricSystem([], robot=other), np.zeros(3)
-    with pytest.raises(ValueError, match="the evasion is for 2 coordinates, the system has 3"):
-        ss.rollout(flat, q, q, q, ss.Obstacles.none(), steps=1, evasion=evasion)
-    with pytest.raises(ValueError, match="an evasion needs a filter, which keeps its flights off obstacles"):
-        ss.rollout(
-            system, GOAL, 0.0 * GOAL, GOAL, ss.Obstacles.none(), period=PERIOD, steps=1, evasion=evasion
-        )
-    with pytest.raises(ValueError, match="an evasion holds its goal for a period"):
-        ss.rollout(
-            system,
-            GOAL,
-            0.0 * GOAL,
-            GOAL,
-            ss.Obstacles.none(),
-            steps=1,
-            integrator="runge_kutta_4",
-            evasion=evasion,
-        )
     with pytest.raises(ValueError, match="the system has no clearances to obstacles"):
         ss.Evasion(flat)
     for period in (0.0, np.nan):

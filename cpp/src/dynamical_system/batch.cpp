@@ -103,9 +103,6 @@ std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::M
                                    const Eigen::MatrixXd& goals, const Obstacles& obstacles,
                                    const RolloutSettings& settings, int threads) {
   check(system, q, v, goals);
-  if (settings.escape != nullptr || settings.evasion != nullptr) {
-    throw std::invalid_argument("batch: an escape or evasion belongs to one motion; give none");
-  }
   check_records(system, settings, q.rows());
   std::vector<Rollout> result(static_cast<std::size_t>(q.rows()));
   share(q.rows(), threads, settings.interrupted, [&](auto&& next, const Interrupted& halted) {

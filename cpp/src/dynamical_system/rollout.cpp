@@ -21,31 +21,6 @@ void check_size(const Eigen::VectorXd& vector, const char* name, int nv) {
   }
 }
 
-void check_filter(const AccelerationFilter& filter, int nv, const RolloutSettings& settings) {
-  if (filter.num_coordinates() != nv) {
-    throw std::invalid_argument("the filter is for " + std::to_string(filter.num_coordinates()) +
-                                " coordinates, the system has " + std::to_string(nv));
-  }
-  if (filter.period() != settings.period) {
-    throw std::invalid_argument("the filter has a period of " + std::to_string(filter.period()) +
-                                " s, the rollout of " + std::to_string(settings.period) + " s; they must be equal");
-  }
-  if (settings.integrator == Integrator::runge_kutta_4) {
-    throw std::invalid_argument("a filter holds the acceleration for a period: use semi_implicit_euler or second_order");
-  }
-}
-
-/// Of what takes the lead now and then.
-void check_leader(const std::string& name, int num_coordinates, int nv, const RolloutSettings& settings) {
-  if (num_coordinates != nv) {
-    throw std::invalid_argument("the " + name + " is for " + std::to_string(num_coordinates) +
-                                " coordinates, the system has " + std::to_string(nv));
-  }
-  if (settings.integrator == Integrator::runge_kutta_4) {
-    throw std::invalid_argument("an " + name + " holds its goal for a period: use semi_implicit_euler or second_order");
-  }
-}
-
 /// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t + dt.
 /// A stage that falls back brakes; the status that is recorded is that of the step's own state.
 void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, Goal& goal,
@@ -83,8 +58,8 @@ void check_records(const GeometricSystem& system, const RolloutSettings& setting
     throw std::invalid_argument("period times steps is not finite");
   }
   const double numbers = 1.0 + 4.0 * system.robot().num_coordinates() + system.num_embedding_coordinates() +
-                         (settings.time_steps ? 1.0 : 0.0) + (settings.filter ? 1.0 : 0.0);
-  const double row = numbers * sizeof(double) + sizeof(StepStatus) + (settings.filter ? sizeof(TorqueStatus) : 0);
+                         (settings.time_steps ? 1.0 : 0.0);
+  const double row = numbers * sizeof(double) + sizeof(StepStatus);
   const double most_rows = std::floor(most_record_bytes / (row * static_cast<double>(std::max<Eigen::Index>(motions, 1))));
   if (settings.steps > most_rows - 1.0) {
     throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at most " +
@@ -103,9 +78,7 @@ Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& setti
                  Eigen::MatrixXd(rows, system.num_embedding_coordinates()),
                  Eigen::MatrixXd(rows, nv),
                  {},
-                 Eigen::VectorXd(settings.time_steps ? rows : 0),
-                 {},
-                 Eigen::VectorXd::Zero(settings.filter ? rows : 0)};
+                 Eigen::VectorXd(settings.time_steps ? rows : 0)};
   result.statuses.reserve(static_cast<std::size_t>(rows));
   return result;
 }
@@ -121,61 +94,17 @@ Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, con
   Rollout result = make_rollout(system, settings);
   const Eigen::Index rows = result.time.size();
   const double dt = settings.period;
-  std::optional<AccelerationFilter> filter = settings.filter;
-  if (filter) {
-    check_filter(*filter, nv, settings);
-  }
-  if (settings.escape != nullptr) {
-    check_leader("escape", settings.escape->num_coordinates(), nv, settings);
-  }
-  if (settings.evasion != nullptr) {
-    check_leader("evasion", settings.evasion->num_coordinates(), nv, settings);
-    if (!filter) {
-      throw std::invalid_argument("an evasion needs a filter, which keeps its flights off obstacles");
-    }
-  }
-  constexpr double no_potential = std::numeric_limits<double>::quiet_NaN();  // before the first step
-  TorqueSolution filtered(nv);
   GeometricSystem::Workspace w(system);
   ObstaclesInMotion obstacles(start_obstacles);
   Eigen::VectorXd q = start;
   Eigen::VectorXd v = start_velocity;
-  const Flight* flight = nullptr;
-  Goal refuge = goal;  // of the flight
-  const Goal* followed = &goal;
   for (Eigen::Index k = 0; k < rows; ++k) {
     if (settings.interrupted()) {
       throw Interruption();
     }
-    const bool known = k > 0 && flight == nullptr;  // how far the goal itself was, as seen from a way to it
-    const bool leads = k < settings.steps;          // the last row is the first of the rollout that goes on from here
-    if (leads && settings.evasion != nullptr) {
-      flight = settings.evasion->pursue(goal, q, v, obstacles.now(), dt);
-      followed = &goal;
-      if (flight != nullptr) {
-        refuge = JointGoal(flight->refuge());
-        followed = &refuge;
-      }
-    }
     const Clock::time_point begin = settings.time_steps ? Clock::now() : Clock::time_point{};
-    if (leads && settings.escape != nullptr && flight == nullptr) {
-      followed = &settings.escape->pursue(goal, q, known ? w.pull.potential : no_potential, dt);
-    }
-    const StepStatus status = system.acceleration(q, v, *followed, obstacles.now(), w);
-    Eigen::VectorXd a = w.acceleration;
-    if (flight != nullptr && !is_fallback(status)) {
-      a = flight->acceleration(q, v, dt);
-    }
-    if (filter) {
-      // Where the state is unusable nothing was measured.
-      const Clearances* clearances = status == StepStatus::invalid_state ? nullptr : &w.clearances;
-      result.filter_statuses.push_back(filter->apply(q, v, a, clearances, filtered));
-      a = filtered.acceleration;
-      for (int n = 0; n < filtered.num_safety_rows; ++n) {
-        result.safety_slack[k] =
-            std::max(result.safety_slack[k], filtered.safety[static_cast<std::size_t>(n)].slack);
-      }
-    }
+    const StepStatus status = system.acceleration(q, v, goal, obstacles.now(), w);
+    const Eigen::VectorXd a = w.acceleration;
     if (settings.time_steps) {
       result.step_seconds[k] = std::chrono::duration<double>(Clock::now() - begin).count();
     }

@@ -17,22 +17,24 @@ import numpy.typing as npt
 
 import sidestep
 from sidestep._core import (
-    AccelerationFilter,
     BarrierSettings,
     ClearanceBarrier,
     CollisionDensity,
+    Controller,
+    ControllerSettings,
     GeometricSystem,
     JointType,
     Obstacles,
     instruction_set,
+    integrate,
     rollout,
 )
+from sidestep.arm import Arm
 from sidestep.bench import peers_jax
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.bench.step import cpu_model
 from sidestep.body import Body
 from sidestep.mesh import mesh_model
-from sidestep.presets import barrier_system
 from sidestep.reproduce import dense_analytic, torch_autograd
 from sidestep.reproduce.serial_chain import SerialChain
 from sidestep.robot import Robot
@@ -150,16 +152,22 @@ def _in_cpp(
     goal: Array,
     obstacles: Obstacles,
     seconds: float,
-    guard: Any = None,
 ) -> Array:
     """Microseconds of steps of the system in motions of it."""
     times: list[Array] = []
     end = time.perf_counter() + seconds
     while not times or time.perf_counter() < end:
-        run = rollout(
-            system, start, 0.0 * start, goal, obstacles, steps=MOTION, time_steps=True, filter=guard
-        )
+        run = rollout(system, start, 0.0 * start, goal, obstacles, steps=MOTION, time_steps=True)
         times.append(1e6 * run.step_seconds)
+    return np.concatenate(times)
+
+
+def _controlled(controller: Controller, start: Array, seconds: float) -> Array:
+    """The same of steps of the whole controller, in C++."""
+    times: list[Array] = []
+    end = time.perf_counter() + seconds
+    while not times or time.perf_counter() < end:
+        times.append(1e6 * integrate(controller, start, 0.0 * start, steps=MOTION).step_seconds)
     return np.concatenate(times)
 
 
@@ -226,12 +234,11 @@ def _optional(name: str, work: str, module: str, make: Callable[[], Call], *, ch
 
 @dataclass(frozen=True)
 class _Arm:
-    """The covering body among the balls of a problem of `bench reach`, along a motion of the recommended system."""
+    """The covering body among the balls of a problem of `bench reach`, along a motion of the controller."""
 
     robot: Robot
     body: Body
-    system: GeometricSystem
-    guard: AccelerationFilter
+    controller: Controller
     obstacles: Obstacles
     start: Array
     goal: Array
@@ -245,10 +252,15 @@ class _Arm:
             ProblemSettings(robot=ROBOT, obstacles=BALLS, seed=settings.seed), robot=robot
         ).problem(0)
         obstacles, start, goal = problem.obstacles_at(0.0), problem.start, problem.goal
-        system, guard = barrier_system(robot, body), AccelerationFilter(robot)
-        run = rollout(system, start, 0.0 * start, goal, obstacles, steps=MOTION, filter=guard)
+        controller = Controller(
+            Arm.from_robot(robot, body),
+            ControllerSettings(planner=None, look_ahead=None, synchronous=True, output="acceleration"),
+        )
+        controller.set_goal(goal)
+        controller.set_obstacles(obstacles)
+        run = integrate(controller, start, 0.0 * start, steps=MOTION)
         states = [(q, v, q) for q, v in zip(run.q, run.v, strict=True)]
-        return cls(robot, body, system, guard, obstacles, start, goal, states)
+        return cls(robot, body, controller, obstacles, start, goal, states)
 
     @property
     def balls(self) -> Array:
@@ -256,10 +268,9 @@ class _Arm:
 
 
 def _whole_arm(settings: PeerSettings) -> tuple[States, list[_Way]]:
-    """Steps with a filter."""
+    """Steps of the controller; planner and look-ahead have threads of their own."""
     arm = _Arm.of(settings)
-    robot, body, system, guard = arm.robot, arm.body, arm.system, arm.guard
-    obstacles, start, goal, states, balls = arm.obstacles, arm.start, arm.goal, arm.states, arm.balls
+    robot, body, goal, states, balls = arm.robot, arm.body, arm.goal, arm.states, arm.balls
     chain = SerialChain.of(robot, body)
     # Around each ellipsoid: a sphere as large as its longest semi-axis.
     moving = _moving(robot)
@@ -268,17 +279,13 @@ def _whole_arm(settings: PeerSettings) -> tuple[States, list[_Way]]:
     radii = np.sqrt(levels * np.linalg.eigvalsh(chain.covariances)[:, -1])
     spheres = f"{len(radii)} spheres around the same ellipsoids"
 
-    def step(q: Array, v: Array) -> Array:
-        found = system.acceleration(q, v, goal, obstacles)
-        return guard.apply(q, v, found.acceleration, clearances=found).acceleration
-
     ways = [
         _Way(
             "Sidestep, C++",
-            f"system and filter: {len(body.links)} ellipsoids, self-collision, limits, quadratic program",
-            measured=lambda: _in_cpp(system, start, goal, obstacles, settings.seconds, guard),
+            f"controller, acceleration: {len(body.links)} ellipsoids, self-collision, limits, quadratic program",
+            measured=lambda: _controlled(arm.controller, arm.start, settings.seconds),
         ),
-        _Way("Sidestep, Python", "the same, two calls", step),
+        _Way("Sidestep, Python", "the same, one call", lambda q, v: arm.controller.step(q, v).acceleration),
         _optional(
             "CBFpy",
             f"the filter of a joint velocity: {spheres}, no self-collision, no limits, quadratic program",

@@ -13,17 +13,17 @@ import numpy.typing as npt
 import sidestep
 from sidestep._core import (
     AccelerationFilter,
-    GeometricSystem,
+    Controller,
+    ControllerSettings,
     Obstacles,
     QuadraticProgram,
     QuadraticProgramData,
     QuadraticProgramStatus,
-    rollout,
+    integrate,
 )
+from sidestep.arm import Arm
 from sidestep.bench.step import MOTION, clear_place, cpu_model
 from sidestep.bench.step_scenes import table_cloud
-from sidestep.body import Body
-from sidestep.presets import barrier_system
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -142,40 +142,44 @@ def _measure(
 
 def _programs(settings: QuadraticProgramSettings) -> list[QuadraticProgramData]:
     """Of every tenth state; at least one is held by a clearance or a limit."""
-    robot, system, obstacles, rng = _scene(settings)
-    filter = AccelerationFilter(robot)
+    robot, controller, obstacles, rng = _scene(settings)
+    system, filter = controller.system, AccelerationFilter(robot)
     programs: list[QuadraticProgramData] = []
     q = clear_place(robot, system, obstacles, rng)
     constrained = False
     while len(programs) < settings.programs or not constrained:
         goal = clear_place(robot, system, obstacles, rng)
-        moved = rollout(system, q, np.zeros_like(q), goal, obstacles, steps=MOTION, filter=filter)
+        controller.set_goal(goal)
+        moved = integrate(controller, q, np.zeros_like(q), steps=MOTION)
         for k in range(0, MOTION, EVERY):
             step = system.acceleration(moved.q[k], moved.v[k], goal, obstacles)
             filter.apply(moved.q[k], moved.v[k], step.acceleration, clearances=step)
             programs.append(filter.program)
             constrained = constrained or _core(programs[-1])[2] > 0
-        q = np.clip(moved.q[-1], robot.limits.lower, robot.limits.upper)
+        q = np.clip(moved.last_q, robot.limits.lower, robot.limits.upper)
     return programs
 
 
 def _step_seconds(settings: QuadraticProgramSettings) -> Array:
-    """Of whole steps with system and filter, in C++, between places like those of the programs."""
-    robot, system, obstacles, rng = _scene(settings)
-    q, goal = (clear_place(robot, system, obstacles, rng) for _ in range(2))
-    filter = AccelerationFilter(robot)
-    moved = rollout(
-        system, q, np.zeros_like(q), goal, obstacles, steps=MOTION, filter=filter, time_steps=True
-    )
-    return moved.step_seconds
+    """Of whole steps of the controller, in C++, between places like those of the programs."""
+    robot, controller, obstacles, rng = _scene(settings)
+    q, goal = (clear_place(robot, controller.system, obstacles, rng) for _ in range(2))
+    controller.set_goal(goal)
+    return integrate(controller, q, np.zeros_like(q), steps=MOTION).step_seconds
 
 
 def _scene(
     settings: QuadraticProgramSettings,
-) -> tuple[Robot, GeometricSystem, Obstacles, np.random.Generator]:
+) -> tuple[Robot, Controller, Obstacles, np.random.Generator]:
     robot = Robot.named(settings.robot)
     rng = np.random.default_rng(settings.seed)
-    return robot, barrier_system(robot, Body.cover(robot)), table_cloud(POINTS, rng), rng
+    obstacles = table_cloud(POINTS, rng)
+    controller = Controller(
+        Arm.from_robot(robot),
+        ControllerSettings(planner=None, look_ahead=None, synchronous=True, output="acceleration"),
+    )
+    controller.set_obstacles(obstacles)
+    return robot, controller, obstacles, rng
 
 
 def _core(program: QuadraticProgramData) -> tuple[Array | None, float, int]:

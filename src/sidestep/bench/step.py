@@ -20,7 +20,6 @@ except ImportError:  # not on Windows
 
 import sidestep
 from sidestep._core import (
-    AccelerationFilter,
     CollisionDensity,
     Controller,
     ControllerSettings,
@@ -87,7 +86,7 @@ def run_step_bench(
     many points all around it, to the best of what was drawn.
 
     Rows of a controller are of all that its step does beside planner and look-ahead, whose threads are not the step's:
-    system, escape from local minima, room at the goal, and a program for torque, or for acceleration as "with filter".
+    system, escape from local minima, room at the goal, and a program for torque, or for acceleration.
     Mass matrix and bias, which torque needs, have a row of their own.
 
     A step is as long as the clock says, whatever else the machine did meanwhile: `max_us`. `interruptions` says how
@@ -217,7 +216,6 @@ class _Row:
     system: GeometricSystem
     obstacles: Obstacles
     num_components: int
-    filter: AccelerationFilter | None
     python: bool
 
     def measure(self, settings: StepSettings) -> dict[str, Any]:
@@ -244,7 +242,6 @@ class _Row:
             "joints": self.robot.num_coordinates,
             "gaussians": self.num_components,
             "points": len(self.obstacles.points),
-            "filter": self.filter is not None,
             "steps": times.total,
             **{f"{name}_us": value for name, value in times.microseconds().items()},
             "undisturbed_max_us": round(1e6 * undisturbed, 3) if undisturbed > 0.0 else None,
@@ -264,14 +261,11 @@ class _Row:
             self.obstacles,
             steps=steps,
             time_steps=True,
-            filter=self.filter,
         )
         return _inside(self.robot, moved.q[-1]), moved.step_seconds
 
     def _from_python(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
-        moved = rollout(
-            self.system, q, np.zeros_like(q), goal, self.obstacles, steps=steps, filter=self.filter
-        )
+        moved = rollout(self.system, q, np.zeros_like(q), goal, self.obstacles, steps=steps)
         seconds = np.empty(steps)
         for k in range(steps):
             start = time.perf_counter_ns()
@@ -344,7 +338,6 @@ def _rows(settings: StepSettings) -> Iterator[_Row]:
                 system,
                 Obstacles([[0.4, 0.1, 0.3]]),
                 len(body.links),
-                None,
                 python,
             )
     robot = Robot.named(settings.robot)
@@ -355,16 +348,13 @@ def _rows(settings: StepSettings) -> Iterator[_Row]:
             obstacles = cloud(num, np.random.default_rng(settings.seed))
             name = f"{robot.name}, {num} points, {shape}"
             scene = (robot, system, obstacles, ellipsoids)
-            yield _Row(f"{name}, without filter", *scene, None, False)
-            yield _Row(f"{name}, with filter", *scene, AccelerationFilter(robot), False)
-            yield _ControllerRow(f"{name}, controller", *scene, None, False, arm, "automatic")
-            yield _ControllerRow(
-                f"{name}, controller, acceleration", *scene, None, False, arm, "acceleration"
-            )
-            yield _Row(f"{name}, without filter", *scene, None, True)
+            yield _Row(f"{name}, without filter", *scene, False)
+            yield _ControllerRow(f"{name}, controller", *scene, False, arm, "automatic")
+            yield _ControllerRow(f"{name}, controller, acceleration", *scene, False, arm, "acceleration")
+            yield _Row(f"{name}, without filter", *scene, True)
     if arm.has_dynamics:
         dynamics = RigidBodyDynamics(robot, arm.inertials)
         none = Obstacles.none()
         yield _DynamicsRow(
-            f"{robot.name}, mass matrix and bias", robot, system, none, ellipsoids, None, False, dynamics
+            f"{robot.name}, mass matrix and bias", robot, system, none, ellipsoids, False, dynamics
         )

@@ -26,8 +26,8 @@ def step(
     """Times one control step: Table 6.1 of the thesis, the whole arm and the whole controller among clouds of points.
 
     Every row on one core, from C++ (around each step of a motion) and from Python. Motions go between places with
-    3 cm of clearance, as far as there are any. The filter holds limits and clearances by a quadratic program. The
-    controller does in its step all but planner and look-ahead, which have threads of their own (`bench realtime`).
+    3 cm of clearance, as far as there are any. The controller, which holds limits and clearances by a quadratic
+    program, does in its step all but planner and look-ahead, which have threads of their own (`bench realtime`).
     Kept is the longest step of the motions during which the core was kept: given to no other program. Last, the kernel
     that leaves no point out, as a share of what a core does that only multiplies and adds.
     """
