@@ -23,6 +23,7 @@ LONG = {
     "guide": "guide.set_goal([1.5, 0, 0]), guide.set_obstacles(wall), guide.step([0, 0, 0], 0.0)",
     "finish": "run.finish()",
     "integrate": "ss.integrate(stepped, q, 0 * q, steps=10_000_000)",
+    "integrate_batch": "ss.integrate_batch(many, rows, 0 * rows, steps=9_000_000, threads=2)",
     "refine_cover": "refine(steps=10**9)",
 }
 
@@ -44,7 +45,7 @@ planner = ss.PathPlanner(robot, body, settings=settings)
 guide = ss.Guide(robot, body, planner=settings, synchronous=True)
 arm = ss.Arm.from_robot(robot)
 run = ss.RealTimeRun(ss.Controller(arm), q, 0 * q, steps=100_000)
-stepped = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
+stepped, *many = (ss.Controller(arm, ss.ControllerSettings(synchronous=True)) for _ in range(5))
 
 
 def refine(steps):

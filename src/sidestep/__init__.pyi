@@ -61,6 +61,7 @@ from ._core import christoffel_symbols as christoffel_symbols
 from ._core import controller_settings_fields as controller_settings_fields
 from ._core import geodesic_acceleration as geodesic_acceleration
 from ._core import integrate as integrate
+from ._core import integrate_batch as integrate_batch
 from ._core import is_fallback as is_fallback
 from ._core import metric_matrix as metric_matrix
 from ._core import rollout as rollout

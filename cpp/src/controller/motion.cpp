@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <numbers>
+#include <set>
 #include <stdexcept>
 #include <string>
 
+#include "../batch.hpp"
 #include "impl.hpp"
 
 namespace sidestep {
@@ -79,6 +82,38 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
   record.clearance.conservativeResize(done);
   record.step_seconds.conservativeResize(done);
   return record;
+}
+
+std::vector<MotionRecord> integrate_batch(const std::vector<Controller*>& controllers, const Eigen::MatrixXd& q,
+                                          const Eigen::MatrixXd& v, int steps, const Eigen::MatrixXd& goals,
+                                          double tolerance, int threads, const Interrupted& interrupted) {
+  const auto num = static_cast<Eigen::Index>(controllers.size());
+  for (const Eigen::MatrixXd* rows : {&q, &v, &goals}) {
+    if (rows->rows() != num && !(rows == &goals && goals.size() == 0)) {
+      const char* const name = rows == &q ? "q" : rows == &v ? "v" : "goals";
+      throw std::invalid_argument(std::string("integrate_batch: ") + name + " has " + std::to_string(rows->rows()) +
+                                  " rows, needed is one for each of the " + std::to_string(num) + " controllers");
+    }
+  }
+  if (std::set<Controller*>(controllers.begin(), controllers.end()).size() != controllers.size()) {
+    throw std::invalid_argument("integrate_batch: a controller is there twice; each motion needs its own");
+  }
+  const double row = (3.0 * static_cast<double>(q.cols()) + 2.0) * sizeof(double) + sizeof(SafetyStatus) + sizeof(Activity);
+  if (const Eigen::Index most = most_rows(row, num); steps > most) {
+    throw std::invalid_argument("integrate_batch: steps is " + std::to_string(steps) + ", must be at most " +
+                                std::to_string(most) + " for " + std::to_string(num) + " motions: their records may have 8 GiB");
+  }
+  std::deque<Controller::Use> uses;
+  for (Controller* const controller : controllers) {
+    uses.emplace_back(*controller);
+  }
+  std::vector<MotionRecord> records(controllers.size());
+  share(num, threads, interrupted, [&](Eigen::Index k, const Interrupted& halted) {
+    const Eigen::VectorXd goal = goals.size() == 0 ? Eigen::VectorXd() : Eigen::VectorXd(goals.row(k).transpose());
+    const auto i = static_cast<std::size_t>(k);
+    records[i] = integrate(*controllers[i], q.row(k).transpose(), v.row(k).transpose(), steps, goal, tolerance, halted);
+  });
+  return records;
 }
 
 }  // namespace sidestep

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "../batch.hpp"
 #include "rollout_rows.hpp"
 
 namespace sidestep {
@@ -60,10 +61,10 @@ void check_records(const GeometricSystem& system, const RolloutSettings& setting
   const double numbers = 1.0 + 4.0 * system.robot().num_coordinates() + system.num_embedding_coordinates() +
                          (settings.time_steps ? 1.0 : 0.0);
   const double row = numbers * sizeof(double) + sizeof(StepStatus);
-  const double most_rows = std::floor(most_record_bytes / (row * static_cast<double>(std::max<Eigen::Index>(motions, 1))));
-  if (settings.steps > most_rows - 1.0) {
+  const Eigen::Index most_steps = std::max<Eigen::Index>(most_rows(row, motions) - 1, 0);
+  if (settings.steps > most_steps) {
     throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at most " +
-                                std::to_string(std::max(static_cast<long long>(most_rows) - 1, 0LL)) + " for " +
+                                std::to_string(most_steps) + " for " +
                                 std::to_string(motions) + " motions: their records may have 8 GiB");
   }
 }

@@ -23,9 +23,6 @@ struct RolloutSettings {
   Interrupted interrupted = never_interrupted;  ///< asked before every step
 };
 
-/// [bytes] that the records of one call may have together: 8 GiB.
-inline constexpr double most_record_bytes = 8.0 * 1024.0 * 1024.0 * 1024.0;
-
 /// A kinematic motion of the system: row k is at time k dt; there are steps + 1 rows.
 struct Rollout {
   Eigen::VectorXd time;                ///< [s]
@@ -39,7 +36,7 @@ struct Rollout {
 /// Integrates the system alone from (q, v), obstacles and goal moving at their velocities: nothing holds limits or clearances.
 /// What has to keep them is a Controller, see `integrate`.
 /// Throws std::invalid_argument on sizes, a period or number of steps that is not positive, and a record of more than
-/// `most_record_bytes`; Interruption if interrupted.
+/// 8 GiB; Interruption if interrupted.
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                 Goal goal, const Obstacles& obstacles, const RolloutSettings& settings);
 inline Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
