@@ -8,16 +8,18 @@ from __future__ import annotations
 import inspect
 import re
 from pathlib import Path
+from types import ModuleType
 
 import sidestep
+from sidestep import thesis
 
 PAGE = Path(__file__).parent / "reference.md"
 STUB = Path(sidestep.__file__).parent / "__init__.pyi"
 HEADING = {"_core": "Core: embeddings, geometry, dynamical system"}
 INTRODUCTION = """# Reference
 
-Every public name of `sidestep`; `python docs/make_reference.py` writes this page. `help(sidestep.NAME)` has arguments,
-shapes, units, frames and errors.
+Every public name of `sidestep` and `sidestep.thesis`; `python docs/make_reference.py` writes this page.
+`help(sidestep.NAME)` has arguments, shapes, units, frames and errors.
 """
 SETTINGS = """
 ## Settings of the controller
@@ -28,9 +30,9 @@ and `local_minimum` may be None (in scenario files null), which leaves the part 
 """
 
 
-def first_sentence(name: str) -> str:
+def first_sentence(name: str, package: ModuleType = sidestep) -> str:
     """The first sentence of a public object's docstring, or what comes before its formula, as a cell of a table."""
-    text = inspect.getdoc(getattr(sidestep, name)) or ""
+    text = inspect.getdoc(getattr(package, name)) or ""
     if re.match(rf"{name}\(.*\)( -> .*)?$", text.split("\n")[0]):  # a signature that the binding put first
         text = text.split("\n", 1)[1].strip()
     paragraph = re.split(r"\n\s*\n|\n    ", text)[0]
@@ -65,6 +67,9 @@ def page() -> str:
         parts.append("| name | what it is |\n|---|---|")
         parts += [f"| `{name}` | {first_sentence(name)} |" for name in sorted(members)]
     parts.append(SETTINGS + "\n".join(settings_table()))
+    parts.append("\n## The thesis: `sidestep.thesis`\n")
+    parts.append("| name | what it is |\n|---|---|")
+    parts += [f"| `{name}` | {first_sentence(name, thesis)} |" for name in sorted(thesis.__all__)]
     return "\n".join(parts) + "\n"
 
 

@@ -8,11 +8,12 @@ is compared with finite differences, and the geodesic term in closed form with d
 import numpy as np
 
 import sidestep as ss
+from sidestep import thesis
 
 robot = ss.Robot.named("planar3")
 body = ss.Body.fit(robot, components=2, seed=0)
 obstacles = ss.Obstacles([[0.9, 0.3, 0.0], [0.4, -0.5, 0.0]], radii=0.1)
-psi = ss.CollisionDensity(robot, body)
+psi = thesis.CollisionDensity(robot, body)
 
 q, v = np.array([0.3, -0.4, 0.8]), np.array([0.5, -1.0, 0.7])
 here = psi.evaluate(q, v, obstacles)
@@ -26,8 +27,8 @@ curvature = np.dot([-1, 16, -30, 16, -1], along) / (12 * h * h)
 print(f"relative error of dpsi/dt:   {abs(slope / (here.jacobian[0] @ v) - 1):.1e}")
 print(f"relative error of d2psi/dt2: {abs(curvature / here.curvatures[0] - 1):.1e}")
 
-closed = ss.geodesic_acceleration(here.jacobian, here.curvatures)
-symbols = ss.christoffel_symbols(here.jacobian, psi.hessian(q, obstacles)[None])
+closed = thesis.geodesic_acceleration(here.jacobian, here.curvatures)
+symbols = thesis.christoffel_symbols(here.jacobian, psi.hessian(q, obstacles)[None])
 dense = -np.einsum("kij,i,j->k", symbols, v, v)
 print("geodesic acceleration", closed)
 print(f"relative difference to dense Christoffel symbols: {np.abs(closed / dense - 1).max():.1e}")

@@ -8,10 +8,11 @@ moves.
 import numpy as np
 
 import sidestep as ss
+from sidestep import thesis
 
 robot = ss.Robot.named("planar3")
 body = ss.Body.fit(robot, components=1, seed=0)
-psi = ss.CollisionDensity(robot, body)
+psi = thesis.CollisionDensity(robot, body)
 position, velocity = np.array([1.0, 0.7, 0.0]), np.array([-0.03, 0.02, 0.0])
 start, goal = np.array([1.5, -0.6, 0.3]), np.array([-0.9, 1.2, 1.4])
 rest = np.zeros(3)
@@ -29,7 +30,7 @@ difference = np.dot([-1, 16, -30, 16, -1], around) / (12 * h * h)
 print(f"d2psi/dt2 of an arm at rest: {curvature:.6f}, by finite differences {difference:.6f}")
 
 system = ss.GeometricSystem([psi], stiffness=2.0, damping=3.0)
-motion = ss.rollout(system, start, rest, goal, ball(0.0), steps=10000)
+motion = thesis.rollout(system, start, rest, goal, ball(0.0), steps=10000)
 print(f"joint error {np.abs(motion.q[-1] - goal).max():.4f} rad")
 
 pose = np.eye(4)

@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 import sidestep as ss
+from sidestep import thesis
 
 # A scanned box, here made on the spot: 5000 points on its surface, written as PLY.
 box = trimesh.creation.box((0.2, 0.4, 0.3))
@@ -28,6 +29,6 @@ print(f"every point is covered: {bool((distances.min(axis=1) <= 1e-6).all())}")
 
 robot = ss.Robot.named("fr3_arm")
 body = ss.Body.fit(robot, components=1, seed=0)
-psi = ss.CollisionDensity(robot, body, average=True)
+psi = thesis.CollisionDensity(robot, body, average=True)
 values = [psi.evaluate(robot.neutral, np.zeros(7), points).values[0] for points in (cloud, merged)]
 print(f"average density at rest: {values[0]:.3f} of all points, {values[1]:.3f} of the merged ones [1/m^3]")

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep import thesis
 from support import planar_problems
 
 pytestmark = pytest.mark.slow
 
 LONG = {
-    "rollout": "ss.rollout(system, q, 0 * q, q + 1, none, steps=20_000_000)",
-    "rollout_batch": "ss.rollout_batch(system, rows, 0 * rows, rows, none, steps=5_000_000, threads=2)",
+    "rollout": "thesis.rollout(system, q, 0 * q, q + 1, none, steps=20_000_000)",
+    "rollout_batch": "thesis.rollout_batch(system, rows, 0 * rows, rows, none, steps=5_000_000, threads=2)",
     "plan": "planner.plan([0, 0, 0], [1.5, 0, 0], wall)",
     "guide": "guide.set_goal([1.5, 0, 0]), guide.set_obstacles(wall), guide.step([0, 0, 0], 0.0)",
     "finish": "run.finish()",
@@ -67,7 +68,7 @@ else:
     print("ended by itself", flush=True)
 run.stop()
 assert len(run.finish().taken) < 100_000
-moved = ss.rollout(system, q, 0 * q, q + 0.1, none, steps=5)
+moved = thesis.rollout(system, q, 0 * q, q + 0.1, none, steps=5)
 assert np.isfinite(moved.q).all() and len(moved.time) == 6
 print("goes on", flush=True)
 """
@@ -98,7 +99,7 @@ def test_a_handler_that_does_not_raise_does_not_end_the_work():
     try:
         timer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
         timer.start()
-        motion = ss.rollout(system, [0, 0], [0, 0], [1, 1], ss.Obstacles.none(), steps=1_500_000)
+        motion = thesis.rollout(system, [0, 0], [0, 0], [1, 1], ss.Obstacles.none(), steps=1_500_000)
         timer.join()
     finally:
         signal.signal(signal.SIGINT, before)

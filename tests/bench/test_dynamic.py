@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sidestep import ExactClearance, Robot, SceneObject, rollout
+from sidestep import ExactClearance, Robot, SceneObject
 from sidestep.bench import (
     DynamicProblem,
     Judge,
@@ -24,6 +24,7 @@ from sidestep.bench.arm import Arm
 from sidestep.bench.dynamic import BLOCKED_WITHIN, FROM_GOAL, FROM_START, with_ball
 from sidestep.bench.methods import build_body
 from sidestep.bench.problem import poses_over
+from sidestep.thesis import rollout
 
 
 @cache

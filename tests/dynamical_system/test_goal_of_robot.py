@@ -3,6 +3,7 @@
 import pytest
 
 import sidestep as ss
+from sidestep import thesis
 
 
 def pose_goal(robot: ss.Robot) -> ss.PoseGoal:
@@ -14,7 +15,7 @@ def status(robot: ss.Robot, goal: ss.PoseGoal) -> ss.StepStatus:
     system = ss.GeometricSystem([], robot=robot)
     q = robot.neutral
     step = system.acceleration(q, 0 * q, goal, ss.Obstacles.none())
-    motion = ss.rollout(system, q, 0 * q, goal, ss.Obstacles.none(), steps=2)
+    motion = thesis.rollout(system, q, 0 * q, goal, ss.Obstacles.none(), steps=2)
     assert set(motion.statuses) == {step.status}
     return step.status
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep import thesis
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +82,7 @@ def test_an_arm_found_inside_moves_out_and_says_so(robot: ss.Robot, system: ss.G
     assert str(step.diagnosis) == (
         "link fr3_link7 is inside the barrier of obstacle point 0, 30 mm deep, and moves out"
     )
-    motion = ss.rollout(system, q, np.zeros(7), q, ball, steps=5000)
+    motion = thesis.rollout(system, q, np.zeros(7), q, ball, steps=5000)
     assert motion.statuses[-1] == ss.StepStatus.ok
     # the push asks for 2 m/s^2 along h, and the rebound for about 1 rad/s
     assert np.linalg.norm(motion.acceleration, axis=1).max() < 40.0

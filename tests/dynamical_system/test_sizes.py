@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep import thesis
 from sidestep._core import QuadraticProgram
 
 
@@ -19,22 +20,22 @@ Q = np.zeros((3, 2))
 def test_records_that_would_be_too_large_are_refused(system, steps):
     none = ss.Obstacles.none()
     with pytest.raises(ValueError, match=f"steps is {steps}, must be at most .* for 1 motions"):
-        ss.rollout(system, Q[0], Q[0], Q[0], none, steps=steps)
+        thesis.rollout(system, Q[0], Q[0], Q[0], none, steps=steps)
     with pytest.raises(ValueError, match=f"steps is {steps}, must be at most .* for 3 motions"):
-        ss.rollout_batch(system, Q, Q, Q, none, steps=steps)
+        thesis.rollout_batch(system, Q, Q, Q, none, steps=steps)
 
 
 def test_motions_count_together(system):
     none, many = ss.Obstacles.none(), np.zeros((100_000, 2))
     with pytest.raises(ValueError, match=r"steps is 10000, must be at most .* for 100000 motions"):
-        ss.rollout_batch(system, many, many, many, none, steps=10_000)
+        thesis.rollout_batch(system, many, many, many, none, steps=10_000)
 
 
 @pytest.mark.parametrize("threads", [-1, 1025, 2**31 - 1])
 def test_threads_are_bounded(system, threads):
     message = f"threads is {threads}, must be from 0 to 1024"
     with pytest.raises(ValueError, match=message):
-        ss.rollout_batch(system, Q, Q, Q, ss.Obstacles.none(), steps=2, threads=threads)
+        thesis.rollout_batch(system, Q, Q, Q, ss.Obstacles.none(), steps=2, threads=threads)
 
 
 def test_rows_nodes_and_programs_have_an_upper_bound():

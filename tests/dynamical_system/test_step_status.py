@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep import thesis
 from support.random_scene import scene
 
 RATE = 10.0  # [1/s] of the fallback
 
 
-def system_of(switch: ss.Unswitched | None = None) -> ss.GeometricSystem:
+def system_of(switch: thesis.Unswitched | None = None) -> ss.GeometricSystem:
     case = scene("fr3")
-    return ss.GeometricSystem([ss.CollisionDensity(case.robot, case.body)], switch=switch)
+    return ss.GeometricSystem([thesis.CollisionDensity(case.robot, case.body)], switch=switch)
 
 
 def arguments() -> dict[str, np.ndarray | ss.Obstacles]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep import thesis
 from support.random_scene import ROBOTS, Scene, State, scene
 
 STIFFNESS, DAMPING = 2.0, 1.2
@@ -31,11 +32,11 @@ def parts(
     spring = STIFFNESS * (state.q - case.robot.neutral)
     damping = DAMPING * state.v
     h = -solve(J, spring) - damping if form == "plain" else -solve(J, spring + damping)
-    return h, ss.geodesic_acceleration(J, c), sum(float(e.values.sum()) for e in evaluations)
+    return h, thesis.geodesic_acceleration(J, c), sum(float(e.values.sum()) for e in evaluations)
 
 
 def embeddings_of(case: Scene) -> list[ss.Embedding]:
-    return [ss.CollisionDensity(case.robot, case.body), ss.JointLimitPotential(case.robot, slope=4.0)]
+    return [thesis.CollisionDensity(case.robot, case.body), thesis.JointLimitPotential(case.robot, slope=4.0)]
 
 
 def distances(case: Scene, state: State) -> np.ndarray:
@@ -60,15 +61,15 @@ def sigmoid(u: np.ndarray | float) -> np.ndarray | float:
 SWITCHES = ["unswitched", "harmonic", "geodesic", "binary", "sigmoid", "distance"]
 
 
-def make(kind: str, psi: float, nv: int) -> ss.Unswitched:
+def make(kind: str, psi: float, nv: int) -> thesis.Unswitched:
     """A switch of each kind whose threshold is near the state's psi, so that weights are of every size."""
     return {
-        "unswitched": ss.Unswitched(),
-        "harmonic": ss.HarmonicOnly(),
-        "geodesic": ss.GeodesicOnly(),
-        "binary": ss.BinarySwitch(psi),
-        "sigmoid": ss.SigmoidSwitch(0.8 * psi, 5.0 / (psi + 1.0)),
-        "distance": ss.DistanceSwitch(np.linspace(0.05, 0.4, nv), 12.0),
+        "unswitched": thesis.Unswitched(),
+        "harmonic": thesis.HarmonicOnly(),
+        "geodesic": thesis.GeodesicOnly(),
+        "binary": thesis.BinarySwitch(psi),
+        "sigmoid": thesis.SigmoidSwitch(0.8 * psi, 5.0 / (psi + 1.0)),
+        "distance": thesis.DistanceSwitch(np.linspace(0.05, 0.4, nv), 12.0),
     }[kind]
 
 
@@ -109,7 +110,7 @@ def test_every_mode_and_damping_form(name: str, kind: str) -> None:
             np.testing.assert_allclose(step.geodesic, g, rtol=0, atol=EXACT * scale)
             np.testing.assert_allclose(step.switch, weights, rtol=0, atol=EXACT)
             np.testing.assert_allclose(step.acceleration, a, rtol=0, atol=2 * EXACT * scale)
-            np.testing.assert_allclose(step.metric, ss.metric_matrix(step.jacobian), rtol=1e-13)
+            np.testing.assert_allclose(step.metric, thesis.metric_matrix(step.jacobian), rtol=1e-13)
             assert step.values.sum() == pytest.approx(psi, rel=1e-13)
             seen += list(weights)
     if kind in ("binary", "sigmoid", "distance"):
@@ -121,10 +122,10 @@ def test_every_mode_and_damping_form(name: str, kind: str) -> None:
 def test_a_binary_switch_is_harmonic_up_to_and_including_its_threshold() -> None:
     case = scene("fr3")
     state = case.states[0]
-    density = ss.CollisionDensity(case.robot, case.body)
+    density = thesis.CollisionDensity(case.robot, case.body)
     psi = float(density.evaluate(state.q, state.v, state.obstacles).values[0])
     for threshold, weight in ((psi, 1.0), (np.nextafter(psi, 0.0), 0.0)):
-        system = ss.GeometricSystem([density], switch=ss.BinarySwitch(threshold))
+        system = ss.GeometricSystem([density], switch=thesis.BinarySwitch(threshold))
         step = system.acceleration(state.q, state.v, case.robot.neutral, state.obstacles)
         assert (step.switch == weight).all()
 
@@ -152,14 +153,14 @@ def test_gains_are_scalars_diagonals_or_matrices() -> None:
     system = ss.GeometricSystem([], robot=robot, stiffness=2.0, damping=[1.0, 2.0, 3.0])
     assert np.array_equal(system.stiffness, 2.0 * np.eye(3))
     assert np.array_equal(system.damping, np.diag([1.0, 2.0, 3.0]))
-    assert system.damping_form == ss.DampingForm.plain
-    assert isinstance(system.switch, ss.Unswitched)
+    assert system.damping_form == thesis.DampingForm.plain
+    assert isinstance(system.switch, thesis.Unswitched)
 
 
 def test_no_geodesic_term_at_rest() -> None:
     for name in ("fr3", "ur5", "planar2"):
         case = scene(name)
-        system = ss.GeometricSystem(embeddings_of(case), switch=ss.GeodesicOnly())
+        system = ss.GeometricSystem(embeddings_of(case), switch=thesis.GeodesicOnly())
         for state in case.states:
             rest = np.zeros_like(state.q)
             step = system.acceleration(state.q, rest, case.robot.neutral, state.at_rest())
@@ -171,7 +172,7 @@ def test_no_geodesic_term_at_rest() -> None:
 
 def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
     case = scene("fr3")
-    system = ss.GeometricSystem(embeddings_of(case), switch=ss.GeodesicOnly())
+    system = ss.GeometricSystem(embeddings_of(case), switch=thesis.GeodesicOnly())
     for state in case.states:
         once, back, twice = (
             system.acceleration(state.q, f * state.v, case.robot.neutral, state.at_rest()).acceleration
@@ -198,19 +199,22 @@ def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
         (lambda: {"stiffness": np.eye(3)}, r"stiffness has shape \(3, 3\), expected \(2, 2\)"),
         (lambda: {"damping": [1.0, 1.0, 1.0]}, r"damping has shape \(3,\), expected \(2,\)"),
         (lambda: {"damping_form": "strong"}, "damping_form is 'strong', must be one of: plain, metric"),
-        (lambda: {"switch": ss.BinarySwitch(np.nan)}, "switch threshold must be finite"),
-        (lambda: {"switch": ss.SigmoidSwitch(1.0, 0.0)}, "switch slope is 0.0*, must be finite and positive"),
-        (lambda: {"switch": ss.SigmoidSwitch(np.inf, 1.0)}, "switch threshold must be finite"),
+        (lambda: {"switch": thesis.BinarySwitch(np.nan)}, "switch threshold must be finite"),
         (
-            lambda: {"switch": ss.DistanceSwitch([0.1], 1.0)},
+            lambda: {"switch": thesis.SigmoidSwitch(1.0, 0.0)},
+            "switch slope is 0.0*, must be finite and positive",
+        ),
+        (lambda: {"switch": thesis.SigmoidSwitch(np.inf, 1.0)}, "switch threshold must be finite"),
+        (
+            lambda: {"switch": thesis.DistanceSwitch([0.1], 1.0)},
             "switch thresholds: expected 2 finite values, got 1",
         ),
         (
-            lambda: {"switch": ss.DistanceSwitch([0.1, np.nan], 1.0)},
+            lambda: {"switch": thesis.DistanceSwitch([0.1, np.nan], 1.0)},
             "switch thresholds: expected 2 finite values",
         ),
         (
-            lambda: {"switch": ss.DistanceSwitch([0.1, 0.1], -1.0)},
+            lambda: {"switch": thesis.DistanceSwitch([0.1, 0.1], -1.0)},
             "switch slope is -1.0*, must be finite and positive",
         ),
     ],
@@ -218,17 +222,17 @@ def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
 def test_a_bad_setting_is_named(settings: Callable[[], dict], message: str) -> None:
     case = scene("planar2")
     with pytest.raises(ValueError, match=message):
-        ss.GeometricSystem([ss.CollisionDensity(case.robot, case.body)], **settings())
+        ss.GeometricSystem([thesis.CollisionDensity(case.robot, case.body)], **settings())
 
 
 def test_embeddings_must_fit_the_system() -> None:
     case = scene("planar2")
-    limits = ss.JointLimitPotential(case.robot)
-    other = ss.JointLimitPotential(ss.Robot.named("planar3"))
+    limits = thesis.JointLimitPotential(case.robot)
+    other = thesis.JointLimitPotential(ss.Robot.named("planar3"))
     with pytest.raises(ValueError, match="an embedding was made for robot 'planar3', not for 'planar2'"):
         ss.GeometricSystem([limits, other])
     with pytest.raises(ValueError, match="a distance switch needs an embedding with a body, such as"):
-        ss.GeometricSystem([limits], switch=ss.DistanceSwitch([0.1, 0.1], 1.0))
+        ss.GeometricSystem([limits], switch=thesis.DistanceSwitch([0.1, 0.1], 1.0))
     with pytest.raises(ValueError, match="give either embeddings, which know their robot, or an empty list"):
         ss.GeometricSystem([])
     with pytest.raises(ValueError, match="give either embeddings, which know their robot, or an empty list"):

@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import sidestep as ss
-from sidestep import _core
+from sidestep import _core, thesis
 from sidestep.simulation import SelfCollision
 from support.finite_differences import derivative, second_derivative
 from support.random_scene import random_body
@@ -286,10 +286,10 @@ def test_a_wall_sampled_finely_moves_the_arm_as_one_sampled_coarsely() -> None:
     )
     start, goal = np.array([-1.3, 0.2]), np.array([1.3, -0.2])
     motions = [
-        ss.rollout(system, start, np.zeros(2), goal, wall(spacing), period=0.004, steps=750)
+        thesis.rollout(system, start, np.zeros(2), goal, wall(spacing), period=0.004, steps=750)
         for spacing in (0.01, 0.002)
     ]
-    straight = ss.rollout(system, start, np.zeros(2), goal, ss.Obstacles.none(), period=0.004, steps=750)
+    straight = thesis.rollout(system, start, np.zeros(2), goal, ss.Obstacles.none(), period=0.004, steps=750)
     bent = np.abs(motions[0].q - straight.q).max()
     assert bent > 0.1  # rad: the wall is in the way
     # A soft minimum would be lower by T log 25 = 6.4 mm on the finer cloud; here the arms agree to what a spacing of

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep import thesis
 from support.finite_differences import derivative
 from support.random_scene import ROBOTS, State, scene
 
 
-def limits_of(robot: ss.Robot) -> ss.JointLimitPotential:
-    return ss.JointLimitPotential(
+def limits_of(robot: ss.Robot) -> thesis.JointLimitPotential:
+    return thesis.JointLimitPotential(
         robot, slope=4.0, height=2.0
     )  # wide steps, so that they are felt everywhere
 
 
-def stacked(state: State, limits: ss.JointLimitPotential, unit: float) -> tuple[np.ndarray, ...]:
+def stacked(state: State, limits: thesis.JointLimitPotential, unit: float) -> tuple[np.ndarray, ...]:
     """J (2, nv), Hessians (2, nv, nv), curvatures (2,) of the density, in `unit` [1/m^3], and the limits."""
     zeta = limits.evaluate(state.q, state.v, ss.Obstacles.none())
     jacobian = np.vstack([state.gradient / unit, zeta.jacobian])
@@ -34,9 +35,9 @@ def test_closed_form_agrees_with_dense_christoffel_symbols(name: str, num_coordi
         # exact to 1e-12. The closed form has no such limit (see below).
         unit = max(1.0, float(np.linalg.norm(state.gradient)) / 10.0)
         jacobian, hessians, curvatures = (a[:num_coordinates] for a in stacked(state, limits, unit))
-        symbols = ss.christoffel_symbols(jacobian, hessians)
+        symbols = thesis.christoffel_symbols(jacobian, hessians)
         dense = -np.einsum("kij,i,j->k", symbols, state.v, state.v)
-        closed = ss.geodesic_acceleration(jacobian, curvatures)
+        closed = thesis.geodesic_acceleration(jacobian, curvatures)
         scale = np.abs(np.outer(state.v, state.v) * hessians).sum()  # of the terms that are added
         np.testing.assert_allclose(closed, dense, rtol=1e-9, atol=1e-9 * scale)
 
@@ -44,10 +45,10 @@ def test_closed_form_agrees_with_dense_christoffel_symbols(name: str, num_coordi
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_system_uses_this_geodesic_term(name: str) -> None:
     case = scene(name)
-    density, limits = ss.CollisionDensity(case.robot, case.body), limits_of(case.robot)
+    density, limits = thesis.CollisionDensity(case.robot, case.body), limits_of(case.robot)
     goal = case.robot.neutral
-    for embeddings in ([density], [density, limits], [ss.Sum([density, limits])]):
-        system = ss.GeometricSystem(embeddings, switch=ss.GeodesicOnly())
+    for embeddings in ([density], [density, limits], [thesis.Sum([density, limits])]):
+        system = ss.GeometricSystem(embeddings, switch=thesis.GeodesicOnly())
         for state in case.states:
             step = system.acceleration(state.q, state.v, goal, state.obstacles)
             parts = [e.evaluate(state.q, state.v, state.obstacles) for e in embeddings]
@@ -80,7 +81,7 @@ def test_the_geodesic_term_stays_exact_next_to_an_obstacle(num_coordinates: int,
         c[0] *= size**2
         reference = exact_geodesic(J, c)
         np.testing.assert_allclose(
-            ss.geodesic_acceleration(J, c), reference, rtol=0, atol=1e-6 * np.abs(reference).max()
+            thesis.geodesic_acceleration(J, c), reference, rtol=0, atol=1e-6 * np.abs(reference).max()
         )
 
 
@@ -107,7 +108,7 @@ def exact_geodesic(jacobian: np.ndarray, curvatures: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_christoffel_symbols_are_those_of_the_metric(name: str, num_coordinates: int) -> None:
     case = scene(name)
-    density, limits = ss.CollisionDensity(case.robot, case.body), limits_of(case.robot)
+    density, limits = thesis.CollisionDensity(case.robot, case.body), limits_of(case.robot)
     for state in case.states[:20]:
         unit = max(1.0, float(np.linalg.norm(state.gradient)) / 10.0)
 
@@ -117,13 +118,13 @@ def test_christoffel_symbols_are_those_of_the_metric(name: str, num_coordinates:
             return np.vstack([psi, limits.evaluate(q, rest, state.obstacles).jacobian])[:num_coordinates]
 
         def metric(q: np.ndarray, jacobian=jacobian) -> np.ndarray:
-            return ss.metric_matrix(jacobian(q))
+            return thesis.metric_matrix(jacobian(q))
 
         dG = derivative(metric, state.q)  # [i, j, k] = d_k G_ij
         first_kind = 0.5 * (dG.transpose(0, 2, 1) + dG - dG.transpose(2, 0, 1))  # [l, i, j]
         expected = np.linalg.solve(metric(state.q), first_kind.reshape(len(state.q), -1))
         hessians = stacked(state, limits, unit)[1][:num_coordinates]
-        symbols = ss.christoffel_symbols(jacobian(state.q), hessians)
+        symbols = thesis.christoffel_symbols(jacobian(state.q), hessians)
         # differences of G over 1e-4 rad, see test_collision_density; G is 100 at most
         np.testing.assert_allclose(
             symbols.reshape(expected.shape), expected, rtol=0, atol=1e-6 * np.abs(dG).max()
@@ -138,7 +139,7 @@ def test_metric_is_symmetric_and_at_least_the_identity(name: str) -> None:
     for state in case.states:
         for num in (1, 2):
             jacobian = stacked(state, limits, 1.0)[0][:num]
-            metric = ss.metric_matrix(jacobian)
+            metric = thesis.metric_matrix(jacobian)
             assert np.array_equal(metric, metric.T)
             # T2.9; eigenvalues are exact to rounding of the largest
             values = np.linalg.eigvalsh(metric)
@@ -149,20 +150,20 @@ def test_metric_is_symmetric_and_at_least_the_identity(name: str) -> None:
 
 
 def test_flat_space() -> None:
-    assert np.array_equal(ss.metric_matrix(np.zeros((0, 3))), np.eye(3))
-    assert np.array_equal(ss.geodesic_acceleration(np.zeros((0, 3)), []), np.zeros(3))
-    assert not ss.christoffel_symbols(np.zeros((1, 3)), np.zeros((1, 3, 3))).any()
+    assert np.array_equal(thesis.metric_matrix(np.zeros((0, 3))), np.eye(3))
+    assert np.array_equal(thesis.geodesic_acceleration(np.zeros((0, 3)), []), np.zeros(3))
+    assert not thesis.christoffel_symbols(np.zeros((1, 3)), np.zeros((1, 3, 3))).any()
 
 
 def test_no_joints() -> None:
-    assert ss.metric_matrix(np.zeros((3, 0))).shape == (0, 0)
-    assert ss.geodesic_acceleration(np.zeros((3, 0)), np.zeros(3)).shape == (0,)
+    assert thesis.metric_matrix(np.zeros((3, 0))).shape == (0, 0)
+    assert thesis.geodesic_acceleration(np.zeros((3, 0)), np.zeros(3)).shape == (0,)
 
 
 def test_shapes_are_checked() -> None:
     with pytest.raises(ValueError, match=r"jacobian must have shape \(m, nv\)"):
-        ss.metric_matrix(np.zeros(3))
+        thesis.metric_matrix(np.zeros(3))
     with pytest.raises(ValueError, match=r"curvatures has shape \(1,\), expected \(2,\)"):
-        ss.geodesic_acceleration(np.zeros((2, 3)), [0.0])
+        thesis.geodesic_acceleration(np.zeros((2, 3)), [0.0])
     with pytest.raises(ValueError, match=r"hessians must have shape \(m, nv, nv\)"):
-        ss.christoffel_symbols(np.zeros((2, 3)), np.zeros((1, 3, 3)))
+        thesis.christoffel_symbols(np.zeros((2, 3)), np.zeros((1, 3, 3)))

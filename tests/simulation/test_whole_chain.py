@@ -8,7 +8,6 @@ from stand_ins import simulate
 
 from sidestep import (
     Body,
-    CollisionDensity,
     GeometricSystem,
     Robot,
     SceneObject,
@@ -18,6 +17,7 @@ from sidestep import (
     run_kinematically,
 )
 from sidestep._core import Obstacles
+from sidestep.thesis import CollisionDensity
 
 START, GOAL = np.deg2rad([0, 45, 0, -66, 0, 66, 45]), np.deg2rad([90, 45, 0, -66, 0, 66, 45])
 

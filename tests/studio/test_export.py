@@ -188,7 +188,7 @@ def test_every_number_is_in_the_file_and_in_the_snippet(
         elif parameter.name == "density":
             assert given["CollisionDensity"]["average"] == (value == "average")
         elif parameter.name == "combine":
-            assert ("ss.Sum(" in code) == (value == "sum")
+            assert ("thesis.Sum(" in code) == (value == "sum")
         elif parameter.place == "controller":
             kind = "ControllerSettings" if METHODS[name].controlled else "TorqueController"
             assert given[kind][parameter.field] == value

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sidestep import Scenario, controller_settings_fields, presets
+from sidestep import Scenario, controller_settings_fields
 from sidestep.bench.method import Method as BenchMethod
 from sidestep.scenario.scenario import (
     BodyChoice,
@@ -19,6 +19,7 @@ from sidestep.studio.methods import METHODS, check_numbers
 from sidestep.studio.page.tuning import add_control, show_value, unit_for, value_of
 from sidestep.studio.parameters import Parameter
 from sidestep.studio.systems import as_file, settings_of
+from sidestep.thesis import ThesisNumbers
 
 
 def test_every_method_of_the_benchmark_is_there() -> None:
@@ -33,8 +34,8 @@ def test_the_recommended_numbers_are_those_of_the_controller_and_the_thesis(scen
     for entry in controller_settings_fields():
         assert attrgetter(str(entry["name"]))(settings) == entry["default"], entry["name"]
     thesis = METHODS["thesis"].defaults
-    own = {field.name: thesis[field.name] for field in dataclasses.fields(presets.Thesis)}
-    assert presets.Thesis(**own) == presets.Thesis()
+    own = {field.name: thesis[field.name] for field in dataclasses.fields(ThesisNumbers)}
+    assert ThesisNumbers(**own) == ThesisNumbers()
 
 
 def every_parameter() -> dict[str, Parameter]:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from sidestep import presets
 from sidestep.arm import Arm
 from sidestep.bench.method import Method
 from sidestep.bench.motion import ControllerMover, Mover, SystemMover
 from sidestep.body import Body
 from sidestep.robot import Robot
+from sidestep.thesis import ThesisNumbers, thesis_system
 
 
 def build_body(method: Method, robot: Robot) -> Body:
     """The body that a method needs, from the user's cache or made now."""
     if method.safe:
         return Body.cover(robot)
-    return Body.fit(robot, components=presets.Thesis().components)
+    return Body.fit(robot, components=ThesisNumbers().components)
 
 
 def build_mover(method: Method, robot: Robot, body: Body | None = None) -> Mover:
@@ -22,9 +22,9 @@ def build_mover(method: Method, robot: Robot, body: Body | None = None) -> Mover
     body = build_body(method, robot) if body is None else body
     match method:
         case Method.thesis:
-            return SystemMover(robot, presets.thesis_system(robot, body))
+            return SystemMover(robot, thesis_system(robot, body))
         case Method.unswitched:
-            return SystemMover(robot, presets.thesis_system(robot, body, switched=False))
+            return SystemMover(robot, thesis_system(robot, body, switched=False))
         case Method.controller:
             return ControllerMover(robot, Arm.from_robot(robot, body))
         case Method.reactive:

@@ -35,9 +35,9 @@ from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.bench.step import cpu_model
 from sidestep.body import Body
 from sidestep.mesh import mesh_model
-from sidestep.reproduce import dense_analytic, torch_autograd
-from sidestep.reproduce.serial_chain import SerialChain
 from sidestep.robot import Robot
+from sidestep.thesis.reproduce import dense_analytic, torch_autograd
+from sidestep.thesis.reproduce.serial_chain import SerialChain
 
 Array = npt.NDArray[np.float64]
 Call = Callable[[Array, Array], Array]

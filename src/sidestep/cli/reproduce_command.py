@@ -31,9 +31,9 @@ def reproduce(
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from sidestep.reproduce import Part, Settings
-    from sidestep.reproduce import reproduce as run
-    from sidestep.reproduce.registry import select
+    from sidestep.thesis.reproduce import Part, Settings
+    from sidestep.thesis.reproduce import reproduce as run
+    from sidestep.thesis.reproduce.registry import select
 
     parts = select(only or [])
     terminal = console(quiet=quiet, to_stderr=json == "-")

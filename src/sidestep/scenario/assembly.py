@@ -13,23 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from sidestep import (
-    BinarySwitch,
-    Body,
-    CollisionDensity,
-    Controller,
-    DistanceSwitch,
-    Embedding,
-    GeodesicOnly,
-    GeometricSystem,
-    HarmonicOnly,
-    JointLimitPotential,
-    Robot,
-    SigmoidSwitch,
-    Sum,
-    TorqueController,
-    Unswitched,
-)
+from sidestep import Body, Controller, Embedding, GeometricSystem, Robot, TorqueController
 from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
 from sidestep.mesh import read_mesh
@@ -55,6 +39,17 @@ from sidestep.scenario.validation import ScenarioError
 from sidestep.simulation import ControllerDriver, SceneObject, SystemDriver
 from sidestep.simulation.pose_aim import PoseAim, PoseTarget, Posture, posture_at
 from sidestep.simulation.scene import Kind, check_scene
+from sidestep.thesis import (
+    BinarySwitch,
+    CollisionDensity,
+    DistanceSwitch,
+    GeodesicOnly,
+    HarmonicOnly,
+    JointLimitPotential,
+    SigmoidSwitch,
+    Sum,
+    Unswitched,
+)
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]

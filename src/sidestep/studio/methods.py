@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sidestep import presets
 from sidestep.studio.parameters import (
     ARRIVAL,
     BARRIERS,
@@ -21,6 +20,7 @@ from sidestep.studio.parameters import (
     spring,
     switch,
 )
+from sidestep.thesis import ThesisNumbers
 
 WRITTEN = "written"  # the method of a scenario file that says itself how the arm is moved
 
@@ -93,7 +93,7 @@ METHODS: dict[str, Method] = {
                     "m",
                     0.02,
                     0.5,
-                    presets.Thesis.outer,
+                    ThesisNumbers.outer,
                     "Distance at which the first two joints and the last let go.",
                 ),
                 switch(
@@ -101,10 +101,10 @@ METHODS: dict[str, Method] = {
                     "m",
                     0.02,
                     0.5,
-                    presets.Thesis.inner,
+                    ThesisNumbers.inner,
                     "Distance at which the joints between let go.",
                 ),
-                switch("slope", "1/m", 1.0, 100.0, presets.Thesis.slope, "Higher switches more abruptly."),
+                switch("slope", "1/m", 1.0, 100.0, ThesisNumbers.slope, "Higher switches more abruptly."),
                 *_DENSITY,
             ),
         ),

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from sidestep import presets
 from sidestep.scenario.scenario import (
     BodyChoice,
     EmbeddingChoice,
@@ -20,6 +19,7 @@ from sidestep.scenario.scenario import (
     SystemChoice,
 )
 from sidestep.scenario.settings import FIELDS, PROGRAM, value_in, with_values
+from sidestep.thesis import ThesisNumbers
 
 Value: TypeAlias = float | int | str | None
 Numbers: TypeAlias = dict[str, Any]  # values by the names of parameters; as a file has them
@@ -204,8 +204,8 @@ _y = _number(SystemChoice, "system")
 def spring(stiffness: str, damping: str) -> tuple[Parameter, ...]:
     """Stiffness, damping and its form, by sentences of what the first two trade, with the thesis's numbers."""
     return (
-        dataclasses.replace(_y("stiffness", "1/s²", 0.1, 10.0, stiffness), default=presets.Thesis.stiffness),
-        dataclasses.replace(_y("damping", "1/s", 0.5, 10.0, damping), default=presets.Thesis.damping),
+        dataclasses.replace(_y("stiffness", "1/s²", 0.1, 10.0, stiffness), default=ThesisNumbers.stiffness),
+        dataclasses.replace(_y("damping", "1/s", 0.5, 10.0, damping), default=ThesisNumbers.damping),
         _choice(
             SystemChoice,
             "system",
@@ -245,7 +245,7 @@ DENSITY: tuple[Parameter, ...] = (
         "components",
         (1, 2, 3, 4, 5, 6, 8, "aic", "bic"),
         "Gaussians per link: more fit it closer, and cost time in every step; aic and bic choose.",
-        default=presets.Thesis.components,
+        default=ThesisNumbers.components,
         body=True,
     ),
     _choice(

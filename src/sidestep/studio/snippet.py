@@ -26,7 +26,8 @@ def python_snippet(snapshot: Snapshot) -> str:
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
     code = _controller_code if method.controlled else _written_code
-    return "\n".join(["import sidestep as ss", "", *code(snapshot, written)]) + "\n"
+    room = [] if method.controlled else ["from sidestep import thesis"]
+    return "\n".join(["import sidestep as ss", *room, "", *code(snapshot, written)]) + "\n"
 
 
 def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
@@ -140,12 +141,14 @@ def _goal_code(snapshot: Snapshot) -> list[str]:
 
 def _system_code(written: Scenario) -> list[str]:
     body, embedding, system = written.body, written.embedding, written.system
-    density = f"density = ss.CollisionDensity(robot, body, average={embedding.density == 'average'})"
+    density = f"density = thesis.CollisionDensity(robot, body, average={embedding.density == 'average'})"
     lines, names = [density], "density"
     if embedding.joint_limits is not None:
-        lines += _call("limits = ss.JointLimitPotential", dataclasses.asdict(embedding.joint_limits), "robot")
+        lines += _call(
+            "limits = thesis.JointLimitPotential", dataclasses.asdict(embedding.joint_limits), "robot"
+        )
         names += ", limits"
-    together = f"[ss.Sum([{names}])]" if embedding.combine == "sum" and len(lines) > 1 else f"[{names}]"
+    together = f"[thesis.Sum([{names}])]" if embedding.combine == "sum" and len(lines) > 1 else f"[{names}]"
     spring = {
         "stiffness": system.stiffness,
         "damping": system.damping,
@@ -163,13 +166,13 @@ def _system_code(written: Scenario) -> list[str]:
 def _switch_code(switch: SwitchChoice) -> str:
     match switch.type:
         case "distance":
-            return f"ss.DistanceSwitch({list(switch.thresholds or ())!r}, {switch.slope!r})"
+            return f"thesis.DistanceSwitch({list(switch.thresholds or ())!r}, {switch.slope!r})"
         case "sigmoid":
-            return f"ss.SigmoidSwitch({switch.threshold!r}, {switch.slope!r})"
+            return f"thesis.SigmoidSwitch({switch.threshold!r}, {switch.slope!r})"
         case "binary":
-            return f"ss.BinarySwitch({switch.threshold!r})"
+            return f"thesis.BinarySwitch({switch.threshold!r})"
         case "harmonic_only":
-            return "ss.HarmonicOnly()"
+            return "thesis.HarmonicOnly()"
         case "geodesic_only":
-            return "ss.GeodesicOnly()"
+            return "thesis.GeodesicOnly()"
     return "None"
