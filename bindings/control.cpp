@@ -237,6 +237,7 @@ void bind_torque_controller(nb::module_& m) {
       .value("limited", TorqueStatus::limited, "optimal, with a limit in the way")
       .value("relaxed", TorqueStatus::relaxed, "velocity or acceleration limits gave way")
       .value("relaxed_safety", TorqueStatus::relaxed_safety, "not all clearances and position limits can be kept")
+      .value("clearance_lost", TorqueStatus::clearance_lost, "the least clearance is below zero, whatever the rest")
       .value("fallback_invalid_input", TorqueStatus::fallback_invalid_input, "unusable input, damped stop")
       .value("fallback_solver", TorqueStatus::fallback_solver, "program not solved, damped stop")
       .def("__str__", [](TorqueStatus status) { return name(status); })
@@ -287,7 +288,11 @@ void bind_torque_controller(nb::module_& m) {
                      return s.dominant < 0 ? nb::none() : nb::cast(s.safety[static_cast<std::size_t>(s.dominant)]);
                    },
                    nb::sig("def dominant(self) -> SafetyRow | None"),
-                   "The clearance that bends the motion most; None if none does.");
+                   "The clearance that bends the motion most; None if none does.")
+      .def_ro("least_clearance", &TorqueSolution::least_clearance,
+              "The least clearance given [m], with a row or without; inf if there is none.")
+      .def_ro("least_coordinate", &TorqueSolution::least_coordinate, "Which clearance that is; -1 if there is none.")
+      .def_ro("least_nearest", &TorqueSolution::least_nearest, "Its nearest obstacle point; -1 if there is none.");
 
   nb::class_<TorqueController>(m, "TorqueController",
                                "Torque that tracks a wanted acceleration within every limit of the arm:\n"
@@ -297,7 +302,7 @@ void bind_torque_controller(nb::module_& m) {
       .def(
           "__init__",
           [](TorqueController* self, const Robot& robot, double period, const ArrayLike& tracking_weight,
-             const ArrayLike& torque_weight, double slack_weight, double safety_weight, double position_margin,
+             const ArrayLike& torque_weight, double slack_weight, double velocity_overrun, double acceleration_overrun, double position_margin,
              double stop_time, double stop_damping, const SafetySettings* safety) {
             const int nv = robot.num_coordinates();
             TorqueControllerSettings settings;
@@ -305,7 +310,8 @@ void bind_torque_controller(nb::module_& m) {
             settings.tracking_weight = as_filled_vector(tracking_weight, "tracking_weight", nv);
             settings.torque_weight = as_filled_vector(torque_weight, "torque_weight", nv);
             settings.slack_weight = slack_weight;
-            settings.safety_weight = safety_weight;
+            settings.velocity_overrun = velocity_overrun;
+            settings.acceleration_overrun = acceleration_overrun;
             settings.safety = safety == nullptr ? SafetySettings() : *safety;
             settings.position_margin = position_margin;
             settings.stop_time = stop_time;
@@ -316,14 +322,16 @@ void bind_torque_controller(nb::module_& m) {
           nb::arg("tracking_weight") = TorqueControllerSettings().tracking_weight[0],
           nb::arg("torque_weight") = TorqueControllerSettings().torque_weight[0],
           nb::arg("slack_weight") = TorqueControllerSettings().slack_weight,
-          nb::arg("safety_weight") = TorqueControllerSettings().safety_weight,
+          nb::arg("velocity_overrun") = TorqueControllerSettings().velocity_overrun,
+          nb::arg("acceleration_overrun") = TorqueControllerSettings().acceleration_overrun,
           nb::arg("position_margin") = TorqueControllerSettings().position_margin,
           nb::arg("stop_time") = TorqueControllerSettings().stop_time,
           nb::arg("stop_damping") = TorqueControllerSettings().stop_damping,
           nb::arg("safety") = nb::none(),
           "period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];\n"
           "torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the\n"
-          "steepest tracking cost; safety_weight [-]: price of leaving clearances and position limits over that;\n"
+          "steepest tracking cost; velocity_overrun, acceleration_overrun [-], >= 1: the factor up to which those limits\n"
+          "give way to clearances and torque limits;\n"
           "position_margin [rad | m]: position limits are moved inwards by it; stop_time [s]: time constant of the\n"
           "damped stop; stop_damping [-]: its damping without a mass matrix, over effort limit / velocity limit;\n"
           "safety: SafetySettings, by default as they are. Raises ValueError that names the setting.")

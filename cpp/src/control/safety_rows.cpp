@@ -73,7 +73,7 @@ double demanded_deceleration(double room, double u, const ClosingLimits& limits,
   const double for_a_stop = u > 0.0 && left > 0.0 ? std::max(rate * u, u * u / (2.0 * left)) : infinity;
   const double too_fast = std::max(u - std::max(allowed, 0.0), 0.0);  // closing
   const double too_slow = std::max(std::min(u, 0.0) - allowed, 0.0);  // leaving
-  const double returning = along_profile + limits.correction * too_fast / period + firmness * rate * too_slow;
+  const double returning = std::min(along_profile + firmness * rate * too_slow, A) + limits.correction * too_fast / period;
   return std::min({at_once, returning, for_a_stop, limits.hardest});
 }
 
@@ -95,27 +95,28 @@ void SafetySettings::validate() const {
 }
 
 SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
-    : normals(RowMatrix::Zero(settings.max_rows < 0 ? 0 : settings.max_rows, num_coordinates)),
+    : normals(RowMatrix::Zero((settings.validate(), settings.max_rows), num_coordinates)),
       lower(Eigen::VectorXd::Zero(normals.rows())),
       lengths(Eigen::VectorXd::Zero(normals.rows())),
       coordinates(static_cast<std::size_t>(normals.rows())),
       nearest(static_cast<std::size_t>(normals.rows())),
-      settings_((settings.validate(), settings)),
+      depths(Eigen::VectorXd::Zero(normals.rows())),
+      settings_(settings),
       urgency_(Eigen::VectorXd::Zero(normals.rows())),
       response_(Eigen::VectorXd::Zero(num_coordinates)) {}
 
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
   const ClearanceState& approach = clearances.approach;
-  if (clearances.curvatures.size() != num || clearances.margins.size() != num || approach.values.size() != num ||
-      approach.rates.size() != num || approach.curvatures.size() != num ||
+  if (clearances.least.size() != num || clearances.curvatures.size() != num || clearances.margins.size() != num ||
+      approach.values.size() != num || approach.rates.size() != num || approach.curvatures.size() != num ||
       approach.gradients.rows() != normals.cols() || approach.gradients.cols() != num) {
     return false;
   }
   for (Eigen::Index k = 0; k < num; ++k) {
     if (clearances.nearest[k] >= 0 &&
-        !(std::isfinite(clearances.curvatures[k]) && std::isfinite(approach.values[k]) &&
-          std::isfinite(approach.rates[k]) && std::isfinite(approach.curvatures[k]) &&
+        !(!std::isnan(clearances.least[k]) && std::isfinite(clearances.curvatures[k]) &&
+          std::isfinite(approach.values[k]) && std::isfinite(approach.rates[k]) && std::isfinite(approach.curvatures[k]) &&
           approach.gradients.col(k).allFinite())) {
       return false;
     }
@@ -169,8 +170,15 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
   // Insert into the list of the most critical, which is kept sorted; it is short.
   clear();
   for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
-    if (clearances.nearest[k] < 0 || max_size() == 0 ||
-        !(approach.gradients.col(k).norm() > shortest_gradient)) {
+    if (clearances.nearest[k] < 0 || max_size() == 0) {
+      continue;
+    }
+    if (!(approach.gradients.col(k).norm() > shortest_gradient)) {
+      const ClosingLimits none{smallest_deceleration, smallest_deceleration, rate, settings_.correction};
+      const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
+      if (demanded_deceleration(room_of(k), -approach.rates[k], none, period) > c) {
+        helpless = static_cast<int>(k);
+      }
       continue;
     }
     const double urgency = room_of(k) + approach.rates[k] / rate;
@@ -219,12 +227,16 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
       }
     } else if (required > now && lasts) {
       required = now;
+    } else if (room <= 0.0 && required > now && net > 0.0) {
+      // Of what closes in, not of the way back.
+      required = std::min(required, std::max(now, settings_.correction * u / period - c));
     }
     const double length = gradient.norm();
     normals.row(row) = gradient.transpose() / length;
     lower[row] = required / length;
     lengths[row] = length;
     nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];
+    depths[row] = std::max(-approach.values[k], 0.0);
   }
   if (hardest_row >= 0) {
     const int row = along_path = size_ < max_size() ? size_++ : size_ - 1;
@@ -234,6 +246,7 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     lengths[row] = lengths[hardest_row];
     coordinates[static_cast<std::size_t>(row)] = coordinates[static_cast<std::size_t>(hardest_row)];
     nearest[static_cast<std::size_t>(row)] = nearest[static_cast<std::size_t>(hardest_row)];
+    depths[row] = 0.0;
   }
 }
 

@@ -23,10 +23,16 @@ constexpr double symmetry_tolerance = 1e-6;
 constexpr double torque_tolerance = 1e-6;
 // Slack below this, relative to 1 /s^2 plus the bound, is rounding of the second program and not worth a status.
 constexpr double slack_tolerance = 1e-9;
-// Position limits that no acceleration within this many times the limits can break are left out of the second program.
-constexpr double relaxed_reach = 10.0;
-// The smallest second program; the next ones double.
-constexpr int fewest_relaxed_rows = 4;
+// The program of least shortfalls prefers small accelerations with this weight, so that there is one solution.
+constexpr double regularisation = 1e-6;
+// That of the ways out of what is lost, which a joint of little leverage [rad/rad] is not to be flung about for.
+constexpr double lost_regularisation = 1e-2;
+// Shortfalls below this, relative to 1 /s^2 plus what is asked for, may be of the regularisation alone.
+constexpr double shortfall_tolerance = 1e-4;
+// ε: the shortfall of a clearance that the joints change by less than 5 cm/rad counts less [(m/rad)²], as in recovery.hpp.
+constexpr double least_gradient_squared = 0.05 * 0.05;
+// The smallest program of least shortfalls; the next ones double.
+constexpr int fewest_rows = 4;
 // Damping [Nm s/rad | N s/m] of the stop for joints without an effort or a velocity limit to derive it from.
 constexpr double unlimited_stop_damping = 1.0;
 
@@ -56,6 +62,7 @@ const char* name(TorqueStatus status) noexcept {
     case TorqueStatus::limited: return "limited";
     case TorqueStatus::relaxed: return "relaxed";
     case TorqueStatus::relaxed_safety: return "relaxed_safety";
+    case TorqueStatus::clearance_lost: return "clearance_lost";
     case TorqueStatus::fallback_invalid_input: return "fallback_invalid_input";
     case TorqueStatus::fallback_solver: return "fallback_solver";
   }
@@ -90,7 +97,10 @@ void TorqueControllerSettings::validate(const Robot& robot) const {
   check_weight(tracking_weight, "tracking_weight", nv, false);
   check_weight(torque_weight, "torque_weight", nv, true);
   require_positive(slack_weight, "torque controller: slack_weight");
-  require_positive(safety_weight, "torque controller: safety_weight");
+  require(velocity_overrun >= 1.0 && velocity_overrun < infinity, "torque controller: velocity_overrun",
+          velocity_overrun, "finite and >= 1");
+  require(acceleration_overrun >= 1.0 && acceleration_overrun < infinity, "torque controller: acceleration_overrun",
+          acceleration_overrun, "finite and >= 1");
   safety.validate();
   require_positive(stop_time, "torque controller: stop_time");
   require_positive(stop_damping, "torque controller: stop_damping");
@@ -115,31 +125,38 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       rows_(nv_, settings_.safety),
       hard_data_(nv_, nv_ + rows_.max_size()),
       hard_(nv_, nv_ + rows_.max_size()),
-      relaxed_rows_(static_cast<std::size_t>(rows_.max_size() + 2 * nv_)),
+      rows_used_(static_cast<std::size_t>(rows_.max_size())),
+      comfort_data_(2 * nv_, 3 * nv_ + rows_.max_size()),
+      comfort_(2 * nv_, 3 * nv_ + rows_.max_size()),
+      widening_data_(2 * nv_, 2 * nv_),
+      widening_(2 * nv_, 2 * nv_),
+      allowed_(Eigen::VectorXd::Zero(rows_.max_size())),
       row_multipliers_(Eigen::VectorXd::Zero(rows_.max_size())),
-      box_(relaxed_reach * limits_.acceleration),
+      wide_lower_(Eigen::VectorXd::Zero(nv_)),
+      wide_upper_(Eigen::VectorXd::Zero(nv_)),
       mass_(Eigen::MatrixXd::Zero(nv_, nv_)),
       mass_cholesky_(Eigen::MatrixXd::Zero(nv_, nv_)),
       velocity_(Eigen::VectorXd::Zero(nv_)),
       wanted_(Eigen::VectorXd::Zero(nv_)),
       bias_(Eigen::VectorXd::Zero(nv_)) {
-  const int most = rows_.max_size() + 2 * nv_;
-  for (int num = fewest_relaxed_rows; num < most; num *= 2) {
-    relaxed_.emplace_back(nv_, num);
+  // Over x = (q̈, s): q̈ - s <= upper, q̈ + s >= lower, the torque rows, normals q̈ >= lower; s >= 0.
+  comfort_data_.A.topLeftCorner(nv_, nv_).setIdentity();
+  comfort_data_.A.block(0, nv_, nv_, nv_).diagonal().setConstant(-1.0);
+  comfort_data_.A.block(nv_, 0, nv_, nv_).setIdentity();
+  comfort_data_.A.block(nv_, nv_, nv_, nv_).setIdentity();
+  comfort_data_.lower.tail(nv_).setZero();
+  // Over x = (q̈, e): q̈ + e within the box, the torque rows.
+  widening_data_.H.diagonal().head(nv_).setConstant(regularisation);
+  widening_data_.A.topLeftCorner(nv_, nv_).setIdentity();
+  widening_data_.A.topRightCorner(nv_, nv_).setIdentity();
+  for (int num = fewest_rows; num < rows_.max_size(); num *= 2) {
+    least_.emplace_back(nv_, num);
   }
-  relaxed_.emplace_back(nv_, most);
+  least_.emplace_back(nv_, rows_.max_size());
 }
 
-TorqueController::Relaxed::Relaxed(int nv, int num)
-    : num_rows(num), data(2 * nv + num, 3 * nv + num), program(2 * nv + num, 3 * nv + num) {
-  // Over x = (q̈, s, r): q̈ - s <= upper, q̈ + s >= lower, the torque rows, normals q̈ + r >= lower; s >= 0, r >= 0.
-  data.A.topLeftCorner(nv, nv).setIdentity();
-  data.A.block(0, nv, nv, nv).diagonal().setConstant(-1.0);
-  data.A.block(nv, 0, nv, nv).setIdentity();
-  data.A.block(nv, nv, nv, nv).setIdentity();
-  data.A.bottomRightCorner(num, num).setIdentity();
-  data.lower.tail(nv + num).setZero();
-}
+TorqueController::LeastShortfall::LeastShortfall(int nv, int num)
+    : num_rows(num), data(nv + num, nv + num), program(nv + num, nv + num) {}
 
 TorqueStatus TorqueController::solve(ConstVectorRef q,
                                      ConstVectorRef v,
@@ -186,6 +203,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   row_multipliers_.setZero();
   solution.num_safety_rows = 0;
   solution.dominant = -1;
+  report_clearance(clearances, solution);
   if (q_known && v_known && mass_known && bias_known) {
     if (clearances != nullptr && clear) {
       // Without any effort limit the torque never is what braking lacks.
@@ -206,6 +224,12 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       status = solve_relaxed(solution);
     }
     report_safety(solution);
+    if (rows_.helpless >= 0 && status < TorqueStatus::relaxed_safety) {
+      status = TorqueStatus::relaxed_safety;
+    }
+    if (solution.least_clearance < 0.0 && status < TorqueStatus::clearance_lost) {
+      status = TorqueStatus::clearance_lost;
+    }
     if (!(wanted_known && clear) && status != TorqueStatus::fallback_solver) {
       status = TorqueStatus::fallback_invalid_input;
     }
@@ -230,6 +254,18 @@ bool TorqueController::factorise_mass() noexcept {
     }
   }
   return cholesky(mass_, mass_cholesky_);
+}
+
+void TorqueController::add_active(int i, double at_upper, double at_lower, double at_effort,
+                                  TorqueSolution& solution) const noexcept {
+  const auto joint = static_cast<std::size_t>(i);
+  solution.active[joint] = solution.active[joint] |
+                           (at_upper > 0.0   ? bounds_.upper_limit[joint]
+                            : at_lower < 0.0 ? bounds_.lower_limit[joint]
+                                             : Limit::none) |
+                           (at_effort > 0.0   ? Limit::torque_upper
+                            : at_effort < 0.0 ? Limit::torque_lower
+                                              : Limit::none);
 }
 
 bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
@@ -270,125 +306,224 @@ bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
     row_multipliers_[k] = std::max(-hard_.multipliers()[2 * nv_ + k], 0.0);
   }
   for (int i = 0; i < nv_; ++i) {
-    const double at_bound = hard_.multipliers()[i], at_effort = hard_.multipliers()[nv_ + i];
-    const auto joint = static_cast<std::size_t>(i);
-    solution.active[joint] = (at_bound > 0.0   ? bounds_.upper_limit[joint]
-                              : at_bound < 0.0 ? bounds_.lower_limit[joint]
-                                               : Limit::none) |
-                             (at_effort > 0.0   ? Limit::torque_upper
-                              : at_effort < 0.0 ? Limit::torque_lower
-                                                : Limit::none);
+    const double at_bound = hard_.multipliers()[i];
+    add_active(i, at_bound, at_bound, hard_.multipliers()[nv_ + i], solution);
   }
   return accept(solution);
 }
 
-void TorqueController::collect_relaxed_rows() noexcept {
-  num_relaxed_rows_ = 0;
-  const auto append = [this](int row) { relaxed_rows_[static_cast<std::size_t>(num_relaxed_rows_++)] = row; };
-  for (int k = 0; k < rows_.size(); ++k) {
-    if (!(settings_.hard_bounds && rows_.satisfied_within(k, bounds_.lower, bounds_.upper))) {
-      append(k);
-    }
+void TorqueController::widen_bounds() noexcept {
+  wide_lower_ = bounds_.lower;
+  wide_upper_ = bounds_.upper;
+  if (settings_.hard_bounds) {
+    return;
   }
-  for (int i = 0; i < nv_ && !settings_.hard_bounds; ++i) {
-    if (std::isfinite(bounds_.position_lower[i]) && bounds_.position_lower[i] > -box_[i]) {
-      append(-1 - 2 * i);
+  // To the overruns, which end where position limits do, unless these need more.
+  for (int i = 0; i < nv_; ++i) {
+    const double most = settings_.acceleration_overrun * limits_.acceleration[i];
+    const double fastest = settings_.velocity_overrun * limits_.velocity[i];
+    const double up = std::max(most, bounds_.position_lower[i]), down = std::max(most, -bounds_.position_upper[i]);
+    double upper = std::max(bounds_.upper[i], std::min((fastest - velocity_[i]) / settings_.period, up));
+    double lower = std::min(bounds_.lower[i], std::max((-fastest - velocity_[i]) / settings_.period, -down));
+    const double position_lower = std::min(bounds_.position_lower[i], upper);
+    const double position_upper = std::max(bounds_.position_upper[i], lower);
+    if (position_lower <= position_upper) {
+      lower = std::max(lower, position_lower);
+      upper = std::min(upper, position_upper);
     }
-    if (std::isfinite(bounds_.position_upper[i]) && bounds_.position_upper[i] < box_[i]) {
-      append(-2 - 2 * i);
+    wide_lower_[i] = lower;
+    wide_upper_[i] = upper;
+  }
+}
+
+void TorqueController::collect_rows() noexcept {
+  num_rows_used_ = 0;
+  for (int k = 0; k < rows_.size(); ++k) {
+    if (!rows_.satisfied_within(k, wide_lower_, wide_upper_)) {
+      rows_used_[static_cast<std::size_t>(num_rows_used_++)] = k;
     }
   }
 }
 
-TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept {
-  collect_relaxed_rows();
-  Relaxed& relaxed = *std::find_if(relaxed_.begin(), relaxed_.end() - 1,
-                                   [this](const Relaxed& r) { return r.num_rows >= num_relaxed_rows_; });
-  QuadraticProgramData& data = relaxed.data;
-  double farthest = 0.0, steepest = 0.0;
+double TorqueController::lowered(int n, bool rounded) const noexcept {
+  const double asked = rows_.lower[rows_used_[static_cast<std::size_t>(n)]], size = 1.0 + std::abs(asked);
+  return rounded                                    ? asked - allowed_[n] - slack_tolerance * size
+         : allowed_[n] > shortfall_tolerance * size ? asked - allowed_[n]
+                                                    : asked;
+}
+
+bool TorqueController::solve_least(LeastShortfall& least, bool of_lost, TorqueSolution& solution) noexcept {
+  QuadraticProgramData& data = least.data;
+  data.lower.head(nv_) = wide_lower_;
+  data.upper.head(nv_) = wide_upper_;
+  data.H.diagonal().head(nv_).setConstant(of_lost ? lost_regularisation : regularisation);
   for (int i = 0; i < nv_; ++i) {
-    const double nearest = std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i]);
-    farthest = std::max(farthest, std::abs(wanted_[i] - nearest));
-    steepest = std::max(steepest, tracking_weight_[i] * (1.0 + std::abs(wanted_[i] - nearest)));
+    data.g[i] = of_lost ? -lost_regularisation * std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i]) : 0.0;
   }
-  const double price = settings_.slack_weight * steepest;
+  for (int n = 0; n < num_rows_used_; ++n) {
+    const int row = rows_used_[static_cast<std::size_t>(n)];
+    const bool lost = rows_.depths[row] > 0.0, shared = lost == of_lost;
+    data.A(nv_ + n, nv_ + n) = shared ? 1.0 : 0.0;
+    data.row_lower[nv_ + n] = shared ? rows_.lower[row] : of_lost ? lowered(n, true) : -infinity;
+  }
+  if (least.program.solve(data) != QuadraticProgramStatus::solved) {
+    return false;
+  }
+  solution.acceleration = least.program.solution().head(nv_);
+  for (int n = 0; n < num_rows_used_; ++n) {
+    const int row = rows_used_[static_cast<std::size_t>(n)];
+    if (of_lost || rows_.depths[row] == 0.0) {
+      const double short_by = rows_.lower[row] - rows_.normals.row(row).dot(solution.acceleration.transpose());
+      row_multipliers_[row] = allowed_[n] = std::max(short_by, 0.0);
+    }
+  }
+  for (int i = 0; i < nv_; ++i) {  // what the shortfalls are due to
+    const Eigen::VectorXd& multipliers = least.program.multipliers();
+    add_active(i, multipliers[i], multipliers[i], multipliers[nv_ + least.num_rows + i], solution);
+  }
+  return true;
+}
+
+bool TorqueController::find_least_shortfalls(TorqueSolution& solution) noexcept {
+  LeastShortfall& least = *std::find_if(least_.begin(), least_.end() - 1,
+                                        [this](const LeastShortfall& l) { return l.num_rows >= num_rows_used_; });
+  QuadraticProgramData& data = least.data;
+  data.A.topLeftCorner(nv_, nv_) = mass_;
+  data.A.bottomRows(least.num_rows).setZero();
+  data.row_lower.head(nv_) = hard_data_.row_lower.head(nv_);
+  data.row_upper.head(nv_) = hard_data_.row_upper.head(nv_);
+  data.row_lower.tail(least.num_rows).setConstant(-infinity);
+  double deepest = 0.0;
+  for (int n = 0; n < num_rows_used_; ++n) {
+    deepest = std::max(deepest, rows_.depths[rows_used_[static_cast<std::size_t>(n)]]);
+  }
+  for (int n = 0; n < num_rows_used_; ++n) {
+    const int row = rows_used_[static_cast<std::size_t>(n)];
+    const double squared = rows_.lengths[row] * rows_.lengths[row];
+    data.A.row(nv_ + n).head(nv_) = rows_.normals.row(row);
+    const double share = rows_.depths[row] > 0.0 ? rows_.depths[row] / deepest : 1.0;
+    data.H(nv_ + n, nv_ + n) = std::max(squared / (squared + least_gradient_squared) * share, regularisation);
+  }
+  allowed_.setZero();
+  if (!solve_least(least, false, solution)) {
+    // The torque does not reach the box: widen it by as little as that takes.
+    widening_data_.A.bottomLeftCorner(nv_, nv_) = mass_;
+    widening_data_.row_lower << wide_lower_, hard_data_.row_lower.head(nv_);
+    widening_data_.row_upper << wide_upper_, hard_data_.row_upper.head(nv_);
+    if (widening_.solve(widening_data_) != QuadraticProgramStatus::solved) {
+      return false;
+    }
+    for (int i = 0; i < nv_; ++i) {
+      const double reached = widening_.solution()[i], rounding = slack_tolerance * (1.0 + std::abs(reached));
+      wide_lower_[i] = std::min(wide_lower_[i], reached - rounding);
+      wide_upper_[i] = std::max(wide_upper_[i], reached + rounding);
+    }
+    solution.acceleration = widening_.solution().head(nv_);
+    static_cast<void>(solve_least(least, false, solution));
+  }
+  if (deepest > 0.0 && !solve_least(least, true, solution)) {
+    for (int n = 0; n < num_rows_used_; ++n) {  // as the first solution leaves them
+      const int row = rows_used_[static_cast<std::size_t>(n)];
+      allowed_[n] = std::max(rows_.lower[row] - rows_.normals.row(row).dot(solution.acceleration.transpose()), 0.0);
+    }
+  }
+  return true;
+}
+
+bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noexcept {
+  QuadraticProgramData& data = comfort_data_;
+  double steepest = 0.0;
+  for (int i = 0; i < nv_; ++i) {
+    const double beyond = std::abs(wanted_[i] - std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i]));
+    steepest = std::max(steepest, tracking_weight_[i] * (1.0 + beyond));
+  }
   data.H.topLeftCorner(nv_, nv_) = hard_data_.H;
-  data.H.diagonal().segment(nv_, nv_) = tracking_weight_;
-  data.H.diagonal().tail(relaxed.num_rows).setConstant(tracking_weight_.maxCoeff());
-  data.g.setZero();
+  data.H.diagonal().tail(nv_) = tracking_weight_;
   data.g.head(nv_) = hard_data_.g;
+  data.g.tail(nv_).setConstant(settings_.slack_weight * steepest);
+  data.lower.head(nv_) = wide_lower_;
+  data.upper.head(nv_) = wide_upper_;
+  data.row_upper.head(nv_) = bounds_.upper;
+  data.row_lower.segment(nv_, nv_) = bounds_.lower;
   data.A.block(2 * nv_, 0, nv_, nv_) = mass_;
   data.row_lower.segment(2 * nv_, nv_) = hard_data_.row_lower.head(nv_);
   data.row_upper.segment(2 * nv_, nv_) = hard_data_.row_upper.head(nv_);
-  if (settings_.hard_bounds) {
-    data.lower.head(nv_) = bounds_.lower;
-    data.upper.head(nv_) = bounds_.upper;
-  } else {
-    data.row_upper.head(nv_) = bounds_.upper;
-    data.row_lower.segment(nv_, nv_) = bounds_.lower;
-    data.g.segment(nv_, nv_).setConstant(price);
+  data.row_lower.tail(rows_.max_size()).setConstant(-infinity);
+  for (int n = 0; n < num_rows_used_; ++n) {
+    const int row = rows_used_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
+    data.A.row(at).head(nv_) = rows_.normals.row(row);
+    data.row_lower[at] = lowered(n, rounded);
   }
-  data.row_lower.tail(relaxed.num_rows).setConstant(-infinity);
-  data.A.block(3 * nv_, 0, relaxed.num_rows, nv_).setZero();
-  for (int n = 0; n < num_relaxed_rows_; ++n) {
-    const int row = relaxed_rows_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
-    data.g[2 * nv_ + n] = settings_.safety_weight * price;
-    if (row >= 0) {
-      data.A.row(at).head(nv_) = rows_.normals.row(row);
-      data.row_lower[at] = rows_.lower[row];
-    } else {
-      const int joint = (-1 - row) / 2;
-      const bool upper = (-1 - row) % 2 == 1;
-      data.A(at, joint) = upper ? -1.0 : 1.0;
-      data.row_lower[at] = upper ? -bounds_.position_upper[joint] : bounds_.position_lower[joint];
-    }
+  if (comfort_.solve(data) != QuadraticProgramStatus::solved) {
+    return false;
   }
-  if (relaxed.program.solve(data) != QuadraticProgramStatus::solved) {
+  solution.acceleration = comfort_.solution().head(nv_);
+  const Eigen::VectorXd& multipliers = comfort_.multipliers();
+  const int first_row = 2 * nv_;  // multipliers of the bounds come before those of the rows
+  for (int i = 0; i < nv_; ++i) {
+    add_active(i, std::max(multipliers[i], multipliers[first_row + i]), std::min(multipliers[i], multipliers[first_row + nv_ + i]),
+               multipliers[first_row + 2 * nv_ + i], solution);
+  }
+  for (int n = 0; n < num_rows_used_; ++n) {
+    row_multipliers_[rows_used_[static_cast<std::size_t>(n)]] = std::max(-multipliers[first_row + 3 * nv_ + n], 0.0);
+  }
+  return accept(solution);
+}
+
+TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept {
+  widen_bounds();
+  collect_rows();
+  std::fill(solution.active.begin(), solution.active.end(), Limit::none);
+  allowed_.setZero();
+  const bool found = solve_comfort(false, solution) ||
+                     (find_least_shortfalls(solution) &&
+                      (solve_comfort(false, solution) || solve_comfort(true, solution) ||
+                       (find_least_shortfalls(solution) && accept(solution))));
+  if (!found) {
     stop(true, solution);
     return TorqueStatus::fallback_solver;
   }
-  solution.acceleration = relaxed.program.solution().head(nv_);
-  if (settings_.hard_bounds) {
-    solution.acceleration = solution.acceleration.cwiseMax(bounds_.lower).cwiseMin(bounds_.upper);  // rounding
+  double farthest = 0.0;
+  for (int i = 0; i < nv_; ++i) {
+    farthest = std::max(farthest, std::abs(wanted_[i] - std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i])));
   }
-  const Eigen::VectorXd& multipliers = relaxed.program.multipliers();
-  const int first_row = 2 * nv_ + relaxed.num_rows;  // multipliers of the bounds come before those of the rows
   const auto outside = [farthest](double amount, double bound) {
     return std::abs(amount) > slack_tolerance * (1.0 + std::abs(bound) + farthest) ? amount : 0.0;
   };
   bool bounds_kept = true, safe = true;
   for (int i = 0; i < nv_; ++i) {
-    const double q_ddot = solution.acceleration[i];
+    double& q_ddot = solution.acceleration[i];
     const double beyond = q_ddot - std::clamp(q_ddot, bounds_.lower[i], bounds_.upper[i]);
     solution.slack[i] = outside(beyond, beyond > 0.0 ? bounds_.upper[i] : bounds_.lower[i]);
     bounds_kept = bounds_kept && solution.slack[i] == 0.0;
     const double beyond_position = q_ddot - std::clamp(q_ddot, bounds_.position_lower[i], bounds_.position_upper[i]);
     safe = safe && outside(beyond_position, q_ddot - beyond_position) == 0.0;
-    const auto joint = static_cast<std::size_t>(i);
-    const double at_upper = std::max(multipliers[i], multipliers[first_row + i]);
-    const double at_lower = std::min(multipliers[i], multipliers[first_row + nv_ + i]);
-    const double at_effort = multipliers[first_row + 2 * nv_ + i];
-    solution.active[joint] = (at_upper > 0.0   ? bounds_.upper_limit[joint]
-                              : at_lower < 0.0 ? bounds_.lower_limit[joint]
-                                               : Limit::none) |
-                             (at_effort > 0.0   ? Limit::torque_upper
-                              : at_effort < 0.0 ? Limit::torque_lower
-                                                : Limit::none);
-  }
-  for (int n = 0; n < num_relaxed_rows_; ++n) {
-    const int row = relaxed_rows_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
-    const double bound = data.row_lower[at];
-    const double short_by = bound - data.A.row(at).head(nv_).dot(solution.acceleration.transpose());
-    safe = safe && !(outside(short_by, bound) > 0.0);
-    if (row >= 0) {
-      row_multipliers_[row] = std::max(-multipliers[first_row + at], 0.0);
+    if (settings_.hard_bounds && solution.slack[i] == 0.0) {
+      q_ddot -= beyond;  // rounding
     }
   }
-  if (!accept(solution)) {
-    stop(true, solution);
-    return TorqueStatus::fallback_solver;
+  for (int n = 0; n < num_rows_used_; ++n) {
+    const int row = rows_used_[static_cast<std::size_t>(n)];
+    const double short_by = rows_.lower[row] - rows_.normals.row(row).dot(solution.acceleration.transpose());
+    safe = safe && !(outside(short_by, rows_.lower[row]) > 0.0);
   }
   return !safe ? TorqueStatus::relaxed_safety : !bounds_kept ? TorqueStatus::relaxed : TorqueStatus::limited;
+}
+
+void TorqueController::report_clearance(const Clearances* clearances, TorqueSolution& solution) const noexcept {
+  solution.least_clearance = infinity;
+  solution.least_coordinate = solution.least_nearest = -1;
+  if (clearances == nullptr) {
+    return;
+  }
+  const Eigen::Index num = std::min(clearances->nearest.size(), clearances->least.size());
+  for (Eigen::Index k = 0; k < num; ++k) {
+    if (clearances->nearest[k] >= 0 && clearances->least[k] < solution.least_clearance) {
+      solution.least_clearance = clearances->least[k];
+      solution.least_coordinate = static_cast<int>(k);
+      solution.least_nearest = clearances->nearest[k];
+    }
+  }
 }
 
 void TorqueController::report_safety(TorqueSolution& solution) noexcept {

@@ -146,7 +146,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     program.stop_damping = settings.stop_damping;
     program.torque_weight.setConstant(settings.torque_weight);
     program.slack_weight = settings.slack_weight;
-    program.safety_weight = settings.safety_weight;
+    program.velocity_overrun = settings.velocity_overrun;
+    program.acceleration_overrun = settings.acceleration_overrun;
     torque_program_.emplace(arm.robot(), program);
     if (arm.has_dynamics()) {
       dynamics_.emplace(arm.dynamics());

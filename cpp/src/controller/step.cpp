@@ -159,6 +159,7 @@ void Controller::Impl::report(bool known) noexcept {
     case TorqueStatus::limited: command.status = SafetyStatus::limited; break;
     case TorqueStatus::relaxed: command.status = SafetyStatus::relaxed; break;
     case TorqueStatus::relaxed_safety: command.status = SafetyStatus::margin_lost; break;
+    case TorqueStatus::clearance_lost: command.status = SafetyStatus::clearance_lost; break;
     case TorqueStatus::fallback_invalid_input:
     case TorqueStatus::fallback_solver: command.status = SafetyStatus::stopping; break;
   }

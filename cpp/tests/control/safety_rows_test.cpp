@@ -109,6 +109,10 @@ BOOST_AUTO_TEST_CASE(demands_by_value) {
   BOOST_TEST(demanded_deceleration(-0.005, 0.0, limits, T) == 1.0, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(demanded_deceleration(-0.005, 0.1, limits, T) == 4.0);
   BOOST_TEST(demanded_deceleration(-0.005, 0.002, limits, T) == 1.0 + 0.5 * 0.002 / T, boost::test_tools::tolerance(1e-12));
+  // Deeper than the hardest deceleration would take, no more than is planned with; what closes in is slowed harder.
+  BOOST_TEST(demanded_deceleration(-0.1, 0.0, limits, T) == 2.0);
+  BOOST_TEST(demanded_deceleration(-0.1, -0.001, limits, T) == 2.0);
+  BOOST_TEST(demanded_deceleration(-0.1, 0.001, limits, T) == 2.5, boost::test_tools::tolerance(1e-12));
   // Leaving with that speed already: the speed may fall along the line, w = -(0.01 - uT/2)/(1/10 + T/2).
   BOOST_TEST(std::abs(demanded_deceleration(-0.01, -0.1, limits, T) + 1.0) < 0.02);  // -10 u, up to T of order
   // Limits that are infinite leave the line.
@@ -349,8 +353,11 @@ BOOST_AUTO_TEST_CASE(more_than_is_to_be_had_is_asked_for_only_where_room_runs_ou
   BOOST_TEST(lower(0.3, 2.5, -2.0) == asked(0.3, 2.5, -2.0), close);  // it does not stop in time
   BOOST_TEST_REQUIRE(asked(0.4, 2.5, -2.0) > now);
   BOOST_TEST(lower(0.4, 2.5, -2.0) == now, close);  // it does
-  BOOST_TEST_REQUIRE(asked(-0.02, -0.01, -2.0) > now);
-  BOOST_TEST(lower(-0.02, -0.01, -2.0) == now, close);                         // too near, but on its way out
+  BOOST_TEST_REQUIRE(asked(-0.02, -0.01, -4.0) > now);
+  BOOST_TEST(lower(-0.02, -0.01, -4.0) == now, close);                         // too near, but on its way out
+  BOOST_TEST_REQUIRE(asked(-0.02, 1e-9, -4.0) > now);
+  BOOST_TEST(lower(-0.02, 1e-9, -4.0) == now, close);          // what is asked for does not jump where closing ends
+  BOOST_TEST(lower(-0.02, 0.02, -4.0) == 0.5 * 0.02 / 0.001 - -4.0, close);  // the end of closing, not the way back
   BOOST_TEST(lower(-0.02, -0.01, -11.0) == asked(-0.02, -0.01, -11.0), close);  // as long as that lasts
 }
 

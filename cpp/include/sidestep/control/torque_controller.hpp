@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "sidestep/control/acceleration_bounds.hpp"
@@ -17,6 +18,7 @@ enum class TorqueStatus {
   limited,                 ///< optimal within the limits, and at least one of them is in the way
   relaxed,                 ///< velocity or acceleration limits gave way to clearances, position or torque limits
   relaxed_safety,          ///< not all clearances and position limits can be kept (see safety, slack)
+  clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest (least_clearance)
   fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
   fallback_solver,         ///< the quadratic program could not be solved: damped stop
 };
@@ -52,6 +54,8 @@ struct TorqueSolution {
   std::vector<SafetyRow> safety;                   ///< the first num_safety_rows, most critical first
   int num_safety_rows = 0;
   int dominant = -1;                               ///< the entry of `safety` that bends the motion most; -1 if none
+  double least_clearance = std::numeric_limits<double>::infinity();  ///< [m], of all that are given, also those without a row; inf: none
+  int least_coordinate = -1, least_nearest = -1;   ///< which clearance that is, and its nearest point; -1: none
 };
 
 struct TorqueControllerSettings {
@@ -66,8 +70,10 @@ struct TorqueControllerSettings {
   Eigen::VectorXd torque_weight = Eigen::VectorXd::Constant(1, 1e-6);
   /// Price of leaving the acceleration bounds when they cannot be kept: that many times the steepest tracking cost [-].
   double slack_weight = 1e3;
-  /// Price of leaving a clearance or a position limit: that many times the price of the other bounds [-].
-  double safety_weight = 1e3;
+  /// For clearances and torque limits the velocity limits give way up to this factor, in [1, inf) [-].
+  double velocity_overrun = 1.2;
+  /// And the acceleration limits up to this one, in [1, inf), but for what position limits need [-].
+  double acceleration_overrun = 10.0;
   /// What is kept of the clearances, where they are given.
   SafetySettings safety = {};
   /// Velocity and acceleration limits do not give way to clearances. For motion without torque, see AccelerationFilter.
@@ -92,9 +98,12 @@ struct TorqueControllerSettings {
 ///               lower(q, v) <= q̈ <= upper(q, v)        (see acceleration_bounds.hpp)
 ///
 /// The torque is eliminated by the first constraint. What is sacrificed, in this order: the task, which is the cost;
-/// velocity and acceleration limits (unless hard_bounds); clearances and position limits; torque limits never. A first
-/// program has every constraint hard. If it is infeasible, a second one adds slack to each of them but the torque
-/// limits, at the cost p's with prices p so far apart, and so far above the task's, that the order is kept in practice.
+/// velocity and acceleration limits up to the overruns (unless hard_bounds); clearances; those overruns and position limits;
+/// torque limits never. A first program has every constraint hard. If it is infeasible, a second one adds slack to the bounds,
+/// within a box of the overruns and of position limits, at the cost p's with a price p far above the task's. If that is
+/// infeasible, a third one finds the shortfalls r of the clearances of which Σ r² is least, by which their rows are then
+/// lowered: what pulls two ways is shared, and an arm that cannot get out comes to rest. Where the torque does not reach the
+/// box, it is first widened by the least squares that do. So there always is a solution.
 ///
 /// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
 /// clearances are unusable, the same without them.
@@ -135,17 +144,30 @@ class TorqueController {
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
  private:
-  /// The second program for up to `num_rows` clearances and position limits.
-  struct Relaxed {
-    Relaxed(int nv, int num_rows);
+  /// The third program for up to `num_rows` clearances.
+  struct LeastShortfall {
+    LeastShortfall(int nv, int num_rows);
     int num_rows;
-    QuadraticProgramData data;  // over (q̈, slack of the bounds, slack of the rows)
+    QuadraticProgramData data;  // over (q̈, shortfalls of the rows)
     QuadraticProgram program;
   };
 
   bool solve_within_bounds(TorqueSolution& solution) noexcept;
   TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
-  void collect_relaxed_rows() noexcept;
+  void widen_bounds() noexcept;
+  void collect_rows() noexcept;
+  /// The second program, with rows lowered by what is allowed; rounded: also where that is next to nothing, and by rounding.
+  bool solve_comfort(bool rounded, TorqueSolution& solution) noexcept;
+  /// What row n of those used asks for, less what is allowed.
+  double lowered(int n, bool rounded) const noexcept;
+  /// The third program over x = (q̈, r): the torque rows, normals q̈ + r >= lower, first of the clearances that are not lost,
+  /// then of those that are, while the others keep what they have.
+  bool solve_least(LeastShortfall& least, bool of_lost, TorqueSolution& solution) noexcept;
+  /// Writes what is to be allowed, and an acceleration that falls short by no more.
+  bool find_least_shortfalls(TorqueSolution& solution) noexcept;
+  /// Joint i has these multipliers at its bounds and its torque.
+  void add_active(int i, double at_upper, double at_lower, double at_effort, TorqueSolution& solution) const noexcept;
+  void report_clearance(const Clearances* clearances, TorqueSolution& solution) const noexcept;
   bool accept(TorqueSolution& solution) noexcept;
   void report_safety(TorqueSolution& solution) noexcept;
   void stop(bool mass_known, TorqueSolution& solution) noexcept;
@@ -159,15 +181,19 @@ class TorqueController {
   SafetyRows rows_;
   QuadraticProgramData hard_data_;
   QuadraticProgram hard_;
-  std::vector<Relaxed> relaxed_;                   // by number of rows, so that the usual few stay cheap
-  // Rows of the second program: k >= 0 is row k of rows_, k < 0 a position limit of joint (-1 - k)/2, odd ones upper.
-  std::vector<int> relaxed_rows_;
-  int num_relaxed_rows_ = 0;
+  std::vector<int> rows_used_;                     // of rows_, in the programs after the first
+  int num_rows_used_ = 0;
+  QuadraticProgramData comfort_data_;              // over (q̈, slack of the bounds)
+  QuadraticProgram comfort_;
+  QuadraticProgramData widening_data_;             // over (q̈, what it is outside the box)
+  QuadraticProgram widening_;
+  std::vector<LeastShortfall> least_;              // by number of rows, so that the usual few stay cheap
+  Eigen::VectorXd allowed_;                        // shortfalls of the rows used
   Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
-  Eigen::VectorXd box_;                            // position limits beyond it are left out of the second program
+  Eigen::VectorXd wide_lower_, wide_upper_;        // box of the programs after the first
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
-  std::int64_t counts_[6] = {};
+  std::int64_t counts_[7] = {};
 };
 
 }  // namespace sidestep

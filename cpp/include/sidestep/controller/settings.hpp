@@ -49,8 +49,9 @@ struct ControllerSettings {
   Output output = Output::automatic;
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop [s]
-  double stop_damping = 0.25;    ///< of a stop without a mass matrix, see TorqueControllerSettings; so are the next three
-  double torque_weight = 1e-6, slack_weight = 1e3, safety_weight = 1e3;
+  double stop_damping = 0.25;    ///< of a stop without a mass matrix, see TorqueControllerSettings; so are the next four
+  double torque_weight = 1e-6, slack_weight = 1e3;
+  double velocity_overrun = 1.2, acceleration_overrun = 10.0;
   double obstacle_timeout = std::numeric_limits<double>::infinity();  ///< age from which obstacles count as stale [s]
   bool local_activation = true;  ///< barriers leave room at goals and narrow places among what rests
   bool synchronous = false;      ///< planner, look-ahead and posture search run inside `step`, so that motions repeat
