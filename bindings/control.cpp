@@ -290,7 +290,7 @@ void bind_torque_controller(nb::module_& m) {
                    nb::sig("def dominant(self) -> SafetyRow | None"),
                    "The clearance that bends the motion most; None if none does.")
       .def_ro("least_clearance", &TorqueSolution::least_clearance,
-              "The least clearance given [m], with a row or without; inf if there is none.")
+              "The least clearance given [m], exact, with a row or without; inf if there is none.")
       .def_ro("least_coordinate", &TorqueSolution::least_coordinate, "Which clearance that is; -1 if there is none.")
       .def_ro("least_nearest", &TorqueSolution::least_nearest, "Its nearest obstacle point; -1 if there is none.");
 
@@ -302,8 +302,8 @@ void bind_torque_controller(nb::module_& m) {
       .def(
           "__init__",
           [](TorqueController* self, const Robot& robot, double period, const ArrayLike& tracking_weight,
-             const ArrayLike& torque_weight, double slack_weight, double velocity_overrun, double acceleration_overrun, double position_margin,
-             double stop_time, double stop_damping, const SafetySettings* safety) {
+             const ArrayLike& torque_weight, double slack_weight, double velocity_overrun, double acceleration_overrun,
+             double position_margin, double stop_time, double stop_damping, const SafetySettings* safety) {
             const int nv = robot.num_coordinates();
             TorqueControllerSettings settings;
             settings.period = period;

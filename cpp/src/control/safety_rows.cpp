@@ -10,7 +10,7 @@ namespace sidestep {
 namespace {
 
 // A clearance whose gradient is shorter than this [m/rad] is one that no joint can change.
-constexpr double shortest_gradient = 1e-9;
+constexpr double shortest_gradient = 1e-6;
 // A leaving speed that is missing comes by this many times the rate: see the header.
 constexpr double firmness = 3.0;
 // A stop along the path takes at most this many times as long by the torque as by the acceleration limits: beyond, lines
@@ -73,7 +73,8 @@ double demanded_deceleration(double room, double u, const ClosingLimits& limits,
   const double for_a_stop = u > 0.0 && left > 0.0 ? std::max(rate * u, u * u / (2.0 * left)) : infinity;
   const double too_fast = std::max(u - std::max(allowed, 0.0), 0.0);  // closing
   const double too_slow = std::max(std::min(u, 0.0) - allowed, 0.0);  // leaving
-  const double returning = std::min(along_profile + firmness * rate * too_slow, A) + limits.correction * too_fast / period;
+  const double away = std::min(along_profile + firmness * rate * too_slow, A);
+  const double returning = away + limits.correction * too_fast / period;
   return std::min({at_once, returning, for_a_stop, limits.hardest});
 }
 

@@ -21,16 +21,6 @@ constexpr double symmetry_tolerance = 1e-6;
 // The torque of a solved program is outside the effort limits by rounding at most; more than this fraction of the
 // limit means that the solution is not one.
 constexpr double torque_tolerance = 1e-6;
-// Slack below this, relative to 1 /s^2 plus the bound, is rounding of the second program and not worth a status.
-constexpr double slack_tolerance = 1e-9;
-// The program of least shortfalls prefers small accelerations with this weight, so that there is one solution.
-constexpr double regularisation = 1e-6;
-// That of the ways out of what is lost, which a joint of little leverage [rad/rad] is not to be flung about for.
-constexpr double lost_regularisation = 1e-2;
-// Shortfalls below this, relative to 1 /s^2 plus what is asked for, may be of the regularisation alone.
-constexpr double shortfall_tolerance = 1e-4;
-// ε: the shortfall of a clearance that the joints change by less than 5 cm/rad counts less [(m/rad)²], as in recovery.hpp.
-constexpr double least_gradient_squared = 0.05 * 0.05;
 // The smallest program of least shortfalls; the next ones double.
 constexpr int fewest_rows = 4;
 // Damping [Nm s/rad | N s/m] of the stop for joints without an effort or a velocity limit to derive it from.
@@ -146,7 +136,6 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
   comfort_data_.A.block(nv_, nv_, nv_, nv_).setIdentity();
   comfort_data_.lower.tail(nv_).setZero();
   // Over x = (q̈, e): q̈ + e within the box, the torque rows.
-  widening_data_.H.diagonal().head(nv_).setConstant(regularisation);
   widening_data_.A.topLeftCorner(nv_, nv_).setIdentity();
   widening_data_.A.topRightCorner(nv_, nv_).setIdentity();
   for (int num = fewest_rows; num < rows_.max_size(); num *= 2) {
@@ -312,214 +301,17 @@ bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
   return accept(solution);
 }
 
-void TorqueController::widen_bounds() noexcept {
-  wide_lower_ = bounds_.lower;
-  wide_upper_ = bounds_.upper;
-  if (settings_.hard_bounds) {
-    return;
-  }
-  // To the overruns, which end where position limits do, unless these need more.
-  for (int i = 0; i < nv_; ++i) {
-    const double most = settings_.acceleration_overrun * limits_.acceleration[i];
-    const double fastest = settings_.velocity_overrun * limits_.velocity[i];
-    const double up = std::max(most, bounds_.position_lower[i]), down = std::max(most, -bounds_.position_upper[i]);
-    double upper = std::max(bounds_.upper[i], std::min((fastest - velocity_[i]) / settings_.period, up));
-    double lower = std::min(bounds_.lower[i], std::max((-fastest - velocity_[i]) / settings_.period, -down));
-    const double position_lower = std::min(bounds_.position_lower[i], upper);
-    const double position_upper = std::max(bounds_.position_upper[i], lower);
-    if (position_lower <= position_upper) {
-      lower = std::max(lower, position_lower);
-      upper = std::min(upper, position_upper);
-    }
-    wide_lower_[i] = lower;
-    wide_upper_[i] = upper;
-  }
-}
-
-void TorqueController::collect_rows() noexcept {
-  num_rows_used_ = 0;
-  for (int k = 0; k < rows_.size(); ++k) {
-    if (!rows_.satisfied_within(k, wide_lower_, wide_upper_)) {
-      rows_used_[static_cast<std::size_t>(num_rows_used_++)] = k;
-    }
-  }
-}
-
-double TorqueController::lowered(int n, bool rounded) const noexcept {
-  const double asked = rows_.lower[rows_used_[static_cast<std::size_t>(n)]], size = 1.0 + std::abs(asked);
-  return rounded                                    ? asked - allowed_[n] - slack_tolerance * size
-         : allowed_[n] > shortfall_tolerance * size ? asked - allowed_[n]
-                                                    : asked;
-}
-
-bool TorqueController::solve_least(LeastShortfall& least, bool of_lost, TorqueSolution& solution) noexcept {
-  QuadraticProgramData& data = least.data;
-  data.lower.head(nv_) = wide_lower_;
-  data.upper.head(nv_) = wide_upper_;
-  data.H.diagonal().head(nv_).setConstant(of_lost ? lost_regularisation : regularisation);
-  for (int i = 0; i < nv_; ++i) {
-    data.g[i] = of_lost ? -lost_regularisation * std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i]) : 0.0;
-  }
-  for (int n = 0; n < num_rows_used_; ++n) {
-    const int row = rows_used_[static_cast<std::size_t>(n)];
-    const bool lost = rows_.depths[row] > 0.0, shared = lost == of_lost;
-    data.A(nv_ + n, nv_ + n) = shared ? 1.0 : 0.0;
-    data.row_lower[nv_ + n] = shared ? rows_.lower[row] : of_lost ? lowered(n, true) : -infinity;
-  }
-  if (least.program.solve(data) != QuadraticProgramStatus::solved) {
-    return false;
-  }
-  solution.acceleration = least.program.solution().head(nv_);
-  for (int n = 0; n < num_rows_used_; ++n) {
-    const int row = rows_used_[static_cast<std::size_t>(n)];
-    if (of_lost || rows_.depths[row] == 0.0) {
-      const double short_by = rows_.lower[row] - rows_.normals.row(row).dot(solution.acceleration.transpose());
-      row_multipliers_[row] = allowed_[n] = std::max(short_by, 0.0);
-    }
-  }
-  for (int i = 0; i < nv_; ++i) {  // what the shortfalls are due to
-    const Eigen::VectorXd& multipliers = least.program.multipliers();
-    add_active(i, multipliers[i], multipliers[i], multipliers[nv_ + least.num_rows + i], solution);
-  }
-  return true;
-}
-
-bool TorqueController::find_least_shortfalls(TorqueSolution& solution) noexcept {
-  LeastShortfall& least = *std::find_if(least_.begin(), least_.end() - 1,
-                                        [this](const LeastShortfall& l) { return l.num_rows >= num_rows_used_; });
-  QuadraticProgramData& data = least.data;
-  data.A.topLeftCorner(nv_, nv_) = mass_;
-  data.A.bottomRows(least.num_rows).setZero();
-  data.row_lower.head(nv_) = hard_data_.row_lower.head(nv_);
-  data.row_upper.head(nv_) = hard_data_.row_upper.head(nv_);
-  data.row_lower.tail(least.num_rows).setConstant(-infinity);
-  double deepest = 0.0;
-  for (int n = 0; n < num_rows_used_; ++n) {
-    deepest = std::max(deepest, rows_.depths[rows_used_[static_cast<std::size_t>(n)]]);
-  }
-  for (int n = 0; n < num_rows_used_; ++n) {
-    const int row = rows_used_[static_cast<std::size_t>(n)];
-    const double squared = rows_.lengths[row] * rows_.lengths[row];
-    data.A.row(nv_ + n).head(nv_) = rows_.normals.row(row);
-    const double share = rows_.depths[row] > 0.0 ? rows_.depths[row] / deepest : 1.0;
-    data.H(nv_ + n, nv_ + n) = std::max(squared / (squared + least_gradient_squared) * share, regularisation);
-  }
-  allowed_.setZero();
-  if (!solve_least(least, false, solution)) {
-    // The torque does not reach the box: widen it by as little as that takes.
-    widening_data_.A.bottomLeftCorner(nv_, nv_) = mass_;
-    widening_data_.row_lower << wide_lower_, hard_data_.row_lower.head(nv_);
-    widening_data_.row_upper << wide_upper_, hard_data_.row_upper.head(nv_);
-    if (widening_.solve(widening_data_) != QuadraticProgramStatus::solved) {
-      return false;
-    }
-    for (int i = 0; i < nv_; ++i) {
-      const double reached = widening_.solution()[i], rounding = slack_tolerance * (1.0 + std::abs(reached));
-      wide_lower_[i] = std::min(wide_lower_[i], reached - rounding);
-      wide_upper_[i] = std::max(wide_upper_[i], reached + rounding);
-    }
-    solution.acceleration = widening_.solution().head(nv_);
-    static_cast<void>(solve_least(least, false, solution));
-  }
-  if (deepest > 0.0 && !solve_least(least, true, solution)) {
-    for (int n = 0; n < num_rows_used_; ++n) {  // as the first solution leaves them
-      const int row = rows_used_[static_cast<std::size_t>(n)];
-      allowed_[n] = std::max(rows_.lower[row] - rows_.normals.row(row).dot(solution.acceleration.transpose()), 0.0);
-    }
-  }
-  return true;
-}
-
-bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noexcept {
-  QuadraticProgramData& data = comfort_data_;
-  double steepest = 0.0;
-  for (int i = 0; i < nv_; ++i) {
-    const double beyond = std::abs(wanted_[i] - std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i]));
-    steepest = std::max(steepest, tracking_weight_[i] * (1.0 + beyond));
-  }
-  data.H.topLeftCorner(nv_, nv_) = hard_data_.H;
-  data.H.diagonal().tail(nv_) = tracking_weight_;
-  data.g.head(nv_) = hard_data_.g;
-  data.g.tail(nv_).setConstant(settings_.slack_weight * steepest);
-  data.lower.head(nv_) = wide_lower_;
-  data.upper.head(nv_) = wide_upper_;
-  data.row_upper.head(nv_) = bounds_.upper;
-  data.row_lower.segment(nv_, nv_) = bounds_.lower;
-  data.A.block(2 * nv_, 0, nv_, nv_) = mass_;
-  data.row_lower.segment(2 * nv_, nv_) = hard_data_.row_lower.head(nv_);
-  data.row_upper.segment(2 * nv_, nv_) = hard_data_.row_upper.head(nv_);
-  data.row_lower.tail(rows_.max_size()).setConstant(-infinity);
-  for (int n = 0; n < num_rows_used_; ++n) {
-    const int row = rows_used_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
-    data.A.row(at).head(nv_) = rows_.normals.row(row);
-    data.row_lower[at] = lowered(n, rounded);
-  }
-  if (comfort_.solve(data) != QuadraticProgramStatus::solved) {
-    return false;
-  }
-  solution.acceleration = comfort_.solution().head(nv_);
-  const Eigen::VectorXd& multipliers = comfort_.multipliers();
-  const int first_row = 2 * nv_;  // multipliers of the bounds come before those of the rows
-  for (int i = 0; i < nv_; ++i) {
-    add_active(i, std::max(multipliers[i], multipliers[first_row + i]), std::min(multipliers[i], multipliers[first_row + nv_ + i]),
-               multipliers[first_row + 2 * nv_ + i], solution);
-  }
-  for (int n = 0; n < num_rows_used_; ++n) {
-    row_multipliers_[rows_used_[static_cast<std::size_t>(n)]] = std::max(-multipliers[first_row + 3 * nv_ + n], 0.0);
-  }
-  return accept(solution);
-}
-
-TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept {
-  widen_bounds();
-  collect_rows();
-  std::fill(solution.active.begin(), solution.active.end(), Limit::none);
-  allowed_.setZero();
-  const bool found = solve_comfort(false, solution) ||
-                     (find_least_shortfalls(solution) &&
-                      (solve_comfort(false, solution) || solve_comfort(true, solution) ||
-                       (find_least_shortfalls(solution) && accept(solution))));
-  if (!found) {
-    stop(true, solution);
-    return TorqueStatus::fallback_solver;
-  }
-  double farthest = 0.0;
-  for (int i = 0; i < nv_; ++i) {
-    farthest = std::max(farthest, std::abs(wanted_[i] - std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i])));
-  }
-  const auto outside = [farthest](double amount, double bound) {
-    return std::abs(amount) > slack_tolerance * (1.0 + std::abs(bound) + farthest) ? amount : 0.0;
-  };
-  bool bounds_kept = true, safe = true;
-  for (int i = 0; i < nv_; ++i) {
-    double& q_ddot = solution.acceleration[i];
-    const double beyond = q_ddot - std::clamp(q_ddot, bounds_.lower[i], bounds_.upper[i]);
-    solution.slack[i] = outside(beyond, beyond > 0.0 ? bounds_.upper[i] : bounds_.lower[i]);
-    bounds_kept = bounds_kept && solution.slack[i] == 0.0;
-    const double beyond_position = q_ddot - std::clamp(q_ddot, bounds_.position_lower[i], bounds_.position_upper[i]);
-    safe = safe && outside(beyond_position, q_ddot - beyond_position) == 0.0;
-    if (settings_.hard_bounds && solution.slack[i] == 0.0) {
-      q_ddot -= beyond;  // rounding
-    }
-  }
-  for (int n = 0; n < num_rows_used_; ++n) {
-    const int row = rows_used_[static_cast<std::size_t>(n)];
-    const double short_by = rows_.lower[row] - rows_.normals.row(row).dot(solution.acceleration.transpose());
-    safe = safe && !(outside(short_by, rows_.lower[row]) > 0.0);
-  }
-  return !safe ? TorqueStatus::relaxed_safety : !bounds_kept ? TorqueStatus::relaxed : TorqueStatus::limited;
-}
-
 void TorqueController::report_clearance(const Clearances* clearances, TorqueSolution& solution) const noexcept {
   solution.least_clearance = infinity;
   solution.least_coordinate = solution.least_nearest = -1;
   if (clearances == nullptr) {
     return;
   }
-  const Eigen::Index num = std::min(clearances->nearest.size(), clearances->least.size());
+  const Eigen::Index num = std::min({clearances->nearest.size(), clearances->least.size(), clearances->values.size()});
   for (Eigen::Index k = 0; k < num; ++k) {
-    if (clearances->nearest[k] >= 0 && clearances->least[k] < solution.least_clearance) {
-      solution.least_clearance = clearances->least[k];
+    const double value = std::min(clearances->least[k], clearances->values[k]);
+    if (clearances->nearest[k] >= 0 && value < solution.least_clearance) {
+      solution.least_clearance = value;
       solution.least_coordinate = static_cast<int>(k);
       solution.least_nearest = clearances->nearest[k];
     }

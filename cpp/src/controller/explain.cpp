@@ -45,7 +45,7 @@ std::string Controller::Impl::explain() const {
     return text;
   }
   const auto diagnosis = system->diagnose(workspace);
-  if (command.status == SafetyStatus::clearance_lost) {
+  if (command.status == SafetyStatus::clearance_lost && command.coordinate >= 0) {
     const CoordinateLabel& label = system->labels()[static_cast<std::size_t>(command.coordinate)];
     text = parties(label, obstacles().words_for(command.point)) + " overlap by " + millimetres(command.clearance) + ", as far as the covering body says; ";
     if (label.kind == CoordinateLabel::Kind::obstacle) {

@@ -300,6 +300,9 @@ BOOST_AUTO_TEST_CASE(unusable_clearances_are_noticed) {
     c.nearest[1] = -1;
     BOOST_TEST(rows.usable(c));
   }
+  Clearances of_nothing = good;
+  of_nothing.least[1] = std::numeric_limits<double>::quiet_NaN();
+  BOOST_TEST(!rows.usable(of_nothing));
   Clearances short_of_rates = good;
   short_of_rates.approach.rates.resize(2);
   BOOST_TEST(!rows.usable(short_of_rates));
@@ -323,6 +326,10 @@ BOOST_AUTO_TEST_CASE(settings_of_safety_rows_are_checked) {
   BOOST_TEST(message_of([](S& s) { s.braking_fraction = 1.5; }).find("allowed: 0.05 to 1") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.correction = 0.0; }).find("correction") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.max_rows = -1; }).find("max_rows") != std::string::npos);
+  // Before anything of that size is allocated, which fails otherwise or takes all memory.
+  BOOST_TEST(message_of([](S& s) { s.max_rows = 100'000; }).find("max_rows is 100000") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.max_rows = std::numeric_limits<int>::max(); }).find("from 0 to 256") !=
+             std::string::npos);
 }
 
 BOOST_AUTO_TEST_CASE(more_than_is_to_be_had_is_asked_for_only_where_room_runs_out) {

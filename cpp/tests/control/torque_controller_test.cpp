@@ -289,6 +289,10 @@ BOOST_AUTO_TEST_CASE(settings_of_the_torque_controller_are_checked) {
   BOOST_TEST(message_of([](S& s) { s.torque_weight.setConstant(-1.0); }).find("torque_weight") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.torque_weight.setZero(); }).empty());
   BOOST_TEST(message_of([](S& s) { s.slack_weight = infinity; }).find("slack_weight") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.velocity_overrun = 0.9; }).find("velocity_overrun is 0.9") != std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.acceleration_overrun = infinity; }).find("acceleration_overrun") !=
+             std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.velocity_overrun = s.acceleration_overrun = 1.0; }).empty());
   BOOST_TEST(message_of([](S& s) { s.stop_time = -1.0; }).find("stop_time") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.stop_damping = 0.0; }).find("stop_damping") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.position_margin = -0.1; }).find("position_margin") != std::string::npos);

@@ -13,7 +13,8 @@ struct AccelerationFilterSettings {
 
 /// The acceleration nearest to a wanted one within the limits of joints and clearances, for motion without torque:
 /// TorqueController with unit masses and unlimited effort. Position, velocity and acceleration limits are then what the
-/// actuators can do: they are never left, and only clearances can give way to them (status relaxed_safety).
+/// actuators can do: they are never left, and only clearances can give way to them (status
+/// relaxed_safety, clearance_lost where one is below zero).
 class AccelerationFilter {
  public:
   /// Throws std::invalid_argument if the settings are not valid.

@@ -59,9 +59,9 @@ struct ClosingLimits {
 // every period: what disturbs makes the demand grow before s is gone, with the logarithm of s; what is then not to be had
 // goes into the margin.
 // A room that is negative grows back to p⁻¹(s) < 0: closing ends as above, and the leaving speed e that is missing comes by
-// 3γ e, on the line s'' = −3γ s' − 2γ² s: firmly, but without a demand of order 1/T, and never above A. So what closes in is
-// slowed harder than at rest, however deep it is: where clearances want opposite things, the arm comes to rest. What comes nearer by v unseen (an
-// obstacle whose velocity is not given) is held off at s = −1.5 v/γ, an acceleration d that is not known of at −d/2γ².
+// 3γ e, on the line s'' = −3γ s' − 2γ² s: firmly, but without a demand of order 1/T, and never above A. So what closes
+// in is slowed harder than at rest, however deep it is: where clearances want opposite things, the arm comes to rest.
+// What comes nearer by v unseen (an obstacle whose velocity is not given) is held off at s = −1.5 v/γ, an acceleration d that is not known of at −d/2γ².
 //
 // What a row may ask for. The curvature c adds to the demand, other rows want something else, and close to position
 // limits joints cannot give all: no more than b = max ∇h·a within the bounds of now and the torque. With b the room lasts
@@ -76,8 +76,8 @@ struct ClosingLimits {
 // κ is no larger than twice what meets the demand, nor than takes `correction` of the velocity in this period; bounds of
 // comfort are exceeded κ times by it.
 // Where something else closes in, or the room is used up, a row asks for no more than b if with b the room lasts. Only
-// where it does not are bounds of comfort given up for it; where the room is used up, only for the end of closing, and not for
-// the way back: what is asked for does not jump where closing turns into leaving.
+// where it does not are bounds of comfort given up for it; where the room is used up, only for the end of closing, and
+// not for the way back: what is asked for does not jump where closing turns into leaving.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.

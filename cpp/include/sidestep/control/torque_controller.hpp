@@ -18,7 +18,7 @@ enum class TorqueStatus {
   limited,                 ///< optimal within the limits, and at least one of them is in the way
   relaxed,                 ///< velocity or acceleration limits gave way to clearances, position or torque limits
   relaxed_safety,          ///< not all clearances and position limits can be kept (see safety, slack)
-  clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest (least_clearance)
+  clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest
   fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
   fallback_solver,         ///< the quadratic program could not be solved: damped stop
 };
@@ -54,7 +54,8 @@ struct TorqueSolution {
   std::vector<SafetyRow> safety;                   ///< the first num_safety_rows, most critical first
   int num_safety_rows = 0;
   int dominant = -1;                               ///< the entry of `safety` that bends the motion most; -1 if none
-  double least_clearance = std::numeric_limits<double>::infinity();  ///< [m], of all that are given, also those without a row; inf: none
+  /// The least of all clearances given [m], exact, also without a row; inf: none.
+  double least_clearance = std::numeric_limits<double>::infinity();
   int least_coordinate = -1, least_nearest = -1;   ///< which clearance that is, and its nearest point; -1: none
 };
 
@@ -98,12 +99,14 @@ struct TorqueControllerSettings {
 ///               lower(q, v) <= q̈ <= upper(q, v)        (see acceleration_bounds.hpp)
 ///
 /// The torque is eliminated by the first constraint. What is sacrificed, in this order: the task, which is the cost;
-/// velocity and acceleration limits up to the overruns (unless hard_bounds); clearances; those overruns and position limits;
-/// torque limits never. A first program has every constraint hard. If it is infeasible, a second one adds slack to the bounds,
-/// within a box of the overruns and of position limits, at the cost p's with a price p far above the task's. If that is
-/// infeasible, a third one finds the shortfalls r of the clearances of which Σ r² is least, by which their rows are then
-/// lowered: what pulls two ways is shared, and an arm that cannot get out comes to rest. Where the torque does not reach the
-/// box, it is first widened by the least squares that do. So there always is a solution.
+/// velocity and acceleration limits up to the overruns (unless hard_bounds); clearances; the overruns and position
+/// limits; torque limits never. A first program has every constraint hard. If it is infeasible, a second one adds slack
+/// to the bounds, within a box of the overruns and of position limits, at the cost p's with a price p far above the
+/// task's. If that is infeasible, a third one finds the shortfalls r of the clearances of which Σ w r² is least, with
+/// w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of those that are not below zero, then of those
+/// that are, w times their depth over the largest. What pulls two ways is shared, and an arm that cannot get out comes
+/// to rest. Where the torque does not reach the box, it is first widened by the least squares that do. So there always
+/// is a solution.
 ///
 /// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
 /// clearances are unusable, the same without them.
@@ -144,6 +147,9 @@ class TorqueController {
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
  private:
+  /// Slack below this, relative to 1 /s^2 plus the bound, is rounding and not worth a status.
+  static constexpr double slack_tolerance = 1e-9;
+
   /// The third program for up to `num_rows` clearances.
   struct LeastShortfall {
     LeastShortfall(int nv, int num_rows);
@@ -156,12 +162,12 @@ class TorqueController {
   TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
   void widen_bounds() noexcept;
   void collect_rows() noexcept;
-  /// The second program, with rows lowered by what is allowed; rounded: also where that is next to nothing, and by rounding.
+  /// The second program, with rows lowered by what is allowed; rounded: also where that is next to nothing.
   bool solve_comfort(bool rounded, TorqueSolution& solution) noexcept;
   /// What row n of those used asks for, less what is allowed.
   double lowered(int n, bool rounded) const noexcept;
-  /// The third program over x = (q̈, r): the torque rows, normals q̈ + r >= lower, first of the clearances that are not lost,
-  /// then of those that are, while the others keep what they have.
+  /// The third program over x = (q̈, r): the torque rows, normals q̈ + r >= lower, first of the clearances that are not
+  /// lost, then of those that are, while the others keep what they have.
   bool solve_least(LeastShortfall& least, bool of_lost, TorqueSolution& solution) noexcept;
   /// Writes what is to be allowed, and an acceleration that falls short by no more.
   bool find_least_shortfalls(TorqueSolution& solution) noexcept;
