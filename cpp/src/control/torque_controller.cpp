@@ -205,7 +205,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
     } else {
       wanted_ = -velocity_ / settings_.stop_time;
     }
-    if (solve_within_bounds(solution)) {
+    if (solve_within_bounds(solution) && !presses_for_lost()) {
       const bool free = std::all_of(solution.active.begin(), solution.active.end(),
                                     [](Limit limit) { return limit == Limit::none; });
       status = free && row_multipliers_.isZero(0.0) ? TorqueStatus::ok : TorqueStatus::limited;

@@ -45,6 +45,15 @@ void TorqueController::widen_bounds() noexcept {
   }
 }
 
+bool TorqueController::presses_for_lost() const noexcept {
+  for (int k = 0; k < rows_.size(); ++k) {
+    if (rows_.depths[k] > 0.0 && row_multipliers_[k] > 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void TorqueController::collect_rows() noexcept {
   num_rows_used_ = 0;
   for (int k = 0; k < rows_.size(); ++k) {
@@ -185,7 +194,8 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
   collect_rows();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   allowed_.setZero();
-  const bool found = solve_comfort(false, solution) ||
+  row_multipliers_.setZero();
+  const bool found = (solve_comfort(false, solution) && !presses_for_lost()) ||
                      (find_least_shortfalls(solution) &&
                       (solve_comfort(false, solution) || solve_comfort(true, solution) ||
                        (find_least_shortfalls(solution) && accept(solution))));

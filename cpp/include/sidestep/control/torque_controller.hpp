@@ -102,9 +102,9 @@ struct TorqueControllerSettings {
 /// velocity and acceleration limits up to the overruns (unless hard_bounds); clearances; the overruns and position
 /// limits; torque limits never. A first program has every constraint hard. If it is infeasible, a second one adds slack
 /// to the bounds, within a box of the overruns and of position limits, at the cost p's with a price p far above the
-/// task's. If that is infeasible, a third one finds the shortfalls r of the clearances of which Σ w r² is least, with
-/// w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of those that are not below zero, then of those
-/// that are, w times their depth over the largest. What pulls two ways is shared, and an arm that cannot get out comes
+/// task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
+/// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of those
+/// that are not below zero, then of those that are, w times their depth over the largest. What pulls two ways is shared, and an arm that cannot get out comes
 /// to rest. Where the torque does not reach the box, it is first widened by the least squares that do. So there always
 /// is a solution.
 ///
@@ -162,6 +162,9 @@ class TorqueController {
   TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
   void widen_bounds() noexcept;
   void collect_rows() noexcept;
+  /// Whether a clearance below zero bends the last solution. Then the third program has its say also where all could be
+  /// met: what only the last bit of an acceleration limit can give would come and go from step to step.
+  bool presses_for_lost() const noexcept;
   /// The second program, with rows lowered by what is allowed; rounded: also where that is next to nothing.
   bool solve_comfort(bool rounded, TorqueSolution& solution) noexcept;
   /// What row n of those used asks for, less what is allowed.

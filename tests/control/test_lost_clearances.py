@@ -1,0 +1,92 @@
+"""Arms that start in contact: folded into themselves, or inside a ball."""
+
+import numpy as np
+import pytest
+
+import sidestep as ss
+
+PERIOD = 0.001
+FOLDED = {  # of a UR10, two links 15 cm inside each other
+    "a way out": [-5.86, -2.74, 3.13, -1.49, 4.09, 4.55],
+    "none": [0.68, 5.35, -3.13, -4.24, 2.77, -1.33],
+}
+FALLBACKS = {ss.TorqueStatus.fallback_solver, ss.TorqueStatus.fallback_invalid_input}
+HARMLESS = {
+    ss.TorqueStatus.ok,
+    ss.TorqueStatus.limited,
+    ss.TorqueStatus.relaxed,
+    ss.TorqueStatus.relaxed_safety,
+}
+
+
+class Motion:
+    """What a controller's commands do to an arm, state by state; the status is checked against the clearance."""
+
+    def __init__(self, controller: ss.Controller, robot: ss.Robot, q: np.ndarray, steps: int) -> None:
+        limits = robot.limits
+        v = np.zeros(len(q))
+        self.clearances = np.empty(steps)
+        self.speeds, self.accelerations = np.empty(steps), np.empty(steps)
+        self.programs, self.overrun = set(), 0.0
+        for k in range(steps):
+            command = controller.step(q, v)
+            if command.clearance < 0.0:
+                assert command.program not in HARMLESS, (k, command.clearance)
+                assert command.status == ss.SafetyStatus.clearance_lost
+            v = v + PERIOD * command.acceleration
+            q = q + PERIOD * v
+            self.clearances[k] = command.clearance
+            self.speeds[k] = np.abs(v).max()
+            self.accelerations[k] = np.abs(command.acceleration).max()
+            self.overrun = max(self.overrun, np.max(np.abs(v) / limits.velocity))
+            self.programs.add(command.program)
+        assert not self.programs & FALLBACKS
+
+
+@pytest.mark.parametrize("output", ["torque", "acceleration"])
+@pytest.mark.parametrize("start", FOLDED)
+def test_an_arm_folded_into_itself_gets_out_or_comes_to_rest(start: str, output: str) -> None:
+    arm = ss.Arm.load("ur10")
+    settings = ss.ControllerSettings(synchronous=True, output=output)
+    motion = Motion(ss.Controller(arm, settings), arm.robot, np.array(FOLDED[start]), 3000)
+    allowed = settings.velocity_overrun if output == "torque" else 1.0
+    assert motion.clearances[0] < -0.14
+    assert motion.overrun <= allowed * (1.0 + 1e-6)
+    if start == "a way out":
+        assert motion.clearances[-1] > 0.005
+    else:
+        assert motion.clearances[-1] > motion.clearances[0]
+    assert motion.speeds[-500:].max() < 0.05
+    assert motion.accelerations[-500:].max() < 0.5
+
+
+@pytest.mark.parametrize("output", ["torque", "acceleration"])
+@pytest.mark.parametrize(("link", "gets_out"), [("fr3_rightfinger", True), ("fr3_link4", False)])
+def test_an_arm_engulfed_by_a_ball_gets_out_or_comes_to_rest(link: str, gets_out: bool, output: str) -> None:
+    """40 cm around the hand, of which it can move out, or around an elbow that cannot leave."""
+    arm = ss.Arm.load("fr3")
+    at = arm.robot.pose(arm.robot.neutral, link)[:3, 3]
+    engulfed = ss.Controller(arm, ss.ControllerSettings(synchronous=True, output=output))
+    engulfed.set_obstacles(ss.Obstacles([at], [0.4]))
+    motion = Motion(engulfed, arm.robot, arm.robot.neutral, 4000)
+    assert motion.clearances[0] < -0.4
+    if gets_out:
+        assert motion.clearances[-1] > 0.0
+    else:
+        assert motion.clearances[-1] > motion.clearances[0]
+    assert motion.speeds[-500:].max() < 0.05
+    assert motion.accelerations[-500:].max() < 0.5
+
+
+def test_a_clearance_that_no_joint_changes_is_told() -> None:
+    robot = ss.Robot.named("planar3")
+    lost = ss.Clearances(
+        values=[-1.0], rates=[0.0], curvatures=[0.0], gradients=np.zeros((1, 3)), nearest=[4]
+    )
+    zero = np.zeros(3)
+    for solution in (
+        ss.AccelerationFilter(robot).apply(zero, zero, zero, clearances=lost),
+        ss.TorqueController(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=lost),
+    ):
+        assert solution.status == ss.TorqueStatus.clearance_lost
+        assert (solution.least_clearance, solution.least_coordinate, solution.least_nearest) == (-1.0, 0, 4)
