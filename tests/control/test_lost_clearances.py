@@ -27,7 +27,8 @@ class Motion:
         v = np.zeros(len(q))
         self.clearances = np.empty(steps)
         self.speeds, self.accelerations = np.empty(steps), np.empty(steps)
-        self.programs, self.overrun = set(), 0.0
+        self.programs: set[ss.TorqueStatus] = set()
+        self.overrun = 0.0
         for k in range(steps):
             command = controller.step(q, v)
             if command.clearance < 0.0:
@@ -48,7 +49,7 @@ class Motion:
 def test_an_arm_folded_into_itself_gets_out_or_comes_to_rest(start: str, output: str) -> None:
     arm = ss.Arm.load("ur10")
     settings = ss.ControllerSettings(synchronous=True, output=output)
-    motion = Motion(ss.Controller(arm, settings), arm.robot, np.array(FOLDED[start]), 3000)
+    motion = Motion(ss.Controller(arm, settings), ss.Robot.named("ur10"), np.array(FOLDED[start]), 3000)
     allowed = settings.velocity_overrun if output == "torque" else 1.0
     assert motion.clearances[0] < -0.14
     assert motion.overrun <= allowed * (1.0 + 1e-6)
@@ -64,11 +65,11 @@ def test_an_arm_folded_into_itself_gets_out_or_comes_to_rest(start: str, output:
 @pytest.mark.parametrize(("link", "gets_out"), [("fr3_rightfinger", True), ("fr3_link4", False)])
 def test_an_arm_engulfed_by_a_ball_gets_out_or_comes_to_rest(link: str, gets_out: bool, output: str) -> None:
     """40 cm around the hand, of which it can move out, or around an elbow that cannot leave."""
-    arm = ss.Arm.load("fr3")
-    at = arm.robot.pose(arm.robot.neutral, link)[:3, 3]
+    arm, robot = ss.Arm.load("fr3"), ss.Robot.named("fr3")
+    at = robot.pose(robot.neutral, link)[:3, 3]
     engulfed = ss.Controller(arm, ss.ControllerSettings(synchronous=True, output=output))
     engulfed.set_obstacles(ss.Obstacles([at], [0.4]))
-    motion = Motion(engulfed, arm.robot, arm.robot.neutral, 4000)
+    motion = Motion(engulfed, robot, robot.neutral, 4000)
     assert motion.clearances[0] < -0.4
     if gets_out:
         assert motion.clearances[-1] > 0.0
