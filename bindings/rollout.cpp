@@ -16,7 +16,7 @@
 #include "sidestep/dynamical_system/escape.hpp"
 #include "sidestep/dynamical_system/evasion.hpp"
 #include "sidestep/dynamical_system/progress_monitor.hpp"
-#include "sidestep/dynamical_system/rollout.hpp"
+#include "sidestep/thesis/rollout.hpp"
 
 namespace sidestep::python {
 namespace {

@@ -11,7 +11,7 @@
 #include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
 #include "sidestep/embedding/clearance_barrier.hpp"
-#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/thesis/collision_density.hpp"
 #include "sidestep/embedding/joint_limit_barrier.hpp"
 #include "sidestep/embedding/self_collision_barrier.hpp"
 

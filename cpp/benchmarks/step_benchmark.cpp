@@ -5,7 +5,7 @@
 
 #include "scenes.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
-#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/thesis/collision_density.hpp"
 #include "timing.hpp"
 
 namespace {

@@ -12,7 +12,7 @@
 
 #include "sidestep/body/body.hpp"
 #include "sidestep/dynamical_system/geometric_system.hpp"
-#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/thesis/collision_density.hpp"
 #include "sidestep/kinematics/robot.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <memory>
 
-#include "sidestep/embedding/collision_density.hpp"
-#include "sidestep/embedding/joint_limit_potential.hpp"
+#include "sidestep/thesis/collision_density.hpp"
+#include "sidestep/thesis/joint_limit_potential.hpp"
 #include "support/allocations.hpp"
 #include "support/random_scene.hpp"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "sidestep/dynamical_system/rollout.hpp"
+#include "sidestep/thesis/rollout.hpp"
 #include "support/random_scene.hpp"
 #include "support/serial_arm.hpp"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-#include "sidestep/dynamical_system/rollout.hpp"
+#include "sidestep/thesis/rollout.hpp"
 #include "sidestep/embedding/clearance_barrier.hpp"
 #include "sidestep/embedding/joint_limit_barrier.hpp"
 #include "support/allocations.hpp"

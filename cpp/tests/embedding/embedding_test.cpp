@@ -6,9 +6,9 @@
 
 #include "sidestep/embedding/approach_mean.hpp"
 #include "sidestep/embedding/boltzmann_mean.hpp"
-#include "sidestep/embedding/collision_density.hpp"
-#include "sidestep/embedding/joint_limit_potential.hpp"
-#include "sidestep/embedding/sum.hpp"
+#include "sidestep/thesis/collision_density.hpp"
+#include "sidestep/thesis/joint_limit_potential.hpp"
+#include "sidestep/thesis/sum.hpp"
 #include "support/random_scene.hpp"
 
 using namespace sidestep;

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "sidestep/dynamical_system/rollout.hpp"
+#include "sidestep/thesis/rollout.hpp"
 
 namespace sidestep {
 

@@ -1,5 +1,5 @@
 // The density, with every instruction set of this machine, against the plain sum over points and Gaussians one by one.
-#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/thesis/collision_density.hpp"
 
 #include <Eigen/LU>
 #include <boost/test/unit_test.hpp>

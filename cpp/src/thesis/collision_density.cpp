@@ -1,4 +1,4 @@
-#include "sidestep/embedding/collision_density.hpp"
+#include "sidestep/thesis/collision_density.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "sidestep/dynamical_system/batch.hpp"
+#include "sidestep/thesis/rollout_batch.hpp"
 
 #include <stdexcept>
 #include <string>

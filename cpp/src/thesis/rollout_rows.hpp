@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "sidestep/dynamical_system/rollout.hpp"
+#include "sidestep/thesis/rollout.hpp"
 
 namespace sidestep {
 

@@ -1,4 +1,4 @@
-#include "sidestep/embedding/sum.hpp"
+#include "sidestep/thesis/sum.hpp"
 
 #include <algorithm>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "sidestep/embedding/joint_limit_potential.hpp"
+#include "sidestep/thesis/joint_limit_potential.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "sidestep/dynamical_system/rollout.hpp"
+#include "sidestep/thesis/rollout.hpp"
 
 #include <algorithm>
 #include <chrono>
