@@ -17,8 +17,8 @@ from pathlib import Path
 from ompl import util
 
 import sidestep as ss
+from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
-from sidestep.link_pairs import tables_and_pairs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "guidance"))
 from ompl_reference import solved

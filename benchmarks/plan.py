@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 import sidestep as ss
+from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.bench.arm import load_robot
 from sidestep.bench.motion_bench_maker import read_motion_bench_maker
 from sidestep.bench.parallel import cpu_name
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
-from sidestep.link_pairs import tables_and_pairs
 from sidestep.obstacles import obstacles_from_shapes
 
 

@@ -221,7 +221,7 @@ void bind_embedding(nb::module_& m) {
   nb::class_<ClearanceTableBarrier, Embedding>(
       m, "ClearanceTableBarrier",
       "One coordinate per table, a barrier of the clearance it holds: self-collision of links with two joints between\n"
-      "them, see sidestep.clearance_tables. Other parameters as in ClearanceBarrier.")
+      "them, see sidestep.arm.clearance_tables. Other parameters as in ClearanceBarrier.")
       .def(
           "__init__",
           [](ClearanceTableBarrier* self, const Robot& robot, std::vector<ClearanceTable> tables, double activation,

@@ -61,6 +61,10 @@ from .control import TorqueFault as TorqueFault
 from .control import TorqueSolution as TorqueSolution
 from .control import TorqueStatus as TorqueStatus
 from .control import acceleration_bounds as acceleration_bounds
+from .distance import ExactClearance as ExactClearance
+from .distance import SceneObject as SceneObject
+from .distance import SelfClearance as SelfClearance
+from .distance import SelfCollision as SelfCollision
 from .obstacles import Box as Box
 from .obstacles import Capsule as Capsule
 from .obstacles import Cylinder as Cylinder
@@ -85,11 +89,7 @@ from .scenario import shipped_scenarios as shipped_scenarios
 from .simulation import Arrival as Arrival
 from .simulation import ControllerDriver as ControllerDriver
 from .simulation import Evaluation as Evaluation
-from .simulation import ExactClearance as ExactClearance
 from .simulation import KinematicRun as KinematicRun
-from .simulation import SceneObject as SceneObject
-from .simulation import SelfClearance as SelfClearance
-from .simulation import SelfCollision as SelfCollision
 from .simulation import Simulation as Simulation
 from .simulation import SimulationRun as SimulationRun
 from .simulation import SystemDriver as SystemDriver

@@ -321,7 +321,7 @@ class ClearanceBarrier(Embedding):
     strength: larger turns the motion away earlier within that distance. power >= 2: larger stays flat longer
     and rises steeper. floor [m]: below it psi goes on along its tangent. temperature [m]: smoothing between
     neighbouring points. reach [m]: clearances are measured up to here, at least to the activation distance. More
-    costs time; it is for who wants to see them, or limits closing speeds from afar (SpeedRegulator). What
+    costs time; it is for who wants to see them. What
     approaches is seen from as far as the arm needs to stop. window [temperatures]: points that are farther than
     the nearest by more do not count, each of which would change the mean by window exp(-window) temperature at most,
     2e-7 m; fewer cost less. The body must be calibrated (Body.cover); raises ValueError that names what is wrong.
@@ -396,7 +396,7 @@ class ClearanceTable:
 class ClearanceTableBarrier(Embedding):
     """
     One coordinate per table, a barrier of the clearance it holds: self-collision of links with two joints between
-    them, see sidestep.clearance_tables. Other parameters as in ClearanceBarrier.
+    them, see sidestep.arm.clearance_tables. Other parameters as in ClearanceBarrier.
     """
 
     def __init__(self, robot: Robot, tables: Sequence[ClearanceTable], *, activation: float = 0.05, strength: float = 0.02, power: float = 2.0, floor: float = 0.002, reach: float = 0.0) -> None: ...
@@ -551,30 +551,6 @@ def find_posture(robot: Robot, goal: PoseGoal, near: numpy.typing.ArrayLike, *, 
     that are left: below 1e-7 it is there, else it is the nearest that was found. Knows of no obstacles.
     Raises ValueError on sizes, what is not finite, and a goal of another robot.
     """
-
-class SpeedRegulator:
-    """
-    Regulates the speed along a motion by an acceleration beta v, beta <= 0, which leaves the path of a geodesic as
-    it is: the smooth maximum rho of all ratios of speed to allowed speed obeys drho/dt <= rate (1 - rho)/min(rho, 1).
-    joint_fraction [-]: of the joint velocity limits that is allowed; rate [1/s]: how quickly that is approached;
-    closing_speed [m/s] and closing_slope [1/s]: the motion of the arm may shrink a clearance h by at most
-    closing_speed + closing_slope max(h, 0) per second, for what is within the reach of its barrier. Raises
-    ValueError that names the setting.
-    """
-
-    def __init__(self, *, joint_fraction: float = 0.9, rate: float = 10.0, closing_speed: float = float('inf'), closing_slope: float = 1.0) -> None: ...
-
-    @property
-    def joint_fraction(self) -> float: ...
-
-    @property
-    def rate(self) -> float: ...
-
-    @property
-    def closing_speed(self) -> float: ...
-
-    @property
-    def closing_slope(self) -> float: ...
 
 class StepStatus(enum.Enum):
     """What a step of the system says about its result."""
@@ -789,16 +765,6 @@ class Step:
         """dpsi/dq (m, nv)."""
 
     @property
-    def speed_ratio(self) -> float:
-        """
-        rho of the SpeedRegulator: largest speed over the one allowed; 0 without one.
-        """
-
-    @property
-    def speed_drag(self) -> float:
-        """beta <= 0 [1/s] of the SpeedRegulator, which adds beta v."""
-
-    @property
     def clearances(self) -> Clearances:
         """Clearances of the coordinates that are barriers of them (m)."""
 
@@ -841,12 +807,11 @@ class GeometricSystem:
     space.
     stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive
     semi-definite. damping_form, pull_form: a DampingForm, a PullForm, or their names. switch: None (unswitched) or one of the switches.
-    speed: a SpeedRegulator, which adds beta v to the acceleration.
     recovery: what a barrier does with an arm inside it, by default Recovery().
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None, speed: SpeedRegulator | None = None) -> None: ...
+    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None) -> None: ...
 
     @property
     def num_embedding_coordinates(self) -> int: ...
@@ -1025,16 +990,6 @@ class Rollout:
         """
 
     @property
-    def filter_statuses(self) -> list[TorqueStatus]:
-        """One TorqueStatus per row; empty without a filter."""
-
-    @property
-    def safety_slack(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        (steps + 1,) largest shortfall of a clearance's constraint [m/s^2]; empty without a filter.
-        """
-
-    @property
     def q(self) -> numpy.typing.NDArray[numpy.float64]:
         """(steps + 1, nv) [rad]"""
 
@@ -1054,13 +1009,11 @@ class Rollout:
     def switch(self) -> numpy.typing.NDArray[numpy.float64]:
         """Weights of the harmonic part (steps + 1, nv)"""
 
-def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False, filter: AccelerationFilter | None = None, escape: Escape | None = None, evasion: Evasion | None = None) -> Rollout:
+def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout:
     """
-    Integrates the system from q, v (nv,) towards a goal, obstacles and goal moving at their velocities.
-    period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds;
-    filter: what the acceleration passes before it is applied, of the same period, not with runge_kutta_4;
-    escape: sub-goals where the motion is stuck; evasion: flights out of the way of what moves, with a filter. Both keep their state
-    from one call to the next.
+    Integrates the system alone from q, v (nv,) towards a goal, obstacles and goal moving at their velocities; nothing holds
+    limits or clearances: what has to keep them is a Controller, see `integrate`.
+    period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.
     """
 
 class QuadraticProgramStatus(enum.Enum):
@@ -1299,10 +1252,13 @@ class TorqueStatus(enum.Enum):
     relaxed_safety = 3
     """not all clearances and position limits can be kept"""
 
-    fallback_invalid_input = 4
+    clearance_lost = 4
+    """the least clearance is below zero, whatever the rest"""
+
+    fallback_invalid_input = 5
     """unusable input, damped stop"""
 
-    fallback_solver = 5
+    fallback_solver = 6
     """program not solved, damped stop"""
 
     @property
@@ -1399,6 +1355,20 @@ class TorqueSolution:
     def dominant(self) -> SafetyRow | None:
         """The clearance that bends the motion most; None if none does."""
 
+    @property
+    def least_clearance(self) -> float:
+        """
+        The least clearance given [m], exact, with a row or without; inf if there is none.
+        """
+
+    @property
+    def least_coordinate(self) -> int:
+        """Which clearance that is; -1 if there is none."""
+
+    @property
+    def least_nearest(self) -> int:
+        """Its nearest obstacle point; -1 if there is none."""
+
 class TorqueController:
     """
     Torque that tracks a wanted acceleration within every limit of the arm:
@@ -1407,11 +1377,12 @@ class TorqueController:
     Source: Bosc, equation T6.3, corrected. One object per thread.
     """
 
-    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, safety_weight: float = 1000.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, safety: SafetySettings | None = None) -> None:
+    def __init__(self, robot: Robot, *, period: float = 0.001, tracking_weight: numpy.typing.ArrayLike = 1.0, torque_weight: numpy.typing.ArrayLike = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, safety: SafetySettings | None = None) -> None:
         """
         period [s]: time between two steps; tracking_weight: Q, scalar or (nv,) [per (/s^2)^2];
         torque_weight: R, scalar or (nv,) [-]; slack_weight [-]: price of leaving the acceleration bounds over the
-        steepest tracking cost; safety_weight [-]: price of leaving clearances and position limits over that;
+        steepest tracking cost; velocity_overrun, acceleration_overrun [-], >= 1: the factor up to which those limits
+        give way to clearances and torque limits;
         position_margin [rad | m]: position limits are moved inwards by it; stop_time [s]: time constant of the
         damped stop; stop_damping [-]: its damping without a mass matrix, over effort limit / velocity limit;
         safety: SafetySettings, by default as they are. Raises ValueError that names the setting.
@@ -1472,35 +1443,18 @@ class AccelerationFilter:
     def count(self, status: TorqueStatus) -> int:
         """Number of calls that ended with this status."""
 
-class BatchEvaluation:
-    """One step at each of N states."""
-
-    @property
-    def accelerations(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(N, nv) [rad/s^2]"""
-
-    @property
-    def values(self) -> numpy.typing.NDArray[numpy.float64]:
-        """psi (N, m); NaN where the step fell back"""
-
-    @property
-    def statuses(self) -> list[StepStatus]:
-        """One StepStatus per state."""
-
-def evaluate_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, threads: int = 0) -> BatchEvaluation:
+def integrate_batch(controllers: Sequence[Controller], q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goals: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0, threads: int = 0) -> list[MotionRecord]:
     """
-    One step at each of N states q, v (N, nv) towards goals (N, nv), on several threads (0: one per processor).
-    A system with one embedding coordinate that is no clearance (CollisionDensity, JointLimitPotential, their Sum), with
-    neither distance switch nor speed regulator nor one-sided pull, takes eight states side by side: as single steps within
-    rounding (1e-12 relative), in a third of the time.
-    Raises ValueError on wrong shapes.
+    The motions of N controllers from q, v (N, nv), row k of controller k, each as `integrate` gives it, bit for bit, on
+    several threads (0: one per processor). Each ends when every joint is within tolerance [rad | m] of its row of goals
+    (N, nv), if given. Releases the GIL. Raises ValueError as `integrate` does, on a controller that is there twice and records
+    of more than 8 GiB, RuntimeError while a controller is in use.
     """
 
-def rollout_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', filter: AccelerationFilter | None = None, threads: int = 0) -> list[Rollout]:
+def rollout_batch(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, goals: numpy.typing.ArrayLike, obstacles: Obstacles, *, period: float = 0.001, steps: int, integrator: Integrator | str = 'semi_implicit_euler', threads: int = 0) -> list[Rollout]:
     """
     The motions from N states q, v (N, nv) towards goals (N, nv) as `rollout` gives them, on several threads
-    (0: one per processor). Those that `evaluate_batch` would take side by side are, without a filter and but for
-    runge_kutta_4: each step is then that of `rollout` within rounding. Raises ValueError on wrong shapes.
+    (0: one per processor). Raises ValueError on wrong shapes.
     """
 
 class PlanStatus(enum.Enum):
@@ -1600,7 +1554,7 @@ class PlannerSettings:
         max_nodes, default 10000, allowed 2 to 1e+06: of both trees: the budget of a search
         max_iterations, default 40000, allowed 1 to 2e+09: of a search: its budget
         max_seconds [s], default inf, allowed 1e-09 to inf: of a search; motions then do not repeat
-        shortcuts, default 100, allowed 0 to 100000: attempts to shorten a path: more are shorter and later
+        shortcuts, default 100, allowed 0 to 1e+06: attempts to shorten a path: more are shorter and later
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
@@ -2340,7 +2294,8 @@ class ControllerSettings:
         stop_damping, default 0.25, allowed 0.001 to 10: of a stop where the mass matrix is unusable, as a share of effort limit / velocity limit
         torque_weight, default 1e-06, allowed 0 to 1000: price of torque against tracking: larger saves torque and sags
         slack_weight, default 1000.0, allowed 1 to 1e+06: price of leaving velocity and acceleration limits against tracking
-        safety_weight, default 1000.0, allowed 1 to 1e+06: price of leaving clearances against that of other limits
+        velocity_overrun, default 1.2, allowed 1 to 10: factor up to which velocity limits give way to clearances
+        acceleration_overrun, default 10.0, allowed 1 to 100: factor up to which acceleration limits give way to clearances
         obstacle_timeout [s], default inf, allowed 0.001 to inf: age from which obstacles are stale and the arm stops
         local_activation, default True, allowed 0 to 1: barriers leave room at goals and narrow places among what rests; without it the arm creeps there
         synchronous, default False, allowed 0 to 1: planner, look-ahead and posture search run inside step: motions repeat bit for bit, steps take longer
@@ -2349,7 +2304,7 @@ class ControllerSettings:
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, safety_weight: float = 1000.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
+    def __init__(self, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
 
     @property
     def period(self) -> float: ...
@@ -2388,10 +2343,16 @@ class ControllerSettings:
     def slack_weight(self, value: float, /) -> None: ...
 
     @property
-    def safety_weight(self) -> float: ...
+    def velocity_overrun(self) -> float: ...
 
-    @safety_weight.setter
-    def safety_weight(self, value: float, /) -> None: ...
+    @velocity_overrun.setter
+    def velocity_overrun(self, value: float, /) -> None: ...
+
+    @property
+    def acceleration_overrun(self) -> float: ...
+
+    @acceleration_overrun.setter
+    def acceleration_overrun(self, value: float, /) -> None: ...
 
     @property
     def obstacle_timeout(self) -> float: ...

@@ -12,15 +12,14 @@ import pytest
 from typer.testing import CliRunner
 
 import sidestep as ss
-from sidestep import clearance_tables
-from sidestep.arm import shipped_arms
+from sidestep.arm import clearance_tables, shipped_arms
+from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.body.cover import CERTIFICATE_TOLERANCE
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_overshoot import overshoot
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.body.cover_surface import LinkSurface
 from sidestep.cli import app
-from sidestep.link_pairs import tables_and_pairs
 
 NAMES = [entry.name for entry in ss.robots() if entry.name != "z1"]  # that one is prepared on first use
 LIMIT = 'lower="-3.141592653589793" upper="3.141592653589793"'
@@ -34,8 +33,8 @@ def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def _nothing_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sidestep.body.body.cover_mixtures", None)
-    monkeypatch.setattr("sidestep.clearance_tables._measure", None)
-    monkeypatch.setattr("sidestep.link_pairs._find_pairs", None)
+    monkeypatch.setattr("sidestep.arm.clearance_tables._measure", None)
+    monkeypatch.setattr("sidestep.arm.link_pairs._find_pairs", None)
 
 
 def robot_of(name: str) -> ss.Robot:

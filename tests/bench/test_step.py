@@ -11,9 +11,9 @@ import pytest
 from sidestep import Obstacles, _core
 from sidestep.bench import StepSettings, compare_steps, run_step_bench
 from sidestep.bench import step as step_module
+from sidestep.bench.methods import barrier_system
 from sidestep.bench.step_scenes import REACH, table_cloud, uniform_cloud
 from sidestep.body import Body
-from sidestep.presets import barrier_system
 from sidestep.robot import Robot
 
 

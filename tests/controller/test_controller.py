@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import sidestep as ss
-from sidestep import _core, presets
+from sidestep import _core
+from sidestep.bench.methods import barrier_system
 from sidestep.obstacles import pose_at
 
 PERIOD = 0.001
@@ -294,7 +295,7 @@ def bare(arm: ss.Arm, goal: np.ndarray, seen: ss.Obstacles) -> ss.Controller:
 
 def test_without_its_further_parts_it_is_the_system_followed_by_the_program(planar: ss.Arm) -> None:
     robot, goal, seen = planar.robot, planar.neutral + 0.3, near_the_tip(planar)
-    system, program = presets.barrier_system(robot, planar.body), ss.TorqueController(robot)
+    system, program = barrier_system(robot, planar.body), ss.TorqueController(robot)
     controller, bounded = bare(planar, goal, seen), 0
     for q, v in zip(*states(planar, 20), strict=True):
         M, h = robot.mass_matrix(q), robot.bias(q, v)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.bench.methods import barrier_system
 from sidestep.bench.problem import poses_over
 from sidestep.bench.problems import balls
-from sidestep.presets import barrier_system
-from sidestep.simulation import ExactClearance
+from sidestep.distance import ExactClearance
 
 PERIOD = 0.002
 GOAL = np.array([-2.9, 0.0])  # 0.24 rad before the limit of joint 1

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import sidestep as ss
 from sidestep import _core, thesis
-from sidestep.simulation import SelfCollision
+from sidestep.distance import SelfCollision
 from support.finite_differences import derivative, second_derivative
 from support.random_scene import random_body
 

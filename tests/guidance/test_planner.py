@@ -13,7 +13,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
-from sidestep.clearance_tables import clearance_tables
+from sidestep.arm.clearance_tables import clearance_tables
 from support.planar_problems import BODY, balls, free_ends
 
 FLOOR = 0.005  # [m], the default

@@ -16,9 +16,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from sidestep import SceneObject
+from sidestep.distance.solid import object_solid
 from sidestep.obstacles import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere, pose_at
 from sidestep.obstacles.ball_cover import EXCESS
-from sidestep.simulation.solid import object_solid
 
 ROUNDING = 1e-9  # [m] poses are applied in double precision at the scale of ten metres
 SOLVER = 2e-6  # [m] to which Coal's iterations find distances of convex solids

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from sidestep import Robot, read_srdf
+from sidestep.distance import SelfCollision
 from sidestep.robot import catalogue
-from sidestep.simulation import SelfCollision
 
 TEXT = """<robot name="arm">
   <disable_default_collisions link="d"/>

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from sidestep._core import Controller, DistanceSwitch, GeometricSystem, Obstacles
-from sidestep.pose import from_roll_pitch_yaw, pose_at
+from sidestep.distance import SceneObject
+from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import assemble, solids
 from sidestep.scenario.seen import seen_at, view_of
-from sidestep.simulation import SceneObject
 
 BASE = """\
 format: 1

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sidestep.distance import sweep
 from sidestep.scenario import Scenario, run_scenario, runner
 from sidestep.scenario.assembly import assemble
-from sidestep.simulation import sweep
 
 # Without obstacles the system is e'' = -0.5 e - 1.5 e', so e(t) = e0 (2 exp(-t/2) - exp(-t)). With e0 = 1 it
 # passes 0.05 where exp(-t/2) = 1 - sqrt(0.95).

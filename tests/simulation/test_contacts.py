@@ -8,7 +8,7 @@ from stand_ins import InverseDynamics, Spring, simulate
 
 from sidestep import Robot, SceneObject, Simulation, evaluate
 from sidestep._core import Obstacles
-from sidestep.simulation import seen_obstacles
+from sidestep.distance import seen_obstacles
 
 START, GOAL = np.zeros(2), np.array([1.2, 0.0])
 

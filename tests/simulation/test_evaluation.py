@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sidestep import KinematicRun, Robot, SceneObject, SimulationRun, evaluate
-from sidestep.pose import pose_at, pose_vector
+from sidestep.robot.pose import pose_at, pose_vector
 from sidestep.simulation import Contact
 
 DT = 0.01

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sidestep import GeometricSystem, JointGoal, Obstacles, Robot
-from sidestep.pose import pose_at
+from sidestep.robot.pose import pose_at
 from sidestep.simulation import Arrival, run_kinematically
 from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from sidestep import Scenario
-from sidestep.pose import pose_at
+from sidestep.robot.pose import pose_at
 from sidestep.studio import loop as loop_module
 from sidestep.studio import messages as m
 from sidestep.studio.headless import Window, check_files, save_animation

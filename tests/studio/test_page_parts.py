@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
-from sidestep.pose import pose_at
+from sidestep.robot.pose import pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS
 from sidestep.studio.mover import ControllerMover

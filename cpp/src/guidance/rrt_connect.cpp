@@ -53,7 +53,7 @@ const std::vector<Field<PlannerSettings>>& fields() {
       {"max_nodes", &S::max_nodes, "-", 2.0, 1e6, "of both trees: the budget of a search"},
       {"max_iterations", &S::max_iterations, "-", 1.0, 2e9, "of a search: its budget"},
       {"max_seconds", &S::max_seconds, "s", 1e-9, infinity, "of a search; motions then do not repeat"},
-      {"shortcuts", &S::shortcuts, "-", 0.0, 1e5, "attempts to shorten a path: more are shorter and later"},
+      {"shortcuts", &S::shortcuts, "-", 0.0, 1e6, "attempts to shorten a path: more are shorter and later"},
   };
   return all;
 }

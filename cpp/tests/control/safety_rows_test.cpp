@@ -328,7 +328,7 @@ BOOST_AUTO_TEST_CASE(settings_of_safety_rows_are_checked) {
   BOOST_TEST(message_of([](S& s) { s.max_rows = -1; }).find("max_rows") != std::string::npos);
   // Before anything of that size is allocated, which fails otherwise or takes all memory.
   BOOST_TEST(message_of([](S& s) { s.max_rows = 100'000; }).find("max_rows is 100000") != std::string::npos);
-  BOOST_TEST(message_of([](S& s) { s.max_rows = std::numeric_limits<int>::max(); }).find("from 0 to 256") !=
+  BOOST_TEST(message_of([](S& s) { s.max_rows = std::numeric_limits<int>::max(); }).find("allowed: 1 to 256") !=
              std::string::npos);
 }
 

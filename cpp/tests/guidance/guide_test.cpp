@@ -120,7 +120,7 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
 BOOST_AUTO_TEST_CASE(a_path_that_is_blocked_while_it_is_improved_is_given_up_at_once) {
   const Robot robot = turning();
   GuideSettings settings;
-  settings.planner.shortcuts = 1'000'000'000;  // for longer than anybody waits
+  settings.planner.shortcuts = 1'000'000;  // for longer than anybody waits
   Guide guide(body_of(robot), settings);
   guide.set_obstacles(point(0.5, 0.0));
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sidestep import _core, clearance_tables, link_pairs
+from sidestep import _core
+from sidestep.arm import clearance_tables, link_pairs
 from sidestep.body import cache as body_cache
 from sidestep.body.cover import CoverSettings
 from sidestep.robot import Robot

@@ -11,9 +11,9 @@ from typing import TypeAlias
 import numpy as np
 
 from sidestep import _core
+from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.body import Body
 from sidestep.body.cover import CoverProgress
-from sidestep.link_pairs import tables_and_pairs
 from sidestep.robot import Robot
 
 Pair: TypeAlias = tuple[str, str]

@@ -18,9 +18,9 @@ from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.outcome import Judge
 from sidestep.bench.problem import Problem, SceneProblem
 from sidestep.body import Body
+from sidestep.distance import ExactClearance, SceneObject, SelfCollision
 from sidestep.obstacles import Shape, obstacles_from_shapes
 from sidestep.robot import Robot
-from sidestep.simulation import ExactClearance, SceneObject, SelfCollision
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]

@@ -20,9 +20,9 @@ from sidestep.bench.problem import Problem
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, Workspace
 from sidestep.bench.scenes import SceneOutcome, SceneResult, SceneSettings, collect, judged
 from sidestep.bench.step_times import StepTimes
-from sidestep.pose import moved
+from sidestep.distance import SceneObject
 from sidestep.robot import Robot
-from sidestep.simulation import SceneObject
+from sidestep.robot.pose import moved
 
 Array = npt.NDArray[np.float64]
 

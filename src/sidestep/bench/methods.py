@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sidestep._core import BarrierSettings, Controller, ControllerSettings, GeometricSystem
 from sidestep.arm import Arm
 from sidestep.bench.method import Method
 from sidestep.bench.motion import ControllerMover, Mover, SystemMover
@@ -29,3 +30,16 @@ def build_mover(method: Method, robot: Robot, body: Body | None = None) -> Mover
             return ControllerMover(robot, Arm.from_robot(robot, body))
         case Method.reactive:
             return ControllerMover(robot, Arm.from_robot(robot, body), {"planner": None})
+
+
+def barrier_system(
+    robot: Robot, body: Body | None = None, *, numbers: BarrierSettings | None = None
+) -> GeometricSystem:
+    """The geometric system of a `Controller`: a barrier for every part of the body, joint limit and pair of links.
+
+    Args:
+        robot: the arm. body: a covering body of it; by default `Body.cover(robot)`.
+        numbers: in place of the defaults.
+    """
+    settings = ControllerSettings(synchronous=True, planner=None, barriers=numbers or BarrierSettings())
+    return Controller(Arm.from_robot(robot, body), settings).system

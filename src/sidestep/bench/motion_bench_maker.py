@@ -17,7 +17,7 @@ import numpy.typing as npt
 import yaml
 
 from sidestep.obstacles import Box, Cylinder, Shape, Sphere
-from sidestep.pose import from_quaternion, pose_at
+from sidestep.robot.pose import from_quaternion, pose_at
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]

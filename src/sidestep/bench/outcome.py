@@ -12,9 +12,9 @@ from sidestep.bench.motion import Motion, MotionSettings
 from sidestep.bench.problem import Problem, between_jumps
 from sidestep.bench.step_times import StepTimes
 from sidestep.bench.way_out import WayOut, find_way_out
+from sidestep.distance import ExactClearance, SelfCollision
+from sidestep.distance.clearance import FINEST
 from sidestep.robot import Robot
-from sidestep.simulation import ExactClearance, SelfCollision
-from sidestep.simulation.clearance import FINEST
 from sidestep.simulation.evaluation import excess_over
 
 Array = npt.NDArray[np.float64]

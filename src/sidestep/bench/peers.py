@@ -34,8 +34,8 @@ from sidestep.bench import peers_jax
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.bench.step import cpu_model
 from sidestep.body import Body
-from sidestep.mesh import mesh_model
 from sidestep.robot import Robot
+from sidestep.robot.mesh import mesh_model
 from sidestep.thesis.reproduce import dense_analytic, torch_autograd
 from sidestep.thesis.reproduce.serial_chain import SerialChain
 

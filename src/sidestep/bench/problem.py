@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Obstacles
-from sidestep.pose import pose_vector
-from sidestep.simulation import ExactClearance, SceneObject
-from sidestep.simulation.scene import AWAY
+from sidestep.distance import ExactClearance, SceneObject
+from sidestep.distance.scene import AWAY
+from sidestep.robot.pose import pose_vector
 
 Array = npt.NDArray[np.float64]
 

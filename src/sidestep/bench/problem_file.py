@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sidestep.bench.problems import ReachProblem
-from sidestep.schema import parse_json
+from sidestep.body.schema import parse_json
 
 FORMAT = "sidestep-reach-problems"
 VERSION = 1

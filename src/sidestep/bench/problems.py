@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Obstacles
-from sidestep.mesh import mesh_model
+from sidestep.distance import ExactClearance, SceneObject, SelfCollision
 from sidestep.robot import Robot
-from sidestep.simulation import ExactClearance, SceneObject, SelfCollision
+from sidestep.robot.mesh import mesh_model
 
 Array = npt.NDArray[np.float64]
 

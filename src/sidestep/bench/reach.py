@@ -17,8 +17,8 @@ from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
 from sidestep.bench.step_times import StepTimes
+from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
-from sidestep.simulation import SelfCollision
 
 
 @dataclass(frozen=True)

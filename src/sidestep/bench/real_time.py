@@ -13,10 +13,10 @@ import numpy as np
 import sidestep
 from sidestep._core import Controller, ControllerSettings, Obstacles, RealTimeRecord, RealTimeRun
 from sidestep.arm import Arm
+from sidestep.bench.methods import barrier_system
 from sidestep.bench.step import clear_place, cpu_model
 from sidestep.bench.step_scenes import table_cloud
 from sidestep.bench.step_times import StepTimes
-from sidestep.presets import barrier_system
 from sidestep.robot import Robot
 
 BESIDE = ("goals", "clouds and goals")

@@ -22,7 +22,7 @@ from sidestep.bench.parallel import Progress, Worker, cpu_name, run_tasks
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
-from sidestep.simulation import Clearance, EllipsoidClearance, SceneObject
+from sidestep.distance import Clearance, EllipsoidClearance, SceneObject
 
 Array = npt.NDArray[np.float64]
 Task = TypeVar("Task")

@@ -32,10 +32,10 @@ from sidestep._core import (
     rollout,
 )
 from sidestep.arm import Arm
+from sidestep.bench.methods import barrier_system
 from sidestep.bench.step_scenes import table_cloud, uniform_cloud
 from sidestep.bench.step_times import StepTimes
 from sidestep.body import Body
-from sidestep.presets import barrier_system
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]

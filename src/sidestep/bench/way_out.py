@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from sidestep.bench.motion import Motion
 from sidestep.bench.problem import Problem, between_jumps, poses_over
+from sidestep.distance import ExactClearance, SceneObject, SelfCollision
 from sidestep.robot import Robot
-from sidestep.simulation import ExactClearance, SceneObject, SelfCollision
 
 Array = npt.NDArray[np.float64]
 

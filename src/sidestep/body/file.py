@@ -17,8 +17,8 @@ from sidestep import _core
 from sidestep.body.cover import CoverSettings, LinkCover, TradeOff
 from sidestep.body.fitting import FitSettings, LinkFit
 from sidestep.body.mixture import Mixture
+from sidestep.body.schema import mismatch, parse_json, shortened
 from sidestep.body.selection import CriterionCurve
-from sidestep.schema import mismatch, parse_json, shortened
 
 if TYPE_CHECKING:
     from sidestep.robot import Robot

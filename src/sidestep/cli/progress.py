@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from sidestep.distance import ExactClearance
 from sidestep.scenario.runner import run_scenario
-from sidestep.simulation import ExactClearance
 from sidestep.simulation.joint_words import in_words, largest_ways
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class _Follower:
     """Updates the bar of a run now and then. Obstacles that were pushed are taken where they started."""
 
     def __init__(self, parts: Assembly, bar: Progress, task: object) -> None:
-        from sidestep.pose import pose_vector
+        from sidestep.robot.pose import pose_vector
 
         self._parts, self._bar, self._task = parts, bar, task
         self._clearance = ExactClearance(parts.robot, parts.objects) if parts.objects else None

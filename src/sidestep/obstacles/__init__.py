@@ -4,7 +4,7 @@ from sidestep._core import Obstacles
 from sidestep.obstacles.cloud import load_point_cloud, merge_in_voxels
 from sidestep.obstacles.scene import obstacles_from_shapes
 from sidestep.obstacles.shapes import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere
-from sidestep.pose import pose_at
+from sidestep.robot.pose import pose_at
 
 __all__ = [
     "Box",

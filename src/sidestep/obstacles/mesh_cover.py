@@ -6,8 +6,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from sidestep.mesh import mesh_model
 from sidestep.obstacles.ball_cover import check_count, cover
+from sidestep.robot.mesh import mesh_model
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from sidestep._core import real_array
-from sidestep.mesh import read_mesh
 from sidestep.obstacles import covering, mesh_cover, solid_cover
 from sidestep.obstacles.ball_cover import EXCESS, check_excess
-from sidestep.pose import about_axis, checked_pose, moved, pose_at
+from sidestep.robot.mesh import read_mesh
+from sidestep.robot.pose import about_axis, checked_pose, moved, pose_at
 
 Points = NDArray[np.float64]
 Balls = tuple[NDArray[np.float64], NDArray[np.float64]]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sidestep.mesh import read_mesh
+from sidestep.robot.mesh import read_mesh
 
 if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
     import trimesh

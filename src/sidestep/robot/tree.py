@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sidestep._core import Frame, Joint, JointLimits, JointType, real_array
-from sidestep.pose import about_axis, checked_pose, pose_at
 from sidestep.robot.degrees import DEGREES_HINT, degrees_hint, looks_like_degrees
 from sidestep.robot.link import Array, Link
+from sidestep.robot.pose import about_axis, checked_pose, pose_at
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
 CORE_TOLERANCE = 1e-9  # on R Rᵀ - 1, the core's own

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.degrees import DEGREES_HINT, looks_like_degrees
 from sidestep.robot.link import Array, Geometry, Inertial, Link
+from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.source import Description
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed")

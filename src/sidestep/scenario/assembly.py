@@ -16,11 +16,13 @@ import trimesh
 from sidestep import Body, Controller, Embedding, GeometricSystem, Robot, TorqueController
 from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
-from sidestep.mesh import read_mesh
+from sidestep.distance import SceneObject
+from sidestep.distance.scene import Kind, check_scene
 from sidestep.obstacles import load_point_cloud
 from sidestep.obstacles.shapes import EXTENT
-from sidestep.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.degrees import degrees_hint
+from sidestep.robot.mesh import read_mesh
+from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario.parts import controller_settings_of, torque_program_of
 from sidestep.scenario.scenario import (
     BasePose,
@@ -36,9 +38,8 @@ from sidestep.scenario.scenario import (
 )
 from sidestep.scenario.seen import View, seen_at, view_of
 from sidestep.scenario.validation import ScenarioError
-from sidestep.simulation import ControllerDriver, SceneObject, SystemDriver
+from sidestep.simulation import ControllerDriver, SystemDriver
 from sidestep.simulation.pose_aim import PoseAim, PoseTarget, Posture, posture_at
-from sidestep.simulation.scene import Kind, check_scene
 from sidestep.thesis import (
     BinarySwitch,
     CollisionDensity,

@@ -9,18 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Controller, CoordinateKind, CoordinateLabel, GeometricSystem
+from sidestep.distance import ExactClearance
 from sidestep.scenario.assembly import Assembly, Progress, assemble
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.scenario import Scenario
-from sidestep.simulation import (
-    Arrival,
-    ControllerDriver,
-    ExactClearance,
-    Run,
-    Simulation,
-    evaluate,
-    run_kinematically,
-)
+from sidestep.simulation import Arrival, ControllerDriver, Run, Simulation, evaluate, run_kinematically
 from sidestep.simulation.evaluation import POSE_TOLERANCE
 from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.run import obstacles_over_time

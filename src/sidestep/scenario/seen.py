@@ -9,13 +9,13 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import Obstacles
+from sidestep.distance import SceneObject
 from sidestep.obstacles import Box, Capsule, Cylinder, Plane
 from sidestep.obstacles.covering import check_spacing, square
 from sidestep.obstacles.mesh_cover import mesh_balls
 from sidestep.obstacles.shapes import Balls
-from sidestep.pose import moved
+from sidestep.robot.pose import moved
 from sidestep.scenario.scenario import Obstacle
-from sidestep.simulation import SceneObject
 
 Array = npt.NDArray[np.float64]
 

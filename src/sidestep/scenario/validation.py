@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from sidestep.schema import mismatch
+from sidestep.body.schema import mismatch
 
 if TYPE_CHECKING:
     import jsonschema

@@ -1,4 +1,4 @@
-"""Physics, exact clearance, and what a run achieved."""
+"""Physics, and what a run achieved."""
 
 import lazy_loader
 

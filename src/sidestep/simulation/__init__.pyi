@@ -1,11 +1,7 @@
-from .clearance import Clearance as Clearance
-from .clearance import ExactClearance as ExactClearance
-from .clearance import PathClearance as PathClearance
 from .driver import ControllerDriver as ControllerDriver
 from .driver import Drive as Drive
 from .driver import Driver as Driver
 from .driver import SystemDriver as SystemDriver
-from .ellipsoid_clearance import EllipsoidClearance as EllipsoidClearance
 from .evaluation import Evaluation as Evaluation
 from .evaluation import LimitViolations as LimitViolations
 from .evaluation import evaluate as evaluate
@@ -17,8 +13,4 @@ from .run import Contact as Contact
 from .run import KinematicRun as KinematicRun
 from .run import Run as Run
 from .run import SimulationRun as SimulationRun
-from .scene import SceneObject as SceneObject
-from .scene import seen_obstacles as seen_obstacles
-from .self_collision import SelfClearance as SelfClearance
-from .self_collision import SelfCollision as SelfCollision
 from .simulation import Simulation as Simulation

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.simulation.clearance import ExactClearance
+from sidestep.distance.clearance import ExactClearance
 from sidestep.simulation.joint_words import in_words, largest_ways
 from sidestep.simulation.run import Run, SimulationRun
 

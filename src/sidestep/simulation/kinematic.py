@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, JointGoal, Obstacles, PoseGoal, real_array, rollout
-from sidestep.pose import pose_vector
+from sidestep.distance.scene import Scene, check_scene
 from sidestep.robot import Robot
+from sidestep.robot.pose import pose_vector
 from sidestep.simulation.driver import ControllerDriver
 from sidestep.simulation.pose_aim import PoseAim, PoseTarget
 from sidestep.simulation.run import (
@@ -21,7 +22,6 @@ from sidestep.simulation.run import (
     obstacles_over_time,
     status_name,
 )
-from sidestep.simulation.scene import Scene, check_scene
 
 Array = npt.NDArray[np.float64]
 

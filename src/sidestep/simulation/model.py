@@ -11,10 +11,10 @@ import numpy.typing as npt
 import trimesh
 
 from sidestep._core import JointType
-from sidestep.pose import pose_at, pose_vector
+from sidestep.distance.convex_parts import convex_parts
+from sidestep.distance.scene import Scene, SceneObject, check_scene
 from sidestep.robot import Robot
-from sidestep.simulation.convex_parts import convex_parts
-from sidestep.simulation.scene import Scene, SceneObject, check_scene
+from sidestep.robot.pose import pose_at, pose_vector
 
 Array = npt.NDArray[np.float64]
 

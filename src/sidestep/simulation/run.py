@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Obstacles
+from sidestep.distance.scene import SceneObject
 from sidestep.obstacles import obstacles_from_shapes
 from sidestep.obstacles.scene import Seen
 from sidestep.robot import Robot
 from sidestep.simulation.pose_aim import PoseTarget
-from sidestep.simulation.scene import SceneObject
 
 Array = npt.NDArray[np.float64]
 ObstacleSource: TypeAlias = Seen | Callable[[float], Obstacles]

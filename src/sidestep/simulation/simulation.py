@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import real_array
+from sidestep.distance.scene import Scene, check_scene
 from sidestep.robot import Robot
 from sidestep.simulation.driver import Driver
 from sidestep.simulation.model import build_model
 from sidestep.simulation.pose_aim import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, SimulationRun
-from sidestep.simulation.scene import Scene, check_scene
 
 Array = npt.NDArray[np.float64]
 

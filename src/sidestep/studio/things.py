@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.distance import SceneObject
 from sidestep.obstacles import load_point_cloud, merge_in_voxels
-from sidestep.pose import from_roll_pitch_yaw, pose_at
+from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import solids
 from sidestep.scenario.scenario import Obstacle, Shape, Vector3
 from sidestep.scenario.seen import View, view_of
-from sidestep.simulation import SceneObject
 
 Array = npt.NDArray[np.float64]
 

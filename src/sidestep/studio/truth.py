@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.pose import pose_vector
+from sidestep.distance import ExactClearance
+from sidestep.distance.clearance import Clearance
 from sidestep.robot import Robot
-from sidestep.simulation import ExactClearance
-from sidestep.simulation.clearance import Clearance
+from sidestep.robot.pose import pose_vector
 from sidestep.studio.messages import Row
 from sidestep.studio.things import Thing
 

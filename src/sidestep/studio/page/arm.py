@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from sidestep.mesh import simplified
-from sidestep.pose import pose_vector
 from sidestep.robot import Robot
+from sidestep.robot.mesh import simplified
+from sidestep.robot.pose import pose_vector
 from sidestep.studio.page import colours
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import JointType
-from sidestep.pose import pose_vector
 from sidestep.robot import Robot
+from sidestep.robot.pose import pose_vector
 from sidestep.simulation.pose_aim import Posture
 from sidestep.studio import messages as m
 from sidestep.studio.page.arm import ArmView, reach, short_names

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from sidestep.pose import pose_vector
+from sidestep.distance.clearance import Clearance
 from sidestep.robot import Robot
-from sidestep.simulation.clearance import Clearance
+from sidestep.robot.pose import pose_vector
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import reach
 

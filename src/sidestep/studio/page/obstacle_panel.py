@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.obstacles import load_point_cloud
-from sidestep.pose import from_quaternion, pose_at
+from sidestep.robot.pose import from_quaternion, pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.page.note import add_note
 from sidestep.studio.page.placing import Ball, Camera, free_place

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.pose import pose_at, pose_vector
+from sidestep.distance import ExactClearance, SceneObject
 from sidestep.robot import Robot
-from sidestep.simulation import ExactClearance, SceneObject
+from sidestep.robot.pose import pose_at, pose_vector
 
 Array = npt.NDArray[np.float64]
 Ball = tuple[Array, float]  # centre (3,) and radius [m]

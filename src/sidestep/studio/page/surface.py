@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, JointType, Obstacles
 from sidestep.body import Body
-from sidestep.pose import pose_vector
 from sidestep.robot import Robot
+from sidestep.robot.pose import pose_vector
 from sidestep.scenario import Scenario
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import Method, method_named

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sidestep.body import Body
+from sidestep.distance.clearance import Clearance
 from sidestep.extras import MissingExtraError
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
-from sidestep.simulation.clearance import Clearance
 from sidestep.studio import messages as m
 from sidestep.studio.methods import method_named
 from sidestep.studio.page import colours

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sidestep import Robot
+from sidestep.distance import SceneObject
 from sidestep.drawing import draw_arm
 from sidestep.drawing.palette import BLUE
-from sidestep.simulation import SceneObject
 from sidestep.thesis.reproduce import style
 from sidestep.thesis.reproduce.item import Array
 

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
-from sidestep.mesh import mesh_model
-from sidestep.simulation.scene import SceneObject
+from sidestep.distance.scene import SceneObject
+from sidestep.robot.mesh import mesh_model
 
 Array = npt.NDArray[np.float64]
 

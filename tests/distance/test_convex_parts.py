@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from sidestep import Robot
-from sidestep.simulation.convex_parts import MOST_PARTS, convex_parts
+from sidestep.distance.convex_parts import MOST_PARTS, convex_parts
 
 
 def _inside(part: np.ndarray, points: np.ndarray) -> np.ndarray:

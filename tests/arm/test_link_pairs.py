@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sidestep import Body, Obstacles, Robot, SelfCollision, SelfCollisionBarrier
-from sidestep.link_pairs import NEAR, barrier_pairs, stored_at
+from sidestep.arm.link_pairs import NEAR, barrier_pairs, stored_at
 
 
 @pytest.fixture(autouse=True)

@@ -16,19 +16,19 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import real_array
-from sidestep.pose import from_quaternion, pose_vector
-from sidestep.robot import Robot
-from sidestep.simulation.link_parts import LinkParts, hulls_apart
-from sidestep.simulation.scene import Scene, check_scene
-from sidestep.simulation.solid import POINT_RADIUS, Solid, mesh_solid, object_solid, penetration
-from sidestep.simulation.sweep import smallest_distance
-from sidestep.simulation.travel import (
+from sidestep.distance.link_parts import LinkParts, hulls_apart
+from sidestep.distance.scene import Scene, check_scene
+from sidestep.distance.solid import POINT_RADIUS, Solid, mesh_solid, object_solid, penetration
+from sidestep.distance.sweep import smallest_distance
+from sidestep.distance.travel import (
     interpolate,
     interpolate_many,
     interpolate_pose,
     object_travel,
     travel_per_joint,
 )
+from sidestep.robot import Robot
+from sidestep.robot.pose import from_quaternion, pose_vector
 
 Array = npt.NDArray[np.float64]
 

@@ -10,11 +10,11 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.mesh import mesh_model
+from sidestep.distance.convex_parts import convex_parts
+from sidestep.distance.solid import hull_model
+from sidestep.distance.travel import interpolate_many, travel_per_joint
 from sidestep.robot import Robot
-from sidestep.simulation.convex_parts import convex_parts
-from sidestep.simulation.solid import hull_model
-from sidestep.simulation.travel import interpolate_many, travel_per_joint
+from sidestep.robot.mesh import mesh_model
 
 Array = npt.NDArray[np.float64]
 

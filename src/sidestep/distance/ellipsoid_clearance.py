@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.body import Body
-from sidestep.pose import pose_at
+from sidestep.distance.clearance import Clearance
+from sidestep.distance.scene import Scene, check_scene
+from sidestep.distance.solid import object_solid
 from sidestep.robot import Robot
-from sidestep.simulation.clearance import Clearance
-from sidestep.simulation.scene import Scene, check_scene
-from sidestep.simulation.solid import object_solid
+from sidestep.robot.pose import pose_at
 
 Array = npt.NDArray[np.float64]
 

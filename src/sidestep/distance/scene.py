@@ -13,7 +13,7 @@ import trimesh
 from sidestep._core import Obstacles, real_array
 from sidestep.obstacles import Box, Capsule, Cylinder, Plane, Shape, Sphere
 from sidestep.obstacles.shapes import is_shape
-from sidestep.pose import checked_pose, pose_at
+from sidestep.robot.pose import checked_pose, pose_at
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["sphere", "box", "cylinder", "capsule", "plane", "mesh"]

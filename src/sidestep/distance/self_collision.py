@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import real_array
-from sidestep.mesh import mesh_model
+from sidestep.distance.link_parts import LinkParts, hulls_apart
+from sidestep.distance.sweep import smallest_distance
+from sidestep.distance.travel import interpolate, interpolate_many, travel_per_joint
 from sidestep.robot import Robot, read_srdf
-from sidestep.simulation.link_parts import LinkParts, hulls_apart
-from sidestep.simulation.sweep import smallest_distance
-from sidestep.simulation.travel import interpolate, interpolate_many, travel_per_joint
+from sidestep.robot.mesh import mesh_model
 
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]

@@ -10,10 +10,10 @@ import pytest
 from sidestep import Body, ClearanceTable, ClearanceTableBarrier, Obstacles, Robot, SelfCollision
 from sidestep._core import BarrierSettings, CoordinateKind
 from sidestep.arm import shipped_arms
+from sidestep.arm.clearance_tables import clearance_tables, stored_at
+from sidestep.arm.link_pairs import barrier_pairs
+from sidestep.bench.methods import barrier_system
 from sidestep.body import cache
-from sidestep.clearance_tables import clearance_tables, stored_at
-from sidestep.link_pairs import barrier_pairs
-from sidestep.presets import barrier_system
 
 
 @pytest.fixture

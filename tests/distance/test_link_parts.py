@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from sidestep import Robot, SelfCollision
-from sidestep.simulation.link_parts import LinkParts, hulls_apart
+from sidestep.distance.link_parts import LinkParts, hulls_apart
 
 Array = np.ndarray
 
@@ -90,8 +90,8 @@ def test_a_part_far_from_the_joints_travels_more(checked: SelfCollision) -> None
 
 
 def test_a_link_without_volume_is_its_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sidestep.simulation.link_parts.convex_parts", lambda triangles: ())
-    monkeypatch.setattr("sidestep.simulation.link_parts.hull_model", lambda corners: None)
+    monkeypatch.setattr("sidestep.distance.link_parts.convex_parts", lambda triangles: ())
+    monkeypatch.setattr("sidestep.distance.link_parts.hull_model", lambda corners: None)
     robot = Robot.named("planar3")
     ((part,),) = LinkParts(robot, ["link1"]).of_link
     assert isinstance(part.shape, coal.BVHModelOBBRSS)

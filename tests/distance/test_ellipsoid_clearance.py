@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sidestep import Body, Robot, SceneObject, planar_arm
-from sidestep.pose import pose_at
-from sidestep.simulation import EllipsoidClearance
+from sidestep.distance import EllipsoidClearance
+from sidestep.robot.pose import pose_at
 
 SEMI_AXES = np.array([0.3, 0.05, 0.02])
 

@@ -12,6 +12,7 @@ import trimesh
 import sidestep as ss
 from sidestep import SceneObject
 from sidestep._core import Obstacles
+from sidestep.distance import seen_obstacles
 from sidestep.obstacles import (
     Box,
     Capsule,
@@ -22,8 +23,7 @@ from sidestep.obstacles import (
     obstacles_from_shapes,
     pose_at,
 )
-from sidestep.pose import pose_vector
-from sidestep.simulation import seen_obstacles
+from sidestep.robot.pose import pose_vector
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sidestep.mesh import read_mesh, simplified
+from sidestep.robot.mesh import read_mesh, simplified
 
 
 def test_files_that_are_no_mesh_are_named(tmp_path: Path) -> None:

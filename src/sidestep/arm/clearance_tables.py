@@ -18,8 +18,8 @@ from sidestep._core import ClearanceTable, JointType
 from sidestep.arm import shipped_arms
 from sidestep.body import cache
 from sidestep.body.file import write_bytes
+from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
-from sidestep.simulation import SelfCollision
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Mask: TypeAlias = npt.NDArray[np.bool_]

@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from sidestep._core import ClearanceTable, Obstacles, SelfCollisionBarrier
 from sidestep.arm import shipped_arms
+from sidestep.arm.clearance_tables import Progress, clearance_tables
 from sidestep.body import Body, cache
 from sidestep.body.file import write_text
-from sidestep.clearance_tables import Progress, clearance_tables
+from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
-from sidestep.simulation import SelfCollision
 
 Array: TypeAlias = npt.NDArray[np.float64]
 LinkPair: TypeAlias = tuple[str, str, float]
