@@ -19,6 +19,7 @@ from ompl import util
 import sidestep as ss
 from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
+from sidestep.planning import PathPlanner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "guidance"))
 from ompl_reference import solved
@@ -40,7 +41,7 @@ def main() -> None:
         robot = ss.Robot.named(result["robot"])
         body = ss.Body.cover(robot)
         tables, pairs = tables_and_pairs(robot, body)
-        planner = ss.PathPlanner(robot, body, pairs=pairs, tables=tables)
+        planner = PathPlanner(robot, body, pairs=pairs, tables=tables)
         asked = ProblemSettings(robot=result["robot"], obstacles=settings["obstacles"], seed=settings["seed"])
         generator = ProblemGenerator(asked, robot=robot)
         found = []

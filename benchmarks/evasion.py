@@ -8,12 +8,13 @@ import time
 
 import numpy as np
 
-from sidestep import Evasion, Robot
+from sidestep import Robot
 from sidestep.bench import ProblemSettings
 from sidestep.bench.method import Method
 from sidestep.bench.methods import build_system
 from sidestep.bench.problems import ProblemGenerator
 from sidestep.distance import SelfCollision
+from sidestep.system import Evasion
 
 PROBLEMS = 40
 TIMES = (0.0, 0.5, 1.0, 1.5)  # [s] at which an arm that has not moved from its start looks

@@ -26,6 +26,7 @@ from sidestep.bench.parallel import cpu_name
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.obstacles import obstacles_from_shapes
+from sidestep.planning import PathPlanner, PlannerSettings, PlanStatus
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Task:
 
     set: str
     index: int
-    planners: dict[str, ss.PathPlanner]
+    planners: dict[str, PathPlanner]
     start: np.ndarray
     goal: np.ndarray
     obstacles: ss.Obstacles
@@ -72,14 +73,13 @@ def summary(seconds: list[float]) -> dict[str, float]:
     }
 
 
-def planners(robot: ss.Robot, body: ss.Body, names: list[str]) -> dict[str, ss.PathPlanner]:
+def planners(robot: ss.Robot, body: ss.Body, names: list[str]) -> dict[str, PathPlanner]:
     """One that is content with the first path, and one that improves it."""
     tables, pairs = tables_and_pairs(robot, body)
-    floor = ss.PlannerSettings().floor
-    settings = {"first_path": ss.PlannerSettings(margin=floor, shortcuts=0), "improved": ss.PlannerSettings()}
+    floor = PlannerSettings().floor
+    settings = {"first_path": PlannerSettings(margin=floor, shortcuts=0), "improved": PlannerSettings()}
     return {
-        name: ss.PathPlanner(robot, body, pairs=pairs, tables=tables, settings=settings[name])
-        for name in names
+        name: PathPlanner(robot, body, pairs=pairs, tables=tables, settings=settings[name]) for name in names
     }
 
 
@@ -98,7 +98,7 @@ def published_tasks(given: argparse.Namespace, names: list[str]) -> Iterator[Tas
     """Problems of MotionBenchMaker, with the points that `sidestep bench motionbenchmaker` gives the controller."""
     plain = load_robot(given.robot)
     cover = ss.Body.cover(plain)
-    made: dict[tuple[tuple[str, float], ...], tuple[ss.Robot, dict[str, ss.PathPlanner]]] = {}
+    made: dict[tuple[tuple[str, float], ...], tuple[ss.Robot, dict[str, PathPlanner]]] = {}
     own = (*plain.coordinate_names, *plain.held)
     for problem in read_motion_bench_maker(given.motion_bench_maker)[:: given.every]:
         locked = {name: value for name, value in problem.held.items() if name in own}
@@ -144,7 +144,7 @@ def main() -> None:
                 group.seconds[name].append(spent)
         for group in (figures[task.set], figures["all"]):
             group.statuses[plan.status.name] += 1
-            if plan.status is ss.PlanStatus.found:
+            if plan.status is PlanStatus.found:
                 group.straight += plan.path.shape[0] == 2
                 group.lengths.append(plan.length)
                 group.margins.append(plan.margin)

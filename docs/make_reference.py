@@ -12,6 +12,7 @@ from types import ModuleType
 
 import sidestep
 from sidestep import thesis
+from sidestep.controller import controller_settings_fields
 
 PAGE = Path(__file__).parent / "reference.md"
 STUB = Path(sidestep.__file__).parent / "__init__.pyi"
@@ -43,7 +44,7 @@ def first_sentence(name: str, package: ModuleType = sidestep) -> str:
 def settings_table() -> list[str]:
     """The tree of the controller's settings, a row each, as the core states it."""
     rows = ["| setting | default | unit | allowed | what it trades |\n|---|---|---|---|---|"]
-    for field in sidestep.controller_settings_fields():
+    for field in controller_settings_fields():
         least, most = (f"{field[end]:g}" for end in ("least", "most"))
         allowed = "on, off" if isinstance(field["default"], bool) else f"{least} to {most}"
         default = (

@@ -9,6 +9,7 @@ import numpy as np
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import GeometricSystem
 
 LENGTH, WIDTH = 0.5, 0.08  # [m] of a link
 robot = ss.Robot.named("planar3")
@@ -22,7 +23,7 @@ body = ss.Body(
 ball = ss.Obstacles([[0.91, 0.76, 0.0]], radii=0.05)
 start, goal = np.array([1.5, -0.6, 0.3]), np.array([-0.9, 1.2, 1.4])
 
-system = ss.GeometricSystem([thesis.CollisionDensity(robot, body)], stiffness=2.0, damping=3.0)
+system = GeometricSystem([thesis.CollisionDensity(robot, body)], stiffness=2.0, damping=3.0)
 motion = thesis.rollout(system, start, np.zeros(3), goal, ball, steps=12000, integrator="second_order")
 for k in range(2000, 12001, 2000):
     print(f"t = {motion.time[k]:4.1f} s   q = {motion.q[k].round(5)}")

@@ -9,6 +9,7 @@ import numpy as np
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import GeometricSystem
 
 robot = ss.Robot.named("planar3")
 body = ss.Body.fit(robot, components=1, seed=0)
@@ -29,7 +30,7 @@ around = [psi.evaluate(near, rest, ball(k * h)).values[0] for k in (-2, -1, 0, 1
 difference = np.dot([-1, 16, -30, 16, -1], around) / (12 * h * h)
 print(f"d2psi/dt2 of an arm at rest: {curvature:.6f}, by finite differences {difference:.6f}")
 
-system = ss.GeometricSystem([psi], stiffness=2.0, damping=3.0)
+system = GeometricSystem([psi], stiffness=2.0, damping=3.0)
 motion = thesis.rollout(system, start, rest, goal, ball(0.0), steps=10000)
 print(f"joint error {np.abs(motion.q[-1] - goal).max():.4f} rad")
 

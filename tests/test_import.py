@@ -145,9 +145,17 @@ def test_the_extras_hold_what_the_errors_say() -> None:
     ("hidden", "code", "extra"),
     [
         ("trimesh", "import sidestep as ss; ss.Robot.named('planar3').collision_mesh('link1')", "prepare"),
-        ("scipy", "import sidestep as ss; ss.Arm.load('planar3', cache=False)", "prepare"),
-        ("coal", "import sidestep as ss; ss.Arm.load('planar3', cache=False)", "prepare"),
-        ("coal", "import sidestep as ss; ss.SelfCollision", "prepare"),
+        (
+            "scipy",
+            "from sidestep import Arm, robot; Arm.load(robot.planar_arm(4), cache=False)",
+            "prepare",
+        ),
+        (
+            "coal",
+            "from sidestep import Arm, robot; Arm.load(robot.planar_arm(4), cache=False)",
+            "prepare",
+        ),
+        ("coal", "from sidestep.distance import SelfCollision", "prepare"),
         ("scipy", "import sidestep as ss; ss.Body", "prepare"),
         ("trimesh", "import sidestep as ss; ss.Sphere", "prepare"),
         (
@@ -219,7 +227,7 @@ for name in sidestep.__all__:
         "Controller",
         "Obstacles",
     } <= at_hand
-    assert {"PoseGoal", "Robot", "TorqueController", "robots"} <= at_hand
+    assert {"PoseGoal", "Robot", "RealTimeRun", "robots"} <= at_hand
 
 
 @pytest.mark.parametrize(

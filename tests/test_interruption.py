@@ -13,6 +13,8 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.planning import PathPlanner, PlannerSettings, PlanStatus
+from sidestep.system import GeometricSystem
 from support import planar_problems
 
 pytestmark = pytest.mark.slow
@@ -34,16 +36,19 @@ import numpy as np
 import sidestep as ss
 from support import planar_problems
 from sidestep._core import refine_cover
+from sidestep import thesis
+from sidestep.planning import Guide, PathPlanner, PlannerSettings
+from sidestep.system import GeometricSystem
 
 robot = ss.Robot.named("planar3")
 body = ss.Body(**planar_problems.BODY)
 q, none = np.array([0.1, 0.2, 0.3]), ss.Obstacles.none()
-system, rows = ss.GeometricSystem([], robot=robot), np.tile(q, (4, 1))
+system, rows = GeometricSystem([], robot=robot), np.tile(q, (4, 1))
 angles = np.linspace(0.0, 2.0 * np.pi, 400)
 wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linspace(0.45, 1.6, 40)], 0.05)
-settings = ss.PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000)
-planner = ss.PathPlanner(robot, body, settings=settings)
-guide = ss.Guide(robot, body, planner=settings, synchronous=True)
+settings = PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000)
+planner = PathPlanner(robot, body, settings=settings)
+guide = Guide(robot, body, planner=settings, synchronous=True)
 arm = ss.Arm.from_robot(robot)
 run = ss.RealTimeRun(ss.Controller(arm), q, 0 * q, steps=100_000)
 stepped, *many = (ss.Controller(arm, ss.ControllerSettings(synchronous=True)) for _ in range(5))
@@ -93,7 +98,7 @@ def test_ctrl_c_ends_what_takes_long(name):
 
 
 def test_a_handler_that_does_not_raise_does_not_end_the_work():
-    system = ss.GeometricSystem([], robot=ss.Robot.named("planar2"))
+    system = GeometricSystem([], robot=ss.Robot.named("planar2"))
     seen = []
     before = signal.signal(signal.SIGINT, lambda *_: seen.append(True))
     try:
@@ -110,13 +115,13 @@ def test_a_handler_that_does_not_raise_does_not_end_the_work():
 def test_two_threads_are_not_let_into_one_planner():
     robot, body = ss.Robot.named("planar3"), ss.Body(**planar_problems.BODY)
     wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linspace(0.45, 1.6, 40)], 0.05)
-    settings = ss.PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000, max_seconds=3.0)
-    planner, plans = ss.PathPlanner(robot, body, settings=settings), []
+    settings = PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000, max_seconds=3.0)
+    planner, plans = PathPlanner(robot, body, settings=settings), []
     thread = threading.Thread(target=lambda: plans.append(planner.plan([0, 0, 0], [1.5, 0, 0], wall)))
     thread.start()
     time.sleep(0.3)
     with pytest.raises(RuntimeError, match="the planner is in use by another thread"):
         planner.is_free([0, 0, 0], wall)
     thread.join()
-    assert plans[0].status == ss.PlanStatus.timeout
+    assert plans[0].status == PlanStatus.timeout
     assert planner.is_free([0, 0, 0], wall, margin=0.0)

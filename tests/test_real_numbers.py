@@ -8,6 +8,7 @@ import pytest
 import sidestep as ss
 from sidestep._core import real_array
 from sidestep.obstacles import merge_in_voxels
+from sidestep.system import GeometricSystem
 
 NO_NUMBERS = {
     "complex": np.array([0.1 + 2.0j, 0.2]),
@@ -37,11 +38,11 @@ def no_warning():
 
 @pytest.mark.parametrize("value", NO_NUMBERS.values(), ids=NO_NUMBERS)
 def test_other_types_are_refused_with_the_name_of_the_argument(robot, value):
-    system, none, q = ss.GeometricSystem([], robot=robot), ss.Obstacles.none(), np.zeros(2)
+    system, none, q = GeometricSystem([], robot=robot), ss.Obstacles.none(), np.zeros(2)
     calls = {
         "q": lambda: system.acceleration(value, q, q, none),
         "goal": lambda: system.acceleration(q, q, value, none),
-        "stiffness": lambda: ss.GeometricSystem([], robot=robot, stiffness=value),
+        "stiffness": lambda: GeometricSystem([], robot=robot, stiffness=value),
         "radii": lambda: ss.Obstacles(np.zeros((2, 3)), radii=value),
         "v": lambda: robot.bias(q, value),
     }
@@ -66,7 +67,7 @@ def test_masked_entries_are_refused(value):
 
 
 def test_masked_entries_are_refused_by_the_functions(robot):
-    system, none, q = ss.GeometricSystem([], robot=robot), ss.Obstacles.none(), np.zeros(2)
+    system, none, q = GeometricSystem([], robot=robot), ss.Obstacles.none(), np.zeros(2)
     with pytest.raises(ValueError, match="q has masked entries"):
         system.acceleration(MASKED, q, q, none)
     with pytest.raises(ValueError, match="radii has masked entries"):
@@ -97,11 +98,11 @@ def test_real_numbers_of_every_kind_are_taken(robot, value):
 def test_numbers_are_taken_as_scalars(robot):
     for number in (2, 2.0, np.float64(2.0), np.float32(2.0), np.int64(2), np.array(2.0)):
         np.testing.assert_array_equal(
-            ss.GeometricSystem([], robot=robot, stiffness=number).stiffness, 2.0 * np.eye(2)
+            GeometricSystem([], robot=robot, stiffness=number).stiffness, 2.0 * np.eye(2)
         )
     for number in (True, np.bool_(True), 2.0 + 1.0j, np.complex128(2.0), np.timedelta64(2, "s"), "2"):
         with pytest.raises(TypeError, match="stiffness must be an array of real numbers"):
-            ss.GeometricSystem([], robot=robot, stiffness=number)
+            GeometricSystem([], robot=robot, stiffness=number)
 
 
 def test_an_array_of_float64_is_not_copied():

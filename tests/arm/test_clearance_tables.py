@@ -7,13 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep import Body, ClearanceTable, ClearanceTableBarrier, Obstacles, Robot, SelfCollision
+from sidestep import Body, Obstacles, Robot
 from sidestep._core import BarrierSettings, CoordinateKind
 from sidestep.arm import shipped_arms
 from sidestep.arm.clearance_tables import clearance_tables, stored_at
 from sidestep.arm.link_pairs import barrier_pairs
 from sidestep.bench.methods import barrier_system
 from sidestep.body import cache
+from sidestep.distance import SelfCollision
+from sidestep.system import ClearanceTable, ClearanceTableBarrier
 
 
 @pytest.fixture

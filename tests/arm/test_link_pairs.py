@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep import Body, Obstacles, Robot, SelfCollision, SelfCollisionBarrier
+from sidestep import Body, Obstacles, Robot
 from sidestep.arm.link_pairs import NEAR, barrier_pairs, stored_at
+from sidestep.distance import SelfCollision
+from sidestep.system import SelfCollisionBarrier
 
 
 @pytest.fixture(autouse=True)

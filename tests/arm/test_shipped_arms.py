@@ -20,6 +20,7 @@ from sidestep.body.cover_overshoot import overshoot
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.body.cover_surface import LinkSurface
 from sidestep.cli import app
+from sidestep.robot import planar_arm
 
 NAMES = [entry.name for entry in ss.robots() if entry.name != "z1"]  # that one is prepared on first use
 LIMIT = 'lower="-3.141592653589793" upper="3.141592653589793"'
@@ -122,7 +123,7 @@ assert "sidestep.robot" not in sys.modules
 def test_a_description_that_equals_a_shipped_robot_takes_its_cover_tables_and_pairs(tmp_path: Path) -> None:
     shipped = ss.Arm.load("planar3")
     path = tmp_path / "mine.urdf"
-    path.write_text(ss.planar_arm(3).replace('name="planar3"', 'name="mine"'))
+    path.write_text(planar_arm(3).replace('name="planar3"', 'name="mine"'))
     arm = ss.Arm.load(path)
     assert (arm.name, arm.provenance.source) == ("mine", "mine.urdf")
     assert shipped_arms.has_body(shipped, arm.body)
@@ -138,7 +139,7 @@ def test_a_description_that_equals_a_shipped_robot_takes_its_cover_tables_and_pa
 
 def test_tables_and_pairs_of_other_limits_are_not_taken(tmp_path: Path) -> None:
     """Within ±0.5 rad the links of a planar arm are apart, within the shipped robot's limits they touch."""
-    text = ss.planar_arm(3)
+    text = planar_arm(3)
     assert text.count(LIMIT) == 3, text
     path = tmp_path / "planar3.urdf"
     path.write_text(text.replace(LIMIT, 'lower="-0.5" upper="0.5"'))

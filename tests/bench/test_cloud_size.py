@@ -7,6 +7,7 @@ from PIL import Image
 import sidestep as ss
 from sidestep.bench import CloudSizeSettings, draw_cloud_sizes, run_cloud_size_bench
 from sidestep.bench.cloud_size import points_around, points_beyond
+from sidestep.system import ClearanceBarrier
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,7 @@ def test_points_within_reach_are_where_barriers_act(robot, body):
     q, rng = robot.neutral, np.random.default_rng(0)
     points = points_around(robot, body, q, 3000, rng)
     assert points.shape == (3000, 3)
-    barrier = ss.ClearanceBarrier(robot, body)
+    barrier = ClearanceBarrier(robot, body)
     each = np.array(
         [barrier.evaluate(q, 0.0 * q, ss.Obstacles(p[None])).clearances.min() for p in points[:300]]
     )
@@ -35,7 +36,7 @@ def test_points_within_reach_are_where_barriers_act(robot, body):
 
 def test_points_out_of_reach_matter_to_no_barrier(robot, body):
     points = points_beyond(robot, 500, np.random.default_rng(0))
-    barrier = ss.ClearanceBarrier(robot, body, reach=0.3)
+    barrier = ClearanceBarrier(robot, body, reach=0.3)
     rng = np.random.default_rng(1)
     for _ in range(20):
         q = robot.random_configuration(rng)

@@ -5,6 +5,7 @@ import pytest
 
 import sidestep as ss
 from sidestep._core import JointLimits
+from sidestep.control import acceleration_bounds
 
 PERIOD = 0.001
 
@@ -21,7 +22,7 @@ def test_extreme_accelerations_never_leave_the_limits(name):
     q, v = robot.neutral.copy(), np.zeros(robot.num_coordinates)
     high = rng.random(robot.num_coordinates) < 0.5
     for _ in range(5000):
-        lower, upper = ss.acceleration_bounds(robot, q, v, PERIOD)
+        lower, upper = acceleration_bounds(robot, q, v, PERIOD)
         assert np.all(lower <= upper)
         high ^= rng.random(robot.num_coordinates) < 0.002  # long pushes, so that every limit is reached
         a = np.where(high, upper, lower)
@@ -45,24 +46,24 @@ def test_extreme_accelerations_never_leave_the_limits(name):
     ],
 )
 def test_bounds_by_hand(q, v, lower, upper):
-    got = ss.acceleration_bounds(limits_of_one_joint(), [q], [v], PERIOD)
+    got = acceleration_bounds(limits_of_one_joint(), [q], [v], PERIOD)
     np.testing.assert_allclose(np.concatenate(got), [lower, upper], atol=1e-9)  # 1e-16/period of rounding
 
 
 def test_continuous_joint_has_velocity_and_acceleration_bounds_only():
     limits = limits_of_one_joint(-np.inf, np.inf)
     np.testing.assert_array_equal(
-        np.concatenate(ss.acceleration_bounds(limits, [1e3], [0.0], PERIOD)), [-10.0, 10.0]
+        np.concatenate(acceleration_bounds(limits, [1e3], [0.0], PERIOD)), [-10.0, 10.0]
     )
 
 
 def test_bad_input_raises():
     limits = limits_of_one_joint()
     with pytest.raises(ValueError, match="finite"):
-        ss.acceleration_bounds(limits, [np.nan], [0.0], PERIOD)
+        acceleration_bounds(limits, [np.nan], [0.0], PERIOD)
     with pytest.raises(ValueError, match="period"):
-        ss.acceleration_bounds(limits, [0.0], [0.0], 0.0)
+        acceleration_bounds(limits, [0.0], [0.0], 0.0)
     with pytest.raises(ValueError, match=r"v has shape \(2,\)"):
-        ss.acceleration_bounds(limits, [0.0], [0.0, 0.0], PERIOD)
+        acceleration_bounds(limits, [0.0], [0.0, 0.0], PERIOD)
     with pytest.raises(TypeError, match="Robot or JointLimits"):
-        ss.acceleration_bounds("fr3", [0.0], [0.0], PERIOD)
+        acceleration_bounds("fr3", [0.0], [0.0], PERIOD)

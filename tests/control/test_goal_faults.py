@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.system import StepStatus
 
 # Of the hand, from where nothing of the arm itself is in a ball's way.
 FREE_SIDES = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
@@ -69,5 +70,5 @@ def test_the_controller_keeps_the_clearances_with_a_bad_goal(robot: ss.Robot) ->
     for _ in range(700):
         command = controller.step(q, v)
         assert command.bound_by >= 0
-    assert command.system == ss.StepStatus.goal_outside_limits
+    assert command.system == StepStatus.goal_outside_limits
     assert command.activity == ss.Activity.blocked

@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.control import AccelerationFilter, Clearances, TorqueController, TorqueStatus
 
 PERIOD = 0.001
 FOLDED = {  # of a UR10, two links 15 cm inside each other
     "a way out": [-5.86, -2.74, 3.13, -1.49, 4.09, 4.55],
     "none": [0.68, 5.35, -3.13, -4.24, 2.77, -1.33],
 }
-FALLBACKS = {ss.TorqueStatus.fallback_solver, ss.TorqueStatus.fallback_invalid_input}
+FALLBACKS = {TorqueStatus.fallback_solver, TorqueStatus.fallback_invalid_input}
 HARMLESS = {
-    ss.TorqueStatus.ok,
-    ss.TorqueStatus.limited,
-    ss.TorqueStatus.relaxed,
-    ss.TorqueStatus.relaxed_safety,
+    TorqueStatus.ok,
+    TorqueStatus.limited,
+    TorqueStatus.relaxed,
+    TorqueStatus.relaxed_safety,
 }
 
 
@@ -27,7 +28,7 @@ class Motion:
         v = np.zeros(len(q))
         self.clearances = np.empty(steps)
         self.speeds, self.accelerations = np.empty(steps), np.empty(steps)
-        self.programs: set[ss.TorqueStatus] = set()
+        self.programs: set[TorqueStatus] = set()
         self.overrun = 0.0
         for k in range(steps):
             command = controller.step(q, v)
@@ -81,13 +82,11 @@ def test_an_arm_engulfed_by_a_ball_gets_out_or_comes_to_rest(link: str, gets_out
 
 def test_a_clearance_that_no_joint_changes_is_told() -> None:
     robot = ss.Robot.named("planar3")
-    lost = ss.Clearances(
-        values=[-1.0], rates=[0.0], curvatures=[0.0], gradients=np.zeros((1, 3)), nearest=[4]
-    )
+    lost = Clearances(values=[-1.0], rates=[0.0], curvatures=[0.0], gradients=np.zeros((1, 3)), nearest=[4])
     zero = np.zeros(3)
     for solution in (
-        ss.AccelerationFilter(robot).apply(zero, zero, zero, clearances=lost),
-        ss.TorqueController(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=lost),
+        AccelerationFilter(robot).apply(zero, zero, zero, clearances=lost),
+        TorqueController(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=lost),
     ):
-        assert solution.status == ss.TorqueStatus.clearance_lost
+        assert solution.status == TorqueStatus.clearance_lost
         assert (solution.least_clearance, solution.least_coordinate, solution.least_nearest) == (-1.0, 0, 4)

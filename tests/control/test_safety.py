@@ -7,20 +7,22 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
+from sidestep.control import AccelerationFilter, Clearances, SafetySettings, TorqueController, TorqueStatus
+from sidestep.system import GeometricSystem
 
-MARGIN = ss.SafetySettings().margin
+MARGIN = SafetySettings().margin
 PERIOD = 0.001
 
 
 @dataclass(frozen=True)
 class Scene:
     robot: ss.Robot
-    system: ss.GeometricSystem
+    system: GeometricSystem
     start: np.ndarray
     goal: np.ndarray
     obstacles: ss.Obstacles
 
-    def clearances_at(self, q: np.ndarray, v: np.ndarray, obstacles: ss.Obstacles) -> ss.Clearances:
+    def clearances_at(self, q: np.ndarray, v: np.ndarray, obstacles: ss.Obstacles) -> Clearances:
         return self.system.acceleration(q, v, self.goal, obstacles).clearances
 
 
@@ -36,7 +38,7 @@ def scene(name: str, seed: int, speed: float = 0.0) -> Scene:
         covariances=[np.diag([0.060, 0.048, 0.072]) ** 2] * len(links),
         levels=np.ones(len(links)),
     )
-    system = ss.GeometricSystem([_core.ClearanceBarrier(robot, body)])
+    system = GeometricSystem([_core.ClearanceBarrier(robot, body)])
     while True:
         start, goal = robot.random_configuration(rng), robot.random_configuration(rng)
         link = links[int(rng.integers(len(links) // 2, len(links)))]
@@ -52,8 +54,8 @@ def scene(name: str, seed: int, speed: float = 0.0) -> Scene:
 def drive(s: Scene, *, torque: bool, delay: int = 0, steps: int = 2000) -> tuple[float, dict[str, int]]:
     """The smallest clearance under a stiff spring to the goal, and how often each status occurred."""
     controller, filter_ = (
-        ss.TorqueController(s.robot, period=PERIOD),
-        ss.AccelerationFilter(s.robot, period=PERIOD),
+        TorqueController(s.robot, period=PERIOD),
+        AccelerationFilter(s.robot, period=PERIOD),
     )
     q, v, obstacles = s.start, 0.0 * s.start, s.obstacles
     lowest, counts, pending = np.inf, {}, []
@@ -113,7 +115,7 @@ def test_without_the_rows_the_ball_is_hit() -> None:
     s = scene("fr3", 1)
     blind = Scene(s.robot, s.system, s.start, s.goal, ss.Obstacles([[50.0, 0.0, 0.0]]))
     q, v = s.start, 0.0 * s.start
-    filter_ = ss.AccelerationFilter(s.robot, period=PERIOD)
+    filter_ = AccelerationFilter(s.robot, period=PERIOD)
     lowest = np.inf
     for _ in range(2000):
         lowest = min(lowest, float(np.min(s.clearances_at(q, v, s.obstacles).values)))
@@ -127,7 +129,7 @@ def test_without_the_rows_the_ball_is_hit() -> None:
 def test_the_program_that_was_solved_can_be_solved_elsewhere() -> None:
     """Of filter and controller: the rows in use, whose minimiser is the acceleration that they gave."""
     s = scene("fr3", 1)
-    filter_, controller = ss.AccelerationFilter(s.robot), ss.TorqueController(s.robot)
+    filter_, controller = AccelerationFilter(s.robot), TorqueController(s.robot)
     q, v, held = s.start, 0.0 * s.start, 0
     for _ in range(400):
         clearances = s.clearances_at(q, v, s.obstacles)
@@ -151,15 +153,15 @@ def test_the_program_that_was_solved_can_be_solved_elsewhere() -> None:
 
 def test_what_is_reported() -> None:
     robot = ss.Robot.named("planar2")
-    clearances = ss.Clearances(
+    clearances = Clearances(
         values=[np.inf, 0.008],
         rates=[0.0, -0.06],
         curvatures=[0.0, 0.0],
         gradients=[[0, 0], [0.3, 0.1]],
         nearest=[-1, 7],
     )
-    solution = ss.AccelerationFilter(robot).apply([0, 0], [-0.18, -0.06], [-5.0, -5.0], clearances=clearances)
-    assert solution.status == ss.TorqueStatus.limited
+    solution = AccelerationFilter(robot).apply([0, 0], [-0.18, -0.06], [-5.0, -5.0], clearances=clearances)
+    assert solution.status == TorqueStatus.limited
     (row,) = solution.safety
     assert (row.coordinate, row.nearest, row.slack) == (1, 7, 0.0)
     assert row.multiplier > 0.0
@@ -173,8 +175,8 @@ def test_what_is_reported() -> None:
 def test_bad_settings_and_arguments_raise() -> None:
     robot = ss.Robot.named("planar2")
     with pytest.raises(ValueError, match="safety: margin is -1"):
-        ss.SafetySettings(margin=-1.0)
+        SafetySettings(margin=-1.0)
     with pytest.raises(ValueError, match="period is 0"):
-        ss.AccelerationFilter(robot, period=0.0)
+        AccelerationFilter(robot, period=0.0)
     with pytest.raises(TypeError, match="clearances must be Clearances or a Step"):
-        ss.AccelerationFilter(robot).apply([0, 0], [0, 0], [0, 0], clearances=np.zeros(3))
+        AccelerationFilter(robot).apply([0, 0], [0, 0], [0, 0], clearances=np.zeros(3))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.control import Limit, TorqueController, TorqueStatus
 
 ROBOTS = ["fr3", "panda", "ur5", "planar2"]
 
@@ -14,7 +15,7 @@ def robot(request):
 
 
 def test_holds_the_arm_against_gravity(robot):
-    controller = ss.TorqueController(robot)
+    controller = TorqueController(robot)
     rng = np.random.default_rng(0)
     zero = np.zeros(robot.num_coordinates)
     for _ in range(20):
@@ -23,7 +24,7 @@ def test_holds_the_arm_against_gravity(robot):
         if np.any(np.abs(bias) > 0.9 * robot.limits.effort):
             continue
         solution = controller.solve(q, zero, zero, robot.mass_matrix(q), bias)
-        assert solution.status == ss.TorqueStatus.ok
+        assert solution.status == TorqueStatus.ok
         # M R torque / Q: below 1e-6 of (5 kg m^2 * 100 Nm)/(100 Nm)^2, and the torque differs by M of that.
         assert np.max(np.abs(solution.acceleration)) < 1e-6
         np.testing.assert_allclose(solution.torque, bias, atol=1e-5)
@@ -31,7 +32,7 @@ def test_holds_the_arm_against_gravity(robot):
 
 def test_wild_demands_never_break_a_limit(robot):
     limits = robot.limits
-    controller = ss.TorqueController(robot)
+    controller = TorqueController(robot)
     rng = np.random.default_rng(1)
     q, v = robot.neutral.copy(), np.zeros(robot.num_coordinates)
     for k in range(2000):
@@ -46,11 +47,11 @@ def test_wild_demands_never_break_a_limit(robot):
         np.testing.assert_allclose(acceleration, solution.acceleration, atol=1e-7)
         v = v + 0.001 * acceleration
         q = q + 0.001 * v
-        if solution.status != ss.TorqueStatus.relaxed:
+        if solution.status != TorqueStatus.relaxed:
             assert np.all(np.abs(v) <= limits.velocity + 1e-9)  # the error above, over one period
-        if controller.count(ss.TorqueStatus.relaxed) == 0:
+        if controller.count(TorqueStatus.relaxed) == 0:
             assert np.all((q <= limits.upper + 1e-9) & (q >= limits.lower - 1e-9))
-    assert controller.count(ss.TorqueStatus.limited) > 0
+    assert controller.count(TorqueStatus.limited) > 0
 
 
 def test_limits_in_the_way_are_named():
@@ -59,15 +60,15 @@ def test_limits_in_the_way_are_named():
     mass, bias = robot.mass_matrix(q), robot.bias(q, v)
     # Carrying joint 2 along while joint 1 accelerates takes all its torque; for more, all its deceleration.
     for demand, expected in [
-        (20.0, ss.Limit.torque_upper),
-        (1e6, ss.Limit.torque_upper | ss.Limit.acceleration_lower),
+        (20.0, Limit.torque_upper),
+        (1e6, Limit.torque_upper | Limit.acceleration_lower),
     ]:
-        solution = ss.TorqueController(robot).solve(q, v, [demand, 0.0], mass, bias)
-        assert solution.status == ss.TorqueStatus.limited
+        solution = TorqueController(robot).solve(q, v, [demand, 0.0], mass, bias)
+        assert solution.status == TorqueStatus.limited
         assert str(solution.status) == "limited"
-        assert solution.active == (ss.Limit(0), expected)
+        assert solution.active == (Limit(0), expected)
         assert solution.torque[1] == robot.limits.effort[1]
-        if expected & ss.Limit.acceleration_lower:
+        if expected & Limit.acceleration_lower:
             assert solution.acceleration[1] == -robot.limits.acceleration[1]
 
 
@@ -75,7 +76,7 @@ def test_limits_in_the_way_are_named():
 @pytest.mark.parametrize("argument", ["position", "velocity", "acceleration", "mass_matrix", "bias"])
 def test_values_that_are_not_finite_give_a_damped_stop(argument, bad):
     robot = ss.Robot.named("fr3")
-    controller = ss.TorqueController(robot)
+    controller = TorqueController(robot)
     v = np.full(robot.num_coordinates, 0.1)
     inputs = {
         "position": robot.neutral.copy(),
@@ -84,14 +85,14 @@ def test_values_that_are_not_finite_give_a_damped_stop(argument, bad):
         "mass_matrix": robot.mass_matrix(robot.neutral),
         "bias": robot.bias(robot.neutral, v),
     }
-    assert controller.solve(*inputs.values()).status == ss.TorqueStatus.ok
+    assert controller.solve(*inputs.values()).status == TorqueStatus.ok
     known_bias = inputs["bias"].copy()
     inputs[argument].flat[0] = bad
     solution = controller.solve(*inputs.values())
-    assert solution.status == ss.TorqueStatus.fallback_invalid_input
+    assert solution.status == TorqueStatus.fallback_invalid_input
     assert solution.status.is_fallback
     assert str(solution.fault) == argument
-    assert controller.count(ss.TorqueStatus.fallback_invalid_input) == 1
+    assert controller.count(TorqueStatus.fallback_invalid_input) == 1
     assert np.all(np.abs(solution.torque) <= robot.limits.effort)
     if argument == "velocity":  # nothing to damp: hold against gravity
         np.testing.assert_array_equal(solution.torque, known_bias)
@@ -107,10 +108,10 @@ def test_values_that_are_not_finite_give_a_damped_stop(argument, bad):
 def test_bad_settings_and_shapes_raise():
     robot = ss.Robot.named("planar2")
     with pytest.raises(ValueError, match="period is 0"):
-        ss.TorqueController(robot, period=0.0)
+        TorqueController(robot, period=0.0)
     with pytest.raises(ValueError, match="tracking_weight"):
-        ss.TorqueController(robot, tracking_weight=-1.0)
+        TorqueController(robot, tracking_weight=-1.0)
     with pytest.raises(ValueError, match="position_margin is 100"):
-        ss.TorqueController(robot, position_margin=100.0)
+        TorqueController(robot, position_margin=100.0)
     with pytest.raises(ValueError, match=r"mass_matrix has shape \(3, 3\), expected \(2, 2\)"):
-        ss.TorqueController(robot).solve([0, 0], [0, 0], [0, 0], np.eye(3), [0, 0])
+        TorqueController(robot).solve([0, 0], [0, 0], [0, 0], np.eye(3), [0, 0])

@@ -11,7 +11,11 @@ import pytest
 import sidestep as ss
 from sidestep import _core
 from sidestep.bench.methods import barrier_system
-from sidestep.obstacles import pose_at
+from sidestep.control import TorqueController, TorqueStatus
+from sidestep.controller import BarrierSettings, OnlinePlannerSettings, controller_settings_fields
+from sidestep.distance import SelfCollision
+from sidestep.obstacles import obstacles_from_shapes, pose_at
+from sidestep.system import ClearanceBarrier, StepStatus
 
 PERIOD = 0.001
 
@@ -94,7 +98,7 @@ def test_an_unusable_state_gives_a_stop(robot: ss.Robot, arm: ss.Arm) -> None:
 
 def test_the_status_tells_of_a_lost_clearance(robot: ss.Robot, arm: ss.Arm) -> None:
     """Against the least clearance of the body, evaluated apart, at random states among random balls."""
-    barrier = ss.ClearanceBarrier(robot, arm.body)
+    barrier = ClearanceBarrier(robot, arm.body)
     rng, lost = np.random.default_rng(7), 0
     for index in range(150):
         seen = balls(100 + index)
@@ -135,7 +139,7 @@ def test_what_blocks_a_goal_is_said_without_a_planner_as_well(robot: ss.Robot, a
     goal = robot.neutral + np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     hand = robot.pose(goal, "fr3_hand")[:3, 3]
     words = []
-    for planner in (ss.OnlinePlannerSettings(), None):
+    for planner in (OnlinePlannerSettings(), None):
         controller = ss.Controller(arm, settings(planner=planner))
         controller.set_goal(goal)
         controller.set_obstacles(ss.Obstacles([hand], radii=0.05))
@@ -153,7 +157,7 @@ def test_shapes_are_obstacles_and_words_have_their_names(robot: ss.Robot, arm: s
     hand = robot.pose(goal, "fr3_hand")[:3, 3]
     table = ss.Box((0.2, 0.3, 0.1), pose_at(hand), name="table")
     ball = ss.Sphere(0.05, pose_at([-0.5, 0.0, 0.5]), velocity=[-0.1, 0.0, 0.0])
-    for planner in (ss.OnlinePlannerSettings(), None):
+    for planner in (OnlinePlannerSettings(), None):
         controller = ss.Controller(arm, settings(planner=planner))
         controller.set_goal(goal)
         controller.set_obstacles([ss.Obstacles([[-1.0, 0.0, 0.2]], 0.05), table, ball])
@@ -188,7 +192,7 @@ def test_a_diagnosis_has_names(robot: ss.Robot, arm: ss.Arm) -> None:
     controller.step(robot.neutral, np.zeros(7))
     words = controller.geometric_step.diagnosis.describe()
     assert re.match(r"link fr3_\w+ is inside the barrier of 'cup', \d+ mm deep, and moves out", words)
-    seen = ss.obstacles_from_shapes(cup)
+    seen = obstacles_from_shapes(cup)
     other = controller.system.diagnose(robot.neutral, np.zeros(7), robot.neutral + 0.1, seen).describe()
     assert "'cup'" in other
 
@@ -203,7 +207,7 @@ def test_a_posture_is_looked_for_near_the_rest_of_a_pose(robot: ss.Robot, arm: s
         controller.step(robot.neutral, np.zeros(7))
         found = controller.target
         assert found is not None
-        free = ss.SelfCollision(robot).distance(rest).distance > 0.0
+        free = SelfCollision(robot).distance(rest).distance > 0.0
         assert not free or np.abs(found - rest).max() < 1e-9
 
 
@@ -250,16 +254,16 @@ def test_continuous_joints_take_the_nearest_turn_and_survive_encoders_that_wrap(
 
 
 def test_every_setting_has_a_default_in_its_range() -> None:
-    for field in ss.controller_settings_fields():
+    for field in controller_settings_fields():
         assert field["least"] <= field["default"] <= field["most"], field["name"]
         assert field["unit"]
         assert field["trades"]
     with pytest.raises(
         ValueError, match=r"controller: barriers\.stiffness is 1000 1/s\^2, allowed: 0\.01 to 100 1/s\^2"
     ):
-        ss.ControllerSettings(barriers=ss.BarrierSettings(stiffness=1000.0))
+        ss.ControllerSettings(barriers=BarrierSettings(stiffness=1000.0))
     with pytest.raises(TypeError, match="has no setting 'stifness'; it has: stiffness, damping"):
-        ss.BarrierSettings(stifness=1.0)
+        BarrierSettings(stifness=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -295,7 +299,7 @@ def bare(arm: ss.Arm, goal: np.ndarray, seen: ss.Obstacles) -> ss.Controller:
 
 def test_without_its_further_parts_it_is_the_system_followed_by_the_program(planar: ss.Arm) -> None:
     robot, goal, seen = planar.robot, planar.neutral + 0.3, near_the_tip(planar)
-    system, program = barrier_system(robot, planar.body), ss.TorqueController(robot)
+    system, program = barrier_system(robot, planar.body), TorqueController(robot)
     controller, bounded = bare(planar, goal, seen), 0
     for q, v in zip(*states(planar, 20), strict=True):
         M, h = robot.mass_matrix(q), robot.bias(q, v)
@@ -330,8 +334,8 @@ def test_torque_of_a_stop_is_within_the_limits(planar: ss.Arm) -> None:
     controller = bare(planar, planar.neutral, near_the_tip(planar))
     v = states(planar, 1)[1][0]
     found = controller.step(np.full(planar.num_coordinates, np.nan), v)
-    assert found.system == ss.StepStatus.invalid_state
-    assert found.program == ss.TorqueStatus.fallback_invalid_input
+    assert found.system == StepStatus.invalid_state
+    assert found.program == TorqueStatus.fallback_invalid_input
     assert np.all(np.abs(found.torque) <= planar.limits.effort)
 
 

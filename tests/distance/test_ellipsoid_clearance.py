@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sidestep import Body, Robot, SceneObject, planar_arm
+from sidestep import Body, Robot, SceneObject
 from sidestep.distance import EllipsoidClearance
+from sidestep.robot import planar_arm
 from sidestep.robot.pose import pose_at
 
 SEMI_AXES = np.array([0.3, 0.05, 0.02])

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from sidestep import Robot, SelfCollision
+from sidestep import Robot
+from sidestep.distance import SelfCollision
 from sidestep.distance.link_parts import LinkParts, hulls_apart
 
 Array = np.ndarray

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sidestep import Robot, SelfCollision
+from sidestep import Robot
+from sidestep.distance import SelfCollision
 from sidestep.simulation import self_collision, sweep
 
 

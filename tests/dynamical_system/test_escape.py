@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.controller import LocalMinimumSettings
+from sidestep.system import Escape
 
 PERIOD = 0.01
 
@@ -27,14 +29,14 @@ def robot():
 
 
 def test_goal_is_followed_while_it_gets_nearer(robot):
-    escape = ss.Escape(robot, patience=0.1)
+    escape = Escape(robot, patience=0.1)
     followed = pursue(escape, GOAL + (AWAY - GOAL) * 0.98 ** np.arange(200)[:, None])
     np.testing.assert_array_equal(followed, np.tile(GOAL, (200, 1)))
     assert escape.count == 0
 
 
 def test_an_arm_that_has_arrived_is_not_stuck(robot):
-    escape = ss.Escape(robot, patience=0.1)
+    escape = Escape(robot, patience=0.1)
     followed = pursue(escape, GOAL + np.tile([0.009, -0.009], (500, 1)))
     np.testing.assert_array_equal(followed, np.tile(GOAL, (500, 1)))
     pursue(escape, GOAL + np.tile([0.011, 0.0], (15, 1)))
@@ -42,7 +44,7 @@ def test_an_arm_that_has_arrived_is_not_stuck(robot):
 
 
 def test_patience_begins_anew_with_another_goal(robot):
-    escape = ss.Escape(robot, patience=0.2)
+    escape = Escape(robot, patience=0.2)
     pursue(escape, GOAL + (AWAY - GOAL) * 0.98 ** np.arange(100)[:, None])
     state, other = GOAL + (AWAY - GOAL) * 0.98**100, np.array([-2.5, -2.0])
     pursue(escape, np.tile(state, (15, 1)))  # three quarters of the patience
@@ -54,7 +56,7 @@ def test_patience_begins_anew_with_another_goal(robot):
 
 
 def test_sub_goal_comes_after_patience_and_is_given_up_after_half_of_it(robot):
-    escape = ss.Escape(robot, patience=0.2, leg=10.0, spread=0.7, seed=3)
+    escape = Escape(robot, patience=0.2, leg=10.0, spread=0.7, seed=3)
     followed = pursue(escape, at_rest(45))
     away = np.any(followed != GOAL, axis=1)
     # 20 periods of patience after the first; times that are sums of periods may round below it once.
@@ -67,7 +69,7 @@ def test_sub_goal_comes_after_patience_and_is_given_up_after_half_of_it(robot):
 
 
 def test_sub_goal_that_gets_nearer_is_followed_for_its_leg(robot):
-    escape = ss.Escape(robot, patience=0.1, leg=0.5, seed=3)
+    escape = Escape(robot, patience=0.1, leg=0.5, seed=3)
     first = next(k for k in range(100) if np.any(pursue(escape, at_rest(1))[0] != GOAL))
     assert first in (10, 11)
     sub_goal = np.array(escape.pursue(GOAL, AWAY, np.nan, PERIOD).position)
@@ -82,7 +84,7 @@ def test_sub_goal_that_gets_nearer_is_followed_for_its_leg(robot):
 def test_sub_goals_lie_within_the_limits(robot):
     corner = robot.limits.upper
     for seed in range(5):
-        escape = ss.Escape(robot, patience=0.1, seed=seed)
+        escape = Escape(robot, patience=0.1, seed=seed)
         sub_goals = pursue(escape, np.tile(corner, (13, 1)))[-1:]
         assert np.all(sub_goals <= corner)
         assert np.any(sub_goals < corner - 0.01)
@@ -90,7 +92,7 @@ def test_sub_goals_lie_within_the_limits(robot):
 
 def test_sub_goals_repeat_with_the_seed_and_differ_without(robot):
     def run(seed):
-        return pursue(ss.Escape(robot, patience=0.1, seed=seed), at_rest(40))
+        return pursue(Escape(robot, patience=0.1, seed=seed), at_rest(40))
 
     np.testing.assert_array_equal(run(1), run(1))
     assert not np.array_equal(run(1), run(2))
@@ -100,7 +102,7 @@ def test_a_pose_is_pursued_by_its_potential():
     robot = ss.Robot.named("fr3_arm")
     q = robot.neutral
     goal = ss.PoseGoal(robot, robot.frames[-1].name, np.eye(4))
-    escape = ss.Escape(robot, patience=0.1)
+    escape = Escape(robot, patience=0.1)
     unknown = [escape.pursue(goal, q, np.nan, PERIOD) for _ in range(50)]
     falling = [escape.pursue(goal, q, u, PERIOD) for u in 0.9 ** np.arange(50)]
     assert all(isinstance(followed, ss.PoseGoal) for followed in unknown + falling)
@@ -126,7 +128,7 @@ def test_escape_leads_an_arm_out_of_a_local_minimum(robot):
     assert not stuck.arrived
     assert np.abs(stuck.last_q - goal).max() > 0.5
     # An arm of two joints has to fold and turn at once, so its sub-goals have to be far.
-    assert motion(ss.LocalMinimumSettings(patience=1.0, leg=3.0, spread=4.0), 60000).arrived
+    assert motion(LocalMinimumSettings(patience=1.0, leg=3.0, spread=4.0), 60000).arrived
 
 
 @pytest.mark.parametrize(
@@ -140,13 +142,13 @@ def test_escape_leads_an_arm_out_of_a_local_minimum(robot):
 )
 def test_bad_settings_are_named(robot, setting, message):
     with pytest.raises(ValueError, match=message):
-        ss.Escape(robot, **setting)
+        Escape(robot, **setting)
 
 
 def test_sub_goals_for_one_goal_lie_farther_off_one_by_one():
     robot = ss.Robot.named("fr3_arm")
     spread, period = 0.1, 0.01
-    escape = ss.Escape(robot, patience=0.1, leg=0.1, spread=spread, seed=1)
+    escape = Escape(robot, patience=0.1, leg=0.1, spread=spread, seed=1)
     middle = 0.5 * (robot.limits.lower + robot.limits.upper)
     goal, elsewhere = ss.JointGoal(middle + 0.4), ss.JointGoal(middle - 0.8)
 
@@ -176,7 +178,7 @@ def until_escaping(escape, step):
 
 
 def test_another_goal_is_followed_at_once_and_one_that_moves_is_not_another(robot):
-    escape = ss.Escape(robot, patience=0.1, leg=10.0, seed=3)
+    escape = Escape(robot, patience=0.1, leg=10.0, seed=3)
 
     def followed(goal):
         return np.array(escape.pursue(goal, AWAY, np.nan, PERIOD).position)
@@ -197,7 +199,7 @@ def test_another_pose_is_followed_at_once():
     here, turned, shifted = np.eye(4), np.eye(4), np.eye(4)
     turned[:2, :2] = [[np.cos(0.25), -np.sin(0.25)], [np.sin(0.25), np.cos(0.25)]]
     shifted[2, 3] = 0.25
-    escape = ss.Escape(robot, patience=0.1, leg=10.0)
+    escape = Escape(robot, patience=0.1, leg=10.0)
 
     def followed(goal):
         return escape.pursue(goal, q, 1e-3, PERIOD)

@@ -8,6 +8,8 @@ from sidestep.bench.methods import barrier_system
 from sidestep.bench.problem import poses_over
 from sidestep.bench.problems import balls
 from sidestep.distance import ExactClearance
+from sidestep.robot import planar_arm
+from sidestep.system import Evasion, Flight, GeometricSystem
 
 PERIOD = 0.002
 GOAL = np.array([-2.9, 0.0])  # 0.24 rad before the limit of joint 1
@@ -73,7 +75,7 @@ def test_what_rests_or_passes_by_changes_nothing(robot):
 
 
 def test_what_a_look_finds_is_followed_one_look_later_and_without_jumps(system, robot):
-    evasion, at_rest = ss.Evasion(system, delay=0.1, seed=1), np.zeros(2)
+    evasion, at_rest = Evasion(system, delay=0.1, seed=1), np.zeros(2)
     flights = [
         evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD) for k in range(200)
     ]
@@ -81,7 +83,7 @@ def test_what_a_look_finds_is_followed_one_look_later_and_without_jumps(system, 
     first = flights[50]
     assert np.all((first.refuge >= robot.limits.lower) & (first.refuge <= robot.limits.upper))
     np.testing.assert_allclose(first.position, GOAL, atol=2e-3)  # nothing draws the arm away before
-    expected = ss.Flight(robot, first.position, first.velocity, first.refuge)
+    expected = Flight(robot, first.position, first.velocity, first.refuge)
     for k, flight in enumerate(flights[51:], start=51):
         np.testing.assert_array_equal(flight.refuge, first.refuge)
         expected.advance(PERIOD)
@@ -92,7 +94,7 @@ def test_what_a_look_finds_is_followed_one_look_later_and_without_jumps(system, 
 
 
 def test_what_was_found_is_forgotten_for_another_motion(system):
-    evasion, at_rest = ss.Evasion(system, seed=1), np.zeros(2)
+    evasion, at_rest = Evasion(system, seed=1), np.zeros(2)
     for k in range(60):
         found = evasion.pursue(GOAL, GOAL, at_rest, ball(CENTRE + k * PERIOD * SPEED), PERIOD)
     assert found is not None
@@ -102,7 +104,7 @@ def test_what_was_found_is_forgotten_for_another_motion(system):
 
 
 def test_a_look_says_what_to_follow(system):
-    evasion, at_rest = ss.Evasion(system, seed=1), np.zeros(2)
+    evasion, at_rest = Evasion(system, seed=1), np.zeros(2)
     found = evasion.look(GOAL, GOAL, at_rest, ball())
     assert evasion.count == 1
     ahead = ball(CENTRE + 0.1 * SPEED)
@@ -118,7 +120,7 @@ def test_a_look_says_what_to_follow(system):
 
 
 def test_steps_are_made_to_go_into_the_delay(system):
-    evasion, at_rest = ss.Evasion(system, delay=0.1, period=0.04, seed=1), np.zeros(2)
+    evasion, at_rest = Evasion(system, delay=0.1, period=0.04, seed=1), np.zeros(2)
     found = evasion.look(GOAL, GOAL, at_rest, ball())
     kept = evasion.look(GOAL, GOAL, at_rest, ball(CENTRE + 0.1 * SPEED), found)
     for _ in range(3):
@@ -131,17 +133,17 @@ def test_an_arm_that_can_only_brake_is_taken_to_do_so(system):
     beyond = ss.JointGoal(np.array([-4.0, 0.0]))  # outside the limits
     leaving = ss.JointGoal(GOAL, np.array([-1.0, 0.0]))  # a goal that moves out of them
     for goal in (beyond, leaving):
-        evasion = ss.Evasion(system, seed=1)
+        evasion = Evasion(system, seed=1)
         assert evasion.look(goal, GOAL, at_rest, ball()) is not None
         assert evasion.look(goal, GOAL, at_rest, ball(centre=np.array([[0.0, 3.0, 0.0]]))) is None
 
 
 def test_flights_of_joints_without_limits_are_finite():
-    text = ss.planar_arm(2).replace('name="joint2" type="revolute"', 'name="joint2" type="continuous"')
+    text = planar_arm(2).replace('name="joint2" type="revolute"', 'name="joint2" type="continuous"')
     robot = ss.Robot.from_urdf(text)
     assert np.isinf(robot.limits.upper[1])
     system = barrier_system(robot, ss.Body.cover(robot))
-    evasion = ss.Evasion(system, seed=1)
+    evasion = Evasion(system, seed=1)
     for k in range(5):
         found = evasion.look(GOAL, GOAL, np.zeros(2), ball(CENTRE + 0.1 * k * SPEED))
         assert np.isfinite(found.refuge).all()
@@ -165,18 +167,18 @@ def test_flights_of_joints_without_limits_are_finite():
 )
 def test_settings_are_checked(system, change, message):
     with pytest.raises(ValueError, match=message):
-        ss.Evasion(system, **change)
+        Evasion(system, **change)
 
 
 def test_what_does_not_go_together_is_named(system):
-    evasion, other = ss.Evasion(system), ss.Robot.named("planar3")
-    flat, q = ss.GeometricSystem([], robot=other), np.zeros(3)
+    evasion, other = Evasion(system), ss.Robot.named("planar3")
+    flat, q = GeometricSystem([], robot=other), np.zeros(3)
     with pytest.raises(ValueError, match="the system has no clearances to obstacles"):
-        ss.Evasion(flat)
+        Evasion(flat)
     for period in (0.0, np.nan):
         with pytest.raises(ValueError, match=f"period is {period}.*, must be positive and finite"):
             evasion.pursue(GOAL, GOAL, GOAL, ss.Obstacles.none(), period)
-    foreign = ss.Flight(other, q, q, q)
+    foreign = Flight(other, q, q, q)
     with pytest.raises(ValueError, match="the flight is for 3 coordinates, the system has 2"):
         evasion.look(GOAL, GOAL, GOAL, ss.Obstacles.none(), foreign)
     with pytest.raises(ValueError, match=r"q has shape \(3,\), expected \(2,\)"):

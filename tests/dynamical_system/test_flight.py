@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.robot import planar_arm
+from sidestep.system import Flight
 
 START = np.array([0.0, -0.5, 0.3, -1.5, 0.0, 1.5, 0.5])
 AT_REST = np.zeros(7)
@@ -30,7 +32,7 @@ def references(flight, period, duration):
 
 @pytest.mark.parametrize("period", [0.001, 0.01, 0.05])
 def test_it_is_as_quick_as_nine_tenths_of_the_limits_allow(robot, period):
-    rows = references(ss.Flight(robot, START, AT_REST, START + WAY), period, 4.0)
+    rows = references(Flight(robot, START, AT_REST, START + WAY), period, 4.0)
     fastest, hardest = 0.9 * robot.limits.velocity, 0.9 * robot.limits.acceleration
     q, v = rows[:, 0], rows[:, 1]
     assert np.all(np.abs(v) <= fastest + 1e-9)
@@ -47,14 +49,14 @@ def test_it_is_as_quick_as_nine_tenths_of_the_limits_allow(robot, period):
 
 def test_a_joint_that_is_too_fast_to_stop_in_time_comes_back(robot):
     v = 0.9 * robot.limits.velocity
-    rows = references(ss.Flight(robot, START, v, START + 0.01), 0.001, 3.0)
+    rows = references(Flight(robot, START, v, START + 0.01), 0.001, 3.0)
     stop = v**2 / (1.8 * robot.limits.acceleration)
     np.testing.assert_allclose(rows[:, 0].max(axis=0), START + stop, atol=0.01)
     np.testing.assert_allclose(rows[-1, 0], START + 0.01, atol=1e-6)
 
 
 def test_an_arm_follows_it_and_comes_back_to_it(robot):
-    flight = ss.Flight(robot, START, AT_REST, START + 1.0)
+    flight = Flight(robot, START, AT_REST, START + 1.0)
     q, v = START.copy(), AT_REST.copy()
     np.testing.assert_allclose(flight.acceleration(q, v, 0.001), 0.9 * robot.limits.acceleration)
     pull = flight.acceleration(q + 0.01 * np.eye(7)[0], v + 0.1 * np.eye(7)[1], 0.001) - flight.acceleration(
@@ -70,7 +72,7 @@ def test_an_arm_follows_it_and_comes_back_to_it(robot):
 
 
 def test_steps_may_be_of_any_length(robot):
-    one, many = (ss.Flight(robot, START, 0.1 * WAY, START + WAY) for _ in range(2))
+    one, many = (Flight(robot, START, 0.1 * WAY, START + WAY) for _ in range(2))
     one.advance(0.01)
     for _ in range(10):
         many.advance(0.001)
@@ -84,19 +86,19 @@ def test_steps_may_be_of_any_length(robot):
 
 
 def test_what_has_no_limits_is_flown_at_a_finite_acceleration():
-    free = ss.Robot.from_urdf(ss.planar_arm(1), acceleration_limits=np.inf)
+    free = ss.Robot.from_urdf(planar_arm(1), acceleration_limits=np.inf)
     assert np.isinf(free.limits.acceleration).all()
-    flight = ss.Flight(free, np.zeros(1), np.zeros(1), np.ones(1))
+    flight = Flight(free, np.zeros(1), np.zeros(1), np.ones(1))
     np.testing.assert_allclose(flight.acceleration(np.zeros(1), np.zeros(1), 0.001), 90.0)
 
 
 def test_bad_input_is_named(robot):
     with pytest.raises(ValueError, match=r"refuge has shape \(3,\), expected \(7,\)"):
-        ss.Flight(robot, START, START, np.zeros(3))
+        Flight(robot, START, START, np.zeros(3))
     with pytest.raises(ValueError, match=r"q\[0\] is nan, must be a finite number"):
-        ss.Flight(robot, START * np.nan, START, START)
+        Flight(robot, START * np.nan, START, START)
     for period in (0.0, np.nan):
         with pytest.raises(ValueError, match=r"period is .* s, must be positive and finite"):
-            ss.Flight(robot, START, START, START).acceleration(START, START, period)
+            Flight(robot, START, START, START).acceleration(START, START, period)
         with pytest.raises(ValueError, match=r"period is .* s, must be positive and finite"):
-            ss.Flight(robot, START, START, START).advance(period)
+            Flight(robot, START, START, START).advance(period)

@@ -4,6 +4,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import GeometricSystem, StepStatus
 
 
 def pose_goal(robot: ss.Robot) -> ss.PoseGoal:
@@ -11,8 +12,8 @@ def pose_goal(robot: ss.Robot) -> ss.PoseGoal:
     return ss.PoseGoal(robot, frame, robot.pose(robot.neutral, frame))
 
 
-def status(robot: ss.Robot, goal: ss.PoseGoal) -> ss.StepStatus:
-    system = ss.GeometricSystem([], robot=robot)
+def status(robot: ss.Robot, goal: ss.PoseGoal) -> StepStatus:
+    system = GeometricSystem([], robot=robot)
     q = robot.neutral
     step = system.acceleration(q, 0 * q, goal, ss.Obstacles.none())
     motion = thesis.rollout(system, q, 0 * q, goal, ss.Obstacles.none(), steps=2)
@@ -25,10 +26,10 @@ def test_another_robot_with_as_many_joints_is_an_invalid_goal(name, other):
     one, two = ss.Robot.named(name), ss.Robot.named(other)
     assert one.num_coordinates == two.num_coordinates
     assert len(one.joints) == len(two.joints)
-    assert status(one, pose_goal(two)) == ss.StepStatus.invalid_goal
-    assert status(two, pose_goal(one)) == ss.StepStatus.invalid_goal
+    assert status(one, pose_goal(two)) == StepStatus.invalid_goal
+    assert status(two, pose_goal(one)) == StepStatus.invalid_goal
 
 
 def test_the_same_robot_made_again_is_the_same():
     one, again = ss.Robot.named("ur5"), ss.Robot.named("ur5")
-    assert status(again, pose_goal(one)) == ss.StepStatus.ok
+    assert status(again, pose_goal(one)) == StepStatus.ok

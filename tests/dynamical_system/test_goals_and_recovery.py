@@ -5,6 +5,15 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.controller import MotionState
+from sidestep.system import (
+    ClearanceBarrier,
+    CoordinateKind,
+    GeometricSystem,
+    JointLimitBarrier,
+    StepStatus,
+    is_fallback,
+)
 
 
 @pytest.fixture(scope="module")
@@ -13,17 +22,17 @@ def robot() -> ss.Robot:
 
 
 @pytest.fixture(scope="module")
-def system(robot: ss.Robot) -> ss.GeometricSystem:
+def system(robot: ss.Robot) -> GeometricSystem:
     """Balls of 8 cm around the origins of four links."""
     links = ["fr3_link4", "fr3_link5", "fr3_link6", "fr3_link7"]
     covariances = [0.08**2 * np.eye(3)] * 4
     body = ss.Body(
         links=links, weights=np.ones(4), means=np.zeros((4, 3)), covariances=covariances, levels=np.ones(4)
     )
-    return ss.GeometricSystem([ss.ClearanceBarrier(robot, body), ss.JointLimitBarrier(robot)])
+    return GeometricSystem([ClearanceBarrier(robot, body), JointLimitBarrier(robot)])
 
 
-def test_a_goal_as_an_array_is_a_joint_goal(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+def test_a_goal_as_an_array_is_a_joint_goal(robot: ss.Robot, system: GeometricSystem) -> None:
     q, v, free = robot.neutral, np.full(7, 0.1), ss.Obstacles.none()
     plain = system.acceleration(q, v, q + 0.1, free)
     goal = system.acceleration(q, v, ss.JointGoal(q + 0.1), free)
@@ -34,7 +43,7 @@ def test_a_goal_as_an_array_is_a_joint_goal(robot: ss.Robot, system: ss.Geometri
 
 
 def test_the_pull_of_a_pose_is_the_gradient_of_its_potential(
-    robot: ss.Robot, system: ss.GeometricSystem
+    robot: ss.Robot, system: GeometricSystem
 ) -> None:
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -50,7 +59,7 @@ def test_the_pull_of_a_pose_is_the_gradient_of_its_potential(
             np.testing.assert_allclose(step.goal_gradient, slopes, atol=1e-7)  # rounding of U over the step
 
 
-def test_a_bad_pose_is_named(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+def test_a_bad_pose_is_named(robot: ss.Robot, system: GeometricSystem) -> None:
     with pytest.raises(ValueError, match="fr3_hand"):  # lists the known ones
         ss.PoseGoal(robot, "gripper", np.eye(4))
     with pytest.raises(
@@ -62,34 +71,34 @@ def test_a_bad_pose_is_named(robot: ss.Robot, system: ss.GeometricSystem) -> Non
         ss.PoseGoal(robot, "fr3_hand", 2.0 * np.eye(4))
     q, free = robot.neutral, ss.Obstacles.none()
     lost = ss.PoseGoal(robot, "fr3_hand", np.full((4, 4), np.nan))
-    assert system.acceleration(q, np.zeros(7), lost, free).status == ss.StepStatus.invalid_goal
+    assert system.acceleration(q, np.zeros(7), lost, free).status == StepStatus.invalid_goal
     far = ss.PoseGoal(robot, "fr3_hand", [3.0, 0.0, 0.0], position_only=True)
-    assert system.acceleration(q, np.zeros(7), far, free).status == ss.StepStatus.goal_out_of_reach
+    assert system.acceleration(q, np.zeros(7), far, free).status == StepStatus.goal_out_of_reach
 
 
-def test_an_arm_found_inside_moves_out_and_says_so(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+def test_an_arm_found_inside_moves_out_and_says_so(robot: ss.Robot, system: GeometricSystem) -> None:
     q = robot.neutral
     # Not link5 or link6, whose origins coincide: rounding tells which of them is nearer.
     beside = robot.pose(q, "fr3_link7")[:3, 3] + [0.0, 0.09, 0.0]
     ball = ss.Obstacles([beside], 0.04)  # 3 cm deep
     step = system.acceleration(q, np.zeros(7), q, ball)
-    assert step.status == ss.StepStatus.inside_barrier
-    assert not ss.is_fallback(step.status)
-    assert step.diagnosis.state == ss.MotionState.inside_barrier
-    assert step.diagnosis.kind == ss.CoordinateKind.obstacle
+    assert step.status == StepStatus.inside_barrier
+    assert not is_fallback(step.status)
+    assert step.diagnosis.state == MotionState.inside_barrier
+    assert step.diagnosis.kind == CoordinateKind.obstacle
     assert (step.diagnosis.name, step.diagnosis.point) == ("fr3_link7", 0)
     assert step.diagnosis.clearance == pytest.approx(-0.03)
     assert str(step.diagnosis) == (
         "link fr3_link7 is inside the barrier of obstacle point 0, 30 mm deep, and moves out"
     )
     motion = thesis.rollout(system, q, np.zeros(7), q, ball, steps=5000)
-    assert motion.statuses[-1] == ss.StepStatus.ok
+    assert motion.statuses[-1] == StepStatus.ok
     # the push asks for 2 m/s^2 along h, and the rebound for about 1 rad/s
     assert np.linalg.norm(motion.acceleration, axis=1).max() < 40.0
     assert np.linalg.norm(motion.v, axis=1).max() < 3.0
 
 
-def test_a_blocked_goal_has_a_clearance_below_the_floor(robot: ss.Robot, system: ss.GeometricSystem) -> None:
+def test_a_blocked_goal_has_a_clearance_below_the_floor(robot: ss.Robot, system: GeometricSystem) -> None:
     q = robot.neutral
     on_it = ss.Obstacles([robot.pose(q, "fr3_link6")[:3, 3] + [0.0, 0.1, 0.0]], 0.03)
     assert system.goal_clearance(q, on_it) == pytest.approx(-0.01, abs=2e-3)  # another link may be nearer

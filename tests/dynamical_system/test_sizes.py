@@ -6,11 +6,15 @@ import pytest
 import sidestep as ss
 from sidestep import thesis
 from sidestep._core import QuadraticProgram
+from sidestep.control import SafetySettings
+from sidestep.controller import controller_settings_fields
+from sidestep.planning import PlannerSettings
+from sidestep.system import GeometricSystem
 
 
 @pytest.fixture(scope="module")
-def system() -> ss.GeometricSystem:
-    return ss.GeometricSystem([], robot=ss.Robot.named("planar2"))
+def system() -> GeometricSystem:
+    return GeometricSystem([], robot=ss.Robot.named("planar2"))
 
 
 Q = np.zeros((3, 2))
@@ -40,12 +44,12 @@ def test_threads_are_bounded(system, threads):
 
 def test_rows_nodes_and_programs_have_an_upper_bound():
     with pytest.raises(ValueError, match="max_rows is 100000, allowed: 1 to 256"):
-        ss.SafetySettings(max_rows=100_000)
-    assert ss.SafetySettings(max_rows=256).max_rows == 256
+        SafetySettings(max_rows=100_000)
+    assert SafetySettings(max_rows=256).max_rows == 256
     with pytest.raises(ValueError, match="max_nodes is 2147483647, allowed: 2 to 1000000"):
-        ss.PlannerSettings(max_nodes=2**31 - 1)
-    stated = {field["name"]: field["most"] for field in ss.controller_settings_fields()}
+        PlannerSettings(max_nodes=2**31 - 1)
+    stated = {field["name"]: field["most"] for field in controller_settings_fields()}
     nodes = int(stated["planner.search.max_nodes"])  # what the controller states, its planner takes
-    assert ss.PlannerSettings(max_nodes=nodes).max_nodes == nodes
+    assert PlannerSettings(max_nodes=nodes).max_nodes == nodes
     with pytest.raises(ValueError, match="a size is 100000, must be at most 4096"):
         QuadraticProgram(100_000)

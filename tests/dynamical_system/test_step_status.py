@@ -5,14 +5,15 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import GeometricSystem, StepStatus, is_fallback
 from support.random_scene import scene
 
 RATE = 10.0  # [1/s] of the fallback
 
 
-def system_of(switch: thesis.Unswitched | None = None) -> ss.GeometricSystem:
+def system_of(switch: thesis.Unswitched | None = None) -> GeometricSystem:
     case = scene("fr3")
-    return ss.GeometricSystem([thesis.CollisionDensity(case.robot, case.body)], switch=switch)
+    return GeometricSystem([thesis.CollisionDensity(case.robot, case.body)], switch=switch)
 
 
 def arguments() -> dict[str, np.ndarray | ss.Obstacles]:
@@ -35,15 +36,15 @@ def test_states_that_are_not_finite_stop_the_arm(name: str, bad: float) -> None:
         value[i] = bad
         changed = given | {name: value}
         step = system.acceleration(**changed)
-        assert step.status == ss.StepStatus.invalid_state
-        assert ss.is_fallback(step.status)
+        assert step.status == StepStatus.invalid_state
+        assert is_fallback(step.status)
         np.testing.assert_array_equal(step.acceleration, stop(changed["v"]))
 
 
 def without_pull(given: dict[str, np.ndarray | ss.Obstacles]) -> np.ndarray:
     """What barriers and damping do when the arm is already at its goal."""
     step = system_of().acceleration(**(given | {"goal": given["q"]}))
-    assert step.status == ss.StepStatus.ok
+    assert step.status == StepStatus.ok
     return step.acceleration
 
 
@@ -55,8 +56,8 @@ def test_a_goal_that_is_not_finite_leaves_everything_but_its_pull(bad: float) ->
         goal = given["goal"].copy()
         goal[i] = bad
         step = system.acceleration(**(given | {"goal": goal}))
-        assert step.status == ss.StepStatus.invalid_goal
-        assert not ss.is_fallback(step.status)
+        assert step.status == StepStatus.invalid_goal
+        assert not is_fallback(step.status)
         np.testing.assert_array_equal(step.acceleration, expected)
 
 
@@ -68,12 +69,12 @@ def test_a_goal_outside_the_limits_leaves_everything_but_its_pull() -> None:
         for bound, outwards in ((limits.lower[i], -np.inf), (limits.upper[i], np.inf)):
             goal = given["goal"].copy()
             goal[i] = bound
-            assert system.acceleration(**(given | {"goal": goal})).status == ss.StepStatus.ok
+            assert system.acceleration(**(given | {"goal": goal})).status == StepStatus.ok
             goal[i] = np.nextafter(bound, outwards)  # by rounding: as good as at the limit
-            assert system.acceleration(**(given | {"goal": goal})).status == ss.StepStatus.ok
+            assert system.acceleration(**(given | {"goal": goal})).status == StepStatus.ok
             goal[i] = bound + np.copysign(2e-9, outwards)
             step = system.acceleration(**(given | {"goal": goal}))
-            assert step.status == ss.StepStatus.goal_outside_limits
+            assert step.status == StepStatus.goal_outside_limits
             np.testing.assert_array_equal(step.acceleration, expected)
 
 
@@ -90,12 +91,12 @@ def test_the_stop_keeps_to_the_acceleration_limits() -> None:
 def test_a_state_outside_the_limits_is_reported_and_computed() -> None:
     system, given = system_of(), arguments()
     inside = system.acceleration(**given)
-    assert inside.status == ss.StepStatus.ok
+    assert inside.status == StepStatus.ok
     given["q"] = given["q"].copy()
     given["q"][3] = scene("fr3").robot.limits.upper[3] + 0.01
     step = system.acceleration(**given)
-    assert step.status == ss.StepStatus.outside_limits
-    assert not ss.is_fallback(step.status)
+    assert step.status == StepStatus.outside_limits
+    assert not is_fallback(step.status)
     np.testing.assert_array_equal(step.acceleration, step.harmonic + step.geodesic)
     assert step.harmonic[3] < 0.0  # pulled back towards the goal
 
@@ -104,7 +105,7 @@ def test_overflow_stops_the_arm() -> None:
     system, given = system_of(), arguments()
     given["v"] = np.full(7, 1e200)  # finite, but its square is not
     step = system.acceleration(**given)
-    assert step.status == ss.StepStatus.not_finite
+    assert step.status == StepStatus.not_finite
     np.testing.assert_array_equal(step.acceleration, np.full(7, -10.0))
 
 
@@ -112,7 +113,7 @@ def test_a_step_after_a_fallback_is_as_if_nothing_had_happened() -> None:
     system, given = system_of(), arguments()
     before = system.acceleration(**given)
     for bad in ({"q": np.full(7, np.nan)}, {"v": np.full(7, 1e200)}):
-        assert ss.is_fallback(system.acceleration(**(given | bad)).status)
+        assert is_fallback(system.acceleration(**(given | bad)).status)
     np.testing.assert_array_equal(system.acceleration(**given).acceleration, before.acceleration)
 
 

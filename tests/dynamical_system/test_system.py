@@ -7,6 +7,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import Embedding, GeometricSystem, StepStatus
 from support.random_scene import ROBOTS, Scene, State, scene
 
 STIFFNESS, DAMPING = 2.0, 1.2
@@ -23,7 +24,7 @@ def solve(jacobian: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def parts(
-    case: Scene, state: State, embeddings: list[ss.Embedding], form: str
+    case: Scene, state: State, embeddings: list[Embedding], form: str
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """h, g and psi."""
     evaluations = [e.evaluate(state.q, state.v, state.obstacles) for e in embeddings]
@@ -35,7 +36,7 @@ def parts(
     return h, thesis.geodesic_acceleration(J, c), sum(float(e.values.sum()) for e in evaluations)
 
 
-def embeddings_of(case: Scene) -> list[ss.Embedding]:
+def embeddings_of(case: Scene) -> list[Embedding]:
     return [thesis.CollisionDensity(case.robot, case.body), thesis.JointLimitPotential(case.robot, slope=4.0)]
 
 
@@ -82,7 +83,7 @@ def test_every_mode_and_damping_form(name: str, kind: str) -> None:
     threshold = float(np.median([state.psi for state in case.states]))
     switch = make(kind, threshold, nv)
     systems = {
-        form: ss.GeometricSystem(
+        form: GeometricSystem(
             embeddings, stiffness=STIFFNESS, damping=DAMPING, damping_form=form, switch=switch
         )
         for form in ("plain", "metric")
@@ -105,7 +106,7 @@ def test_every_mode_and_damping_form(name: str, kind: str) -> None:
                     weights = sigmoid(12.0 * (distances(case, state) - np.linspace(0.05, 0.4, nv)))
             a = h + g if kind == "unswitched" else weights * h + (1.0 - weights) * g
             scale = max(1.0, np.abs(h).max(), np.abs(g).max())
-            assert step.status == ss.StepStatus.ok
+            assert step.status == StepStatus.ok
             np.testing.assert_allclose(step.harmonic, h, rtol=0, atol=EXACT * scale)
             np.testing.assert_allclose(step.geodesic, g, rtol=0, atol=EXACT * scale)
             np.testing.assert_allclose(step.switch, weights, rtol=0, atol=EXACT)
@@ -125,7 +126,7 @@ def test_a_binary_switch_is_harmonic_up_to_and_including_its_threshold() -> None
     density = thesis.CollisionDensity(case.robot, case.body)
     psi = float(density.evaluate(state.q, state.v, state.obstacles).values[0])
     for threshold, weight in ((psi, 1.0), (np.nextafter(psi, 0.0), 0.0)):
-        system = ss.GeometricSystem([density], switch=thesis.BinarySwitch(threshold))
+        system = GeometricSystem([density], switch=thesis.BinarySwitch(threshold))
         step = system.acceleration(state.q, state.v, case.robot.neutral, state.obstacles)
         assert (step.switch == weight).all()
 
@@ -135,7 +136,7 @@ def test_flat_space_is_a_damped_spring() -> None:
     rng = np.random.default_rng(0)
     K, D = (a @ a.T for a in rng.normal(size=(2, 7, 7)))
     for form in ("plain", "metric"):
-        system = ss.GeometricSystem([], robot=robot, stiffness=K, damping=D, damping_form=form)
+        system = GeometricSystem([], robot=robot, stiffness=K, damping=D, damping_form=form)
         assert system.num_embedding_coordinates == 0
         for _ in range(50):
             q, v = robot.random_configuration(rng), rng.normal(size=7)
@@ -150,7 +151,7 @@ def test_flat_space_is_a_damped_spring() -> None:
 
 def test_gains_are_scalars_diagonals_or_matrices() -> None:
     robot = ss.Robot.named("planar3")
-    system = ss.GeometricSystem([], robot=robot, stiffness=2.0, damping=[1.0, 2.0, 3.0])
+    system = GeometricSystem([], robot=robot, stiffness=2.0, damping=[1.0, 2.0, 3.0])
     assert np.array_equal(system.stiffness, 2.0 * np.eye(3))
     assert np.array_equal(system.damping, np.diag([1.0, 2.0, 3.0]))
     assert system.damping_form == thesis.DampingForm.plain
@@ -160,7 +161,7 @@ def test_gains_are_scalars_diagonals_or_matrices() -> None:
 def test_no_geodesic_term_at_rest() -> None:
     for name in ("fr3", "ur5", "planar2"):
         case = scene(name)
-        system = ss.GeometricSystem(embeddings_of(case), switch=thesis.GeodesicOnly())
+        system = GeometricSystem(embeddings_of(case), switch=thesis.GeodesicOnly())
         for state in case.states:
             rest = np.zeros_like(state.q)
             step = system.acceleration(state.q, rest, case.robot.neutral, state.at_rest())
@@ -172,7 +173,7 @@ def test_no_geodesic_term_at_rest() -> None:
 
 def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
     case = scene("fr3")
-    system = ss.GeometricSystem(embeddings_of(case), switch=thesis.GeodesicOnly())
+    system = GeometricSystem(embeddings_of(case), switch=thesis.GeodesicOnly())
     for state in case.states:
         once, back, twice = (
             system.acceleration(state.q, f * state.v, case.robot.neutral, state.at_rest()).acceleration
@@ -222,7 +223,7 @@ def test_the_geodesic_term_is_quadratic_in_velocity() -> None:
 def test_a_bad_setting_is_named(settings: Callable[[], dict], message: str) -> None:
     case = scene("planar2")
     with pytest.raises(ValueError, match=message):
-        ss.GeometricSystem([thesis.CollisionDensity(case.robot, case.body)], **settings())
+        GeometricSystem([thesis.CollisionDensity(case.robot, case.body)], **settings())
 
 
 def test_embeddings_must_fit_the_system() -> None:
@@ -230,10 +231,10 @@ def test_embeddings_must_fit_the_system() -> None:
     limits = thesis.JointLimitPotential(case.robot)
     other = thesis.JointLimitPotential(ss.Robot.named("planar3"))
     with pytest.raises(ValueError, match="an embedding was made for robot 'planar3', not for 'planar2'"):
-        ss.GeometricSystem([limits, other])
+        GeometricSystem([limits, other])
     with pytest.raises(ValueError, match="a distance switch needs an embedding with a body, such as"):
-        ss.GeometricSystem([limits], switch=thesis.DistanceSwitch([0.1, 0.1], 1.0))
+        GeometricSystem([limits], switch=thesis.DistanceSwitch([0.1, 0.1], 1.0))
     with pytest.raises(ValueError, match="give either embeddings, which know their robot, or an empty list"):
-        ss.GeometricSystem([])
+        GeometricSystem([])
     with pytest.raises(ValueError, match="give either embeddings, which know their robot, or an empty list"):
-        ss.GeometricSystem([limits], robot=case.robot)
+        GeometricSystem([limits], robot=case.robot)

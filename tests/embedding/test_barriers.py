@@ -9,7 +9,20 @@ from scipy.spatial.transform import Rotation
 
 import sidestep as ss
 from sidestep import _core, thesis
+from sidestep.controller import BarrierSettings
 from sidestep.distance import SelfCollision
+from sidestep.robot import planar_arm
+from sidestep.system import (
+    ClearanceBarrier,
+    ClearanceTable,
+    ClearanceTableBarrier,
+    CoordinateKind,
+    Embedding,
+    GeometricSystem,
+    JointLimitBarrier,
+    PlaneBarrier,
+    SelfCollisionBarrier,
+)
 from support.finite_differences import derivative, second_derivative
 from support.random_scene import random_body
 
@@ -41,28 +54,28 @@ def pairs_of(robot: ss.Robot) -> list[tuple[str, str]]:
     return [(first[joints[0]], first[joints[-1]]), (first[joints[1]], first[joints[-1]])]
 
 
-def barrier_cases() -> dict[str, Callable[[ss.Robot, ss.Body], ss.Embedding]]:
+def barrier_cases() -> dict[str, Callable[[ss.Robot, ss.Body], Embedding]]:
     """Wide and soft, so that most states are within reach and differences resolve them."""
     wide = {"activation": 0.8, "temperature": 0.02, "floor": 0.02}
     return {
         # Points that come into a narrower window are seen by second differences.
-        "obstacles": lambda robot, body: ss.ClearanceBarrier(robot, body, reach=0.8, window=24.0, **wide),
-        "self": lambda robot, body: ss.SelfCollisionBarrier(robot, body, pairs_of(robot), **wide),
-        "plane": lambda robot, body: ss.PlaneBarrier(
+        "obstacles": lambda robot, body: ClearanceBarrier(robot, body, reach=0.8, window=24.0, **wide),
+        "self": lambda robot, body: SelfCollisionBarrier(robot, body, pairs_of(robot), **wide),
+        "plane": lambda robot, body: PlaneBarrier(
             robot, body, point=[0, 0, -0.4], normal=[0.1, -0.2, 1.0], links=[pairs_of(robot)[0][1]], **wide
         ),
-        "limits": lambda robot, body: ss.JointLimitBarrier(robot, activation=2.0, floor=0.02),
-        "tables": lambda robot, body: ss.ClearanceTableBarrier(
+        "limits": lambda robot, body: JointLimitBarrier(robot, activation=2.0, floor=0.02),
+        "tables": lambda robot, body: ClearanceTableBarrier(
             robot, [table_of(robot)], activation=0.8, floor=0.02
         ),
     }
 
 
-def table_of(robot: ss.Robot) -> ss.ClearanceTable:
+def table_of(robot: ss.Robot) -> ClearanceTable:
     """Of random control points, one axis of which is one turn."""
     control = np.random.default_rng(2).uniform(0.15, 1.2, (12, 4))
     turn = 2.0 * np.pi / 4
-    return ss.ClearanceTable(
+    return ClearanceTable(
         *pairs_of(robot)[1],
         coordinates=(2, 1),
         begin=(-8.0, 0.1),
@@ -128,7 +141,7 @@ def test_clearances_above_a_dense_wall_are_the_mean_over_all_points() -> None:
     rng = np.random.default_rng(4)
     points = np.column_stack([rng.uniform(-0.7, 0.7, (60_000, 2)), rng.normal(0.1, 0.001, 60_000)])
     window, temperature, activation = 12.0, 0.002, 0.1
-    barrier = ss.ClearanceBarrier(robot, body, activation=activation, temperature=temperature)
+    barrier = ClearanceBarrier(robot, body, activation=activation, temperature=temperature)
     obstacles = ss.Obstacles(points)
     compared = crowded = 0
     for _ in range(20):
@@ -156,7 +169,7 @@ def test_clearances_above_a_dense_wall_are_the_mean_over_all_points() -> None:
 def test_a_point_beyond_single_precision_hides_none_that_is_near() -> None:
     """Cameras mark what they do not see by the largest number; squares of it overflow in bounds of its node."""
     robot = ss.Robot.named("panda")
-    barrier = ss.ClearanceBarrier(robot, covering(robot, 0), activation=0.1)
+    barrier = ClearanceBarrier(robot, covering(robot, 0), activation=0.1)
     rng = np.random.default_rng(6)
     wall = np.column_stack([rng.uniform(-0.7, 0.7, (2000, 2)), np.full(2000, 0.1)])
     largest = float(np.finfo(np.float32).max)
@@ -180,8 +193,8 @@ def test_points_beyond_the_window_hardly_matter(window: float) -> None:
     temperature, num_points = 0.002, 3000
     points = np.column_stack([rng.uniform(-0.8, 0.8, (num_points, 2)), np.full(num_points, 0.35)])
     obstacles = ss.Obstacles(points)
-    narrow = ss.ClearanceBarrier(robot, body, window=window)
-    wide = ss.ClearanceBarrier(robot, body, window=30.0)
+    narrow = ClearanceBarrier(robot, body, window=window)
+    wide = ClearanceBarrier(robot, body, window=30.0)
     seen, differs = 0, 0.0
     for _ in range(20):
         q, v = robot.random_configuration(rng), rng.normal(size=robot.num_coordinates)
@@ -210,7 +223,7 @@ def test_clearance_is_a_lower_bound_exact_on_the_axes() -> None:
         covariances=[R @ np.diag(semi_axes**2) @ R.T],
         levels=[1.0],
     )
-    barrier = ss.ClearanceBarrier(robot, body, activation=0.2, reach=0.5)
+    barrier = ClearanceBarrier(robot, body, activation=0.2, reach=0.5)
     q = np.zeros(2)
     X = robot.pose(q, link)
 
@@ -240,7 +253,7 @@ def test_self_clearance_is_a_lower_bound_of_the_distance() -> None:
     robot = ss.Robot.named("planar3")
     body = covering(robot, 3)
     pair = pairs_of(robot)[0]
-    barrier = ss.SelfCollisionBarrier(robot, body, [pair], activation=2.0, temperature=1e-5)
+    barrier = SelfCollisionBarrier(robot, body, [pair], activation=2.0, temperature=1e-5)
     directions = trimesh.creation.icosphere(subdivisions=3).vertices
 
     def surface(q: np.ndarray, link: str) -> np.ndarray:
@@ -272,7 +285,7 @@ def wall(spacing: float) -> ss.Obstacles:
 
 
 def test_a_wall_sampled_finely_moves_the_arm_as_one_sampled_coarsely() -> None:
-    robot = ss.Robot.from_urdf(ss.planar_arm(2, link_length=0.35))
+    robot = ss.Robot.from_urdf(planar_arm(2, link_length=0.35))
     links = [frame.name for frame in robot.frames if frame.joint >= 0]
     body = _core.Body(
         links=links,
@@ -281,8 +294,8 @@ def test_a_wall_sampled_finely_moves_the_arm_as_one_sampled_coarsely() -> None:
         covariances=np.tile(np.diag([0.2, 0.04, 0.04]) ** 2, (len(links), 1, 1)),
         levels=np.ones(len(links)),
     )
-    system = ss.GeometricSystem(
-        [ss.ClearanceBarrier(robot, body, activation=0.2, strength=0.05)], stiffness=2.0, damping=3.0
+    system = GeometricSystem(
+        [ClearanceBarrier(robot, body, activation=0.2, strength=0.05)], stiffness=2.0, damping=3.0
     )
     start, goal = np.array([-1.3, 0.2]), np.array([1.3, -0.2])
     motions = [
@@ -300,21 +313,21 @@ def test_a_wall_sampled_finely_moves_the_arm_as_one_sampled_coarsely() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda r, b: ss.ClearanceBarrier(r, ss.Body.fit(r, components=1)), "the body is not calibrated"),
-        (lambda r, b: ss.ClearanceBarrier(r, b, activation=0.0), "activation is 0.0*, must be positive"),
-        (lambda r, b: ss.ClearanceBarrier(r, b, strength=-1.0), "strength is -1.0*, must be positive"),
-        (lambda r, b: ss.ClearanceBarrier(r, b, power=1.0), "power is 1.0*, must be at least 2"),
-        (lambda r, b: ss.ClearanceBarrier(r, b, floor=0.2), "floor is 0.2.*, must be positive and below"),
-        (lambda r, b: ss.ClearanceBarrier(r, b, temperature=np.nan), "temperature is nan"),
-        (lambda r, b: ss.ClearanceBarrier(r, b, window=0.5), "window is 0.5.* temperatures, must be from 1"),
-        (lambda r, b: ss.SelfCollisionBarrier(r, b, []), "there is no pair of links"),
-        (lambda r, b: ss.SelfCollisionBarrier(r, b, [("link1", "link9")]), "has no link 'link9'"),
-        (lambda r, b: ss.SelfCollisionBarrier(r, b, [("link1", "link1")]), "rigidly connected"),
-        (lambda r, b: ss.PlaneBarrier(r, b, point=[0, 0, 0], normal=[0, 0, 0], links=["link1"]), "not zero"),
-        (lambda r, b: ss.PlaneBarrier(r, b, point=[0, 0, 0], normal=[0, 0, 1], links=[]), "there is no link"),
+        (lambda r, b: ClearanceBarrier(r, ss.Body.fit(r, components=1)), "the body is not calibrated"),
+        (lambda r, b: ClearanceBarrier(r, b, activation=0.0), "activation is 0.0*, must be positive"),
+        (lambda r, b: ClearanceBarrier(r, b, strength=-1.0), "strength is -1.0*, must be positive"),
+        (lambda r, b: ClearanceBarrier(r, b, power=1.0), "power is 1.0*, must be at least 2"),
+        (lambda r, b: ClearanceBarrier(r, b, floor=0.2), "floor is 0.2.*, must be positive and below"),
+        (lambda r, b: ClearanceBarrier(r, b, temperature=np.nan), "temperature is nan"),
+        (lambda r, b: ClearanceBarrier(r, b, window=0.5), "window is 0.5.* temperatures, must be from 1"),
+        (lambda r, b: SelfCollisionBarrier(r, b, []), "there is no pair of links"),
+        (lambda r, b: SelfCollisionBarrier(r, b, [("link1", "link9")]), "has no link 'link9'"),
+        (lambda r, b: SelfCollisionBarrier(r, b, [("link1", "link1")]), "rigidly connected"),
+        (lambda r, b: PlaneBarrier(r, b, point=[0, 0, 0], normal=[0, 0, 0], links=["link1"]), "not zero"),
+        (lambda r, b: PlaneBarrier(r, b, point=[0, 0, 0], normal=[0, 0, 1], links=[]), "there is no link"),
     ],
 )
-def test_what_is_wrong_is_named(make: Callable[[ss.Robot, ss.Body], ss.Embedding], message: str) -> None:
+def test_what_is_wrong_is_named(make: Callable[[ss.Robot, ss.Body], Embedding], message: str) -> None:
     robot = ss.Robot.named("planar2")
     with pytest.raises(ValueError, match=message):
         make(robot, covering(robot, 0))
@@ -324,7 +337,7 @@ def test_what_is_wrong_is_named(make: Callable[[ss.Robot, ss.Body], ss.Embedding
 def test_lowered_barriers_leave_the_goal_flat_and_keep_what_is_far(name: str) -> None:
     robot = ss.Robot.named(name)
     rng = np.random.default_rng(1)
-    wide = ss.BarrierSettings(activation=0.5, limit_activation=0.5, floor=0.01)
+    wide = BarrierSettings(activation=0.5, limit_activation=0.5, floor=0.01)
     arm = _core.Arm(
         robot=robot,
         body=covering(robot, 1),
@@ -353,7 +366,7 @@ def test_lowered_barriers_leave_the_goal_flat_and_keep_what_is_far(name: str) ->
     np.testing.assert_array_equal(after.values[free], 0.0)
     # What is seen keeps its safety margin, of what is known no more is kept than half the activation distance.
     kinds = np.array([label.kind for label in controller.labels])
-    seen, joints = kinds == ss.CoordinateKind.obstacle, kinds == ss.CoordinateKind.joint_limit
+    seen, joints = kinds == CoordinateKind.obstacle, kinds == CoordinateKind.joint_limit
     np.testing.assert_array_equal(margins[seen], np.inf)
     np.testing.assert_array_equal(after.clearances.margins[seen], np.inf)
     np.testing.assert_allclose(after.clearances.margins[joints], 0.5 * activations[joints], rtol=1e-12)

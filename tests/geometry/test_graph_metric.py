@@ -7,6 +7,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import GeometricSystem
 from support.finite_differences import derivative
 from support.random_scene import ROBOTS, State, scene
 
@@ -48,7 +49,7 @@ def test_the_system_uses_this_geodesic_term(name: str) -> None:
     density, limits = thesis.CollisionDensity(case.robot, case.body), limits_of(case.robot)
     goal = case.robot.neutral
     for embeddings in ([density], [density, limits], [thesis.Sum([density, limits])]):
-        system = ss.GeometricSystem(embeddings, switch=thesis.GeodesicOnly())
+        system = GeometricSystem(embeddings, switch=thesis.GeodesicOnly())
         for state in case.states:
             step = system.acceleration(state.q, state.v, goal, state.obstacles)
             parts = [e.evaluate(state.q, state.v, state.obstacles) for e in embeddings]

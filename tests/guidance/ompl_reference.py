@@ -13,9 +13,10 @@ from ompl import base, geometric, util
 
 import sidestep as ss
 from sidestep import _core
+from sidestep.planning import PathPlanner
 
 
-def solved(planner: ss.PathPlanner, robot: ss.Robot, problem: dict, margin: float, seconds: float) -> bool:
+def solved(planner: PathPlanner, robot: ss.Robot, problem: dict, margin: float, seconds: float) -> bool:
     nv = robot.num_coordinates
     obstacles = ss.Obstacles(problem["points"], problem["radii"])
     space = base.RealVectorStateSpace(nv)
@@ -51,7 +52,7 @@ def main() -> None:
     name, body, problems, margin, seconds = pickle.load(sys.stdin.buffer)
     util.setLogLevel(util.LOG_NONE)
     robot = ss.Robot.named(name)
-    planner = ss.PathPlanner(robot, _core.Body(**body))
+    planner = PathPlanner(robot, _core.Body(**body))
     print(json.dumps([solved(planner, robot, problem, margin, seconds) for problem in problems]))
 
 

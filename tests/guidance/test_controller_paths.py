@@ -7,6 +7,8 @@ import pytest
 
 import sidestep as ss
 from sidestep import _core
+from sidestep.controller import BarrierSettings, OnlinePlannerSettings
+from sidestep.planning import PlannerSettings, PlanStatus
 
 PERIOD = 0.005
 START, GOAL, REST = np.array([0.8, 0.0, 0.0]), np.array([-0.8, 0.0, 0.0]), np.zeros(3)
@@ -14,9 +16,9 @@ START, GOAL, REST = np.array([0.8, 0.0, 0.0]), np.array([-0.8, 0.0, 0.0]), np.ze
 WALL = ss.Obstacles(np.column_stack([np.linspace(1.0, 1.5, 12), np.zeros(12), np.zeros(12)]), 0.03)
 
 
-def planner(**search: float) -> ss.OnlinePlannerSettings:
-    settings = ss.OnlinePlannerSettings()
-    settings.search = ss.PlannerSettings(**search)
+def planner(**search: float) -> OnlinePlannerSettings:
+    settings = OnlinePlannerSettings()
+    settings.search = PlannerSettings(**search)
     return settings
 
 
@@ -35,7 +37,7 @@ def make(robot: ss.Robot, body: _core.Body):  # type: ignore[no-untyped-def]
 
     def controller(seen: ss.Obstacles, **settings: object) -> ss.Controller:
         usual = {"synchronous": True, "output": "acceleration", "period": PERIOD, "local_minimum": None}
-        barriers = ss.BarrierSettings(activation=0.06)
+        barriers = BarrierSettings(activation=0.06)
         made = ss.Controller(arm, ss.ControllerSettings(**usual | {"barriers": barriers} | settings))
         made.set_goal(GOAL)
         made.set_obstacles(seen)
@@ -56,7 +58,7 @@ def test_it_arrives_where_barriers_alone_are_stuck(make) -> None:  # type: ignor
     controller = make(WALL)
     motion = ss.integrate(controller, START, REST, steps=4000)
     assert motion.activities[-1] == ss.Activity.arrived
-    assert controller.plan.status == ss.PlanStatus.found
+    assert controller.plan.status == PlanStatus.found
 
 
 def test_a_blocked_goal_is_named_and_reached_when_it_clears(make) -> None:  # type: ignore[no-untyped-def]
@@ -72,7 +74,7 @@ def test_a_blocked_goal_is_named_and_reached_when_it_clears(make) -> None:  # ty
 def test_it_finds_the_way_in_its_thread(make) -> None:  # type: ignore[no-untyped-def]
     controller = make(WALL, synchronous=False)
     assert controller.step(START, REST).activity == ss.Activity.moving  # at once, by barriers alone
-    while controller.plan.status != ss.PlanStatus.found:  # however slow the machine is
+    while controller.plan.status != PlanStatus.found:  # however slow the machine is
         clock.sleep(0.001)
         controller.step(START, REST)
     assert controller.searches > 0

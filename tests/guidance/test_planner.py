@@ -14,6 +14,8 @@ import pytest
 import sidestep as ss
 from sidestep import _core
 from sidestep.arm.clearance_tables import clearance_tables
+from sidestep.planning import PathPlanner, PlannerSettings, PlanStatus
+from sidestep.system import ClearanceTable
 from support.planar_problems import BODY, balls, free_ends
 
 FLOOR = 0.005  # [m], the default
@@ -21,18 +23,18 @@ SLACK = 0.002  # [m], the default
 
 
 @pytest.fixture(scope="module")
-def planner(robot: ss.Robot, body: _core.Body) -> ss.PathPlanner:
-    return ss.PathPlanner(robot, body)
+def planner(robot: ss.Robot, body: _core.Body) -> PathPlanner:
+    return PathPlanner(robot, body)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 6, 8, 9, 10])  # of the others OMPL finds no path in 5 s either
 def test_a_path_is_free_everywhere_and_the_same_again(
-    robot: ss.Robot, planner: ss.PathPlanner, seed: int
+    robot: ss.Robot, planner: PathPlanner, seed: int
 ) -> None:
     obstacles = balls(seed, count=4)
     start, goal = free_ends(robot, planner, obstacles, seed)
     plan = planner.plan(start, goal, obstacles, seed=seed)
-    assert plan.status == ss.PlanStatus.found
+    assert plan.status == PlanStatus.found
     np.testing.assert_array_equal(plan.path[[0, -1]], [start, goal])
     share = np.linspace(0.0, 1.0, 300)[:, None]
     for a, b in zip(plan.path[:-1], plan.path[1:], strict=True):
@@ -43,24 +45,24 @@ def test_a_path_is_free_everywhere_and_the_same_again(
     assert plan.length >= np.linalg.norm(goal - start) - 1e-12  # rounding
 
 
-def test_ends_in_collision_are_named(robot: ss.Robot, planner: ss.PathPlanner) -> None:
+def test_ends_in_collision_are_named(robot: ss.Robot, planner: PathPlanner) -> None:
     goal, start = np.zeros(3), np.array([1.5, 0.0, 0.0])
     point = ss.Obstacles([[1.25, 0.0, 0.0]], 0.05)  # in the middle of link3 at the goal
     plan = planner.plan(start, goal, point)
-    assert plan.status == ss.PlanStatus.goal_in_collision
+    assert plan.status == PlanStatus.goal_in_collision
     assert (plan.obstruction.link, plan.obstruction.point) == ("link3", 0)
     # The centre of the ellipsoid: the shortest semi-axis and the radius of the point away from free, in single
     # precision.
     assert 0.1 - 1e-5 <= plan.obstruction.depth <= 0.27 + 0.05
     assert "link 'link3'" in str(plan.obstruction)
-    assert planner.plan(goal, start, point).status == ss.PlanStatus.start_in_collision
+    assert planner.plan(goal, start, point).status == PlanStatus.start_in_collision
     with pytest.raises(ValueError, match=r"goal\[1\] is nan"):
         planner.plan(start, [0.0, np.nan, 0.0], point)
     with pytest.raises(ValueError, match="margin"):
-        ss.PlannerSettings(margin=0.001, floor=0.002)
+        PlannerSettings(margin=0.001, floor=0.002)
 
 
-def test_an_edge_does_not_skip_a_thin_obstacle(planner: ss.PathPlanner) -> None:
+def test_an_edge_does_not_skip_a_thin_obstacle(planner: PathPlanner) -> None:
     a, b = np.array([1.5, 0.0, 0.0]), np.array([-1.5, 0.0, 0.0])
     needle = ss.Obstacles([[1.5, 0.0, 0.0]])  # a point at the end of the last link, halfway
     assert planner.is_free(a, needle, margin=0.0)
@@ -74,7 +76,7 @@ def test_an_edge_does_not_skip_a_thin_obstacle(planner: ss.PathPlanner) -> None:
     importlib.util.find_spec("ompl") is None, reason="OMPL is not installed (pip install ompl)"
 )
 def test_finds_a_path_wherever_ompl_does(robot: ss.Robot, body: _core.Body) -> None:
-    planner = ss.PathPlanner(robot, body)
+    planner = PathPlanner(robot, body)
     problems = []
     for seed in range(25):
         obstacles = balls(seed, count=8)
@@ -89,7 +91,7 @@ def test_finds_a_path_wherever_ompl_does(robot: ss.Robot, body: _core.Body) -> N
     by_ompl = json.loads(done.stdout.decode().strip().splitlines()[-1])
     ours = [
         planner.plan(item["start"], item["goal"], ss.Obstacles(item["points"], item["radii"])).status
-        == ss.PlanStatus.found
+        == PlanStatus.found
         for item in problems
     ]
     assert sum(by_ompl) >= 15  # so that the comparison says something
@@ -99,7 +101,7 @@ def test_finds_a_path_wherever_ompl_does(robot: ss.Robot, body: _core.Body) -> N
 
 def test_tables_tell_how_far_links_are_apart(robot: ss.Robot, body: _core.Body) -> None:
     tables = clearance_tables(robot).tables
-    planner = ss.PathPlanner(robot, body, tables=tables)
+    planner = PathPlanner(robot, body, tables=tables)
     nothing = ss.Obstacles.none()
     folded = np.array([0.3, 2.4, 2.4])
     found = planner.clearance(folded, nothing)
@@ -108,6 +110,6 @@ def test_tables_tell_how_far_links_are_apart(robot: ss.Robot, body: _core.Body) 
     assert not planner.is_free(folded, nothing, margin=found.clearance + 0.001)
     assert planner.is_free(folded, nothing, margin=found.clearance)
     square: dict[str, Any] = {"begin": (0.0, 0.0), "spacing": (1.0, 1.0), "periodic": (False, False)}
-    wrong = ss.ClearanceTable("link1", "no link", coordinates=(1, 2), control=np.zeros((4, 4)), **square)
+    wrong = ClearanceTable("link1", "no link", coordinates=(1, 2), control=np.zeros((4, 4)), **square)
     with pytest.raises(ValueError, match="no link"):
-        ss.PathPlanner(robot, body, tables=[wrong])
+        PathPlanner(robot, body, tables=[wrong])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.system import ClearanceBarrier, GeometricSystem
 
 
 def moving() -> ss.Obstacles:
@@ -48,7 +49,7 @@ def test_a_motion_that_overflows_leaves_the_arm_seeing():
         covariances=np.tile(np.diag([0.27, 0.05, 0.05]) ** 2, (2, 1, 1)),
         levels=[1, 1],
     )
-    system = ss.GeometricSystem([ss.ClearanceBarrier(robot, body, reach=1.0)])
+    system = GeometricSystem([ClearanceBarrier(robot, body, reach=1.0)])
     obstacles = ss.Obstacles([[0.9, 0.45, 0.0], [9.0, 0.0, 0.0]], 0.05, [[0, 0, 0], [1e307, 0, 0]])
     q = np.array([0.1, 0.2])
     seen = np.array(system.acceleration(q, 0 * q, q, obstacles).clearances.values)

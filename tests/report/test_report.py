@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sidestep import Obstacles, SimulationRun
+from sidestep import Obstacles
 from sidestep.report import write_report
 from sidestep.report.figures import position_figure, psi_figure, switch_figure
 from sidestep.report.tables import csv_columns
 from sidestep.scenario import Scenario, ScenarioResult, run_scenario
 from sidestep.scenario.summary import seen_in_words, summary_rows
+from sidestep.simulation import SimulationRun
 
 TEXT = """\
 format: 1

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from sidestep import Robot, read_srdf
+from sidestep import Robot
 from sidestep.distance import SelfCollision
-from sidestep.robot import catalogue
+from sidestep.robot import catalogue, read_srdf
 
 TEXT = """<robot name="arm">
   <disable_default_collisions link="d"/>

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep import Body, Geometry, Robot
+from sidestep import Body, Robot
+from sidestep.robot import Geometry
 
 
 @pytest.fixture(scope="module")

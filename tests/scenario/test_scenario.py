@@ -12,6 +12,8 @@ import pytest
 import yaml
 
 import sidestep as ss
+from sidestep.control import SafetySettings
+from sidestep.controller import controller_settings_fields
 from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
 from sidestep.scenario import scenario as module
 from sidestep.scenario.parts import controller_settings_of, torque_program_of
@@ -326,7 +328,7 @@ def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
         assert schema["$defs"]["obstacle"]["properties"][name]["default"] == defaults[name]
 
 
-@pytest.mark.parametrize("field", ss.controller_settings_fields(), ids=lambda field: field["name"])
+@pytest.mark.parametrize("field", controller_settings_fields(), ids=lambda field: field["name"])
 def test_the_schema_states_the_settings_of_the_core(field: dict[str, Any]) -> None:
     part = json.loads(schema_text())["$defs"]["controller"]
     *parts, own = field["name"].split(".")
@@ -385,7 +387,7 @@ controller:
     settings = controller_settings_of(mine)
     assert settings.local_minimum is None
     assert settings.output.name == "acceleration"
-    for field in ss.controller_settings_fields():
+    for field in controller_settings_fields():
         name = str(field["name"])
         if not name.startswith("local_minimum."):
             assert attrgetter(name)(settings) == given.get(name, field["default"]), name
@@ -414,7 +416,7 @@ def test_the_thesis_s_torque_program_has_the_numbers_of_the_section() -> None:
     safety = numbers.pop("safety")
     assert numbers["slack_weight"] == 50.5
     assert numbers["stop_time"] == ss.ControllerSettings().stop_time
-    assert (safety.margin, safety.rate) == (0.02, ss.SafetySettings().rate)
+    assert (safety.margin, safety.rate) == (0.02, SafetySettings().rate)
     assert torque_program_of(scenario, ss.Robot.named("planar2")).num_coordinates == 2
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sidestep import KinematicRun, Robot, SceneObject, SimulationRun, evaluate
+from sidestep import Robot, SceneObject, evaluate
 from sidestep.robot.pose import pose_at, pose_vector
-from sidestep.simulation import Contact
+from sidestep.simulation import Contact, KinematicRun, SimulationRun
 
 DT = 0.01
 

@@ -8,9 +8,9 @@ import pytest
 from scipy.special import ellipk
 from stand_ins import PENDULUM, Holding, InverseDynamics, Spring, simulate
 
-from sidestep import Arrival, Robot, SceneObject, Simulation
+from sidestep import Robot, SceneObject, Simulation
 from sidestep._core import Obstacles
-from sidestep.simulation import build_model
+from sidestep.simulation import Arrival, build_model
 
 MIMIC = """
 <robot name="mimic">

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from sidestep import GeometricSystem, JointGoal, Obstacles, Robot
+from sidestep import JointGoal, Obstacles, Robot
 from sidestep.robot.pose import pose_at
 from sidestep.simulation import Arrival, run_kinematically
 from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
+from sidestep.system import GeometricSystem
 
 START = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.8])
 TIP = "fr3_hand_tcp"

@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 from stand_ins import simulate
 
-from sidestep import (
-    Body,
-    GeometricSystem,
-    Robot,
-    SceneObject,
-    Simulation,
-    TorqueController,
-    evaluate,
-    run_kinematically,
-)
+from sidestep import Body, Robot, SceneObject, Simulation, evaluate
 from sidestep._core import Obstacles
+from sidestep.control import TorqueController
+from sidestep.simulation import run_kinematically
+from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity
 
 START, GOAL = np.deg2rad([0, 45, 0, -66, 0, 66, 45]), np.deg2rad([90, 45, 0, -66, 0, 66, 45])

@@ -39,6 +39,7 @@ from sidestep.studio.session import Session
 from sidestep.studio.snippet import python_snippet
 from sidestep.studio.systems import as_file, numbers_of
 from sidestep.studio.things import CLOUD_LIMIT, CLOUD_RADIUS, box, cloud, scattered, thinned
+from sidestep.system import GeometricSystem
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
 SMALL_ARM: dict[str, Any] = {
@@ -228,7 +229,7 @@ def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
     session = make_session(strange, method=numbers_of(strange)[0])
     session.step()
     parts = assemble(strange)
-    assert isinstance(parts.mover, ss.GeometricSystem)
+    assert isinstance(parts.mover, GeometricSystem)
     expected = parts.mover.acceleration(
         parts.start, parts.start_velocity, parts.goal, parts.seen
     ).acceleration

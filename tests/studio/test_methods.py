@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from sidestep import Scenario, controller_settings_fields
+from sidestep import Scenario
 from sidestep.bench.method import Method as BenchMethod
+from sidestep.controller import controller_settings_fields
 from sidestep.scenario.scenario import (
     BodyChoice,
     EmbeddingChoice,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sidestep as ss
+from sidestep.planning import PathPlanner
 
 # One ellipsoid along each link of 0.5 m; its box is not covered, which nothing here needs.
 BODY = {
@@ -25,7 +26,7 @@ def balls(seed: int, count: int = 6) -> ss.Obstacles:
 
 
 def free_ends(
-    robot: ss.Robot, planner: ss.PathPlanner, obstacles: ss.Obstacles, seed: int
+    robot: ss.Robot, planner: PathPlanner, obstacles: ss.Obstacles, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Two random configurations with the planner's margin."""
     rng = np.random.default_rng((seed, 1))

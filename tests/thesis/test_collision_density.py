@@ -5,6 +5,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import ClearanceBarrier, PlaneBarrier, SelfCollisionBarrier
 from support.finite_differences import derivative, second_derivative
 from support.random_scene import ROBOTS, scene
 
@@ -188,9 +189,9 @@ def test_a_body_of_another_robot_with_the_same_links_is_refused() -> None:
     message = r"fitted to robot 'arm' \(fingerprint \w{12}\) and cannot be used with robot 'arm'"
     for make in (
         lambda: thesis.CollisionDensity(long, body),
-        lambda: ss.ClearanceBarrier(long, body),
-        lambda: ss.SelfCollisionBarrier(long, body, []),
-        lambda: ss.PlaneBarrier(long, body, point=[0, 0, 0], normal=[0, 0, 1], links=["b"]),
+        lambda: ClearanceBarrier(long, body),
+        lambda: SelfCollisionBarrier(long, body, []),
+        lambda: PlaneBarrier(long, body, point=[0, 0, 0], normal=[0, 0, 1], links=["b"]),
     ):
         with pytest.raises(ValueError, match=message):
             make()

@@ -6,6 +6,7 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.robot import planar_arm
 from support.finite_differences import derivative
 from support.random_scene import NUM_STATES, ROBOTS
 
@@ -66,7 +67,7 @@ def test_half_the_height_at_a_limit_and_nothing_at_infinity() -> None:
     q = np.array([robot.limits.lower[0], 0.0])
     assert limits.evaluate(q, np.zeros(2), ss.Obstacles.none()).values[0] == pytest.approx(1.0, abs=1e-9)
 
-    text = ss.planar_arm(2).replace('type="revolute"', 'type="continuous"')
+    text = planar_arm(2).replace('type="revolute"', 'type="continuous"')
     unlimited = ss.Robot.from_urdf(text)
     assert np.isinf(unlimited.limits.upper).all()
     result = thesis.JointLimitPotential(unlimited).evaluate([100.0, -100.0], [1.0, 1.0], ss.Obstacles.none())

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import GeometricSystem, StepStatus
 
 ROBOTS = ["planar2", "planar3", "ur5", "fr3"]
 
@@ -43,7 +44,7 @@ def kinetic_energies(
 @pytest.mark.parametrize("name", ROBOTS)
 def test_geodesics_keep_their_energy(name: str) -> None:
     robot, density, obstacles, q, v = wide_scene(name)
-    system = ss.GeometricSystem([density], switch=thesis.GeodesicOnly())
+    system = GeometricSystem([density], switch=thesis.GeodesicOnly())
     drifts, turns = [], []
     for steps in (100, 200, 2000):
         motion = thesis.rollout(
@@ -68,7 +69,7 @@ def test_geodesics_keep_their_energy(name: str) -> None:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_geodesic_runs_backwards_through_the_same_states(name: str) -> None:
     robot, density, obstacles, q, v = wide_scene(name)
-    system = ss.GeometricSystem([density], switch=thesis.GeodesicOnly())
+    system = GeometricSystem([density], switch=thesis.GeodesicOnly())
     settings = {"period": 1e-3, "steps": 1000, "integrator": "runge_kutta_4"}
     there = thesis.rollout(system, q, v, robot.neutral, obstacles, **settings)
     back = thesis.rollout(system, there.q[-1], -there.v[-1], robot.neutral, obstacles, **settings)
@@ -86,7 +87,7 @@ def test_metric_damping_loses_energy_all_the_way(name: str) -> None:
     factors = rng.normal(size=(2, robot.num_coordinates, robot.num_coordinates))
     K, D = (np.eye(len(f)) + 0.1 * f @ f.T for f in factors)
     goal = q + 0.25 * (robot.limits.upper - robot.limits.lower).clip(max=3.0) * rng.uniform(-1, 1, q.size)
-    system = ss.GeometricSystem([density], stiffness=K, damping=D, damping_form="metric")
+    system = GeometricSystem([density], stiffness=K, damping=D, damping_form="metric")
     motion = thesis.rollout(
         system, q, v, goal, obstacles, period=2e-3, steps=3000, integrator=thesis.Integrator.runge_kutta_4
     )
@@ -110,7 +111,7 @@ def test_metric_damping_loses_energy_all_the_way(name: str) -> None:
 def test_orders_of_convergence(integrator: str, order: int, steps: int) -> None:
     _, density, obstacles, q, v = wide_scene("planar3")
     moving = ss.Obstacles(obstacles.points, obstacles.radii, [[0.1, -0.2, 0.0], [0.0, 0.3, 0.1]])
-    system = ss.GeometricSystem([density], stiffness=2.0, damping=1.0)
+    system = GeometricSystem([density], stiffness=2.0, damping=1.0)
     goal = q + 0.5
     nv = q.size
 
@@ -135,7 +136,7 @@ def test_rows_are_times_states_and_what_the_system_says_there() -> None:
     _, density, obstacles, q, v = wide_scene("planar3")
     moving = ss.Obstacles(obstacles.points, obstacles.radii, [[0.1, -0.2, 0.0], [0.0, 0.3, 0.1]])
     switch = thesis.SigmoidSwitch(2.0, 1.0)
-    system = ss.GeometricSystem([density], switch=switch)
+    system = GeometricSystem([density], switch=switch)
     goal, dt = q + 0.3, 0.01
     updates = {
         "semi_implicit_euler": lambda q, v, a: (q + dt * (v + dt * a), v + dt * a),
@@ -161,14 +162,14 @@ def test_rows_are_times_states_and_what_the_system_says_there() -> None:
 def test_the_callers_obstacles_stay_where_they_are() -> None:
     _, density, obstacles, q, v = wide_scene("planar2")
     moving = ss.Obstacles(obstacles.points, obstacles.radii, np.ones((2, 3)))
-    thesis.rollout(ss.GeometricSystem([density]), q, v, q, moving, steps=10)
+    thesis.rollout(GeometricSystem([density]), q, v, q, moving, steps=10)
     np.testing.assert_array_equal(moving.points, obstacles.points)
 
 
 def test_a_fallback_brakes_and_is_reported_in_every_row() -> None:
     _, density, obstacles, q, v = wide_scene("fr3")
-    motion = thesis.rollout(ss.GeometricSystem([density]), np.full(7, np.nan), v, q, obstacles, steps=1000)
-    assert set(motion.statuses) == {ss.StepStatus.invalid_state}
+    motion = thesis.rollout(GeometricSystem([density]), np.full(7, np.nan), v, q, obstacles, steps=1000)
+    assert set(motion.statuses) == {StepStatus.invalid_state}
     # v decays with 10/s for a second
     np.testing.assert_allclose(motion.v[-1], v * (1 - 10 * 1e-3) ** 1000, rtol=1e-9)
     # what the equations would have said is not known in these rows
@@ -195,4 +196,4 @@ def test_a_bad_argument_is_named(settings: dict, message: str) -> None:
     _, density, obstacles, q, v = wide_scene("planar2")
     given = {"q": q, "v": v, "goal": q, "obstacles": obstacles} | settings
     with pytest.raises(ValueError, match=message):
-        thesis.rollout(ss.GeometricSystem([density]), **given)
+        thesis.rollout(GeometricSystem([density]), **given)

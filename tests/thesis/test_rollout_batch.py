@@ -5,15 +5,16 @@ import pytest
 
 import sidestep as ss
 from sidestep import thesis
+from sidestep.system import GeometricSystem
 
 
-def scene() -> tuple[ss.Robot, ss.GeometricSystem, ss.Obstacles]:
+def scene() -> tuple[ss.Robot, GeometricSystem, ss.Obstacles]:
     robot = ss.Robot.named("planar3")
     links = [next(f.name for f in robot.frames if f.joint == j) for j in range(len(robot.joints))]
     body = ss.Body(
         links=links, weights=np.ones(3), means=np.zeros((3, 3)), covariances=[0.2**2 * np.eye(3)] * 3
     )
-    return robot, ss.GeometricSystem([thesis.CollisionDensity(robot, body)]), ss.Obstacles([[0.5, 0.4, 0.0]])
+    return robot, GeometricSystem([thesis.CollisionDensity(robot, body)]), ss.Obstacles([[0.5, 0.4, 0.0]])
 
 
 def states(robot: ss.Robot, num: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

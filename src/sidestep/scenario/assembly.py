@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from sidestep import Body, Controller, Embedding, GeometricSystem, Robot, TorqueController
+from sidestep import Body, Controller, Robot
 from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
+from sidestep.control import TorqueController
 from sidestep.distance import SceneObject
 from sidestep.distance.scene import Kind, check_scene
 from sidestep.obstacles import load_point_cloud
@@ -40,6 +41,7 @@ from sidestep.scenario.seen import View, seen_at, view_of
 from sidestep.scenario.validation import ScenarioError
 from sidestep.simulation import ControllerDriver, SystemDriver
 from sidestep.simulation.pose_aim import PoseAim, PoseTarget, Posture, posture_at
+from sidestep.system import Embedding, GeometricSystem
 from sidestep.thesis import (
     BinarySwitch,
     CollisionDensity,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from typing import Any
 
 from sidestep.scenario import Scenario
@@ -18,6 +19,37 @@ from sidestep.studio.systems import as_file, fit_arguments, settings_of
 WIDTH = 80  # [characters] that a window on the page shows
 
 
+# Where the classes are that a snippet needs beside those of `sidestep` itself.
+_ROOMS = {
+    "sidestep.control": ("SafetySettings", "TorqueController"),
+    "sidestep.controller": (
+        "ArrivalSettings",
+        "BarrierSettings",
+        "LocalMinimumSettings",
+        "LookAheadSettings",
+        "OnlinePlannerSettings",
+        "PlannerSettings",
+        "RouteSettings",
+    ),
+    "sidestep.system": ("GeometricSystem",),
+}
+
+
+def _import(room: str, names: list[str]) -> str:
+    """An import statement that fits a page."""
+    line = f"from {room} import {', '.join(names)}"
+    return (
+        line
+        if len(line) <= 88
+        else f"from {room} import (\n" + "".join(f"    {name},\n" for name in names) + ")"
+    )
+
+
+def _spelled(name: str) -> str:
+    """A class as the snippet names it."""
+    return name if any(name in names for names in _ROOMS.values()) else f"ss.{name}"
+
+
 def python_snippet(snapshot: Snapshot) -> str:
     """Python that makes the `controller` that moves the arm, and takes a step without obstacles.
 
@@ -26,8 +58,13 @@ def python_snippet(snapshot: Snapshot) -> str:
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
     code = _controller_code if method.controlled else _written_code
-    room = [] if method.controlled else ["from sidestep import thesis"]
-    return "\n".join(["import sidestep as ss", *room, "", *code(snapshot, written)]) + "\n"
+    lines = code(snapshot, written)
+    used = set(re.findall(r"(?<!\.)\b[A-Z]\w+(?=\()", "\n".join(lines)))
+    imports = [
+        _import(room, sorted(used & set(names))) for room, names in _ROOMS.items() if used & set(names)
+    ]
+    thesis = [] if method.controlled else ["from sidestep import thesis"]
+    return "\n".join(["import sidestep as ss", *thesis, *imports, "", *lines]) + "\n"
 
 
 def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
@@ -37,7 +74,7 @@ def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
         if not name:
             given.append(f"output={thing.output.name!r}")
         finite = {key: value for key, value in own.items() if math.isfinite(value)}
-        head = f"{name.rpartition('.')[2] or 'settings'} = ss.{type(thing).__name__}"
+        head = f"{name.rpartition('.')[2] or 'settings'} = {_spelled(type(thing).__name__)}"
         lines += _call(head, finite, *given)
     return [
         *lines,
@@ -63,8 +100,8 @@ def _written_code(snapshot: Snapshot, written: Scenario) -> list[str]:
     return [
         f"robot = {_robot_code(written.robot, written)}",
         *_system_code(written),
-        *_call("safety = ss.SafetySettings", safety),
-        *_call("controller = ss.TorqueController", torque, "robot", period, "safety=safety"),
+        *_call("safety = SafetySettings", safety),
+        *_call("controller = TorqueController", torque, "robot", period, "safety=safety"),
         *_goal_code(snapshot),
         "",
         "# what is seen: ss.Obstacles(points, radii), of (n, 3) and (n,) [m]",
@@ -159,7 +196,7 @@ def _system_code(written: Scenario) -> list[str]:
         *lines,
         f"psi = {together}",
         f"switch = {_switch_code(system.switch)}",
-        *_call("system = ss.GeometricSystem", spring, "psi", "switch=switch"),
+        *_call("system = GeometricSystem", spring, "psi", "switch=switch"),
     ]
 
 

@@ -65,7 +65,7 @@ class Thing:
         if len(points) > CLOUD_LIMIT:
             raise ValueError(
                 f"{self.name}: the cloud has {len(points)} points; the studio takes at most {CLOUD_LIMIT}: "
-                "thin it with sidestep.merge_in_voxels"
+                "thin it with sidestep.obstacles.merge_in_voxels"
             )
         return points
 

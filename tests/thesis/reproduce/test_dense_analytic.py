@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from sidestep import GeometricSystem, Obstacles, Robot
+from sidestep import Obstacles, Robot
 from sidestep._core import Body
+from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity
 from sidestep.thesis.reproduce import dense_analytic, torch_autograd
 from sidestep.thesis.reproduce.serial_chain import SerialChain

@@ -4,7 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sidestep import GeometricSystem, Obstacles, Robot
+from sidestep import Obstacles, Robot
+from sidestep.system import GeometricSystem
 from sidestep.thesis import BinarySwitch, DistanceSwitch, GeodesicOnly, JointLimitPotential, rollout
 from sidestep.thesis.reproduce import avoidance, planar
 

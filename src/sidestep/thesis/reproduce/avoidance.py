@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sidestep import GeometricSystem
+from sidestep.system import GeometricSystem
 from sidestep.thesis import BinarySwitch, GeodesicOnly, HarmonicOnly, Rollout, Unswitched, rollout
 from sidestep.thesis.reproduce import planar, style
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item, Table

@@ -9,7 +9,8 @@ from itertools import product
 
 import numpy as np
 
-from sidestep import GeometricSystem, Obstacles
+from sidestep import Obstacles
+from sidestep.system import GeometricSystem
 from sidestep.thesis import BinarySwitch, GeodesicOnly, JointLimitPotential, Sum, rollout
 from sidestep.thesis.reproduce import planar, style
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item, Table

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sidestep import GeometricSystem, Obstacles
+from sidestep import Obstacles
+from sidestep.system import GeometricSystem
 from sidestep.thesis import rollout
 from sidestep.thesis.reproduce import planar, style
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item

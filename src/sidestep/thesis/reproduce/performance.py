@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from sidestep import Body, GeometricSystem, Obstacles, Robot
+from sidestep import Body, Obstacles, Robot
+from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity, rollout
 from sidestep.thesis.reproduce import dense_analytic, torch_autograd
 from sidestep.thesis.reproduce.item import Array, Caption, Item, Table

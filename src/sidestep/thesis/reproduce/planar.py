@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from sidestep import Body, Obstacles, Robot, planar_arm
+from sidestep import Body, Obstacles, Robot
 from sidestep._core import Embedding
+from sidestep.robot import planar_arm
 from sidestep.thesis import CollisionDensity
 from sidestep.thesis.reproduce.item import Array
 

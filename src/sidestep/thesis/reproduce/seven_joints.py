@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
-from sidestep import ExactClearance, GeometricSystem
+from sidestep import ExactClearance
 from sidestep.scenario.assembly import Assembly, assemble
 from sidestep.scenario.scenario import Scenario
+from sidestep.system import GeometricSystem
 from sidestep.thesis import (
     BinarySwitch,
     CollisionDensity,
