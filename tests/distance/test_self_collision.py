@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sidestep import Robot
-from sidestep.distance import SelfCollision
-from sidestep.simulation import self_collision, sweep
+from sidestep.distance import SelfCollision, self_collision, sweep
 
 
 @pytest.fixture(scope="module")

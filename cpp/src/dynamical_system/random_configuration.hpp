@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <random>
 
+#include "sidestep/kinematics/vectors.hpp"
+
 namespace sidestep {
 
 /// Writes a configuration (nv) that is uniform within `spread` [rad | m] of q in every joint, and between `lower` and
