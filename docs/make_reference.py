@@ -5,22 +5,23 @@ Run it after adding or renaming a public name; a test fails while the page diffe
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import re
 from pathlib import Path
 from types import ModuleType
 
 import sidestep
-from sidestep import thesis
 from sidestep.controller import controller_settings_fields
 
 PAGE = Path(__file__).parent / "reference.md"
-STUB = Path(sidestep.__file__).parent / "__init__.pyi"
-HEADING = {"_core": "Core: embeddings, geometry, dynamical system"}
+# The rooms of the package, each importing only those before it.
+ROOMS = ("robot", "obstacles", "body", "distance", "system", "control", "planning", "controller", "thesis")
+ROOMS += ("simulation", "scenario", "bench")
 INTRODUCTION = """# Reference
 
-Every public name of `sidestep` and `sidestep.thesis`; `python docs/make_reference.py` writes this page.
-`help(sidestep.NAME)` has arguments, shapes, units, frames and errors.
+What `sidestep` itself has is enough to move an arm; its rooms hold the rest: `from sidestep.planning import PathPlanner`.
+`python docs/make_reference.py` writes this page. `help(sidestep.NAME)` has arguments, shapes, units, frames and errors.
 """
 SETTINGS = """
 ## Settings of the controller
@@ -54,23 +55,24 @@ def settings_table() -> list[str]:
     return rows
 
 
+def table(module: str, names: list[str]) -> list[str]:
+    """A heading and the names of a module, a row each."""
+    package = importlib.import_module(module)
+    rows = [f"| `{name}` | {first_sentence(name, package)} |" for name in sorted(names)]
+    return [f"\n## `{module}`\n", "| name | what it is |\n|---|---|", *rows]
+
+
 def page() -> str:
     """The whole page."""
-    names: dict[str, list[str]] = {}
-    for module, name in re.findall(
-        r"^from \.(\w+)\S* import (\w+)", STUB.read_text(encoding="utf-8"), re.MULTILINE
-    ):
-        if not name.startswith("__"):
-            names.setdefault(module, []).append(name)
-    parts = [INTRODUCTION]
-    for module, members in sorted(names.items()):
-        parts.append(f"\n## {HEADING.get(module, module.replace('_', ' ').capitalize())}\n")
-        parts.append("| name | what it is |\n|---|---|")
-        parts += [f"| `{name}` | {first_sentence(name)} |" for name in sorted(members)]
+    parts = [
+        INTRODUCTION,
+        *table("sidestep", [name for name in sidestep.__all__ if not name.startswith("__")]),
+    ]
     parts.append(SETTINGS + "\n".join(settings_table()))
-    parts.append("\n## The thesis: `sidestep.thesis`\n")
-    parts.append("| name | what it is |\n|---|---|")
-    parts += [f"| `{name}` | {first_sentence(name, thesis)} |" for name in sorted(thesis.__all__)]
+    for room in ROOMS:
+        name = f"sidestep.{room}"
+        members = set(importlib.import_module(name).__all__) - set(sidestep.__all__)
+        parts += table(name, sorted(members))
     return "\n".join(parts) + "\n"
 
 

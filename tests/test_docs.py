@@ -4,6 +4,7 @@ import re
 import runpy
 from pathlib import Path
 
+from sidestep import system
 from sidestep.scenario import Scenario
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -16,7 +17,7 @@ def test_reference_is_what_its_script_writes() -> None:
 
 def test_a_bar_stays_a_bar_in_a_cell_of_the_reference() -> None:
     first_sentence = runpy.run_path(str(DOCS / "make_reference.py"))["first_sentence"]
-    assert r"x, y [rad \| m] move" in first_sentence("ClearanceTable")
+    assert r"x, y [rad \| m] move" in first_sentence("ClearanceTable", system)
     assert r"N(y \| mu_k, Sigma_k)" in first_sentence("Body")
     bars = 0
     for row in (DOCS / "reference.md").read_text(encoding="utf-8").splitlines():

@@ -22,7 +22,7 @@ from sidestep.body.cover_surface import LinkSurface
 from sidestep.cli import app
 from sidestep.robot import planar_arm
 
-NAMES = [entry.name for entry in ss.robots() if entry.name != "z1"]  # that one is prepared on first use
+NAMES = [entry.name for entry in ss.robots()]
 LIMIT = 'lower="-3.141592653589793" upper="3.141592653589793"'
 
 
