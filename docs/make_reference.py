@@ -20,7 +20,7 @@ ROOMS = ("robot", "obstacles", "body", "distance", "system", "control", "plannin
 ROOMS += ("simulation", "scenario", "bench")
 INTRODUCTION = """# Reference
 
-What `sidestep` itself has is enough to move an arm; its rooms hold the rest: `from sidestep.planning import PathPlanner`.
+What `sidestep` itself has is enough to move an arm. Its rooms hold the rest: `from sidestep.planning import Plan`.
 `python docs/make_reference.py` writes this page. `help(sidestep.NAME)` has arguments, shapes, units, frames and errors.
 """
 SETTINGS = """
