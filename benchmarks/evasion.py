@@ -1,4 +1,4 @@
-"""Processor time of a look of `Evasion`, in problems of `sidestep bench reach --moving 0.5`.
+"""Processor time of a look of `LookAhead`, in problems of `sidestep bench reach --moving 0.5`.
 
 Usage: python benchmarks/evasion.py [ROBOT ...]
 """
@@ -14,7 +14,7 @@ from sidestep.bench.method import Method
 from sidestep.bench.methods import build_system
 from sidestep.bench.problems import ProblemGenerator
 from sidestep.distance import SelfCollision
-from sidestep.system import Evasion
+from sidestep.system import LookAhead
 
 PROBLEMS = 40
 TIMES = (0.0, 0.5, 1.0, 1.5)  # [s] at which an arm that has not moved from its start looks
@@ -30,7 +30,7 @@ def looks(name: str) -> tuple[list[float], list[float]]:
     evading: list[float] = []
     for index in range(PROBLEMS):
         problem = generator.problem(index)
-        evasion = Evasion(system, seed=index)
+        evasion = LookAhead(system, seed=index)
         for at in TIMES:
             begin = time.process_time()
             found = evasion.look(

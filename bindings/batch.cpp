@@ -4,7 +4,7 @@
 
 #include <nanobind/stl/vector.h>
 
-#include "dynamical_system.hpp"
+#include "system.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
 

@@ -6,7 +6,7 @@
 
 
 #include "arguments.hpp"
-#include "dynamical_system.hpp"
+#include "system.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
 #include "settings.hpp"
@@ -45,11 +45,11 @@ void bind_settings_tree(nb::module_& m) {
   bind_settings<ArrivalSettings>(m, "ArrivalSettings", "When a goal counts as reached.");
   bind_settings<OnlinePlannerSettings>(
       m, "OnlinePlannerSettings", "The planner that runs beside the loop: how it searches, and how its paths are followed.",
-      {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "RouteSettings", &OnlinePlannerSettings::route)})
+      {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "TimedPathSettings", &OnlinePlannerSettings::route)})
       .def_rw("search", &OnlinePlannerSettings::search)
       .def_rw("route", &OnlinePlannerSettings::route);
-  bind_settings<EvasionSettings>(m, "LookAheadSettings", "Trajectories out of the way of what moves, see Controller.");
-  bind_settings<EscapeSettings>(m, "LocalMinimumSettings", "Sub-goals where the arm is stuck and there is no path.");
+  bind_settings<LookAheadSettings>(m, "LookAheadSettings", "Trajectories out of the way of what moves, see Controller.");
+  bind_settings<LocalMinimumSettings>(m, "LocalMinimumSettings", "Sub-goals where the arm is stuck and there is no path.");
 
   nb::enum_<S::Output>(m, "Output", "What a controller's program solves for.")
       .value("automatic", S::Output::automatic, "Torque where the arm has inertias and effort limits.")
@@ -85,9 +85,9 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<ArrivalSettings>(rows, "arrival.");
         describe_fields<OnlinePlannerSettings>(rows, "planner.", true);
         describe_fields<PlannerSettings>(rows, "planner.search.", true);
-        describe_fields<RouteSettings>(rows, "planner.route.", true);
-        describe_fields<EvasionSettings>(rows, "look_ahead.", true);
-        describe_fields<EscapeSettings>(rows, "local_minimum.", true);
+        describe_fields<TimedPathSettings>(rows, "planner.route.", true);
+        describe_fields<LookAheadSettings>(rows, "look_ahead.", true);
+        describe_fields<LocalMinimumSettings>(rows, "local_minimum.", true);
         return rows;
       },
       nb::sig("def controller_settings_fields() -> list[dict[str, float | str]]"),

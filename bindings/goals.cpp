@@ -2,9 +2,9 @@
 
 #include <limits>
 
-#include "dynamical_system.hpp"
+#include "system.hpp"
 #include "sidestep/controller/posture_search.hpp"
-#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/system/goal.hpp"
 
 namespace sidestep::python {
 

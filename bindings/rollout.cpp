@@ -10,12 +10,12 @@
 #include <string>
 
 #include "arguments.hpp"
-#include "dynamical_system.hpp"
+#include "system.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
-#include "sidestep/dynamical_system/escape.hpp"
-#include "sidestep/dynamical_system/evasion.hpp"
-#include "sidestep/dynamical_system/progress_monitor.hpp"
+#include "sidestep/system/local_minimum_recovery.hpp"
+#include "sidestep/lookahead/look_ahead.hpp"
+#include "sidestep/system/progress_monitor.hpp"
 #include "sidestep/thesis/rollout.hpp"
 
 namespace sidestep::python {
@@ -39,7 +39,7 @@ void bind_rollout(nb::module_& m) {
            "Takes `Step.goal_potential` at a time [s]; whether patience has run out.")
       .def("reset", &ProgressMonitor::reset, "For a new goal.");
 
-  nb::class_<Escape>(m, "Escape",
+  nb::class_<LocalMinimumRecovery>(m, "LocalMinimumRecovery",
                      "Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],\n"
                      "it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):\n"
                      "one uniform within `spread` [rad] of every joint's position and within the limits; the n-th time for one goal within\n"
@@ -49,16 +49,16 @@ void bind_rollout(nb::module_& m) {
                      "Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
-          [](Escape* self, const Robot& robot, double patience, double fraction, double leg, double spread,
+          [](LocalMinimumRecovery* self, const Robot& robot, double patience, double fraction, double leg, double spread,
              std::uint64_t seed) {
-            new (self) Escape(robot, {patience, fraction, leg, spread, seed});
+            new (self) LocalMinimumRecovery(robot, {patience, fraction, leg, spread, seed});
           },
-          nb::arg("robot"), nb::kw_only(), nb::arg("patience") = EscapeSettings().patience,
-          nb::arg("fraction") = EscapeSettings().fraction, nb::arg("leg") = EscapeSettings().leg,
-          nb::arg("spread") = EscapeSettings().spread, nb::arg("seed") = EscapeSettings().seed)
+          nb::arg("robot"), nb::kw_only(), nb::arg("patience") = LocalMinimumSettings().patience,
+          nb::arg("fraction") = LocalMinimumSettings().fraction, nb::arg("leg") = LocalMinimumSettings().leg,
+          nb::arg("spread") = LocalMinimumSettings().spread, nb::arg("seed") = LocalMinimumSettings().seed)
       .def(
           "pursue",
-          [](Escape& self, nb::handle goal, const ArrayLike& q, double potential, double period) {
+          [](LocalMinimumRecovery& self, nb::handle goal, const ArrayLike& q, double potential, double period) {
             const Goal target = as_goal(goal, self.num_coordinates());
             const Eigen::VectorXd at = as_vector(q, "q", self.num_coordinates());
             const Exclusive use(&self, "the escape");
@@ -69,63 +69,63 @@ void bind_rollout(nb::module_& m) {
                   "potential: float, period: float) -> JointGoal | PoseGoal"),
           "The goal to follow in a step of `period` [s]: the goal given, or a sub-goal. potential: `Step.goal_potential`\n"
           "of the step before, NaN where there was none; it is used for poses, not for configurations.")
-      .def_prop_ro("escaping", &Escape::escaping, "Whether the last step followed a sub-goal.")
-      .def_prop_ro("count", &Escape::count, "How many sub-goals there have been.");
+      .def_prop_ro("escaping", &LocalMinimumRecovery::escaping, "Whether the last step followed a sub-goal.")
+      .def_prop_ro("count", &LocalMinimumRecovery::count, "How many sub-goals there have been.");
 
-  nb::class_<Flight>(m, "Flight",
+  nb::class_<AvoidanceTrajectory>(m, "AvoidanceTrajectory",
                      "A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits\n"
                      "allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter\n"
                      "or a TorqueController with clearances. Raises ValueError on wrong shapes and what is not finite.")
       .def(
           "__init__",
-          [](Flight* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& refuge) {
+          [](AvoidanceTrajectory* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& refuge) {
             const int nv = robot.num_coordinates();
-            new (self) Flight(robot.limits(), as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv),
+            new (self) AvoidanceTrajectory(robot.limits(), as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv),
                               as_finite_vector(refuge, "refuge", nv));
           },
           nb::arg("robot"), nb::arg("q"), nb::arg("v"), nb::arg("refuge"))
-      .def("__copy__", [](const Flight& self) { return Flight(self); })
+      .def("__copy__", [](const AvoidanceTrajectory& self) { return AvoidanceTrajectory(self); })
       .def(
           "acceleration",
-          [](const Flight& self, const ArrayLike& q, const ArrayLike& v, double period) {
+          [](const AvoidanceTrajectory& self, const ArrayLike& q, const ArrayLike& v, double period) {
             const int nv = static_cast<int>(self.refuge().size());
             return to_numpy(self.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv), as_period(period)));
           },
           nb::arg("q"), nb::arg("v"), nb::arg("period"),
           "a* + w^2 (q* - q) + 2 w (v* - v) (nv,) [/s^2], w = 10 /s, for a step of `period` [s].")
       .def(
-          "advance", [](Flight& self, double period) { self.advance(as_period(period)); }, nb::arg("period"),
+          "advance", [](AvoidanceTrajectory& self, double period) { self.advance(as_period(period)); }, nb::arg("period"),
           "Moves the reference on by `period` [s].")
       .def_prop_ro(
-          "refuge", [](const Flight& self) { return to_numpy(self.refuge()); }, "Where it comes to rest (nv,) [rad | m].")
+          "refuge", [](const AvoidanceTrajectory& self) { return to_numpy(self.refuge()); }, "Where it comes to rest (nv,) [rad | m].")
       .def_prop_ro(
-          "position", [](const Flight& self) { return to_numpy(self.position()); }, "The reference q* (nv,) [rad | m].")
+          "position", [](const AvoidanceTrajectory& self) { return to_numpy(self.position()); }, "The reference q* (nv,) [rad | m].")
       .def_prop_ro(
-          "velocity", [](const Flight& self) { return to_numpy(self.velocity()); }, "The reference's velocity v* (nv,) [/s].");
+          "velocity", [](const AvoidanceTrajectory& self) { return to_numpy(self.velocity()); }, "The reference's velocity v* (nv,) [/s].");
 
-  nb::class_<Evasion>(m, "Evasion",
+  nb::class_<LookAhead>(m, "LookAhead",
                       "Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until\n"
                       "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
                       "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
-                      "for a Flight to one of `tries` random configurations that does not, to be followed until the way to the goal\n"
+                      "for a AvoidanceTrajectory to one of `tries` random configurations that does not, to be followed until the way to the goal\n"
                       "is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole\n"
                       "times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.\n"
                       "Raises ValueError that names the setting at fault, or if the system has\n"
                       "no clearances to obstacles.")
       .def(
           "__init__",
-          [](Evasion* self, std::shared_ptr<GeometricSystem> system, double horizon, double period, double delay,
+          [](LookAhead* self, std::shared_ptr<GeometricSystem> system, double horizon, double period, double delay,
              double clearance, int tries, std::uint64_t seed) {
-            new (self) Evasion(std::move(system), {horizon, period, delay, clearance, tries, seed});
+            new (self) LookAhead(std::move(system), {horizon, period, delay, clearance, tries, seed});
           },
-          nb::arg("system"), nb::kw_only(), nb::arg("horizon") = EvasionSettings().horizon,
-          nb::arg("period") = EvasionSettings().period, nb::arg("delay") = EvasionSettings().delay,
-          nb::arg("clearance") = EvasionSettings().clearance, nb::arg("tries") = EvasionSettings().tries,
-          nb::arg("seed") = EvasionSettings().seed)
+          nb::arg("system"), nb::kw_only(), nb::arg("horizon") = LookAheadSettings().horizon,
+          nb::arg("period") = LookAheadSettings().period, nb::arg("delay") = LookAheadSettings().delay,
+          nb::arg("clearance") = LookAheadSettings().clearance, nb::arg("tries") = LookAheadSettings().tries,
+          nb::arg("seed") = LookAheadSettings().seed)
       .def(
           "look",
-          [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
-             const std::optional<Flight>& followed) {
+          [](LookAhead& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
+             const std::optional<AvoidanceTrajectory>& followed) {
             const int nv = self.num_coordinates();
             const Goal target = as_goal(goal, nv);
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
@@ -142,13 +142,13 @@ void bind_rollout(nb::module_& m) {
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("followed") = nb::none(),
           nb::sig("def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
-                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: Flight | None = None) -> Flight | None"),
+                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: AvoidanceTrajectory | None = None) -> AvoidanceTrajectory | None"),
           "What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,), obstacles and the flight\n"
           "that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the thread of a\n"
           "loop; other threads run meanwhile. The flight is advanced by who follows it.")
       .def(
           "pursue",
-          [](Evasion& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
+          [](LookAhead& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
              double period) {
             const int nv = self.num_coordinates();
             const Goal target = as_goal(goal, nv);
@@ -157,22 +157,22 @@ void bind_rollout(nb::module_& m) {
             const HeldObstacles held(obstacles);
             return interruptible([&](const Interrupted& interrupted) {
               const InterruptedWhile look(&self, interrupted);
-              const Flight* flight = self.pursue(target, position, velocity, held, as_period(period));
-              return flight == nullptr ? std::nullopt : std::optional<Flight>(*flight);
+              const AvoidanceTrajectory* flight = self.pursue(target, position, velocity, held, as_period(period));
+              return flight == nullptr ? std::nullopt : std::optional<AvoidanceTrajectory>(*flight);
             });
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("period"),
           nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
-                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> Flight | None"),
+                  "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> AvoidanceTrajectory | None"),
           "The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every\n"
           "`delay`, and follows what the look before found, as if another thread had looked meanwhile.")
       .def("reset",
-           [](Evasion& self) {
+           [](LookAhead& self) {
              const Exclusive use(&self, "the evasion");
              self.reset();
            },
            "Before another motion is pursued: what was found is forgotten.")
-      .def_prop_ro("count", &Evasion::count, "How many flights were found.");
+      .def_prop_ro("count", &LookAhead::count, "How many flights were found.");
 
   nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
       .value("semi_implicit_euler", Integrator::semi_implicit_euler, "v += a dt; q += v dt.")

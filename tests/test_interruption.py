@@ -37,7 +37,7 @@ import sidestep as ss
 from support import planar_problems
 from sidestep._core import refine_cover
 from sidestep import thesis
-from sidestep.planning import Guide, PathPlanner, PlannerSettings
+from sidestep.planning import OnlinePlanner, PathPlanner, PlannerSettings
 from sidestep.system import GeometricSystem
 
 robot = ss.Robot.named("planar3")
@@ -48,7 +48,7 @@ angles = np.linspace(0.0, 2.0 * np.pi, 400)
 wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linspace(0.45, 1.6, 40)], 0.05)
 settings = PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000)
 planner = PathPlanner(robot, body, settings=settings)
-guide = Guide(robot, body, planner=settings, synchronous=True)
+guide = OnlinePlanner(robot, body, planner=settings, synchronous=True)
 arm = ss.Arm.from_robot(robot)
 run = ss.RealTimeRun(ss.Controller(arm), q, 0 * q, steps=100_000)
 stepped, *many = (ss.Controller(arm, ss.ControllerSettings(synchronous=True)) for _ in range(5))

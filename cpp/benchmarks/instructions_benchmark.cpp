@@ -9,11 +9,11 @@
 
 #include "scenes.hpp"
 #include "sidestep/control/acceleration_filter.hpp"
-#include "sidestep/dynamical_system/geometric_system.hpp"
-#include "sidestep/embedding/clearance_barrier.hpp"
+#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/barrier/clearance_barrier.hpp"
 #include "sidestep/thesis/collision_density.hpp"
-#include "sidestep/embedding/joint_limit_barrier.hpp"
-#include "sidestep/embedding/self_collision_barrier.hpp"
+#include "sidestep/barrier/joint_limit_barrier.hpp"
+#include "sidestep/barrier/self_collision_barrier.hpp"
 
 int main(int argc, char** argv) {
   using namespace sidestep;

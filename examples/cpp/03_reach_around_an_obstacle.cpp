@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/dynamical_system/geometric_system.hpp"
+#include "sidestep/system/geometric_system.hpp"
 #include "sidestep/thesis/collision_density.hpp"
 #include "sidestep/kinematics/robot.hpp"
 #include "sidestep/obstacles/obstacles.hpp"

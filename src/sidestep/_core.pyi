@@ -709,7 +709,7 @@ class Diagnosis:
 
     def __str__(self) -> str: ...
 
-class Recovery:
+class PenetrationRecovery:
     """
     What is done with an arm inside a barrier. speed [m/s] with which it leaves, rate [1/s] at which it
     takes that up, margin [m] below the floor at which the push is full, rebound [rad/s]: the largest
@@ -807,11 +807,11 @@ class GeometricSystem:
     space.
     stiffness K [1/s^2] and damping D [1/s]: scalar, (nv,) diagonal or (nv, nv), symmetric positive
     semi-definite. damping_form, pull_form: a DampingForm, a PullForm, or their names. switch: None (unswitched) or one of the switches.
-    recovery: what a barrier does with an arm inside it, by default Recovery().
+    recovery: what a barrier does with an arm inside it, by default PenetrationRecovery().
     Raises ValueError that names the setting at fault.
     """
 
-    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: Recovery | None = None) -> None: ...
+    def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: PenetrationRecovery | None = None) -> None: ...
 
     @property
     def num_embedding_coordinates(self) -> int: ...
@@ -868,7 +868,7 @@ class ProgressMonitor:
     def reset(self) -> None:
         """For a new goal."""
 
-class Escape:
+class LocalMinimumRecovery:
     """
     Leads an arm out of local minima without a map: when it has come no nearer to its goal for `patience` [s],
     it follows a random configuration for at most `leg` [s], then its goal again (Barraquand and Latombe 1991):
@@ -895,7 +895,7 @@ class Escape:
     def count(self) -> int:
         """How many sub-goals there have been."""
 
-class Flight:
+class AvoidanceTrajectory:
     """
     A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits
     allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter
@@ -904,7 +904,7 @@ class Flight:
 
     def __init__(self, robot: Robot, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, refuge: numpy.typing.ArrayLike) -> None: ...
 
-    def __copy__(self) -> Flight: ...
+    def __copy__(self) -> AvoidanceTrajectory: ...
 
     def acceleration(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, period: float) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -926,12 +926,12 @@ class Flight:
     def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
         """The reference's velocity v* (nv,) [/s]."""
 
-class Evasion:
+class LookAhead:
     """
     Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until
     the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
     on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
-    for a Flight to one of `tries` random configurations that does not, to be followed until the way to the goal
+    for a AvoidanceTrajectory to one of `tries` random configurations that does not, to be followed until the way to the goal
     is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole
     times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.
     Raises ValueError that names the setting at fault, or if the system has
@@ -940,14 +940,14 @@ class Evasion:
 
     def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 500, seed: int = 0) -> None: ...
 
-    def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: Flight | None = None) -> Flight | None:
+    def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: AvoidanceTrajectory | None = None) -> AvoidanceTrajectory | None:
         """
         What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,), obstacles and the flight
         that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the thread of a
         loop; other threads run meanwhile. The flight is advanced by who follows it.
         """
 
-    def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> Flight | None:
+    def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> AvoidanceTrajectory | None:
         """
         The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every
         `delay`, and follows what the look before found, as if another thread had looked meanwhile.
@@ -1627,9 +1627,9 @@ class PlannerSettings:
     @shortcuts.setter
     def shortcuts(self, value: int, /) -> None: ...
 
-class RouteSettings:
+class TimedPathSettings:
     """
-    How fast the attractor of a Guide passes a path.
+    How fast the attractor of a OnlinePlanner passes a path.
 
         speed [rad/s], default 2.0, allowed 0.01 to 20: largest speed of the reference along the path
         speed_share, default 0.7, allowed 0.01 to 1: of the joints' velocity limits that the reference may ask for
@@ -1686,7 +1686,7 @@ class RouteSettings:
     @delay.setter
     def delay(self, value: float, /) -> None: ...
 
-class GuideStatus(enum.Enum):
+class OnlinePlannerStatus(enum.Enum):
     """What a guided motion is about."""
 
     idle = 0
@@ -1713,11 +1713,11 @@ class GuideStatus(enum.Enum):
     invalid = 7
     """The goal is outside the limits, or the state is not finite."""
 
-class Guidance:
+class PlannerReference:
     """Where a guide draws the arm to, and what the motion is about."""
 
     @property
-    def status(self) -> GuideStatus: ...
+    def status(self) -> OnlinePlannerStatus: ...
 
     @property
     def goal(self) -> JointGoal:
@@ -1737,18 +1737,18 @@ class Guidance:
         within the lead.
         """
 
-class Guide:
+class OnlinePlanner:
     """
     Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.
     Until there is a path, and where the straight way to the goal is free, the attractor is the goal itself.
-    robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: RouteSettings, None for the defaults.
+    robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: TimedPathSettings, None for the defaults.
     period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is
     searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed
     for a motion; synchronous: search in step(), the same every time, else in a thread of its own.
     Raises ValueError that names what is wrong.
     """
 
-    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], tables: Sequence[ClearanceTable] = [], planner: PlannerSettings | None = None, route: RouteSettings | None = None, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
+    def __init__(self, robot: Robot, body: Body, *, pairs: Sequence[tuple[str, str] | tuple[str, str, float]] = [], tables: Sequence[ClearanceTable] = [], planner: PlannerSettings | None = None, route: TimedPathSettings | None = None, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, tolerance: float = 0.05, duration: float = float('inf'), seed: int = 0, synchronous: bool = False) -> None: ...
 
     def set_goal(self, goal: numpy.typing.ArrayLike) -> None:
         """A configuration (nv,) [rad] to go to; from the loop that calls step()."""
@@ -1756,7 +1756,7 @@ class Guide:
     def set_obstacles(self, obstacles: Obstacles) -> None:
         """The obstacles as they are seen now; from any thread."""
 
-    def step(self, q: numpy.typing.ArrayLike, time: float) -> Guidance:
+    def step(self, q: numpy.typing.ArrayLike, time: float) -> PlannerReference:
         """
         Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.
         """
@@ -2158,7 +2158,7 @@ class OnlinePlannerSettings:
     A Controller refuses what is not allowed.
     """
 
-    def __init__(self, *, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, search: PlannerSettings = ..., route: RouteSettings = ...) -> None: ...
+    def __init__(self, *, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, search: PlannerSettings = ..., route: TimedPathSettings = ...) -> None: ...
 
     @property
     def period(self) -> float: ...
@@ -2185,10 +2185,10 @@ class OnlinePlannerSettings:
     def search(self, arg: PlannerSettings, /) -> None: ...
 
     @property
-    def route(self) -> RouteSettings: ...
+    def route(self) -> TimedPathSettings: ...
 
     @route.setter
-    def route(self, arg: RouteSettings, /) -> None: ...
+    def route(self, arg: TimedPathSettings, /) -> None: ...
 
 class LookAheadSettings:
     """

@@ -155,7 +155,7 @@ CLASSES = {  # of the snippet, by places in a scenario file
     "controller.look_ahead": "LookAheadSettings",
     "controller.planner": "OnlinePlannerSettings",
     "controller.planner.search": "PlannerSettings",
-    "controller.planner.route": "RouteSettings",
+    "controller.planner.route": "TimedPathSettings",
     "controller.arrival": "ArrivalSettings",
     "controller.safety": "SafetySettings",
     "system": "GeometricSystem",

@@ -8,10 +8,10 @@
 
 #include "../settings.hpp"
 #include "impl.hpp"
-#include "sidestep/embedding/clearance_barrier.hpp"
-#include "sidestep/embedding/clearance_table_barrier.hpp"
-#include "sidestep/embedding/joint_limit_barrier.hpp"
-#include "sidestep/embedding/self_collision_barrier.hpp"
+#include "sidestep/barrier/clearance_barrier.hpp"
+#include "sidestep/barrier/clearance_table_barrier.hpp"
+#include "sidestep/barrier/joint_limit_barrier.hpp"
+#include "sidestep/barrier/self_collision_barrier.hpp"
 
 namespace sidestep {
 namespace {
@@ -42,11 +42,11 @@ std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const Barrier
   return std::make_shared<GeometricSystem>(robot, std::move(parts), std::move(settings));
 }
 
-std::unique_ptr<Guide> make_guide(const BodyClearance& body, const ControllerSettings& settings) {
+std::unique_ptr<OnlinePlanner> make_guide(const BodyClearance& body, const ControllerSettings& settings) {
   if (!settings.planner) {
     return nullptr;
   }
-  GuideSettings guide;
+  OnlinePlannerConfig guide;
   guide.planner = settings.planner->search;
   guide.route = settings.planner->route;
   guide.period = settings.planner->period;
@@ -54,7 +54,7 @@ std::unique_ptr<Guide> make_guide(const BodyClearance& body, const ControllerSet
   guide.retry = settings.planner->retry;
   guide.seed = settings.seed;
   guide.synchronous = settings.synchronous;
-  return std::make_unique<Guide>(body, guide);
+  return std::make_unique<OnlinePlanner>(body, guide);
 }
 
 bool use_torque(const Arm& arm, ControllerSettings::Output output) {
@@ -66,14 +66,14 @@ bool use_torque(const Arm& arm, ControllerSettings::Output output) {
   return output == ControllerSettings::Output::torque || (output == ControllerSettings::Output::automatic && possible);
 }
 
-EscapeSettings seeded(EscapeSettings settings, std::uint64_t seed) {
+LocalMinimumSettings seeded(LocalMinimumSettings settings, std::uint64_t seed) {
   settings.seed = seed;
   return settings;
 }
 
-Flight at_rest(const Arm& arm) {
+AvoidanceTrajectory at_rest(const Arm& arm) {
   const Eigen::VectorXd q = Eigen::VectorXd::Zero(arm.num_coordinates());
-  return Flight(arm.robot().limits(), q, q, q);
+  return AvoidanceTrajectory(arm.robot().limits(), q, q, q);
 }
 
 }  // namespace
@@ -92,11 +92,11 @@ std::vector<bool> unlimited_joints(const Robot& robot) {
   return unlimited;
 }
 
-Controller::Impl::Snapshot::Snapshot(const Arm& arm, const Flight& flight)
+Controller::Impl::Snapshot::Snapshot(const Arm& arm, const AvoidanceTrajectory& flight)
     : q(Eigen::VectorXd::Zero(arm.num_coordinates())),
       v(q),
       followed(q),
-      places(Eigen::MatrixXd::Zero(q.size(), RouteFollower::most_places + 1)),
+      places(Eigen::MatrixXd::Zero(q.size(), TimedPathFollower::most_places + 1)),
       trajectory(flight) {}
 
 Controller::Impl::Impl(Arm a, ControllerSettings s)
@@ -130,7 +130,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       reference_(JointGoal(q_)),
       refuge_(JointGoal(q_)),
       trajectory_(at_rest(arm)),
-      places_(Eigen::MatrixXd::Zero(q_.size(), RouteFollower::most_places + 1)),
+      places_(Eigen::MatrixXd::Zero(q_.size(), TimedPathFollower::most_places + 1)),
       lowered_places_(places_),
       room_(*system),
       posture_room_(body_),
@@ -161,9 +161,9 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     escape_.emplace(arm.robot(), seeded(*settings.local_minimum, settings.seed));
   }
   if (settings.look_ahead) {
-    EvasionSettings look = *settings.look_ahead;
+    LookAheadSettings look = *settings.look_ahead;
     look.seed = settings.seed;
-    evasion_ = std::make_unique<Evasion>(system, look);
+    evasion_ = std::make_unique<LookAhead>(system, look);
   }
   ends_.emplace(body_, settings.planner ? settings.planner->search : PlannerSettings{});
   for (const Joint& joint : arm.robot().joints()) {

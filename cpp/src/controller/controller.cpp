@@ -93,7 +93,7 @@ const GeometricSystem::Workspace& Controller::workspace() const noexcept { retur
 const TorqueSolution& Controller::solution() const noexcept { return impl_->solution; }
 Eigen::VectorXd Controller::target() const { return impl_->target(); }
 Plan Controller::last_plan() const { return impl_->guide ? impl_->guide->last_plan() : Plan{}; }
-Guide::Counts Controller::planner_counts() const { return impl_->guide ? impl_->guide->counts() : Guide::Counts{}; }
+OnlinePlanner::Counts Controller::planner_counts() const { return impl_->guide ? impl_->guide->counts() : OnlinePlanner::Counts{}; }
 bool Controller::has_torque() const noexcept { return impl_->torque; }
 
 }  // namespace sidestep

@@ -79,9 +79,9 @@ std::string Controller::Impl::explain() const {
               "° away; ";
     }
   }
-  if (guide_status_ == GuideStatus::goal_in_collision || guide_status_ == GuideStatus::start_in_collision) {
+  if (guide_status_ == OnlinePlannerStatus::goal_in_collision || guide_status_ == OnlinePlannerStatus::start_in_collision) {
     const Plan plan = guide->last_plan();
-    const std::string where = guide_status_ == GuideStatus::goal_in_collision ? "at the goal " : "where the arm is, ";
+    const std::string where = guide_status_ == OnlinePlannerStatus::goal_in_collision ? "at the goal " : "where the arm is, ";
     return text + where + describe(plan.obstruction) + "; it goes on when that is free";
   }
   if (!guide && target_blocked_) {
@@ -99,7 +99,7 @@ std::string Controller::Impl::explain() const {
       return text + "at the goal " + describe(obstruction) + "; it goes on when that is free";
     }
   }
-  if (guide_status_ == GuideStatus::no_path) {
+  if (guide_status_ == OnlinePlannerStatus::no_path) {
     text += "no path was found yet; it is looked for again; ";
   }
   if (avoiding_) {

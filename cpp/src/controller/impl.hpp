@@ -15,8 +15,8 @@
 #include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/posture_search.hpp"
-#include "sidestep/dynamical_system/escape.hpp"
-#include "sidestep/dynamical_system/evasion.hpp"
+#include "sidestep/system/local_minimum_recovery.hpp"
+#include "sidestep/lookahead/look_ahead.hpp"
 
 namespace sidestep {
 
@@ -43,7 +43,7 @@ class Controller::Impl {
   GeometricSystem::Workspace workspace;
   TorqueSolution solution;
   Command command;
-  std::unique_ptr<Guide> guide;
+  std::unique_ptr<OnlinePlanner> guide;
   bool torque = false;
 
  private:
@@ -58,7 +58,7 @@ class Controller::Impl {
   };
   /// What the step tells the worker every `look_period_`.
   struct Snapshot {
-    explicit Snapshot(const Arm& arm, const Flight& flight);
+    explicit Snapshot(const Arm& arm, const AvoidanceTrajectory& flight);
 
     double time = 0.0;
     Eigen::VectorXd q, v;
@@ -68,11 +68,11 @@ class Controller::Impl {
     JointGoal followed;                  // the reference of the step
     bool by_pose = false;                // the pose goal itself is followed, as it moves
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // where it is now
-    Guide::Following following;
+    OnlinePlanner::Following following;
     Eigen::MatrixXd places;              // where barriers leave room (nv × num_places)
     Eigen::Index num_places = 0;
     bool avoiding = false;
-    Flight trajectory;
+    AvoidanceTrajectory trajectory;
   };
   /// Activation distances, and whether the target itself is inside a barrier.
   struct Activations {
@@ -89,7 +89,7 @@ class Controller::Impl {
     double time = 0.0;
     std::uint64_t goal_number = 0;
     bool avoid = false;
-    Flight trajectory;
+    AvoidanceTrajectory trajectory;
   };
 
   // Of the step.
@@ -124,7 +124,7 @@ class Controller::Impl {
   Obstacles obstacles_at(const Snapshot& snapshot) const;
   Posture search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles,
                          std::uint64_t attempt, std::uint64_t goal_number);
-  Evasion::Leader leader_of(const Guide::Following& following) const;
+  LookAhead::Leader leader_of(const OnlinePlanner::Following& following) const;
   /// Writes activation distances that leave room at places; whether the last of them is inside a barrier.
   bool lower_at(const Eigen::MatrixXd& places, Eigen::Index num, const Obstacles& obstacles,
                 GeometricSystem::Workspace& workspace, Eigen::VectorXd& activations) const noexcept;
@@ -148,7 +148,7 @@ class Controller::Impl {
   std::optional<RigidBodyDynamics::Workspace> dynamics_workspace_;
   std::optional<TorqueController> torque_program_;
   std::optional<AccelerationFilter> filter_;
-  std::optional<Escape> escape_;
+  std::optional<LocalMinimumRecovery> escape_;
   BodyClearance body_;
   BodyClearance::Workspace here_;
   Eigen::VectorXd q_, v_, last_q_, wanted_, turns_;
@@ -163,13 +163,13 @@ class Controller::Impl {
   std::uint64_t goal_number_ = 0, posture_attempt_ = 0, tick_ = 0;
   bool has_target_ = false, posture_found_ = false, moves_ = false;
   Eigen::VectorXd target_;        // a configuration that the arm is led to
-  Guide::Attractor attractor_;
-  GuideStatus guide_status_ = GuideStatus::idle;
+  OnlinePlanner::Attractor attractor_;
+  OnlinePlannerStatus guide_status_ = OnlinePlannerStatus::idle;
   Goal reference_;                // JointGoal
   const Goal* followed_ = nullptr;
   Goal refuge_;                   // JointGoal: the target of the trajectory
   bool avoiding_ = false, pending_ = false;
-  Flight trajectory_;
+  AvoidanceTrajectory trajectory_;
   Eigen::VectorXd own_activations_;
   Eigen::MatrixXd places_, lowered_places_;
   Eigen::Index num_places_ = 0, num_lowered_ = -1;
@@ -177,7 +177,7 @@ class Controller::Impl {
   GeometricSystem::Workspace room_;    // for looks at places, where synchronous
 
   // Of the worker.
-  std::unique_ptr<Evasion> evasion_;
+  std::unique_ptr<LookAhead> evasion_;
   std::optional<RrtConnect> ends_;     // says what is free at an end
   BodyClearance::Workspace posture_room_;
   GeometricSystem::Workspace worker_workspace_;

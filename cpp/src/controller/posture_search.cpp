@@ -7,7 +7,7 @@
 #include <random>
 #include <utility>
 
-#include "../dynamical_system/random_configuration.hpp"
+#include "../system/random_configuration.hpp"
 #include "../settings.hpp"
 
 namespace sidestep {

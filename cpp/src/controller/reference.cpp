@@ -40,7 +40,7 @@ void Controller::Impl::begin_goal() noexcept {
 }
 
 void Controller::Impl::next_posture(const PoseGoal& pose) noexcept {
-  guide_status_ = GuideStatus::idle;
+  guide_status_ = OnlinePlannerStatus::idle;
   has_target_ = target_blocked_ = false;
   if (settings.synchronous) {
     guarded([&] { take_posture(search_posture(pose, q_, obstacles(), posture_attempt_, goal_number_)); });
@@ -86,7 +86,7 @@ void Controller::Impl::choose_reference() noexcept {
       }
     }
     // A posture that no way leads to: another one.
-    const bool fails = guide ? guide_status_ == GuideStatus::no_path || guide_status_ == GuideStatus::goal_in_collision
+    const bool fails = guide ? guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision
                              : target_blocked_;
     if (has_target_ && fails && time_ >= next_posture_) {
       if (++posture_attempt_ % most_posture_attempts == 0) {
@@ -107,7 +107,7 @@ void Controller::Impl::choose_reference() noexcept {
   } else {
     rest_at(target_);
   }
-  const bool led = guide && guide_status_ != GuideStatus::no_path;
+  const bool led = guide && guide_status_ != OnlinePlannerStatus::no_path;
   if (escape_ && !led && !target_blocked_ && !avoiding_) {
     followed_ = &escape_->pursue(reference_, q_, std::numeric_limits<double>::quiet_NaN(), settings.period);
   }
@@ -187,10 +187,10 @@ void Controller::Impl::avoid() noexcept {
   }
   if (settings.synchronous) {
     guarded([&] {
-      const Evasion::Leader leader = evasion_->is_due(settings.period) && guide && followed_ == &reference_
+      const LookAhead::Leader leader = evasion_->is_due(settings.period) && guide && followed_ == &reference_
                                          ? leader_of(guide->following())
-                                         : Evasion::Leader{};
-      const Flight* found = evasion_->pursue(*followed_, q_, v_, obstacles(), settings.period, leader);
+                                         : LookAhead::Leader{};
+      const AvoidanceTrajectory* found = evasion_->pursue(*followed_, q_, v_, obstacles(), settings.period, leader);
       avoiding_ = found != nullptr;
       if (avoiding_) {
         trajectory_ = *found;

@@ -90,7 +90,7 @@ void Controller::Impl::take_orders() noexcept {
     target_blocked_ = false;
     posture_attempt_ = 0;
     moves_ = goal_ != nullptr && is_moving(*goal_);
-    guide_status_ = GuideStatus::idle;
+    guide_status_ = OnlinePlannerStatus::idle;
     num_lowered_ = -1;
     next_posture_ = 0.0;
     begins_goal_ = goal_ != nullptr;  // where the state is known
@@ -211,7 +211,7 @@ Activity Controller::Impl::judge_activity() noexcept {
   }
   const bool at_rest = v_.cwiseAbs().maxCoeff() < settings.arrival.speed;
   const bool out_of_reach = !posture_found_;
-  const bool no_way = guide_status_ == GuideStatus::no_path || guide_status_ == GuideStatus::goal_in_collision ||
+  const bool no_way = guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision ||
                       (!guide && target_blocked_);
   return at_rest && (no_way || out_of_reach) ? Activity::blocked : Activity::moving;
 }
@@ -232,7 +232,7 @@ void Controller::Impl::write_snapshot() noexcept {
   if (const auto* joint = std::get_if<JointGoal>(followed_)) {
     s.followed = *joint;
   }
-  s.following = guide && has_target_ && followed_ == &reference_ ? guide->following() : Guide::Following{};
+  s.following = guide && has_target_ && followed_ == &reference_ ? guide->following() : OnlinePlanner::Following{};
   write_places(s.places, s.num_places);
   if (disturbed_) {
     s.num_places = 0;

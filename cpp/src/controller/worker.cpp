@@ -85,8 +85,8 @@ void Controller::Impl::look(const Snapshot& s) {
       std::get<PoseGoal>(followed).pose = s.pose;
     }
     FoundTrajectory& found = trajectories_.draft();
-    const std::optional<Flight> followed_now = s.avoiding ? std::optional(s.trajectory) : std::nullopt;
-    const std::optional<Flight> best = evasion_->look(followed, s.q, s.v, around, followed_now, leader_of(s.following));
+    const std::optional<AvoidanceTrajectory> followed_now = s.avoiding ? std::optional(s.trajectory) : std::nullopt;
+    const std::optional<AvoidanceTrajectory> best = evasion_->look(followed, s.q, s.v, around, followed_now, leader_of(s.following));
     found.time = s.time;
     found.goal_number = s.goal_number;
     found.avoid = best.has_value();
@@ -118,11 +118,11 @@ Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::Vect
   return posture;
 }
 
-Evasion::Leader Controller::Impl::leader_of(const Guide::Following& following) const {
+LookAhead::Leader Controller::Impl::leader_of(const OnlinePlanner::Following& following) const {
   if (!guide) {
     return {};
   }
-  const std::shared_ptr<const Route> route = guide->route(following.route_number);
+  const std::shared_ptr<const TimedPath> route = guide->route(following.route_number);
   if (route == nullptr) {
     return {};
   }

@@ -72,9 +72,9 @@ BOOST_AUTO_TEST_CASE(every_field_has_a_default_in_its_range_and_refuses_what_is_
   check_group<ArrivalSettings>("controller: arrival.", [](ControllerSettings& s) -> auto& { return s.arrival; });
   check_group<OnlinePlannerSettings>("controller: planner.", [](ControllerSettings& s) -> auto& { return *s.planner; });
   check_group<PlannerSettings>("controller: planner.search.", [](ControllerSettings& s) -> auto& { return s.planner->search; });
-  check_group<RouteSettings>("controller: planner.route.", [](ControllerSettings& s) -> auto& { return s.planner->route; });
-  check_group<EvasionSettings>("controller: look_ahead.", [](ControllerSettings& s) -> auto& { return *s.look_ahead; });
-  check_group<EscapeSettings>("controller: local_minimum.", [](ControllerSettings& s) -> auto& { return *s.local_minimum; });
+  check_group<TimedPathSettings>("controller: planner.route.", [](ControllerSettings& s) -> auto& { return s.planner->route; });
+  check_group<LookAheadSettings>("controller: look_ahead.", [](ControllerSettings& s) -> auto& { return *s.look_ahead; });
+  check_group<LocalMinimumSettings>("controller: local_minimum.", [](ControllerSettings& s) -> auto& { return *s.local_minimum; });
 }
 
 BOOST_AUTO_TEST_CASE(what_a_controller_cannot_do_is_refused_with_name_value_and_range) {

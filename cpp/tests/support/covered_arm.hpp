@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/system/goal.hpp"
 #include "sidestep/model/arm.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 #include "support/serial_arm.hpp"

@@ -1,25 +1,25 @@
 """The planner on clearance: one path, or a path kept up beside a motion."""
 
 from sidestep._core import (
-    Guidance,
-    Guide,
-    GuideStatus,
     Obstruction,
+    OnlinePlanner,
+    OnlinePlannerStatus,
     PathPlanner,
     Plan,
+    PlannerReference,
     PlannerSettings,
     PlanStatus,
-    RouteSettings,
+    TimedPathSettings,
 )
 
 __all__ = [
-    "Guidance",
-    "Guide",
-    "GuideStatus",
     "Obstruction",
+    "OnlinePlanner",
+    "OnlinePlannerStatus",
     "PathPlanner",
     "Plan",
     "PlanStatus",
+    "PlannerReference",
     "PlannerSettings",
-    "RouteSettings",
+    "TimedPathSettings",
 ]

@@ -29,7 +29,7 @@ _ROOMS = {
         "LookAheadSettings",
         "OnlinePlannerSettings",
         "PlannerSettings",
-        "RouteSettings",
+        "TimedPathSettings",
     ),
     "sidestep.system": ("GeometricSystem",),
 }

@@ -1,6 +1,7 @@
 """The geometric system and its parts: embeddings, barriers, metric, recovery, look-ahead."""
 
 from sidestep._core import (
+    AvoidanceTrajectory,
     ClearanceBarrier,
     ClearanceTable,
     ClearanceTableBarrier,
@@ -9,15 +10,14 @@ from sidestep._core import (
     Diagnosis,
     Embedding,
     EmbeddingEvaluation,
-    Escape,
-    Evasion,
-    Flight,
     GeometricSystem,
     JointLimitBarrier,
+    LocalMinimumRecovery,
+    LookAhead,
+    PenetrationRecovery,
     PlaneBarrier,
     ProgressMonitor,
     PullForm,
-    Recovery,
     SelfCollisionBarrier,
     Step,
     StepStatus,
@@ -25,6 +25,7 @@ from sidestep._core import (
 )
 
 __all__ = [
+    "AvoidanceTrajectory",
     "ClearanceBarrier",
     "ClearanceTable",
     "ClearanceTableBarrier",
@@ -33,15 +34,14 @@ __all__ = [
     "Diagnosis",
     "Embedding",
     "EmbeddingEvaluation",
-    "Escape",
-    "Evasion",
-    "Flight",
     "GeometricSystem",
     "JointLimitBarrier",
+    "LocalMinimumRecovery",
+    "LookAhead",
+    "PenetrationRecovery",
     "PlaneBarrier",
     "ProgressMonitor",
     "PullForm",
-    "Recovery",
     "SelfCollisionBarrier",
     "Step",
     "StepStatus",

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sidestep/control/acceleration_bounds.hpp"
-#include "sidestep/embedding/clearances.hpp"
+#include "sidestep/barrier/clearances.hpp"
 #include "sidestep/fields.hpp"
 #include "sidestep/kinematics/robot.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "sidestep/control/acceleration_bounds.hpp"
 #include "sidestep/control/torque_controller.hpp"
-#include "sidestep/dynamical_system/geometric_system.hpp"
+#include "sidestep/system/geometric_system.hpp"
 
 namespace sidestep {
 

@@ -9,8 +9,8 @@
 
 #include "sidestep/controller/command.hpp"
 #include "sidestep/controller/settings.hpp"
-#include "sidestep/dynamical_system/goal.hpp"
-#include "sidestep/guidance/guide.hpp"
+#include "sidestep/system/goal.hpp"
+#include "sidestep/planning/online_planner.hpp"
 #include "sidestep/model/arm.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
@@ -94,7 +94,7 @@ class Controller {
   Eigen::VectorXd target() const;
   /// What the planner found last, and how often it searched. Not for the loop.
   Plan last_plan() const;
-  Guide::Counts planner_counts() const;
+  OnlinePlanner::Counts planner_counts() const;
   bool has_torque() const noexcept;
 
  private:

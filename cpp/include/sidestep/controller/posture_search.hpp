@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "sidestep/dynamical_system/goal.hpp"
+#include "sidestep/system/goal.hpp"
 
 namespace sidestep {
 

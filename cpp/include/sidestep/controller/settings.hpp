@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "sidestep/control/safety_rows.hpp"
-#include "sidestep/dynamical_system/escape.hpp"
-#include "sidestep/dynamical_system/evasion.hpp"
+#include "sidestep/system/local_minimum_recovery.hpp"
+#include "sidestep/lookahead/look_ahead.hpp"
 #include "sidestep/fields.hpp"
-#include "sidestep/guidance/route.hpp"
-#include "sidestep/guidance/rrt_connect.hpp"
+#include "sidestep/planning/timed_path.hpp"
+#include "sidestep/planning/rrt_connect.hpp"
 
 namespace sidestep {
 
@@ -31,10 +31,10 @@ struct ArrivalSettings {
   double speed = 0.05;        ///< largest joint speed [rad/s | m/s]
 };
 
-/// The planner that runs beside the loop, see Guide.
+/// The planner that runs beside the loop, see OnlinePlanner.
 struct OnlinePlannerSettings {
   PlannerSettings search = {};
-  RouteSettings route = {};
+  TimedPathSettings route = {};
   double period = 0.02;    ///< between two looks at the scene [s]
   double patience = 1.0;   ///< without progress until it plans again [s]
   double retry = 1.0;      ///< until a failed search is repeated in the same scene [s]
@@ -61,8 +61,8 @@ struct ControllerSettings {
   SafetySettings safety = {};
   ArrivalSettings arrival = {};
   std::optional<OnlinePlannerSettings> planner = OnlinePlannerSettings{};
-  std::optional<EvasionSettings> look_ahead = EvasionSettings{};
-  std::optional<EscapeSettings> local_minimum = EscapeSettings{};  ///< sub-goals where the arm is stuck without a path
+  std::optional<LookAheadSettings> look_ahead = LookAheadSettings{};
+  std::optional<LocalMinimumSettings> local_minimum = LocalMinimumSettings{};  ///< sub-goals where the arm is stuck without a path
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;

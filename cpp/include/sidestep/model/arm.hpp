@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/embedding/clearance_table.hpp"
-#include "sidestep/embedding/link_pair.hpp"
+#include "sidestep/barrier/clearance_table.hpp"
+#include "sidestep/barrier/link_pair.hpp"
 #include "sidestep/kinematics/robot.hpp"
 #include "sidestep/model/dynamics.hpp"
 

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/embedding/embedding.hpp"
+#include "sidestep/barrier/embedding.hpp"
 
 namespace sidestep {
 

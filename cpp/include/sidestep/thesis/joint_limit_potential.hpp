@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "sidestep/embedding/embedding.hpp"
+#include "sidestep/barrier/embedding.hpp"
 
 namespace sidestep {
 

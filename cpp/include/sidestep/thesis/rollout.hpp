@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "sidestep/dynamical_system/geometric_system.hpp"
+#include "sidestep/system/geometric_system.hpp"
 #include "sidestep/interruption.hpp"
 
 namespace sidestep {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "sidestep/embedding/embedding.hpp"
+#include "sidestep/barrier/embedding.hpp"
 
 namespace sidestep {
 

@@ -1,0 +1,140 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "sidestep/control/acceleration_filter.hpp"
+#include "sidestep/lookahead/avoidance_trajectory.hpp"
+#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/system/goal.hpp"
+#include "sidestep/fields.hpp"
+#include "sidestep/interruption.hpp"
+#include "sidestep/obstacles/obstacles.hpp"
+
+namespace sidestep {
+
+struct LookAheadSettings {
+  double horizon = 2.0;      ///< [s] how far is looked ahead
+  double period = 0.01;      ///< [s] of the steps of the motions looked at; made shorter to go into `delay` whole times
+  double delay = 0.1;        ///< [s] from one look to the next, from when on is followed what it found
+  double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
+  int tries = 500;           ///< flights that are drawn in one look
+  std::uint64_t seed = 0;
+
+  /// Throws std::invalid_argument that names the setting, its value and what is allowed.
+  void validate() const;
+};
+template <>
+const std::vector<Field<LookAheadSettings>>& fields();
+
+/// Leads an arm out of the way of what moves, in time: a barrier yields straight away from it, until a joint is at its
+/// limit or at its fastest, where a step aside would have let it pass.
+///
+/// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from where
+/// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal that comes
+/// nearer to an obstacle than `clearance`, and so does the flight that is followed already, flights to random
+/// configurations are drawn: near ones, far ones and such as are near that of the flight followed. They are sifted three
+/// times. Those come first whose references, without a filter, get farthest before the body is deep in an obstacle, which
+/// is quick to say. They are integrated by steps of 0.05 s, as many as there is time for; then those that keep farthest
+/// away by steps of `period`, until one is found that keeps `clearance`. If none does, that is followed whose least
+/// clearance is largest, or of those that go through an obstacle the one that comes to it last. The goal is followed again
+/// as soon as its own way is free.
+///
+/// A flight is no motion of the system: its barriers would push it off its way, straight away from what comes. It goes
+/// where it was seen to go, kept off obstacles and itself, and within limits, by the filter or the torque controller, which
+/// have to be there. Where nothing moves, nothing is
+/// looked at.
+///
+/// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
+///
+/// `look` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
+/// simulated time. One thread at a time.
+class LookAhead {
+ public:
+  /// Moves a goal on for a duration [s] while the arm is at q (nv): along a path, for example. Empty: as the goal's own
+  /// velocity says (`advance`). Each motion that is looked at has a copy.
+  using Leader = std::function<void(const Eigen::VectorXd& q, double duration, Goal& goal)>;
+
+  /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
+  /// which it names.
+  explicit LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings = {});
+
+  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the flight that is followed, if
+  /// there is one. What is to be followed from `delay` on: a flight, or the system to the goal where it is empty, as it is
+  /// if nothing moves or the state is unusable. Allocates.
+  std::optional<AvoidanceTrajectory> look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                             const Obstacles& obstacles, const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
+                             const Leader& leader = {});
+
+  /// The flight to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every `delay`,
+  /// and follows what the look before found.
+  const AvoidanceTrajectory* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
+                       double period, const Leader& leader = {});
+  /// Whether the next `pursue` looks.
+  bool is_due(double period) const noexcept { return !(until_look_ > 0.5 * period); }
+  /// Before another motion is pursued: what was found is forgotten.
+  void reset() noexcept;
+
+  /// Ends a look once it says so, by an Interruption: what was found before stays.
+  void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
+
+  /// How many flights were found.
+  int count() const noexcept { return count_; }
+  const LookAheadSettings& settings() const noexcept { return settings_; }
+  int num_coordinates() const noexcept { return system_->robot().num_coordinates(); }
+
+ private:
+  /// An arm that follows a flight or, where it is empty, the system to a goal.
+  struct Motion {
+    Eigen::VectorXd q, v;
+    Obstacles obstacles;
+    Goal goal;
+    Leader leader;
+    std::optional<AvoidanceTrajectory> flight;
+  };
+  struct Tried {
+    double clearance;
+    AvoidanceTrajectory flight;
+  };
+  /// What integrates motions by a period [s].
+  struct Stepper {
+    double period;
+    AccelerationFilter filter;
+    int steps = 0;  // integrated so far
+
+    Stepper(const Robot& robot, double period);
+  };
+
+  void check_interrupted() const;
+  /// Moves on by one period; the least clearance from obstacles at its beginning [m].
+  double advance(Motion& motion, Stepper& stepper);
+  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that goes
+  /// through an obstacle less, by what is left of the horizon then, at 1 m/s.
+  double least_clearance(Motion motion, Stepper& stepper, double enough);
+  double obstacle_clearance() const noexcept;
+  /// Random flights from a state, those first whose references get farthest before the body is deep in an obstacle.
+  std::vector<AvoidanceTrajectory> draw_flights(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
+  /// The flights from a state that keep farthest away in coarse steps, best first.
+  std::vector<Tried> promising(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
+  Eigen::VectorXd draw(const Eigen::VectorXd& q, double spread);
+
+  std::shared_ptr<const GeometricSystem> system_;
+  LookAheadSettings settings_;
+  GeometricSystem::Workspace workspace_;
+  int periods_;  // of a delay
+  Stepper fine_, coarse_;
+  TorqueSolution filtered_;
+  std::vector<Eigen::Index> of_obstacles_;  // coordinates
+  std::mt19937_64 random_;
+  std::optional<AvoidanceTrajectory> found_, pursued_;
+  double until_look_ = 0.0;
+  int count_ = 0;
+  Interrupted interrupted_ = never_interrupted;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "sidestep/fields.hpp"
+#include "sidestep/planning/body_clearance.hpp"
+#include "sidestep/planning/path_smoothing.hpp"
+#include "sidestep/planning/plan.hpp"
+#include "sidestep/planning/random_stream.hpp"
+#include "sidestep/planning/search_tree.hpp"
+
+namespace sidestep {
+
+struct PlannerSettings {
+  double margin = 0.06;     ///< clearance of a wide way, on which barriers hardly act [m]
+  double floor = 0.005;     ///< clearance that the first way keeps, and every one [m]
+  double allowance = 0.02;       ///< how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
+  double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
+  double slack = 0.002;     ///< see Margins, at least; else a quarter of the margin [m]
+  double fade = 0.3;        ///< see Margins [m]
+  double range = 1.0;       ///< longest edge of the trees, in joints that count by how far they reach, see RrtConnect [rad | m]
+  int max_nodes = 10000;    ///< of both trees
+  int max_iterations = 40000;
+  double max_seconds = std::numeric_limits<double>::infinity();
+  int shortcuts = 100;      ///< attempts to shorten a path
+
+  /// Throws std::invalid_argument that names the setting at fault.
+  void validate() const;
+};
+template <>
+const std::vector<Field<PlannerSettings>>& fields();
+
+/// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
+/// LaValle 2000) with dynamic domains (Yershova et al. 2005). Deterministic in (start, goal, obstacles, seed) unless the time
+/// runs out.
+///
+/// Distances in the trees are √Σ (w_i Δq_i)², w_i the reach of joint i over the mean of all: an edge is as long as what it
+/// moves. Seven of ten samples are uniform within the limits, the others around a node. Both trees grow as far as they can,
+/// the one towards the sample, the other towards where that led. A node that was trapped grows by steps of random length.
+///
+/// The first path keeps the `floor`: those are many, and the soonest found. It is improved then: one that keeps `margin` is
+/// looked for with a 400th of the budget, else one that keeps the geometric mean of the two with a 40th, and what was found is
+/// shortened and widened. What a path keeps is stated in the plan; near start and goal every link may be as near to things as
+/// it is there, see Margins. A link deeper than `allowance` inside something at an end is refused as in collision.
+class RrtConnect {
+ public:
+  /// The body must outlive the planner, which is mutable: one per thread.
+  RrtConnect(const BodyClearance& body, const PlannerSettings& settings);
+
+  Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
+
+  /// The two parts of a plan: the first path, then a better one. margin [m]: in place of the settings', at least the floor.
+  Plan find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
+  void improve(Plan& plan, const Obstacles& obstacles, std::uint64_t seed, double margin);
+
+  /// Ends what is under way once it says so: as if time ran out in `find`, with what there is by then in `improve`.
+  void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
+
+  const PlannerSettings& settings() const noexcept { return settings_; }
+  const BodyClearance& body() const noexcept { return *body_; }
+  BodyClearance::Workspace& workspace() noexcept { return workspace_; }
+
+  /// Whether an item is deeper than its allowance inside something at q; then what.
+  bool obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles, Obstruction& obstruction);
+
+  /// The margins between two ends: of this distance, and less where an end asks for less.
+  Margins margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles);
+
+  /// Whether the straight way is free, with this margin [m] but for its ends.
+  bool sees(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double margin, const Obstacles& obstacles);
+
+  /// Lets a path (nv × W) begin `here`: straight to its last waypoint, from `first` on, that is seen. False where none is.
+  bool enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here,
+             const Obstacles& obstacles);
+
+ private:
+  enum class Growth { trapped, advanced, reached };
+
+  void connect(double margin, int iterations, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
+               const Obstacles& obstacles, double deadline, RandomStream& random, Plan& plan);
+  void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
+              const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
+  /// Draws sample_ between low and high and returns the node of the tree that is nearest to it.
+  int draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& high, SearchTree& tree, RandomStream& random);
+  /// Grows from a node on until the target is reached or no step is free; `trapped` where not even one was.
+  Growth extend(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins,
+                RandomStream& random);
+  /// One step of that.
+  Growth grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles, const Margins& margins,
+              RandomStream& random);
+
+  const BodyClearance* body_;
+  PlannerSettings settings_;
+  BodyClearance::Workspace workspace_;
+  Interrupted interrupted_ = never_interrupted;
+  SearchTree from_start_, from_goal_;
+  Eigen::VectorXd sample_, next_, near_, clearances_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,221 @@
+#include "sidestep/planning/online_planner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "../settings.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double disturbing = 0.1;  // [m] from the arm of what moves
+constexpr double foresight = 1.0;   // [s] in which it could be
+
+}  // namespace
+
+const char* name(OnlinePlannerStatus status) noexcept {
+  switch (status) {
+    case OnlinePlannerStatus::idle: return "idle";
+    case OnlinePlannerStatus::moving: return "moving";
+    case OnlinePlannerStatus::arrived: return "arrived";
+    case OnlinePlannerStatus::no_path: return "no_path";
+    case OnlinePlannerStatus::goal_in_collision: return "goal_in_collision";
+    case OnlinePlannerStatus::start_in_collision: return "start_in_collision";
+    case OnlinePlannerStatus::timeout: return "timeout";
+    case OnlinePlannerStatus::invalid: return "invalid";
+  }
+  return "unknown";
+}
+
+void OnlinePlannerConfig::validate() const {
+  planner.validate();
+  route.validate();
+  const auto positive = [](double value, const char* what) {
+    require(value > 0.0, what, value, "positive");
+  };
+  positive(period, "online planner: period");
+  positive(patience, "online planner: patience");
+  positive(retry, "online planner: retry");
+  positive(tolerance, "online planner: tolerance");
+  positive(duration, "online planner: duration");
+}
+
+OnlinePlanner::OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& settings)
+    : body_(std::move(body)),
+      settings_((settings.validate(), settings)),
+      goal_(Eigen::VectorXd::Zero(body_.robot().num_coordinates())),
+      last_q_(goal_),
+      velocity_(goal_),
+      progress_(settings.patience),
+      here_(body_),
+      states_(State{goal_, goal_}),
+      answers_(Answer{}),
+      newest_(std::make_shared<const Obstacles>(Obstacles::none())),
+      planner_(body_, settings.planner),
+      obstacles_(newest_),
+      watch_(body_),
+      margin_(settings.planner.margin) {
+  if (!settings_.synchronous) {
+    planner_.interrupt_when([this] {
+      newer_ = states_.update() || newer_;
+      return stopping_.load() || states_.get().goal_number != seen_goal_ || overtaken();
+    });
+    thread_ = std::thread([this] { run(); });
+  }
+}
+
+OnlinePlanner::~OnlinePlanner() {
+  stopping_.store(true);
+  wake_.release();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+void OnlinePlanner::set_goal(const Eigen::VectorXd& goal) {
+  if (goal.size() != goal_.size() || !goal.allFinite()) {
+    throw std::invalid_argument("online planner: the goal has " + std::to_string(goal.size()) + " entries, " +
+                                std::to_string(goal_.size()) + " finite ones are needed");
+  }
+  goal_ = goal;
+  ++goal_number_;
+  started_ = false;
+  stops_ = 0;
+  progress_.reset();
+}
+
+void OnlinePlanner::set_obstacles(const Obstacles& obstacles) {
+  const auto same = [&](const Obstacles& o) {
+    return o.size() == obstacles.size() && o.points() == obstacles.points() && o.radii() == obstacles.radii();
+  };
+  auto copy = std::make_shared<const Obstacles>(obstacles);
+  const std::lock_guard lock(mutex_);
+  if (same(*newest_)) {
+    return;
+  }
+  newest_.swap(copy);
+  ++scene_number_;
+}
+
+bool OnlinePlanner::disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept {
+  return body_.nearest_moving(q, obstacles, foresight, here_) < disturbing;
+}
+
+OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor& attractor) noexcept {
+  attractor.velocity.setZero(goal_.size());
+  attractor.acceleration.setZero(goal_.size());
+  attractor.places.col(0) = goal_;
+  attractor.num_places = 1;
+  attractor.arrives = false;
+  if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite() || !std::isfinite(time)) {
+    attractor.position = goal_;
+    if (q.size() == goal_.size()) {
+      attractor.position = q;
+    }
+    return goal_number_ == 0 ? OnlinePlannerStatus::idle : OnlinePlannerStatus::invalid;
+  }
+  const bool first = !started_;
+  if (first) {
+    started_ = true;
+    begin_ = last_time_ = next_look_ = time;
+    last_q_ = q;
+    velocity_.setZero();
+  } else if (time > last_time_) {
+    velocity_ = (q - last_q_) / (time - last_time_);
+    last_q_ = q;
+  }
+  // Tell the guide; in a thread it looks at its own pace, and at once at a new goal.
+  if (!settings_.synchronous || time >= next_look_) {
+    State& state = states_.draft();
+    state.q = q;
+    state.goal = goal_;
+    state.time = time;
+    state.station = follower_.station;
+    state.goal_number = goal_number_;
+    state.route_number = followed_;
+    state.stops = stops_;
+    states_.submit();
+    if (settings_.synchronous) {
+      next_look_ = time + settings_.period;
+      look_safely(states_.get());
+    } else if (first) {
+      wake_.release();
+    }
+  }
+
+  const Answer& answer = answers_.get();
+  const bool ours = answer.goal_number == goal_number_;
+  if (ours && answer.status == PlanStatus::found && !answer.direct) {
+    if (answer.route_number != followed_) {
+      followed_ = answer.route_number;
+      follower_.enter(*answer.route, q, velocity_);
+    }
+    attractor.position.resize(goal_.size());
+    follower_.advance(*answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity,
+                      attractor.acceleration);
+    if (const Eigen::Index num = follower_.narrow(*answer.route, settings_.route, attractor.places); num > 0) {
+      attractor.num_places = num;
+      attractor.arrives = answer.route->length() - follower_.station <= settings_.route.lead;
+    }
+  } else {
+    attractor.position = goal_;
+    follower_.rate = 0.0;
+  }
+  last_time_ = time;
+
+  if ((q - goal_).cwiseAbs().maxCoeff() < settings_.tolerance) {
+    progress_.reset();
+    return OnlinePlannerStatus::arrived;
+  }
+  const double left = ours && !answer.direct && answer.route ? answer.route->length() - follower_.station : 0.0;
+  const double away = (attractor.position - q).norm() + left;
+  if (ours && answer.path_number != measured_) {  // another way may be longer
+    measured_ = answer.path_number;
+    progress_.reset();
+  }
+  if (progress_.update(time, std::exp(away))) {  // it goes with what is left, however long the way
+    ++stops_;
+    progress_.reset();
+  }
+  if (ours) {
+    switch (answer.status) {
+      case PlanStatus::start_in_collision: return OnlinePlannerStatus::start_in_collision;
+      case PlanStatus::goal_in_collision: return OnlinePlannerStatus::goal_in_collision;
+      case PlanStatus::invalid: return OnlinePlannerStatus::invalid;
+      case PlanStatus::no_path:
+      case PlanStatus::timeout:
+        if (!answer.direct) {
+          return OnlinePlannerStatus::no_path;
+        }
+        break;
+      case PlanStatus::found: break;
+    }
+  }
+  return time - begin_ > settings_.duration ? OnlinePlannerStatus::timeout : OnlinePlannerStatus::moving;
+}
+
+OnlinePlanner::Following OnlinePlanner::following() noexcept {
+  const Answer& answer = answers_.current();
+  const bool follows = answer.goal_number == goal_number_ && answer.status == PlanStatus::found && !answer.direct &&
+                       answer.route_number == followed_;
+  return {follows ? followed_ : 0, follower_};
+}
+
+std::shared_ptr<const TimedPath> OnlinePlanner::route(std::uint64_t number) const {
+  const std::lock_guard lock(mutex_);
+  return number != 0 && number == shown_route_number_ ? shown_route_ : nullptr;
+}
+
+Plan OnlinePlanner::last_plan() const {
+  const std::lock_guard lock(mutex_);
+  return shown_;
+}
+
+OnlinePlanner::Counts OnlinePlanner::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+}  // namespace sidestep

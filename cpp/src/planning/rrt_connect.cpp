@@ -1,0 +1,314 @@
+#include "sidestep/planning/rrt_connect.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "../settings.hpp"
+#include "sidestep/planning/path_smoothing.hpp"
+#include "sidestep/planning/random_stream.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
+constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
+constexpr double local = 0.3;            // of the samples are around a node: narrow places are near others
+constexpr double around_node = 2.4;      // how far each joint of such a sample may be from the node's [rad | m]
+constexpr double octaves = 2.5;          // of the lengths of steps from a node that was trapped, below the range
+constexpr double domain = 3.0;           // of the range: how far samples may be from a node that was trapped
+constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
+constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
+
+double seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::vector<Eigen::VectorXd> to_root(const SearchTree& tree, int node) {
+  std::vector<Eigen::VectorXd> way;
+  for (; node >= 0; node = tree.parent(node)) {
+    way.emplace_back(tree.node(node));
+  }
+  return way;
+}
+
+}  // namespace
+
+template <>
+const std::vector<Field<PlannerSettings>>& fields() {
+  using S = PlannerSettings;
+  static const std::vector<Field<S>> all{
+      {"margin", &S::margin, "m", 0.001, 0.5, "clearance of a wide way, which is preferred"},
+      {"floor", &S::floor, "m", 1e-4, 0.5, "clearance that every way keeps: smaller finds narrower ways"},
+      {"allowance", &S::allowance, "m", 0.0, 0.2, "how deep an ellipsoid may be in something at start or goal"},
+      {"pair_allowance", &S::pair_allowance, "m", 0.0, 0.2, "the same of two links below their contact"},
+      {"slack", &S::slack, "m", 1e-5, 0.1, "what an edge may come nearer than its margin: larger is quicker"},
+      {"fade", &S::fade, "m", 0.01, 10.0, "way on which what an end may come nearer fades"},
+      {"range", &S::range, "rad", 0.01, 10.0, "longest edge of the search trees"},
+      {"max_nodes", &S::max_nodes, "-", 2.0, 1e6, "of both trees: the budget of a search"},
+      {"max_iterations", &S::max_iterations, "-", 1.0, 2e9, "of a search: its budget"},
+      {"max_seconds", &S::max_seconds, "s", 1e-9, infinity, "of a search; motions then do not repeat"},
+      {"shortcuts", &S::shortcuts, "-", 0.0, 1e6, "attempts to shorten a path: more are shorter and later"},
+  };
+  return all;
+}
+
+void PlannerSettings::validate() const {
+  check_fields("planner: ", *this);
+  if (!(margin >= floor)) {
+    throw std::invalid_argument("planner: floor is " + std::to_string(floor) + " m and margin " + std::to_string(margin) +
+                                " m; allowed: floor <= margin");
+  }
+}
+
+RrtConnect::RrtConnect(const BodyClearance& body, const PlannerSettings& settings)
+    : body_(&body),
+      settings_(settings),
+      workspace_(body),
+      from_start_(body.reach() / body.reach().mean(), settings.max_nodes),
+      from_goal_(body.reach() / body.reach().mean(), settings.max_nodes),
+      sample_(body.robot().num_coordinates()),
+      next_(body.robot().num_coordinates()),
+      near_(body.robot().num_coordinates()),
+      clearances_(body.num_items()) {
+  settings_.validate();
+}
+
+bool RrtConnect::obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles, Obstruction& obstruction) {
+  const double least = std::min(settings_.allowance, settings_.pair_allowance);
+  body_->clearances(q, obstacles, -least, workspace_, clearances_);
+  int worst = -1;
+  double excess = 0.0;
+  for (int i = 0; i < body_->num_items(); ++i) {
+    const bool pair = body_->label(i).kind == CoordinateLabel::Kind::self;
+    const double beyond = -clearances_[i] - (pair ? settings_.pair_allowance : settings_.allowance);
+    if (clearances_[i] < -least && beyond > excess) {
+      excess = beyond;
+      worst = i;
+    }
+  }
+  if (worst < 0) {
+    return false;
+  }
+  const BodyClearance::Nearest nearest = body_->nearest(worst, q, obstacles, 0.0, workspace_);
+  obstruction = {body_->label(worst), nearest.point, -nearest.clearance,
+                 nearest.point < 0 ? std::string() : obstacles.words_for(nearest.point)};
+  return true;
+}
+
+Margins RrtConnect::margins(double distance, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
+                            const Obstacles& obstacles) {
+  Margins margins{distance, std::max(settings_.slack, slack_share * distance), settings_.fade, {}};
+  for (const Eigen::VectorXd* q : {&start, &goal}) {
+    body_->clearances(*q, obstacles, distance, workspace_, clearances_);
+    Eigen::VectorXd deficits(body_->num_items());
+    for (int i = 0; i < body_->num_items(); ++i) {
+      const double asked = body_->margin(i, margins);
+      deficits[i] = clearances_[i] < asked ? asked + touching - clearances_[i] : 0.0;
+    }
+    if (deficits.maxCoeff() > 0.0) {
+      margins.ends.push_back({*q, deficits});
+    }
+  }
+  return margins;
+}
+
+bool RrtConnect::sees(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double margin, const Obstacles& obstacles) {
+  return body_->edge_free(from, to, obstacles, margins(margin, from, to, obstacles), workspace_);
+}
+
+bool RrtConnect::enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here,
+                       const Obstacles& obstacles) {
+  for (Eigen::Index k = path.cols() - 1; k >= first; --k) {
+    if (sees(here, path.col(k), margin, obstacles)) {
+      Eigen::MatrixXd rest(path.rows(), path.cols() - k + 1);
+      rest << here, path.rightCols(path.cols() - k);
+      path = std::move(rest);
+      return true;
+    }
+  }
+  return false;
+}
+
+Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
+                      std::uint64_t seed) {
+  Plan plan = find(start, goal, obstacles, seed);
+  improve(plan, obstacles, seed, settings_.margin);
+  return plan;
+}
+
+Plan RrtConnect::find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
+                      std::uint64_t seed) {
+  const double begin = seconds();
+  Plan plan;
+  const JointLimits& limits = body_->robot().limits();
+  for (const Eigen::VectorXd* q : {&start, &goal}) {
+    if (q->size() != body_->robot().num_coordinates() || !q->allFinite() ||
+        ((*q - limits.lower).array() < -limit_rounding).any() || ((limits.upper - *q).array() < -limit_rounding).any()) {
+      return plan;
+    }
+  }
+  if (obstructed(start, obstacles, plan.obstruction)) {
+    plan.status = PlanStatus::start_in_collision;
+    return plan;
+  }
+  if (obstructed(goal, obstacles, plan.obstruction)) {
+    plan.status = PlanStatus::goal_in_collision;
+    return plan;
+  }
+  RandomStream random(seed);
+  connect(settings_.floor, settings_.max_iterations, start, goal, obstacles, begin + settings_.max_seconds, random, plan);
+  plan.search_seconds = seconds() - begin;
+  return plan;
+}
+
+void RrtConnect::improve(Plan& plan, const Obstacles& obstacles, std::uint64_t seed, double margin) {
+  if (plan.status != PlanStatus::found) {
+    return;
+  }
+  const double begin = seconds(), deadline = begin + settings_.max_seconds - plan.search_seconds;
+  RandomStream random(~seed);
+  const Eigen::VectorXd start = plan.path.col(0), goal = plan.path.rightCols(1);
+  // A wide way is tried for a little, what lies between for longer.
+  for (const auto& [level, share] : {std::pair{margin, 400}, std::pair{std::sqrt(margin * settings_.floor), 40}}) {
+    if (level > plan.margin) {
+      Plan wider = plan;
+      connect(level, settings_.max_iterations / share, start, goal, obstacles, deadline, random, wider);
+      plan.nodes = wider.nodes;
+      plan.iterations = wider.iterations;
+      if (wider.status == PlanStatus::found) {
+        plan = std::move(wider);
+      }
+    }
+  }
+  if (plan.path.cols() > 2 && settings_.shortcuts > 0 && !interrupted_()) {
+    const Margins kept = margins(plan.margin, start, goal, obstacles);
+    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_, interrupted_);
+    plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_, interrupted_);
+  }
+  plan.improvement_seconds = seconds() - begin;
+}
+
+void RrtConnect::connect(double margin, int iterations, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
+                         const Obstacles& obstacles, double deadline, RandomStream& random, Plan& plan) {
+  plan.status = PlanStatus::no_path;
+  plan.margin = margin;
+  const Margins kept = margins(margin, start, goal, obstacles);
+  if (body_->edge_free(start, goal, obstacles, kept, workspace_)) {
+    plan.path.resize(start.size(), 2);
+    plan.path << start, goal;
+    plan.status = PlanStatus::found;
+  } else {
+    search(start, goal, obstacles, kept, iterations, deadline, random, plan);
+  }
+}
+
+void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
+                        const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan) {
+  from_start_.clear();
+  from_goal_.clear();
+  from_start_.add(start, -1);
+  from_goal_.add(goal, -1);
+  const JointLimits& limits = body_->robot().limits();
+  // A joint without limits is searched a turn to either side of the two ends.
+  const Eigen::VectorXd low = limits.lower.cwiseMax((start.cwiseMin(goal).array() - 2.0 * pi).matrix());
+  const Eigen::VectorXd high = limits.upper.cwiseMin((start.cwiseMax(goal).array() + 2.0 * pi).matrix());
+  SearchTree *one = &from_start_, *other = &from_goal_;
+  const int nodes_before = plan.nodes;
+  for (int i = 0; i < iterations && !one->full() && !other->full(); ++i) {
+    ++plan.iterations;
+    plan.nodes = nodes_before + one->size() + other->size();
+    if (seconds() > deadline || interrupted_()) {
+      plan.status = PlanStatus::timeout;
+      return;
+    }
+    const int nearest = draw_sample(low, high, *one, random);
+    if (extend(*one, nearest, sample_, obstacles, margins, random) != Growth::trapped) {
+      const Eigen::VectorXd met = one->node(one->size() - 1);
+      if (extend(*other, other->nearest(met), met, obstacles, margins, random) == Growth::reached) {
+        std::vector<Eigen::VectorXd> way = to_root(from_start_, from_start_.size() - 1);
+        std::reverse(way.begin(), way.end());
+        const std::vector<Eigen::VectorXd> rest = to_root(from_goal_, from_goal_.size() - 1);
+        way.insert(way.end(), rest.begin() + 1, rest.end());  // the two trees share the node where they met
+        plan.path.resize(start.size(), static_cast<Eigen::Index>(way.size()));
+        for (std::size_t k = 0; k < way.size(); ++k) {
+          plan.path.col(static_cast<Eigen::Index>(k)) = way[k];
+        }
+        plan.nodes = nodes_before + one->size() + other->size();
+        plan.status = PlanStatus::found;
+        return;
+      }
+    }
+    // The smaller tree is the one in a narrow place: it needs the samples.
+    if (one->size() > other->size()) {
+      std::swap(one, other);
+    }
+  }
+}
+
+int RrtConnect::draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& high, SearchTree& tree, RandomStream& random) {
+  if (random.unit() < local) {
+    const auto node = tree.node(static_cast<int>(random.unit() * tree.size()));
+    for (Eigen::Index k = 0; k < sample_.size(); ++k) {
+      sample_[k] = random.uniform(std::max(low[k], node[k] - around_node), std::min(high[k], node[k] + around_node));
+    }
+    return tree.nearest(sample_);
+  }
+  // Samples far from nodes that were trapped only find the same walls again.
+  int nearest = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    for (Eigen::Index k = 0; k < sample_.size(); ++k) {
+      sample_[k] = random.uniform(low[k], high[k]);
+    }
+    nearest = tree.nearest(sample_);
+    if (tree.distance(nearest, sample_) <= tree.domain(nearest)) {
+      break;
+    }
+  }
+  return nearest;
+}
+
+RrtConnect::Growth RrtConnect::extend(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles,
+                                      const Margins& margins, RandomStream& random) {
+  const int before = tree.size();
+  Growth growth = Growth::advanced;
+  while (growth == Growth::advanced && !tree.full()) {
+    growth = grow(tree, from, target, obstacles, margins, random);
+    from = tree.size() - 1;
+  }
+  return growth == Growth::trapped && tree.size() > before ? Growth::advanced : growth;
+}
+
+RrtConnect::Growth RrtConnect::grow(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles,
+                                    const Margins& margins, RandomStream& random) {
+  near_ = tree.node(from);
+  const double distance = tree.distance(from, target);
+  const auto step = [&](double range) {
+    const bool whole = distance <= range;
+    next_ = whole ? target : near_ + range / distance * (target - near_);
+    if (!body_->free(next_, obstacles, margins, workspace_) ||
+        !body_->edge_free(near_, next_, obstacles, margins, workspace_)) {
+      return Growth::trapped;
+    }
+    tree.add(next_, from);
+    return whole ? Growth::reached : Growth::advanced;
+  };
+  // A long step, unless one was not free before; else a shorter one.
+  double longest = settings_.range;
+  if (!tree.bounded(from)) {
+    const Growth growth = step(longest);
+    if (growth != Growth::trapped) {
+      return growth;
+    }
+    longest = std::min(longest, distance);
+    tree.bound(from, domain * settings_.range);
+  }
+  return step(longest * std::exp2(-octaves * random.unit()));
+}
+
+}  // namespace sidestep
