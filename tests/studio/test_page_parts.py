@@ -465,7 +465,7 @@ def test_the_slice_of_an_arm_of_many_joints_is_taken_where_the_others_are(
 def test_a_sentence_begins_large_but_a_name_stays_as_it_is() -> None:
     assert begun("on the way, 0.3 rad from the goal") == "On the way, 0.3 rad from the goal"
     assert begun("fr3_link5 slides along ball3, 53 mm away") == "fr3_link5 slides along ball3, 53 mm away"
-    assert begun("online planner: idle; arriving") == "OnlinePlanner: idle; arriving"
+    assert begun("planner: idle; arriving") == "Planner: idle; arriving"
 
 
 def test_live_lets_the_loop_go_on_only_if_it_ran(make_session: MakeSession, scenario: Scenario) -> None:
