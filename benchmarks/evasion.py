@@ -8,10 +8,9 @@ import time
 
 import numpy as np
 
-from sidestep import Robot
+from sidestep import Arm, Robot
 from sidestep.bench import ProblemSettings
-from sidestep.bench.method import Method
-from sidestep.bench.methods import build_system
+from sidestep.bench.methods import barrier_system
 from sidestep.bench.problems import ProblemGenerator
 from sidestep.distance import SelfCollision
 from sidestep.system import LookAhead
@@ -21,9 +20,9 @@ TIMES = (0.0, 0.5, 1.0, 1.5)  # [s] at which an arm that has not moved from its 
 
 
 def looks(name: str) -> tuple[list[float], list[float]]:
-    """Milliseconds of looks that find no flight, most of them as the way is free, and of those that find one."""
+    """Milliseconds of looks that find no trajectory, most of them as the way is free, and of those that find one."""
     robot = Robot.named(name)
-    system = build_system(Method.barrier, robot)
+    system = barrier_system(robot, Arm.load(name).body)
     settings = ProblemSettings(robot=name, obstacles=10, moving=0.5)
     generator = ProblemGenerator(settings, robot=robot, self_collision=SelfCollision(robot))
     free: list[float] = []
@@ -43,7 +42,7 @@ def looks(name: str) -> tuple[list[float], list[float]]:
 def main() -> None:
     print("| robot | looks | number | median [ms] | p95 [ms] | most [ms] |\n|---|---|---|---|---|---|")
     for name in sys.argv[1:] or ("fr3", "panda", "ur10", "xarm7", "iiwa"):
-        for label, times in zip(("no flight", "flight"), looks(name), strict=True):
+        for label, times in zip(("no trajectory", "trajectory"), looks(name), strict=True):
             median, p95, most = np.quantile(times, (0.5, 0.95, 1.0))
             print(f"| {name} | {label} | {len(times)} | {median:.1f} | {p95:.1f} | {most:.1f} |")
 

@@ -214,7 +214,7 @@ void bind_safety(nb::module_& m) {
       .def_prop_ro("curvatures", [](const Clearances& c) { return to_numpy(c.curvatures); },
                    "d2h/dt2 (m,) [m/s^2] along the motion with constant joint velocity.")
       .def_prop_ro("approach_values", [](const Clearances& c) { return to_numpy(c.approach.values); },
-                   "h (m,) [m] of what the arm has to mind where it moves: that with the least room after a stop.")
+                   "h (m,) [m] of the critical sample: the one with the smallest predicted clearance after braking.")
       .def_prop_ro("approach_rates", [](const Clearances& c) { return to_numpy(c.approach.rates); },
                    "Its dh/dt (m,) [m/s].")
       .def_prop_ro("gradients", [](const Clearances& c) { return to_numpy_matrix(c.gradients.transpose()); },

@@ -85,17 +85,17 @@ void bind_plan(nb::module_& m) {
 
 void bind_planner_settings(nb::module_& m) {
   bind_settings<PlannerSettings>(m, "PlannerSettings", "How a PathPlanner searches.");
-  bind_settings<TimedPathSettings>(m, "TimedPathSettings", "How fast the attractor of a OnlinePlanner passes a path.");
+  bind_settings<TimedPathSettings>(m, "TimedPathSettings", "How fast the reference of an OnlinePlanner passes a path.");
 }
 
-/// What Python gets from a step of a guide.
+/// What Python gets from a step of an OnlinePlanner.
 struct PlannerReference {
   OnlinePlannerStatus status;
   OnlinePlanner::Attractor attractor;
 };
 
 void bind_guide(nb::module_& m) {
-  nb::enum_<OnlinePlannerStatus>(m, "OnlinePlannerStatus", "What a guided motion is about.")
+  nb::enum_<OnlinePlannerStatus>(m, "OnlinePlannerStatus", "What a motion led by an OnlinePlanner is about.")
       .value("idle", OnlinePlannerStatus::idle, "No goal was given.")
       .value("moving", OnlinePlannerStatus::moving, "On the way.")
       .value("arrived", OnlinePlannerStatus::arrived, "Every joint is at the goal.")
@@ -105,26 +105,27 @@ void bind_guide(nb::module_& m) {
       .value("timeout", OnlinePlannerStatus::timeout, "The time for the motion is over; it goes on.")
       .value("invalid", OnlinePlannerStatus::invalid, "The goal is outside the limits, or the state is not finite.");
 
-  nb::class_<PlannerReference>(m, "PlannerReference", "Where a guide draws the arm to, and what the motion is about.")
+  nb::class_<PlannerReference>(m, "PlannerReference",
+                               "The current reference of an OnlinePlanner, and what the motion is about.")
       .def_ro("status", &PlannerReference::status)
       .def_prop_ro("goal", [](const PlannerReference& g) { const OnlinePlanner::Attractor& a = g.attractor;
                      return JointGoal(a.position, a.velocity, a.acceleration); },
-                   "The attractor, as a goal for a GeometricSystem.")
+                   "The reference, as a goal for a GeometricSystem.")
       .def_prop_ro("places",
                    [](const PlannerReference& g) {
                      const OnlinePlanner::Attractor& a = g.attractor;
                      return to_numpy_matrix(a.places.leftCols(a.num_places).transpose());
                    },
-                   "Where barriers are to leave room (k, nv): the narrow places of the path that the arm is about to pass, or the\n"
-                   "goal where there is none. See Controller.activations.")
+                   "Waypoints (k, nv) where activation distances shrink: narrow places of the path that the arm is about to\n"
+                   "pass, or the goal where there is none. See Controller.activations.")
       .def_prop_ro("arrives", [](const PlannerReference& g) { return g.attractor.arrives; },
-                   "Whether barriers are to leave room at the goal as well: `places` are others, and the end of the path is\n"
-                   "within the lead.");
+                   "Whether activation distances shrink at the goal as well: `places` are others, and the end of the path\n"
+                   "is within the lead.");
 
   nb::class_<OnlinePlanner>(
       m, "OnlinePlanner",
-      "Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.\n"
-      "Until there is a path, and where the straight way to the goal is free, the attractor is the goal itself.\n"
+      "Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.\n"
+      "Until there is a path, and where the straight way to the goal is free, the reference is the goal itself.\n"
       "robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: TimedPathSettings, None for the defaults.\n"
       "period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is\n"
       "searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed\n"
@@ -152,7 +153,7 @@ void bind_guide(nb::module_& m) {
       .def(
           "set_goal",
           [](OnlinePlanner& g, const ArrayLike& goal) {
-            const Exclusive use(&g, "the guide");
+            const Exclusive use(&g, "the planner");
             g.set_goal(as_finite_vector(goal, "goal", g.body().robot().num_coordinates()));
           },
           nb::arg("goal"), "A configuration (nv,) [rad] to go to; from the loop that calls step().")
@@ -163,7 +164,7 @@ void bind_guide(nb::module_& m) {
           [](OnlinePlanner& g, const ArrayLike& q, double time) {
             PlannerReference guidance{OnlinePlannerStatus::idle, OnlinePlanner::Attractor(g.body().robot().num_coordinates())};
             const Eigen::VectorXd at = as_vector(q, "q", g.body().robot().num_coordinates());
-            const Exclusive use(&g, "the guide");
+            const Exclusive use(&g, "the planner");
             if (!g.settings().synchronous) {
               guidance.status = g.step(at, time, guidance.attractor);
               return guidance;
@@ -174,11 +175,11 @@ void bind_guide(nb::module_& m) {
               return std::move(guidance);
             });
           },
-          nb::arg("q"), nb::arg("time"), "Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.")
+          nb::arg("q"), nb::arg("time"), "The current reference from q (nv,) [rad] at a time [s] that does not go back.")
       .def(
           "disturbed",
           [](OnlinePlanner& g, const ArrayLike& q, const Obstacles& obstacles) {
-            const Exclusive use(&g, "the guide");
+            const Exclusive use(&g, "the planner");
             return g.disturbed(as_finite_vector(q, "q", g.body().robot().num_coordinates()), obstacles);
           },
           nb::arg("q"), nb::arg("obstacles"),

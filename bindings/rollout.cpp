@@ -61,7 +61,7 @@ void bind_rollout(nb::module_& m) {
           [](LocalMinimumRecovery& self, nb::handle goal, const ArrayLike& q, double potential, double period) {
             const Goal target = as_goal(goal, self.num_coordinates());
             const Eigen::VectorXd at = as_vector(q, "q", self.num_coordinates());
-            const Exclusive use(&self, "the escape");
+            const Exclusive use(&self, "the local-minimum recovery");
             return self.pursue(target, at, potential, as_period(period));
           },
           nb::arg("goal"), nb::arg("q"), nb::arg("potential"), nb::arg("period"),
@@ -73,9 +73,10 @@ void bind_rollout(nb::module_& m) {
       .def_prop_ro("count", &LocalMinimumRecovery::count, "How many sub-goals there have been.");
 
   nb::class_<AvoidanceTrajectory>(m, "AvoidanceTrajectory",
-                     "A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits\n"
-                     "allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter\n"
-                     "or a TorqueController with clearances. Raises ValueError on wrong shapes and what is not finite.")
+                     "A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its\n"
+                     "limits allow, and the acceleration that follows it. It ignores obstacles: the acceleration is for an\n"
+                     "AccelerationFilter or a TorqueController with clearances. Raises ValueError on wrong shapes and what is\n"
+                     "not finite.")
       .def(
           "__init__",
           [](AvoidanceTrajectory* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& refuge) {
@@ -104,14 +105,14 @@ void bind_rollout(nb::module_& m) {
           "velocity", [](const AvoidanceTrajectory& self) { return to_numpy(self.velocity()); }, "The reference's velocity v* (nv,) [/s].");
 
   nb::class_<LookAhead>(m, "LookAhead",
-                      "Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until\n"
-                      "the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving\n"
-                      "on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks\n"
-                      "for a AvoidanceTrajectory to one of `tries` random configurations that does not, to be followed until the way to the goal\n"
-                      "is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole\n"
-                      "times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.\n"
-                      "Raises ValueError that names the setting at fault, or if the system has\n"
-                      "no clearances to obstacles.")
+                      "Leads an arm out of the way of what moves, in time, where a barrier would back off along the line of\n"
+                      "approach until a joint limit stops the arm. A look integrates the system, as an AccelerationFilter lets\n"
+                      "it, with the obstacles moving on as they do; where that comes nearer to them than `clearance` [m] within\n"
+                      "`horizon` [s], it looks for an AvoidanceTrajectory to one of `tries` random configurations that does not,\n"
+                      "to be followed until the way to the goal is free. One thread at a time. period [s]: of the steps looked\n"
+                      "at, shorter where it does not go into delay whole times; delay [s]: from one look to the next, from when\n"
+                      "on is followed what it found; seed: of the configurations.\n"
+                      "Raises ValueError that names the setting at fault, or if the system has no clearances to obstacles.")
       .def(
           "__init__",
           [](LookAhead* self, std::shared_ptr<GeometricSystem> system, double horizon, double period, double delay,
@@ -130,11 +131,11 @@ void bind_rollout(nb::module_& m) {
             const Goal target = as_goal(goal, nv);
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
             if (followed && followed->refuge().size() != nv) {
-              throw std::invalid_argument("the flight is for " + std::to_string(followed->refuge().size()) +
+              throw std::invalid_argument("the trajectory is for " + std::to_string(followed->refuge().size()) +
                                           " coordinates, the system has " + std::to_string(nv));
             }
             const Obstacles seen = obstacles;
-            const Exclusive use(&self, "the evasion");
+            const Exclusive use(&self, "the look-ahead");
             return interruptible([&](const Interrupted& interrupted) {
               const InterruptedWhile look(&self, interrupted);
               return self.look(target, position, velocity, seen, followed);
@@ -143,9 +144,9 @@ void bind_rollout(nb::module_& m) {
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("followed") = nb::none(),
           nb::sig("def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
                   "v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: AvoidanceTrajectory | None = None) -> AvoidanceTrajectory | None"),
-          "What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,), obstacles and the flight\n"
-          "that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the thread of a\n"
-          "loop; other threads run meanwhile. The flight is advanced by who follows it.")
+          "What to follow from `delay` on: a trajectory, or None for the system and the goal. q, v (nv,), obstacles and the\n"
+          "trajectory that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the\n"
+          "thread of a loop; other threads run meanwhile. The trajectory is advanced by who follows it.")
       .def(
           "pursue",
           [](LookAhead& self, nb::handle goal, const ArrayLike& q, const ArrayLike& v, const Obstacles& obstacles,
@@ -153,7 +154,7 @@ void bind_rollout(nb::module_& m) {
             const int nv = self.num_coordinates();
             const Goal target = as_goal(goal, nv);
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
-            const Exclusive use(&self, "the evasion");
+            const Exclusive use(&self, "the look-ahead");
             const HeldObstacles held(obstacles);
             return interruptible([&](const Interrupted& interrupted) {
               const InterruptedWhile look(&self, interrupted);
@@ -164,15 +165,15 @@ void bind_rollout(nb::module_& m) {
           nb::arg("goal"), nb::arg("q"), nb::arg("v"), nb::arg("obstacles"), nb::arg("period"),
           nb::sig("def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, "
                   "v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> AvoidanceTrajectory | None"),
-          "The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every\n"
+          "The trajectory to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every\n"
           "`delay`, and follows what the look before found, as if another thread had looked meanwhile.")
       .def("reset",
            [](LookAhead& self) {
-             const Exclusive use(&self, "the evasion");
+             const Exclusive use(&self, "the look-ahead");
              self.reset();
            },
            "Before another motion is pursued: what was found is forgotten.")
-      .def_prop_ro("count", &LookAhead::count, "How many flights were found.");
+      .def_prop_ro("count", &LookAhead::count, "How many trajectories were found.");
 
   nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
       .value("semi_implicit_euler", Integrator::semi_implicit_euler, "v += a dt; q += v dt.")

@@ -897,9 +897,10 @@ class LocalMinimumRecovery:
 
 class AvoidanceTrajectory:
     """
-    A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its limits
-    allow, and the acceleration that follows it. It minds no obstacles: the acceleration is for an AccelerationFilter
-    or a TorqueController with clearances. Raises ValueError on wrong shapes and what is not finite.
+    A motion from q at v (nv,) to rest at a configuration (nv,), each joint as fast as nine tenths of its
+    limits allow, and the acceleration that follows it. It ignores obstacles: the acceleration is for an
+    AccelerationFilter or a TorqueController with clearances. Raises ValueError on wrong shapes and what is
+    not finite.
     """
 
     def __init__(self, robot: Robot, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, refuge: numpy.typing.ArrayLike) -> None: ...
@@ -928,28 +929,28 @@ class AvoidanceTrajectory:
 
 class LookAhead:
     """
-    Leads an arm out of the way of what moves, in time, where a barrier would yield straight away from it until
-    the arm can no further. A look integrates the system, as an AccelerationFilter lets it, with the obstacles moving
-    on as they do; where that comes nearer to them than `clearance` [m] within `horizon` [s], it looks
-    for a AvoidanceTrajectory to one of `tries` random configurations that does not, to be followed until the way to the goal
-    is free. One thread at a time. period [s]: of the steps looked at, shorter where it does not go into delay whole
-    times; delay [s]: from one look to the next, from when on is followed what it found; seed: of the configurations.
-    Raises ValueError that names the setting at fault, or if the system has
-    no clearances to obstacles.
+    Leads an arm out of the way of what moves, in time, where a barrier would back off along the line of
+    approach until a joint limit stops the arm. A look integrates the system, as an AccelerationFilter lets
+    it, with the obstacles moving on as they do; where that comes nearer to them than `clearance` [m] within
+    `horizon` [s], it looks for an AvoidanceTrajectory to one of `tries` random configurations that does not,
+    to be followed until the way to the goal is free. One thread at a time. period [s]: of the steps looked
+    at, shorter where it does not go into delay whole times; delay [s]: from one look to the next, from when
+    on is followed what it found; seed: of the configurations.
+    Raises ValueError that names the setting at fault, or if the system has no clearances to obstacles.
     """
 
     def __init__(self, system: GeometricSystem, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 500, seed: int = 0) -> None: ...
 
     def look(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, followed: AvoidanceTrajectory | None = None) -> AvoidanceTrajectory | None:
         """
-        What to follow from `delay` on: a flight, or None for the system and the goal. q, v (nv,), obstacles and the flight
-        that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the thread of a
-        loop; other threads run meanwhile. The flight is advanced by who follows it.
+        What to follow from `delay` on: a trajectory, or None for the system and the goal. q, v (nv,), obstacles and the
+        trajectory that is followed, if there is one, are of now. Takes as long as some thousand steps, so not for the
+        thread of a loop; other threads run meanwhile. The trajectory is advanced by who follows it.
         """
 
     def pursue(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, obstacles: Obstacles, period: float) -> AvoidanceTrajectory | None:
         """
-        The flight to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every
+        The trajectory to follow in a step of `period` [s] of a simulation, None where the goal is followed: looks every
         `delay`, and follows what the look before found, as if another thread had looked meanwhile.
         """
 
@@ -958,7 +959,7 @@ class LookAhead:
 
     @property
     def count(self) -> int:
-        """How many flights were found."""
+        """How many trajectories were found."""
 
 class Integrator(enum.Enum):
     """How a step of length dt is taken."""
@@ -1168,7 +1169,7 @@ class Clearances:
     @property
     def approach_values(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        h (m,) [m] of what the arm has to mind where it moves: that with the least room after a stop.
+        h (m,) [m] of the critical sample: the one with the smallest predicted clearance after braking.
         """
 
     @property
@@ -1629,7 +1630,7 @@ class PlannerSettings:
 
 class TimedPathSettings:
     """
-    How fast the attractor of a OnlinePlanner passes a path.
+    How fast the reference of an OnlinePlanner passes a path.
 
         speed [rad/s], default 2.0, allowed 0.01 to 20: largest speed of the reference along the path
         speed_share, default 0.7, allowed 0.01 to 1: of the joints' velocity limits that the reference may ask for
@@ -1687,7 +1688,7 @@ class TimedPathSettings:
     def delay(self, value: float, /) -> None: ...
 
 class OnlinePlannerStatus(enum.Enum):
-    """What a guided motion is about."""
+    """What a motion led by an OnlinePlanner is about."""
 
     idle = 0
     """No goal was given."""
@@ -1714,33 +1715,35 @@ class OnlinePlannerStatus(enum.Enum):
     """The goal is outside the limits, or the state is not finite."""
 
 class PlannerReference:
-    """Where a guide draws the arm to, and what the motion is about."""
+    """
+    The current reference of an OnlinePlanner, and what the motion is about.
+    """
 
     @property
     def status(self) -> OnlinePlannerStatus: ...
 
     @property
     def goal(self) -> JointGoal:
-        """The attractor, as a goal for a GeometricSystem."""
+        """The reference, as a goal for a GeometricSystem."""
 
     @property
     def places(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Where barriers are to leave room (k, nv): the narrow places of the path that the arm is about to pass, or the
-        goal where there is none. See Controller.activations.
+        Waypoints (k, nv) where activation distances shrink: narrow places of the path that the arm is about to
+        pass, or the goal where there is none. See Controller.activations.
         """
 
     @property
     def arrives(self) -> bool:
         """
-        Whether barriers are to leave room at the goal as well: `places` are others, and the end of the path is
-        within the lead.
+        Whether activation distances shrink at the goal as well: `places` are others, and the end of the path
+        is within the lead.
         """
 
 class OnlinePlanner:
     """
-    Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.
-    Until there is a path, and where the straight way to the goal is free, the attractor is the goal itself.
+    Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.
+    Until there is a path, and where the straight way to the goal is free, the reference is the goal itself.
     robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: TimedPathSettings, None for the defaults.
     period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is
     searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed
@@ -1758,7 +1761,7 @@ class OnlinePlanner:
 
     def step(self, q: numpy.typing.ArrayLike, time: float) -> PlannerReference:
         """
-        Where to be drawn to from q (nv,) [rad] at a time [s] that does not go back.
+        The current reference from q (nv,) [rad] at a time [s] that does not go back.
         """
 
     def disturbed(self, q: numpy.typing.ArrayLike, obstacles: Obstacles) -> bool:

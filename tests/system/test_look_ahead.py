@@ -1,4 +1,4 @@
-"""LookAhead: flights out of the way of what moves."""
+"""LookAhead: trajectories out of the way of what moves."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def test_what_a_look_finds_is_followed_one_look_later_and_without_jumps(system, 
     for k, flight in enumerate(flights[51:], start=51):
         np.testing.assert_array_equal(flight.refuge, first.refuge)
         expected.advance(PERIOD)
-        # A kept flight goes on as the look foresaw it, in steps of 0.01 s: off by less than one of these.
+        # A kept trajectory goes on as the look foresaw it, in steps of 0.01 s: off by less than one of these.
         tolerance = 0.0 if k < 100 else 0.9 * robot.limits.acceleration.max() * 0.01
         np.testing.assert_allclose(flight.velocity, expected.velocity, rtol=0.0, atol=tolerance)
         np.testing.assert_allclose(flight.position, expected.position, rtol=0.0, atol=tolerance * 0.1)
@@ -179,7 +179,7 @@ def test_what_does_not_go_together_is_named(system):
         with pytest.raises(ValueError, match=f"period is {period}.*, must be positive and finite"):
             evasion.pursue(GOAL, GOAL, GOAL, ss.Obstacles.none(), period)
     foreign = AvoidanceTrajectory(other, q, q, q)
-    with pytest.raises(ValueError, match="the flight is for 3 coordinates, the system has 2"):
+    with pytest.raises(ValueError, match="the trajectory is for 3 coordinates, the system has 2"):
         evasion.look(GOAL, GOAL, GOAL, ss.Obstacles.none(), foreign)
     with pytest.raises(ValueError, match=r"q has shape \(3,\), expected \(2,\)"):
         evasion.look(GOAL, q, GOAL, ss.Obstacles.none())

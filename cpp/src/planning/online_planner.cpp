@@ -126,7 +126,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
     velocity_ = (q - last_q_) / (time - last_time_);
     last_q_ = q;
   }
-  // Tell the guide; in a thread it looks at its own pace, and at once at a new goal.
+  // Tell the planner; in a thread it looks at its own pace, and at once at a new goal.
   if (!settings_.synchronous || time >= next_look_) {
     State& state = states_.draft();
     state.q = q;

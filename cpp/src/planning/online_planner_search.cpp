@@ -1,4 +1,4 @@
-// The part of the guide beside the loop: looks at the scene, finds paths and keeps to them.
+// The part of the planner beside the loop: looks at the scene, finds paths and keeps to them.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,4 +1,4 @@
-// The guide in its two modes, its hand-over between threads, and the attractor on a route.
+// The planner in its two modes, its hand-over between threads, and the reference on a timed path.
 #include "sidestep/planning/online_planner.hpp"
 
 #include <boost/test/unit_test.hpp>

@@ -13,7 +13,7 @@ namespace sidestep {
 ///
 /// An arm that stops along its path in the time 2τ, every closing speed falling in proportion to time, comes to a clearance
 /// of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is smallest is
-/// what it has to mind: not always the nearest, past which it may move.
+/// the critical sample: not always the nearest, past which the arm may move.
 struct Horizon {
   double time = 0.0;                                           ///< τ [s]
   double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
@@ -41,7 +41,7 @@ struct Horizon {
   }
 };
 
-/// Reduces samples of a clearance to the one that an arm has to mind, see Horizon: the means of h, h', h'' and ∂h, with
+/// Reduces samples of a clearance to the critical one, see Horizon: the means of h, h', h'' and ∂h, with
 /// weights exp(−(h + τ h')/T).
 class StoppingClearance {
  public:

@@ -23,7 +23,7 @@ struct LookAheadSettings {
   double period = 0.01;      ///< [s] of the steps of the motions looked at; made shorter to go into `delay` whole times
   double delay = 0.1;        ///< [s] from one look to the next, from when on is followed what it found
   double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
-  int tries = 500;           ///< flights that are drawn in one look
+  int tries = 500;           ///< trajectories that are drawn in one look
   std::uint64_t seed = 0;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
@@ -32,23 +32,22 @@ struct LookAheadSettings {
 template <>
 const std::vector<Field<LookAheadSettings>>& fields();
 
-/// Leads an arm out of the way of what moves, in time: a barrier yields straight away from it, until a joint is at its
-/// limit or at its fastest, where a step aside would have let it pass.
+/// Leads an arm out of the way of what moves, in time: a barrier backs off along the line of approach until a joint
+/// limit stops the arm, where a step aside would have let it pass.
 ///
-/// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from where
-/// the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal that comes
-/// nearer to an obstacle than `clearance`, and so does the flight that is followed already, flights to random
-/// configurations are drawn: near ones, far ones and such as are near that of the flight followed. They are sifted three
-/// times. Those come first whose references, without a filter, get farthest before the body is deep in an obstacle, which
-/// is quick to say. They are integrated by steps of 0.05 s, as many as there is time for; then those that keep farthest
-/// away by steps of `period`, until one is found that keeps `clearance`. If none does, that is followed whose least
-/// clearance is largest, or of those that go through an obstacle the one that comes to it last. The goal is followed again
-/// as soon as its own way is free.
+/// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from
+/// where the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal
+/// that comes nearer to an obstacle than `clearance`, and so does the trajectory that is followed already,
+/// trajectories to random configurations are drawn: near ones, far ones and such as are near that of the trajectory
+/// followed. They are filtered in three stages. Those come first whose references, without a filter, get farthest
+/// before the body is deep in an obstacle, which is quick to say. They are integrated by steps of 0.05 s, as many as
+/// there is time for; then those that keep farthest away by steps of `period`, until one is found that keeps
+/// `clearance`. If none does, that is followed whose least clearance is largest, or of those that go through an
+/// obstacle the one that comes to it last. The goal is followed again as soon as its own way is free.
 ///
-/// A flight is no motion of the system: its barriers would push it off its way, straight away from what comes. It goes
-/// where it was seen to go, kept off obstacles and itself, and within limits, by the filter or the torque controller, which
-/// have to be there. Where nothing moves, nothing is
-/// looked at.
+/// A trajectory is no motion of the system, whose barriers would push the arm off it. The filter or the torque controller,
+/// which have to be there, keep the arm off obstacles and itself, and within limits. Where nothing moves, nothing is
+/// looked at. Predictions have acceleration limits, not torque limits.
 ///
 /// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
 ///
@@ -64,15 +63,15 @@ class LookAhead {
   /// which it names.
   explicit LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings = {});
 
-  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the flight that is followed, if
-  /// there is one. What is to be followed from `delay` on: a flight, or the system to the goal where it is empty, as it is
-  /// if nothing moves or the state is unusable. Allocates.
+  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the trajectory that is
+  /// followed, if there is one. What is to be followed from `delay` on: a trajectory, or the system to the goal where
+  /// it is empty, as it is if nothing moves or the state is unusable. Allocates.
   std::optional<AvoidanceTrajectory> look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                              const Obstacles& obstacles, const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
                              const Leader& leader = {});
 
-  /// The flight to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every `delay`,
-  /// and follows what the look before found.
+  /// The trajectory to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every
+  /// `delay`, and follows what the look before found.
   const AvoidanceTrajectory* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
                        double period, const Leader& leader = {});
   /// Whether the next `pursue` looks.
@@ -83,13 +82,13 @@ class LookAhead {
   /// Ends a look once it says so, by an Interruption: what was found before stays.
   void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
 
-  /// How many flights were found.
+  /// How many trajectories were found.
   int count() const noexcept { return count_; }
   const LookAheadSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return system_->robot().num_coordinates(); }
 
  private:
-  /// An arm that follows a flight or, where it is empty, the system to a goal.
+  /// An arm that follows a trajectory or, where it is empty, the system to a goal.
   struct Motion {
     Eigen::VectorXd q, v;
     Obstacles obstacles;
@@ -117,9 +116,9 @@ class LookAhead {
   /// through an obstacle less, by what is left of the horizon then, at 1 m/s.
   double least_clearance(Motion motion, Stepper& stepper, double enough);
   double obstacle_clearance() const noexcept;
-  /// Random flights from a state, those first whose references get farthest before the body is deep in an obstacle.
+  /// Random trajectories from a state, those first whose references get farthest before the body is deep in an obstacle.
   std::vector<AvoidanceTrajectory> draw_flights(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
-  /// The flights from a state that keep farthest away in coarse steps, best first.
+  /// The trajectories from a state that keep farthest away in coarse steps, best first.
   std::vector<Tried> promising(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
   Eigen::VectorXd draw(const Eigen::VectorXd& q, double spread);
 

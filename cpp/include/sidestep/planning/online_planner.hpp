@@ -17,7 +17,7 @@
 
 namespace sidestep {
 
-/// What a guided motion is about.
+/// What a motion led by an OnlinePlanner is about.
 enum class OnlinePlannerStatus {
   idle,                ///< no goal was given
   moving,              ///< on the way
@@ -48,10 +48,10 @@ struct OnlinePlannerConfig {
   void validate() const;
 };
 
-/// Leads an arm to a goal by a path that is searched in the background: an attractor that runs ahead on the path.
+/// Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.
 ///
-/// One loop calls `step()` with the state and moves by a GeometricSystem towards the attractor. Until there is a path, and
-/// where the straight way to the goal is free, the attractor is the goal itself. In its own thread the guide looks, every
+/// One loop calls `step()` with the state and moves by a GeometricSystem towards the reference. Until there is a path, and
+/// where the straight way to the goal is free, the reference is the goal itself. In its own thread the planner looks, every
 /// `period`, whether the way ahead is still free among the newest obstacles and the arm makes progress, and searches again
 /// from where the arm is where that is not so; after a stop with a larger margin.
 class OnlinePlanner {
@@ -69,10 +69,10 @@ class OnlinePlanner {
   /// The same points again are no change.
   void set_obstacles(const Obstacles& obstacles);
 
-  /// Where to be drawn to: position, velocity and acceleration (nv) of a JointGoal; and where barriers are to leave room, see
-  /// GeometricSystem::lower_activations: at the first `num_places` columns of `places` (nv), the narrow places of the path that the
-  /// arm is about to pass, or the goal where there is none; at the goal as well where the arm `arrives`: there are some, and
-  /// the end of the path is within the lead.
+  /// The current reference: position, velocity and acceleration (nv) of a JointGoal; and where activation distances
+  /// shrink, see GeometricSystem::lower_activations: at the first `num_places` columns of `places` (nv), the narrow
+  /// places of the path that the arm is about to pass, or the goal where there is none; at the goal as well where the
+  /// arm `arrives`: there are some, and the end of the path is within the lead.
   struct Attractor {
     explicit Attractor(Eigen::Index nv)
         : position(Eigen::VectorXd::Zero(nv)),
@@ -94,22 +94,22 @@ class OnlinePlanner {
   /// `invalid`. Never blocks; allocates nothing unless synchronous.
   [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Attractor& attractor) noexcept;
 
-  /// For a synchronous guide: ends a search under way once it says so, as if time ran out.
+  /// For a synchronous planner: ends a search under way once it says so, as if time ran out.
   void interrupt_when(Interrupted interrupted) {
     if (settings_.synchronous) {
       planner_.interrupt_when(std::move(interrupted));
     }
   }
 
-  /// What the guide found last: the path, or what is in the way. A copy; not for the loop.
+  /// What the planner found last: the path, or what is in the way. A copy; not for the loop.
   Plan last_plan() const;
-  /// Which route the loop follows, 0 if none, and where it is on it. For the loop; allocates nothing.
+  /// Which timed path the loop follows, 0 if none, and where it is on it. For the loop; allocates nothing.
   struct Following {
     std::uint64_t route_number = 0;
     TimedPathFollower follower = {};
   };
   Following following() noexcept;
-  /// A route by its number; null if there is a newer one. Not for the loop.
+  /// A timed path by its number; null if there is a newer one. Not for the loop.
   std::shared_ptr<const TimedPath> route(std::uint64_t number) const;
 
   /// How often it searched for a path, and how often it found one.
@@ -121,7 +121,7 @@ class OnlinePlanner {
   const BodyClearance& body() const noexcept { return body_; }
 
  private:
-  /// What the loop tells the guide.
+  /// What the loop tells the planner.
   struct State {
     Eigen::VectorXd q, goal;
     double time = 0.0, station = 0.0;
@@ -129,12 +129,12 @@ class OnlinePlanner {
     std::uint64_t route_number = 0;  // that it follows
     std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
   };
-  /// What the guide tells the loop.
+  /// What the planner tells the loop.
   struct Answer {
     std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
     PlanStatus status = PlanStatus::no_path;
     bool direct = true;  // straight to the goal
-    std::shared_ptr<const TimedPath> route;  // kept alive by the guide's side: a slot is only overwritten there
+    std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
   };
 
   void run();
@@ -146,7 +146,7 @@ class OnlinePlanner {
   bool ahead_is_free(double station, const Obstacles& obstacles, BodyClearance::Workspace& w) const;
   /// Whether something new blocks the first path, while a better one is made from it.
   bool overtaken();
-  /// Whether the arm sees the attractor, or else finds back to the path, which begins where it is then.
+  /// Whether the straight edge to the reference is free, or else finds back to the path, which begins where it is then.
   bool holds_on(const State& state, const Obstacles& obstacles);
   void follow(const State& state, const Eigen::MatrixXd& path, const Obstacles& obstacles, bool measured);
   Eigen::VectorXd on_route(double station) const;
@@ -182,7 +182,7 @@ class OnlinePlanner {
   std::uint64_t shown_route_number_ = 0;
   Counts counts_;
 
-  // Of the guide.
+  // Of the planner's thread.
   RrtConnect planner_;
   std::shared_ptr<const Obstacles> obstacles_;  // that it plans among
   std::uint64_t seen_scene_ = 0, seen_goal_ = 0, seen_stops_ = 0, route_number_ = 0, path_number_ = 0, searches_ = 0;

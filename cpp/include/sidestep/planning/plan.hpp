@@ -34,7 +34,7 @@ std::string describe(const Obstruction& obstruction);
 /// A path, or why there is none.
 struct Plan {
   PlanStatus status = PlanStatus::invalid;
-  Eigen::MatrixXd path;  ///< (nv × W) waypoints from start, or where a guided arm is then, to goal, straight between them
+  Eigen::MatrixXd path;  ///< (nv × W) waypoints from start, or where a moving arm is then, to goal, straight between
   double margin = 0.0;   ///< [m] that it keeps, but for the ends, see Margins
   Obstruction obstruction;
   // The budget spent.
