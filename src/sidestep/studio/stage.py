@@ -146,16 +146,9 @@ class Stage:
         return self.built.state(self.data)
 
     def begin(self, time: float) -> tuple[Array, Array]:
-        """Moves the obstacles and computes what the control of this period needs; returns q and v (nv,)."""
+        """Computes what the control of the period from a time [s] on needs; returns q and v (nv,)."""
         for actor in self.actors:
             actor.scripted(time)
-        for actor in self._driven:
-            actor.advance(self.period)
-        for actor, at, dof in self._free:
-            if actor.target is not None:
-                actor.advance(self.period)
-                self.data.qpos[at : at + 7] = [*actor.pose[:3, 3], *actor.quaternion]
-                self.data.qvel[dof : dof + 6] = [*actor.velocity, 0.0, 0.0, 0.0]
         self._write_driven()
         mujoco.mj_step1(self.built.model, self.data)
         return self.built.state(self.data)
@@ -165,11 +158,17 @@ class Stage:
         return self.built.mass_matrix(self.data), self.built.bias(self.data)
 
     def end(self, torque: Array) -> bool:
-        """Applies the torque (nv,) for the period; whether the physics is still finite."""
+        """Applies the torque (nv,) for the period and moves the obstacles; whether the physics is still finite."""
         self.data.ctrl[self.built.actuators] = torque
         mujoco.mj_step2(self.built.model, self.data)
+        for actor in self._driven:
+            actor.advance(self.period)
         for actor, at, dof in self._free:
-            if actor.target is None:
+            if actor.target is not None:
+                actor.advance(self.period)
+                self.data.qpos[at : at + 7] = [*actor.pose[:3, 3], *actor.quaternion]
+                self.data.qvel[dof : dof + 6] = [*actor.velocity, 0.0, 0.0, 0.0]
+            else:
                 actor.quaternion = self.data.qpos[at + 3 : at + 7].copy()
                 actor.pose = pose_at(self.data.qpos[at : at + 3], from_quaternion(actor.quaternion))
                 actor.velocity = self.data.qvel[dof : dof + 3].copy()
