@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "../finite.hpp"
 #include "../settings.hpp"
 #include "cholesky.hpp"
 
@@ -18,6 +19,20 @@ constexpr double feasibility_tolerance = 1e-12;
 constexpr double dependence_tolerance = 1e-11;
 // Each constraint is added and dropped a few times at most in practice; this bounds the time of a hopeless case.
 constexpr int iterations_per_constraint = 10;
+
+/// Whether lower <= upper everywhere, without NaN and without a bound at its own infinity.
+bool leaves_room(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) noexcept {
+  bool room = true;
+  for (Eigen::Index i = 0; i < lower.size(); ++i) {
+    room = room && lower[i] <= upper[i] && lower[i] < infinity && upper[i] > -infinity;
+  }
+  return room;
+}
+
+/// Whether a row bounds anything.
+bool in_use(const QuadraticProgramData& data, int row) noexcept {
+  return data.row_lower[row] != -infinity || data.row_upper[row] != infinity;
+}
 
 }  // namespace
 
@@ -113,11 +128,16 @@ void QuadraticProgram::start(const QuadraticProgramData& data) noexcept {
 
 void QuadraticProgram::find_supports(const QuadraticProgramData& data) noexcept {
   for (int row = 0; row < m_; ++row) {
+    if (!in_use(data, row)) {
+      continue;
+    }
     int size = 0;
     double squares = 0.0;
+    const double* const values = &data.A(row, 0);
+    int* const at = &supports_(row, 0);
     for (int i = 0; i < n_; ++i) {
-      const double value = data.A(row, i);
-      supports_(row, size) = i;
+      const double value = values[i];
+      at[size] = i;
       size += value != 0.0 ? 1 : 0;
       squares += value * value;
     }
@@ -127,10 +147,11 @@ void QuadraticProgram::find_supports(const QuadraticProgramData& data) noexcept 
 }
 
 double QuadraticProgram::along_row(const QuadraticProgramData& data, int row, const Eigen::VectorXd& x) const noexcept {
-  const int* at = &supports_(row, 0);
+  const int* const at = &supports_(row, 0);
+  const double* const values = &data.A(row, 0);
   double value = 0.0;
   for (int k = 0; k < support_sizes_[row]; ++k) {
-    value += data.A(row, at[k]) * x[at[k]];
+    value += values[at[k]] * x[at[k]];
   }
   return value;
 }
@@ -172,11 +193,11 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
       low = data.lower[i];
       high = data.upper[i];
     } else {
+      if (!in_use(data, i - n_)) {
+        continue;
+      }
       low = data.row_lower[i - n_];
       high = data.row_upper[i - n_];
-      if (low == -infinity && high == infinity) {
-        continue;  // a row that is not in use
-      }
       value = along_row(data, i - n_, x_);
       norm = row_norms_[i - n_];
     }
@@ -285,14 +306,12 @@ QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data)
       data.row_upper.size() != m_) {
     return QuadraticProgramStatus::wrong_size;
   }
-  if (!data.H.allFinite() || !data.g.allFinite() || !data.A.allFinite() || data.lower.hasNaN() ||
-      data.upper.hasNaN() || data.row_lower.hasNaN() || data.row_upper.hasNaN()) {
+  if (!all_finite(data.H) || !all_finite(data.g) || !all_finite(data.A)) {
     return QuadraticProgramStatus::not_finite;
   }
-  if ((data.lower.array() > data.upper.array()).any() || (data.row_lower.array() > data.row_upper.array()).any() ||
-      (data.lower.array() == infinity).any() || (data.upper.array() == -infinity).any() ||
-      (data.row_lower.array() == infinity).any() || (data.row_upper.array() == -infinity).any()) {
-    return QuadraticProgramStatus::infeasible;
+  if (!leaves_room(data.lower, data.upper) || !leaves_room(data.row_lower, data.row_upper)) {
+    const bool unknown = data.lower.hasNaN() || data.upper.hasNaN() || data.row_lower.hasNaN() || data.row_upper.hasNaN();
+    return unknown ? QuadraticProgramStatus::not_finite : QuadraticProgramStatus::infeasible;
   }
   if (!factorise(data.H)) {
     return QuadraticProgramStatus::not_positive_definite;

@@ -94,7 +94,7 @@ class QuadraticProgram {
   Eigen::MatrixXd R_;              // upper triangular, (num_active_, num_active_) in use; N: active normals
   Eigen::VectorXd x_, multipliers_;
   int num_coupled_ = 0;            // H is diagonal from here on
-  Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;  // (m, n) where rows of A are not zero
+  Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;  // (m, n) where rows of A in use are not zero
   Eigen::VectorXi support_sizes_;  // (m)
   Eigen::VectorXd row_norms_;      // |row| of A
   Eigen::VectorXd u_;              // multipliers of the active constraints, >= 0 for inequalities
