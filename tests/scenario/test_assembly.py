@@ -180,7 +180,7 @@ obstacles:
     assert parts.mover.settings.planner is None
     assert parts.mover.settings.local_minimum is not None
     assert len(parts.body.levels) == parts.body.num_components
-    drive = parts.driver().drive(0.0, parts.goal, np.zeros(2), np.eye(2), np.zeros(2))
+    drive = parts.driver.drive(0.0, parts.goal, np.zeros(2), np.eye(2), np.zeros(2))
     np.testing.assert_array_equal(drive.values, 0.0)
     assert drive.wanted == pytest.approx([0.0, 0.0], abs=1e-12)
     assert drive.system_status == "arrived"

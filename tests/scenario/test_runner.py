@@ -200,7 +200,7 @@ simulation: {{mode: {mode}, period: 0.002, duration: 4.0, tolerance: 1.0e-7}}
     scenario = Scenario.from_text(text)
     aside = run_scenario(scenario).evaluation
     assert aside.collision_free
-    run = runner._run_torque if mode == "torque" else runner._run_kinematic
+    run = runner._run
     first, second = (run(scenario, assemble(scenario), None).q for _ in range(2))
     np.testing.assert_array_equal(first, second)
     pressed = run_scenario(replace(scenario, method="reactive")).evaluation

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from sidestep.simulation import Simulation, SimulationRun, SystemDriver
+from sidestep.simulation import Simulation, SimulationRun
+from sidestep.thesis.driver import SystemDriver
 
 PENDULUM = """
 <robot name="pendulum">
@@ -62,4 +63,4 @@ def simulate(
     simulation: Simulation, system, program, start, goal, duration, obstacles, **options
 ) -> SimulationRun:
     """A run driven by a system and a program."""
-    return simulation.run(SystemDriver(system, program, goal, obstacles), start, goal, duration, **options)
+    return simulation.run(SystemDriver(system, goal, obstacles, program), start, goal, duration, **options)

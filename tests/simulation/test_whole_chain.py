@@ -12,6 +12,7 @@ from sidestep.control import TorqueController
 from sidestep.simulation import run_kinematically
 from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity
+from sidestep.thesis.driver import SystemDriver
 
 START, GOAL = np.deg2rad([0, 45, 0, -66, 0, 66, 45]), np.deg2rad([90, 45, 0, -66, 0, 66, 45])
 
@@ -49,7 +50,9 @@ def test_torque_control_follows_the_kinematic_motion(fr3: tuple[Robot, Collision
     simulated = simulate(
         Simulation(robot, objects), system, TorqueController(robot), START, GOAL, 2.0, obstacles, arrival=None
     )
-    kinematic = run_kinematically(robot, system, START, GOAL, 2.0, obstacles, objects=objects, arrival=None)
+    kinematic = run_kinematically(
+        robot, SystemDriver(system, GOAL, obstacles), START, GOAL, 2.0, objects=objects, arrival=None
+    )
     assert len(simulated) == len(kinematic) == 2000
     # the torque weight's 1e-8 rad/s^2, integrated twice along a motion that obstacles make stiffer
     np.testing.assert_allclose(simulated.q, kinematic.q, atol=1e-5)
@@ -66,9 +69,15 @@ def test_callable_obstacles_and_points_with_velocity_are_the_same_motion(
     robot, psi = fr3
     system = GeometricSystem([psi], stiffness=0.5, damping=1.5)
     point, velocity = np.array([[0.4, 0.53, 0.52]]), np.array([[0.0, 0.0, -0.1]])
-    moving = run_kinematically(robot, system, START, GOAL, 0.5, Obstacles(point, 0.0, velocity))
+    moving = run_kinematically(
+        robot, SystemDriver(system, GOAL, Obstacles(point, 0.0, velocity)), START, GOAL, 0.5
+    )
     called = run_kinematically(
-        robot, system, START, GOAL, 0.5, lambda time: Obstacles(point + time * velocity, 0.0, velocity)
+        robot,
+        SystemDriver(system, GOAL, lambda time: Obstacles(point + time * velocity, 0.0, velocity)),
+        START,
+        GOAL,
+        0.5,
     )
     # rounding of the point's position, added up step by step or at once
     np.testing.assert_allclose(moving.q, called.q, atol=1e-10)
@@ -77,7 +86,7 @@ def test_callable_obstacles_and_points_with_velocity_are_the_same_motion(
 def test_kinematic_run_stops_on_arrival(fr3: tuple[Robot, CollisionDensity]) -> None:
     robot, psi = fr3
     system = GeometricSystem([psi], stiffness=4.0, damping=4.0)
-    run = run_kinematically(robot, system, START, GOAL, 20.0, Obstacles.none())
+    run = run_kinematically(robot, SystemDriver(system, GOAL, Obstacles.none()), START, GOAL, 20.0)
     assert run.arrived
     assert run.time_to_goal is not None
     assert run.time[-1] - run.time_to_goal == pytest.approx(0.2, abs=1.5e-3)  # the rule's hold, one period
@@ -88,7 +97,7 @@ def test_goal_outside_the_limits(fr3: tuple[Robot, CollisionDensity]) -> None:
     robot, psi = fr3
     system = GeometricSystem([psi])
     with pytest.raises(ValueError, match="goal: joint 'fr3_joint4' is 0"):
-        run_kinematically(robot, system, START, np.zeros(7), 1.0, Obstacles.none())
+        run_kinematically(robot, SystemDriver(system, np.zeros(7), Obstacles.none()), START, np.zeros(7), 1.0)
 
 
 def test_kinematic_objects_follow_their_scripts(fr3: tuple[Robot, CollisionDensity]) -> None:
@@ -98,7 +107,12 @@ def test_kinematic_objects_follow_their_scripts(fr3: tuple[Robot, CollisionDensi
         "ball", [0, 1, 1], radius=0.1, motion="moving", velocity=(0, 0, -1), moves_during=(0.1, 0.3)
     )
     run = run_kinematically(
-        robot, GeometricSystem([psi]), START, GOAL, 0.5, Obstacles.none(), objects=[still, ball]
+        robot,
+        SystemDriver(GeometricSystem([psi]), GOAL, Obstacles.none()),
+        START,
+        GOAL,
+        0.5,
+        objects=[still, ball],
     )
     np.testing.assert_allclose(run.object_poses[:, 0], np.tile([0, 0, 0, 1, 0, 0, 0], (len(run), 1)))
     np.testing.assert_allclose(run.object_poses[:, 1, 2], 1 - np.clip(run.time - 0.1, 0, 0.2), atol=1e-12)

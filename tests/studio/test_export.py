@@ -108,7 +108,7 @@ def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
     np.testing.assert_array_equal([torque for *_, torque in recorded(again, 40)], expected)
 
     parts, code = assemble(loaded), python_snippet(at_start)
-    run = parts.driver()
+    run = parts.driver
     variables: dict[str, Any] = {}
     exec(code, variables)
     assert max(len(line) for line in code.splitlines() if "[" not in line) <= 100

@@ -23,8 +23,9 @@ from sidestep._core import (
 )
 from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot, tip_of
-from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation, SystemDriver
-from sidestep.simulation.pose_aim import PoseTarget
+from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation
+from sidestep.simulation.pose_target import PoseTarget
+from sidestep.thesis.driver import SystemDriver
 
 Array = npt.NDArray[np.float64]
 
@@ -128,7 +129,7 @@ class SystemMover:
             program = TorqueController(self.robot, period=settings.period)
             return _under_torque(
                 self.robot,
-                SystemDriver(self.system, program, problem.goal, problem.obstacles_at),
+                SystemDriver(self.system, problem.goal, problem.obstacles_at, program),
                 problem,
                 settings,
             )

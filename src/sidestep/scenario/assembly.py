@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal, TypeAlias, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,6 @@ import trimesh
 from sidestep import Body, Controller, Robot
 from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
-from sidestep.control import TorqueController
 from sidestep.distance import SceneObject
 from sidestep.distance.scene import Kind, check_scene
 from sidestep.obstacles import load_point_cloud
@@ -27,37 +26,24 @@ from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario.parts import controller_settings_of, torque_program_of
 from sidestep.scenario.scenario import (
     BasePose,
-    EmbeddingChoice,
     JointState,
     Obstacle,
     PoseChoice,
     RobotChoice,
     Scenario,
     Shape,
-    SwitchChoice,
-    SystemChoice,
 )
 from sidestep.scenario.seen import View, seen_at, view_of
 from sidestep.scenario.validation import ScenarioError
-from sidestep.simulation import ControllerDriver, SystemDriver
-from sidestep.simulation.pose_aim import PoseAim, PoseTarget, Posture, posture_at
-from sidestep.system import Embedding, GeometricSystem
-from sidestep.thesis import (
-    BinarySwitch,
-    CollisionDensity,
-    DistanceSwitch,
-    GeodesicOnly,
-    HarmonicOnly,
-    JointLimitPotential,
-    SigmoidSwitch,
-    Sum,
-    Unswitched,
-)
+from sidestep.simulation import ControllerDriver
+from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
+from sidestep.system import GeometricSystem
+from sidestep.thesis.custom import custom_system
+from sidestep.thesis.driver import SystemDriver
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 _T = TypeVar("_T")
-Switch: TypeAlias = Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch
 
 POSTURE_STARTS = 20  # from which a posture for a pose is searched: at most a fifth of a second
 MAX_CLOUD_POINTS = 2000  # more balls than this make the physics and the exact distances too slow to be of use
@@ -69,31 +55,29 @@ class Assembly:
 
     Attributes:
         robot, body: as the scenario asks.
-        mover: the `Controller`, or for the method "written" its geometric system.
+        mover: the `Controller`, or for the method "written" its geometric system. driver: it, in a simulation.
         objects: the solid obstacles, for physics and exact clearance.
-        start, start_velocity, goal: (nv,) [rad | m]; for a pose the start, or for "written" a posture that has it.
-        pose: in place of the goal.
+        start, start_velocity: (nv,) [rad | m].
+        posture: the goal; for a pose the start, or for "written" the posture that is gone to.
+        pose: that is to be reached, in place of a configuration.
         seen: what the mover sees; a function of time [s] where an obstacle starts or stops.
-        torque_program: of the method "written", with the weights and limits of the scenario.
     """
 
     robot: Robot
     body: Body
     mover: Controller | GeometricSystem
+    driver: ControllerDriver | SystemDriver
     objects: tuple[SceneObject, ...]
     start: Array
     start_velocity: Array
-    goal: Array
+    posture: IkSolution
     seen: Obstacles | Callable[[float], Obstacles]
-    torque_program: TorqueController
     pose: PoseTarget | None = None
 
-    def driver(self) -> ControllerDriver | SystemDriver:
-        """What drives the arm in a simulation."""
-        if isinstance(self.mover, Controller):
-            return ControllerDriver(self.mover, self.seen)
-        goal = self.pose if isinstance(self.pose, PoseAim) else self.goal
-        return SystemDriver(self.mover, self.torque_program, goal, self.seen)
+    @property
+    def goal(self) -> Array:
+        """(nv,) of the posture."""
+        return self.posture.q
 
 
 def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembly:
@@ -128,41 +112,43 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         settings = _at("method", scenario, partial(controller_settings_of, scenario))
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
     program = _at("controller", scenario, partial(torque_program_of, scenario, robot))
-    mover: Controller | GeometricSystem
-    pose: PoseTarget | None = None
-    if written:
-        mover = _at(
-            "system", scenario, partial(written_system, scenario.embedding, scenario.system, robot, body)
-        )
+    pose = _at("goal", scenario, partial(_target, scenario, robot))
+    posture = IkSolution(start)
+    if pose is None or written:
         posture = _at("goal", scenario, partial(goal_posture, scenario, robot, start))
-        pose, goal = _pose_aim(scenario, robot, posture), posture.q
+    mover: Controller | GeometricSystem
+    driver: ControllerDriver | SystemDriver
+    if written:
+        system = partial(custom_system, scenario.embedding, scenario.system, robot, body)
+        mover, integrator = _at("system", scenario, system), scenario.simulation.integrator
+        driver = SystemDriver(mover, posture.q, seen, program, integrator=integrator)
     else:
         arm = _at("body", scenario, partial(Arm.from_robot, robot, body))
         mover = _at("method", scenario, partial(Controller, arm, settings))
-        pose, goal = _at("goal", scenario, partial(_target, scenario, robot, start))
-        mover.set_goal(goal if pose is None else pose.goal)
+        mover.set_goal(posture.q if pose is None else pose.goal)
+        driver = ControllerDriver(mover, seen)
     return Assembly(
         robot=robot,
         body=body,
         mover=mover,
+        driver=driver,
         objects=tuple(objects),
         start=start,
         start_velocity=velocity,
-        goal=goal,
+        posture=posture,
         seen=seen,
         pose=pose,
-        torque_program=program,
     )
 
 
-def _target(scenario: Scenario, robot: Robot, start: Array) -> tuple[PoseTarget | None, Array]:
-    """The pose to be reached, if it is one, and the configuration; for a pose the start stands for it."""
+def _target(scenario: Scenario, robot: Robot) -> PoseTarget | None:
+    """The pose to be reached, if it is one."""
     choice = scenario.goal
     if isinstance(choice, JointState):
-        return None, coordinates(choice, robot, "goal.position")
+        return None
     _check_frame(choice, robot)
     rest = None if choice.posture is None else coordinates(choice.posture, robot, "goal.posture.position")
-    return PoseTarget(robot, choice.frame, pose_of(choice), rest=rest), start
+    return PoseTarget(robot, choice.frame, pose_of(choice), rest=rest)
 
 
 def _check_frame(choice: PoseChoice, robot: Robot) -> None:
@@ -171,25 +157,18 @@ def _check_frame(choice: PoseChoice, robot: Robot) -> None:
         raise ValueError(f"goal.frame is {choice.frame!r}; allowed: {', '.join(links)}")
 
 
-def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> Posture:
+def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> IkSolution:
     """The configuration where the goal is reached; of a pose the one that the file names, or found from the start.
 
     Raises ValueError that says what is wrong.
     """
     choice = scenario.goal
     if isinstance(choice, JointState):
-        return Posture(coordinates(choice, robot, "goal.position"))
+        return IkSolution(coordinates(choice, robot, "goal.position"))
     _check_frame(choice, robot)
     if choice.posture is not None:
-        return Posture(coordinates(choice.posture, robot, "goal.posture.position"))
-    return posture_at(robot, choice.frame, pose_of(choice), start, starts=POSTURE_STARTS)
-
-
-def _pose_aim(scenario: Scenario, robot: Robot, posture: Posture) -> PoseAim | None:
-    choice = scenario.goal
-    if isinstance(choice, JointState):
-        return None
-    return PoseAim(robot, choice.frame, pose_of(choice), stiffness=scenario.system.stiffness, posture=posture)
+        return IkSolution(coordinates(choice.posture, robot, "goal.posture.position"))
+    return solve_ik(robot, choice.frame, pose_of(choice), start, starts=POSTURE_STARTS)
 
 
 def load_robot(scenario: Scenario) -> Robot:
@@ -301,50 +280,6 @@ def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
         seed=choice.seed,
         progress=progress,
     )
-
-
-def written_system(
-    embedding: EmbeddingChoice, system: SystemChoice, robot: Robot, body: Body
-) -> GeometricSystem:
-    """The system that a file writes out; raises ValueError where its switch does not fit the robot."""
-    return GeometricSystem(
-        _embeddings(embedding, robot, body),
-        stiffness=system.stiffness,
-        damping=system.damping,
-        damping_form=system.damping_form,
-        switch=_switch(system.switch, robot),
-    )
-
-
-def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[Embedding]:
-    parts: list[Embedding] = [CollisionDensity(robot, body, average=choice.density == "average")]
-    if choice.joint_limits is not None:
-        parts.append(
-            JointLimitPotential(robot, slope=choice.joint_limits.slope, height=choice.joint_limits.height)
-        )
-    return [Sum(parts)] if choice.combine == "sum" and len(parts) > 1 else parts
-
-
-def _switch(choice: SwitchChoice, robot: Robot) -> Switch:
-    match choice:
-        case SwitchChoice(type="none"):
-            return Unswitched()
-        case SwitchChoice(type="harmonic_only"):
-            return HarmonicOnly()
-        case SwitchChoice(type="geodesic_only"):
-            return GeodesicOnly()
-        case SwitchChoice(type="binary", threshold=float(threshold)):
-            return BinarySwitch(threshold=threshold)
-        case SwitchChoice(type="sigmoid", threshold=float(threshold), slope=float(slope)):
-            return SigmoidSwitch(threshold=threshold, slope=slope)
-        case SwitchChoice(type="distance", thresholds=tuple(thresholds), slope=float(slope)):
-            if len(thresholds) != robot.num_coordinates:
-                raise ValueError(
-                    f"switch.thresholds has {len(thresholds)} values; robot {robot.name!r} has "
-                    f"{robot.num_coordinates} coordinates ({', '.join(robot.coordinate_names)})"
-                )
-            return DistanceSwitch(thresholds=thresholds, slope=slope)
-    raise ValueError(f"switch of type {choice.type!r} lacks a number it needs, got {choice}")
 
 
 def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:

@@ -8,14 +8,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Controller, CoordinateKind, CoordinateLabel, GeometricSystem
+from sidestep._core import Controller, CoordinateKind, CoordinateLabel
 from sidestep.distance import ExactClearance
 from sidestep.scenario.assembly import Assembly, Progress, assemble
 from sidestep.scenario.result import ScenarioResult
 from sidestep.scenario.scenario import Scenario
-from sidestep.simulation import Arrival, ControllerDriver, Run, Simulation, evaluate, run_kinematically
+from sidestep.simulation import Arrival, Run, Simulation, evaluate, run_kinematically
 from sidestep.simulation.evaluation import POSE_TOLERANCE
-from sidestep.simulation.pose_aim import PoseAim
 from sidestep.simulation.run import obstacles_over_time
 
 Array = npt.NDArray[np.float64]
@@ -48,9 +47,7 @@ def run_scenario(
     if on_start is not None:
         on_start(parts)
     begin = clock.perf_counter()
-    run = _run_torque(scenario, parts, on_step) if scenario.simulation.mode == "torque" else _run_kinematic(
-        scenario, parts, on_step
-    )  # fmt: skip
+    run = _run(scenario, parts, on_step)
     evaluation = evaluate(run, goal_tolerance=scenario.simulation.tolerance)
     samples = np.unique(np.linspace(0, len(run) - 1, MAX_CLEARANCE_SAMPLES).astype(int))
     clearance = np.zeros(0)
@@ -95,46 +92,22 @@ def _reason(parts: Assembly, run: Run) -> str:
     if isinstance(parts.mover, Controller):
         return parts.mover.explain()
     seen = obstacles_over_time(parts.seen)(float(run.time[-1]))
-    goal = parts.pose.at(run.q[-1]) if isinstance(parts.pose, PoseAim) else parts.goal
-    words = parts.mover.diagnose(run.q[-1], run.v[-1], goal, seen).describe()
-    return parts.pose.posture.in_words(words) if isinstance(parts.pose, PoseAim) else words
+    return parts.posture.in_words(parts.mover.diagnose(run.q[-1], run.v[-1], parts.goal, seen).describe())
 
 
-def _arrival(scenario: Scenario) -> Arrival:
-    return Arrival(
-        position=ARRIVAL_SHARE * scenario.simulation.tolerance, distance=ARRIVAL_SHARE * POSE_TOLERANCE
-    )
-
-
-def _run_torque(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
+def _run(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
     choice = scenario.simulation
-    simulation = Simulation(parts.robot, parts.objects, timestep=choice.period, visuals=False)
-    return simulation.run(
-        parts.driver(),
-        parts.start,
-        parts.pose or parts.goal,
-        choice.duration,
-        start_velocity=parts.start_velocity,
-        arrival=_arrival(scenario),
-        on_step=on_step,
-    )
-
-
-def _run_kinematic(scenario: Scenario, parts: Assembly, on_step: OnStep | None) -> Run:
-    choice = scenario.simulation
+    target = parts.driver, parts.start, parts.pose or parts.goal, choice.duration
+    arrival = Arrival(position=ARRIVAL_SHARE * choice.tolerance, distance=ARRIVAL_SHARE * POSE_TOLERANCE)
+    if choice.mode == "torque":
+        simulation = Simulation(parts.robot, parts.objects, timestep=choice.period, visuals=False)
+        return simulation.run(*target, start_velocity=parts.start_velocity, arrival=arrival, on_step=on_step)
     return run_kinematically(
         parts.robot,
-        parts.mover
-        if isinstance(parts.mover, GeometricSystem)
-        else ControllerDriver(parts.mover, parts.seen),
-        parts.start,
-        parts.pose or parts.goal,
-        choice.duration,
-        parts.seen,
+        *target,
         objects=parts.objects,
         timestep=choice.period,
         start_velocity=parts.start_velocity,
-        integrator=choice.integrator,
-        arrival=_arrival(scenario),
+        arrival=arrival,
         on_step=on_step,
     )

@@ -1,7 +1,7 @@
 from .driver import ControllerDriver as ControllerDriver
 from .driver import Drive as Drive
 from .driver import Driver as Driver
-from .driver import SystemDriver as SystemDriver
+from .driver import KinematicDriver as KinematicDriver
 from .evaluation import Evaluation as Evaluation
 from .evaluation import LimitViolations as LimitViolations
 from .evaluation import evaluate as evaluate

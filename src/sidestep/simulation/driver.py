@@ -1,18 +1,17 @@
-"""What drives an arm in a simulation: a `Controller`, or a geometric system with a torque program (the thesis's)."""
+"""What drives an arm in a simulation: a `Controller`; or, of the thesis, a geometric system with a torque QP."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Controller, GeometricSystem
+from sidestep._core import Controller
 from sidestep.obstacles.scene import Seen
-from sidestep.simulation.pose_aim import PoseAim
-from sidestep.simulation.run import ObstacleSource, obstacles_over_time, status_name
+from sidestep.simulation.run import status_name
 
 Array = npt.NDArray[np.float64]
 NOTHING = np.zeros(0)
@@ -37,11 +36,21 @@ class Drive:
     values: Array = field(default_factory=lambda: NOTHING)
 
 
+Moment: TypeAlias = tuple[Array, Array, Array, Drive]  # q, v, achieved acceleration (nv,) each, and the step
+
+
 class Driver(Protocol):
     """Turns a state into a torque, once a period."""
 
     def drive(self, time: float, q: Array, v: Array, mass_matrix: Array, bias: Array) -> Drive:
         """One step at a time [s], q and v (nv,), with mass matrix (nv, nv) and bias (nv,) there."""
+
+
+class KinematicDriver(Protocol):
+    """Moves an arm without physics."""
+
+    def integrate(self, q: Array, v: Array, steps: int, period: float) -> Iterator[Moment]:
+        """So many steps of a period [s] from q and v (nv,)."""
 
 
 class ControllerDriver:
@@ -84,32 +93,10 @@ class ControllerDriver:
             values=self.controller.values,
         )
 
-
-class SystemDriver:
-    """A geometric system, whose acceleration a torque program tracks; nothing keeps clearances.
-
-    Args:
-        system: anything with `acceleration(q, v, goal, obstacles)`. program: anything with `solve`.
-        goal: (nv,), or a pose. obstacles: what the system sees, as for `ControllerDriver`.
-    """
-
-    def __init__(
-        self, system: GeometricSystem | Any, program: Any, goal: Array | PoseAim, obstacles: ObstacleSource
-    ) -> None:
-        self._system, self._program, self._goal = system, program, goal
-        self._see = obstacles_over_time(obstacles)
-
-    def drive(self, time: float, q: Array, v: Array, mass_matrix: Array, bias: Array) -> Drive:
-        """One step of the system, and of the program."""
-        goal = self._goal.at(q) if isinstance(self._goal, PoseAim) else self._goal
-        step = self._system.acceleration(q, v, goal, self._see(time))
-        solution = self._program.solve(q, v, step.acceleration, mass_matrix, bias)
-        return Drive(
-            torque=np.asarray(solution.torque),
-            acceleration=np.asarray(solution.acceleration),
-            wanted=np.asarray(step.acceleration),
-            system_status=status_name(step.status),
-            controller_status=status_name(solution.status),
-            switch=np.atleast_1d(getattr(step, "switch", NOTHING)),
-            values=np.atleast_1d(getattr(step, "values", NOTHING)),
-        )
+    def integrate(self, q: Array, v: Array, steps: int, period: float) -> Iterator[Moment]:
+        """Its accelerations by semi-implicit Euler, see `KinematicDriver`."""
+        for k in range(steps):
+            step = self.drive(k * period, q, v)
+            yield q, v, step.acceleration, step
+            v = v + period * step.acceleration
+            q = q + period * v

@@ -14,7 +14,7 @@ from sidestep.distance.scene import SceneObject
 from sidestep.obstacles import obstacles_from_shapes
 from sidestep.obstacles.scene import Seen
 from sidestep.robot import Robot
-from sidestep.simulation.pose_aim import PoseTarget
+from sidestep.simulation.pose_target import PoseTarget
 
 Array = npt.NDArray[np.float64]
 ObstacleSource: TypeAlias = Seen | Callable[[float], Obstacles]

@@ -14,7 +14,7 @@ from sidestep.distance.scene import Scene, check_scene
 from sidestep.robot import Robot
 from sidestep.simulation.driver import Driver
 from sidestep.simulation.model import build_model
-from sidestep.simulation.pose_aim import PoseTarget
+from sidestep.simulation.pose_target import PoseTarget
 from sidestep.simulation.run import Arrival, ArrivalWatch, Contact, SimulationRun
 
 Array = npt.NDArray[np.float64]
@@ -80,7 +80,8 @@ class Simulation:
         """Runs the loop: state, torque, physics, record.
 
         Args:
-            driver: what turns states into torque: `ControllerDriver` or `SystemDriver`. It never sees `objects`.
+            driver: what turns states into torque: `ControllerDriver`, or the thesis's `SystemDriver`. It never sees
+                `objects`.
             start, goal: (nv,) configurations inside the limits; the goal, perhaps a pose, is what arrival is
                 measured by: the driver has its own.
             duration: at most this long [s].

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.scenario import Scenario
-from sidestep.simulation.pose_aim import Posture
+from sidestep.simulation.pose_target import IkSolution
 from sidestep.studio.parameters import Numbers
 from sidestep.studio.things import Thing
 
@@ -184,7 +184,7 @@ class Snapshot:
     v: Array
     goal: Array | None
     goal_pose: Array | None
-    posture: Posture | None
+    posture: IkSolution | None
     goal_written: bool
     tip: str
     things: tuple[Thing, ...]

@@ -21,7 +21,7 @@ from sidestep._core import (
 from sidestep.arm import Arm
 from sidestep.robot import Robot
 from sidestep.scenario.assembly import POSTURE_STARTS
-from sidestep.simulation.pose_aim import PoseAim, PoseTarget, Posture, posture_at
+from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.simulation.run import status_name
 
 Array = npt.NDArray[np.float64]
@@ -96,14 +96,14 @@ class ControllerMover:
         self._said.step(q, v)
 
     @property
-    def posture(self) -> Posture | None:
+    def posture(self) -> IkSolution | None:
         """Where the arm is led to; None where no posture for the pose is found yet."""
         aim, found = self._aim, None if self._said is None else self._said.target
         if not isinstance(aim, PoseTarget):
-            return Posture(aim)
+            return IkSolution(aim)
         if found is not None:
-            return Posture(found, *aim.errors(found))
-        near = Posture(self._near, *aim.errors(self._near))
+            return IkSolution(found, *aim.errors(found))
+        near = IkSolution(self._near, *aim.errors(self._near))
         return near if near.found else None
 
     @property
@@ -147,13 +147,10 @@ class SystemMover:
 
     def set_goal(self, pose: Array | None, q: Array, *, thorough: bool) -> None:
         """The same; thorough: the posture is looked for from everywhere, not only from q."""
-        self.posture = Posture(q)
-        self._aim: Array | PoseAim = q
+        self.posture = IkSolution(q)
         if pose is not None:
             starts = POSTURE_STARTS if thorough else 1
-            self.posture = posture_at(self._robot, self._tip, pose, q, starts=starts)
-            stiffness = float(self.system.stiffness[0, 0])
-            self._aim = PoseAim(self._robot, self._tip, pose, stiffness=stiffness, posture=self.posture)
+            self.posture = solve_ik(self._robot, self._tip, pose, q, starts=starts)
 
     def step(self, q: Array, v: Array, mass_matrix: Array, bias: Array, obstacles: Obstacles) -> Array:
         """The torque (nv,) [Nm | N] of one period."""
@@ -164,8 +161,7 @@ class SystemMover:
 
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
         """A step of the system alone."""
-        goal = self._aim.at(q) if isinstance(self._aim, PoseAim) else self._aim
-        self._step = self.system.acceleration(q, v, goal, obstacles)
+        self._step = self.system.acceleration(q, v, self.posture.q, obstacles)
 
     @property
     def metric(self) -> Array:

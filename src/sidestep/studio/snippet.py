@@ -11,7 +11,6 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.scenario import RobotChoice, SwitchChoice
 from sidestep.scenario.settings import parts_of, program_from
-from sidestep.simulation.pose_aim import ENTER, POSITION_SHARE, TURN_SHARE
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
 from sidestep.studio.systems import as_file, fit_arguments, settings_of
@@ -167,13 +166,10 @@ def _goal_code(snapshot: Snapshot) -> list[str]:
     if method.controlled:
         near = ["# near which a posture for it is looked for", f"rest = {posture}"]
         return [*pose, *near, f"goal = ss.PoseGoal(arm.robot, {snapshot.tip!r}, pose, rest=rest)"]
-    stiffness = snapshot.numbers[method.name].get("stiffness", snapshot.scenario.system.stiffness)
-    pull = {"position_stiffness": POSITION_SHARE * stiffness, "orientation_stiffness": TURN_SHARE * stiffness}
-    says = f"that has the pose: the goal until the tip is within {1e3 * ENTER[0]:g} mm and {ENTER[1]:g} rad"
+    says = "that has the pose of the tip"
     if snapshot.posture is None or not snapshot.posture.found:
-        says = "the nearest found to the pose, which is out of reach: the goal"
-    goal = _call("goal = ss.PoseGoal", pull, "robot", repr(snapshot.tip), "pose")
-    return [*pose, *goal, f"# {says}", f"posture = {posture}"]
+        says = "the nearest found to the pose of the tip, which is out of reach"
+    return [f"# the posture {says} [rad | m]", f"goal = {posture}"]
 
 
 def _system_code(written: Scenario) -> list[str]:

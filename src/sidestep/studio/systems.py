@@ -12,7 +12,6 @@ from sidestep.arm import Arm
 from sidestep.body import Body
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import written_system
 from sidestep.scenario.parts import controller_settings_of, torque_program_of
 from sidestep.scenario.scenario import (
     BodyChoice,
@@ -25,6 +24,7 @@ from sidestep.scenario.scenario import (
 from sidestep.studio.methods import METHODS, WRITTEN, Method, in_range
 from sidestep.studio.mover import ControllerMover, Mover, SystemMover
 from sidestep.studio.parameters import Numbers, Value, set_in
+from sidestep.thesis.custom import custom_system
 
 SWITCH = "system.switch"  # of several forms, with numbers of their own
 
@@ -126,7 +126,7 @@ def build_mover(
     if method.controlled:
         settings = settings_of(written, synchronous=synchronous)
         return ControllerMover(robot, Arm.from_robot(robot, body), settings, tip)
-    system = written_system(written.embedding, written.system, robot, body)
+    system = custom_system(written.embedding, written.system, robot, body)
     program = torque_program_of(written, robot)
     return SystemMover(robot, system, program, tip)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from sidestep._core import JointType
 from sidestep.robot import Robot
 from sidestep.robot.pose import pose_vector
-from sidestep.simulation.pose_aim import Posture
+from sidestep.simulation.pose_target import IkSolution
 from sidestep.studio import messages as m
 from sidestep.studio.page.arm import ArmView, reach, short_names
 from sidestep.studio.page.obstacles import gizmo_pose
@@ -68,7 +68,7 @@ class GoalControl:
         self.gizmo.on_update(self._dragged)
         self._known: tuple[Array | None, ...] = (None, None, None)
 
-    def show(self, goal: Array | None, pose: Array | None, posture: Posture | None) -> None:
+    def show(self, goal: Array | None, pose: Array | None, posture: IkSolution | None) -> None:
         """Shows the goal that the loop has, whoever set it; does nothing while it stays the same, or is not found."""
         if posture is None:
             return

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from sidestep import JointGoal, Obstacles, Robot
+from sidestep import Obstacles, Robot
 from sidestep.robot.pose import pose_at
 from sidestep.simulation import Arrival, run_kinematically
-from sidestep.simulation.pose_aim import PoseAim, Posture, posture_at
+from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.system import GeometricSystem
+from sidestep.thesis.driver import SystemDriver
 
 START = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.8])
 TIP = "fr3_hand_tcp"
@@ -28,7 +29,7 @@ def test_a_posture_has_the_pose_within_the_limits(arm: Robot) -> None:
     lower, upper = arm.limits.lower, arm.limits.upper
     for _ in range(20):
         pose = arm.pose(rng.uniform(lower, upper), TIP)
-        posture = posture_at(arm, TIP, pose, START, starts=40)
+        posture = solve_ik(arm, TIP, pose, START, starts=40)
         assert posture.found
         np.testing.assert_allclose(
             arm.pose(posture.q, TIP), pose, atol=1e-6
@@ -36,47 +37,31 @@ def test_a_posture_has_the_pose_within_the_limits(arm: Robot) -> None:
         assert ((posture.q >= lower) & (posture.q <= upper)).all()
 
 
-def test_out_of_reach_the_nearest_posture_draws_and_what_lacks_is_said(arm: Robot) -> None:
+def test_out_of_reach_the_nearest_posture_is_found_and_what_lacks_is_said(arm: Robot) -> None:
     pose = pose_at([3.0, 0.0, 0.5]) @ arm.pose(START, TIP)
-    posture = posture_at(arm, TIP, pose, START, starts=3)
+    posture = solve_ik(arm, TIP, pose, START, starts=3)
     assert not posture.found
     assert 2.0 < posture.distance < 3.0  # [m] the arm is 0.86 m long, and was half stretched
-    aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture)
+    aim = PoseTarget(arm, TIP, pose)
     assert aim.errors(posture.q) == (
         pytest.approx(posture.distance, abs=1e-9),
         pytest.approx(posture.angle, abs=1e-7),  # an angle by its cosine, near zero
     )
-    for q in (START, posture.q):
-        drawn = aim.at(q)
-        assert isinstance(drawn, JointGoal)
-        np.testing.assert_array_equal(drawn.position, posture.q)
     assert posture.in_words("on the way, 1.00 rad from the goal") == (
         f"out of reach: the nearest posture found is {100 * posture.distance:.1f} cm and "
         f"{np.rad2deg(posture.angle):.0f}° from the pose; on the way, 1.00 rad from there"
     )
-    assert Posture(START).in_words("arriving") == "arriving"
+    assert IkSolution(START).in_words("arriving") == "arriving"
 
 
 def test_an_arm_of_seven_joints_comes_to_a_pose_in_seconds(arm: Robot) -> None:
     """20 cm forwards the joints move the hand little: the pull of the pose alone takes over 12 s."""
     system = GeometricSystem([], robot=arm, stiffness=4.0, damping=4.0)
     pose = target(arm)
-    aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture_at(arm, TIP, pose, START))
+    aim = PoseTarget(arm, TIP, pose)
+    driver = SystemDriver(system, solve_ik(arm, TIP, pose, START).q, Obstacles.none())
     arrival = Arrival(speed=np.inf, hold=0.0)
-    run = run_kinematically(arm, system, START, aim, 12.0, Obstacles.none(), timestep=0.01, arrival=arrival)
+    run = run_kinematically(arm, driver, START, aim, 12.0, timestep=0.01, arrival=arrival)
     assert run.time_to_goal is not None
     assert run.time_to_goal < 5.0  # as a configuration: e(t) = (1 + 2 t) exp(-2 t)
-
-
-def test_near_by_the_pose_draws_and_the_elbow_is_free(arm: Robot) -> None:
-    pose = target(arm)
-    posture = posture_at(arm, TIP, pose, START)
-    aim = PoseAim(arm, TIP, pose, stiffness=4.0, posture=posture)
-    far = aim.at(START)
-    assert isinstance(far, JointGoal)
-    np.testing.assert_array_equal(far.position, posture.q)
-    assert aim.at(posture.q) is aim.goal
-    free = np.linalg.svd(arm.jacobian(posture.q, TIP))[2][6]  # moves the elbow alone
-    assert aim.at(posture.q + 0.05 * free) is aim.goal
-    assert isinstance(aim.at(START), JointGoal)  # pushed away
     assert aim.errors(START) == (pytest.approx(0.2, abs=1e-9), pytest.approx(0.0, abs=1e-7))

@@ -1,0 +1,68 @@
+"""The geometric system of a scenario that says itself how the arm is moved: its density, embedding and switch."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from sidestep._core import (
+    BinarySwitch,
+    CollisionDensity,
+    DistanceSwitch,
+    Embedding,
+    GeodesicOnly,
+    GeometricSystem,
+    HarmonicOnly,
+    JointLimitPotential,
+    SigmoidSwitch,
+    Sum,
+    Unswitched,
+)
+from sidestep.body import Body
+from sidestep.robot import Robot
+from sidestep.scenario.scenario import EmbeddingChoice, SwitchChoice, SystemChoice
+
+Switch: TypeAlias = Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch
+
+
+def custom_system(
+    embedding: EmbeddingChoice, system: SystemChoice, robot: Robot, body: Body
+) -> GeometricSystem:
+    """The system that a file writes out; raises ValueError where its switch does not fit the robot."""
+    return GeometricSystem(
+        _embeddings(embedding, robot, body),
+        stiffness=system.stiffness,
+        damping=system.damping,
+        damping_form=system.damping_form,
+        switch=_switch(system.switch, robot),
+    )
+
+
+def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[Embedding]:
+    parts: list[Embedding] = [CollisionDensity(robot, body, average=choice.density == "average")]
+    if choice.joint_limits is not None:
+        parts.append(
+            JointLimitPotential(robot, slope=choice.joint_limits.slope, height=choice.joint_limits.height)
+        )
+    return [Sum(parts)] if choice.combine == "sum" and len(parts) > 1 else parts
+
+
+def _switch(choice: SwitchChoice, robot: Robot) -> Switch:
+    match choice:
+        case SwitchChoice(type="none"):
+            return Unswitched()
+        case SwitchChoice(type="harmonic_only"):
+            return HarmonicOnly()
+        case SwitchChoice(type="geodesic_only"):
+            return GeodesicOnly()
+        case SwitchChoice(type="binary", threshold=float(threshold)):
+            return BinarySwitch(threshold=threshold)
+        case SwitchChoice(type="sigmoid", threshold=float(threshold), slope=float(slope)):
+            return SigmoidSwitch(threshold=threshold, slope=slope)
+        case SwitchChoice(type="distance", thresholds=tuple(thresholds), slope=float(slope)):
+            if len(thresholds) != robot.num_coordinates:
+                raise ValueError(
+                    f"switch.thresholds has {len(thresholds)} values; robot {robot.name!r} has "
+                    f"{robot.num_coordinates} coordinates ({', '.join(robot.coordinate_names)})"
+                )
+            return DistanceSwitch(thresholds=thresholds, slope=slope)
+    raise ValueError(f"switch of type {choice.type!r} lacks a number it needs, got {choice}")
