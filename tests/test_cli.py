@@ -163,17 +163,17 @@ TOO_MANY_BALLS = (
     ("method", "shape", "message"),
     [
         (
-            "written",
+            "custom",
             "size: [0.1, 0.1, 0.1]}, spacing: 1.0e-9",
             "spacing of 1e-09 m on 0.06 m^2 asks for about 6e+16 points, allowed",
         ),
         (
-            "written",
+            "custom",
             "size: [0.1, 0.1, 0.1]}, spacing: 1.0e-200",
             "asks for about inf points, allowed are 1000000",
         ),
         (
-            "written",
+            "custom",
             "size: [1.0e+9, 1.0e-12, 1.0e-12]}",
             "asks for about 3.3e+10 points, allowed are 1000000",
         ),
@@ -185,7 +185,7 @@ TOO_MANY_BALLS = (
 def test_a_shape_that_would_take_billions_of_points_is_refused(
     invoke: Invoke, capsys: pytest.CaptureFixture[str], shape: str, message: str, method: str
 ) -> None:
-    points = ", points: surface" if method == "written" else ""
+    points = ", points: surface" if method == "custom" else ""
     obstacle = f"{{shape: {{type: box, {shape}{points}, position: [9, 0, 0]}}"
     Path("bad.yaml").write_text(f"{SCENARIO}method: {method}\nobstacles: [{obstacle}]\n")
     assert invoke("run", "bad.yaml", "--no-report", "-q") == 2

@@ -158,7 +158,7 @@ def test_the_columns_of_the_embedding_have_names(result: ScenarioResult) -> None
 
 def test_the_summary_says_what_is_seen_and_how_much_torque_was_used(result: ScenarioResult) -> None:
     rows = {name: (value, note) for name, value, note in summary_rows(result)}
-    assert rows["method"][0] == "as written, switch: distance"
+    assert rows["method"][0] == "custom, switch: distance"
     assert rows["controller sees"][0] == "1 bare centre"
     run = result.run
     assert isinstance(run, SimulationRun)

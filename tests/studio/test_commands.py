@@ -76,7 +76,7 @@ def test_a_scenario_opens_with_the_method_it_is_written_for(
     dataclasses.replace(shipped, method="controller").save(tmp_path / "mine.yaml")
     for arguments in ((str(tmp_path / "mine.yaml"),), (shipped.name,), (shipped.name, "--method", "thesis")):
         assert invoke(monkeypatch, "studio", *arguments) == 0
-    assert [options["method"] for _, options in opened] == ["controller", "written", "thesis"]
+    assert [options["method"] for _, options in opened] == ["controller", "custom", "thesis"]
 
 
 def test_a_taken_port_is_one_line(

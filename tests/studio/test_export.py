@@ -33,7 +33,7 @@ from sidestep.studio.export import (
     scenario_now,
     unpacked_scenario,
 )
-from sidestep.studio.methods import METHODS, WRITTEN
+from sidestep.studio.methods import CUSTOM, METHODS
 from sidestep.studio.parameters import Parameter
 from sidestep.studio.session import Session
 from sidestep.studio.snippet import python_snippet
@@ -78,7 +78,7 @@ def recorded(session: Session, steps: int) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.parametrize("goal", ["configuration", "pose"])
-@pytest.mark.parametrize("name", [name for name in METHODS if name not in ("geodesic_only", WRITTEN)])
+@pytest.mark.parametrize("name", [name for name in METHODS if name not in ("geodesic_only", CUSTOM)])
 def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, name: str, goal: str
 ) -> None:
@@ -97,7 +97,7 @@ def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
 
     controlled = METHODS[name].controlled
     loaded = Scenario.load(save_scenario(scenario_now(at_start, name="mine"), tmp_path))
-    assert loaded.method == (name if controlled else "written")
+    assert loaded.method == (name if controlled else "custom")
     again = make_session(loaded, method=numbers_of(loaded)[0])
     assert again.snapshot().method == name
     kept = tuned(name)
@@ -143,7 +143,7 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
         replace(mine, controller={**mine.controller, "stop_time": 50.0}),  # out of its range
         replace(mine, system=replace(mine.system, stiffness=50.0)),  # out of its range
     ):
-        assert numbers_of(other) == (WRITTEN, {})
+        assert numbers_of(other) == (CUSTOM, {})
     fall = replace(mine, system=SystemChoice(switch=SwitchChoice("geodesic_only")))
     own = {p.name: numbers[p.name] for p in METHODS["geodesic_only"].parameters}
     assert numbers_of(fall) == ("geodesic_only", own)
@@ -164,7 +164,7 @@ CLASSES = {  # of the snippet, by places in a scenario file
 }
 
 
-@pytest.mark.parametrize("name", [name for name in METHODS if name != WRITTEN])
+@pytest.mark.parametrize("name", [name for name in METHODS if name != CUSTOM])
 def test_every_number_is_in_the_file_and_in_the_snippet(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, name: str
 ) -> None:
@@ -212,7 +212,7 @@ def test_a_shipped_scenario_is_saved_as_it_was_loaded(
 
 
 STRANGE: dict[str, Any] = {
-    "method": "written",
+    "method": "custom",
     "body": BodyChoice(components=3, covariance="diagonal", seed=1),
     "embedding": EmbeddingChoice(
         density="average", joint_limits=JointLimitChoice(slope=20.0), combine="stack"
@@ -244,7 +244,7 @@ def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
     kept = Scenario.load(save_scenario(scenario_now(now, name="kept"), tmp_path))
     assert {key: getattr(kept, key) for key in STRANGE} == STRANGE
     np.testing.assert_allclose(kept.start.velocity, now.v, rtol=1e-12)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(make_session(kept, method=WRITTEN).snapshot().v, kept.start.velocity)
+    np.testing.assert_array_equal(make_session(kept, method=CUSTOM).snapshot().v, kept.start.velocity)
 
 
 def test_numbers_beyond_their_sliders_are_kept_and_others_can_be_moved(
@@ -267,7 +267,7 @@ def test_a_file_of_the_thesis_goes_on_with_the_controller(
 ) -> None:
     """Its mode and integrator are of runs without physics; what is saved can be run."""
     alone = replace(scenario.simulation, mode="kinematic", integrator="runge_kutta_4")
-    session = make_session(replace(scenario, method="written", simulation=alone), method="controller")
+    session = make_session(replace(scenario, method="custom", simulation=alone), method="controller")
     session.step()
     assert session.snapshot().torque_share > 0.0
     loaded = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))

@@ -263,7 +263,7 @@ def test_a_shipped_scenario_is_one_click_away(studio: Studio, looker: Looker) ->
     looker.choose("shipped", "planar-one-obstacle")
     looker.press("Load")
     until(lambda: last(studio).scenario.name == "planar-one-obstacle", "the scenario")
-    assert last(studio).method == "written"  # as it is written for
+    assert last(studio).method == "custom"  # as it is written for
 
 
 def test_the_thesis_is_one_click_away_with_its_arm_of_seven_joints(studio: Studio, looker: Looker) -> None:
@@ -271,7 +271,7 @@ def test_the_thesis_is_one_click_away_with_its_arm_of_seven_joints(studio: Studi
     looker.press("6.2.3")
     thesis = Scenario.load("thesis-6.2.3")
     until(lambda: last(studio).scenario == thesis, "the scenario")
-    assert last(studio).method == "written"
+    assert last(studio).method == "custom"
     until(lambda: last(studio).time > 0.2, "some steps")
     assert studio.view.plots.rows[0, 0] < GAP  # [s] seen from its start, however long its meshes took to load
     studio.send(m.SetRunning(False))

@@ -26,7 +26,7 @@ DEMO_SCENARIO = "thesis-6.2.3"
 class MethodChoice(StrEnum):
     """How the arm is moved."""
 
-    written = "written"
+    custom = "custom"
     barrier = "barrier"
     reactive = "reactive"
     controller = "controller"
@@ -82,8 +82,8 @@ def run(
     method: Annotated[
         MethodChoice | None,
         typer.Option(
-            help="Instead of the scenario's: as written, or the controller (barrier: without planner; reactive: also "
-            "without look ahead and sub-goals)."
+            help="Instead of the scenario's: custom (as the file says), or the controller (barrier: without planner; "
+            "reactive: also without look ahead and sub-goals)."
         ),
     ] = None,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the scenario's mode.")] = None,

@@ -133,7 +133,7 @@ def psi_figure(result: ScenarioResult) -> Figure | None:
     active = [name for name, curve in curves.items() if curve.max() > 0.0]
     if not active:
         return None
-    written = result.scenario.method == "written"
+    written = result.scenario.method == "custom"
     shown = active if written else sorted(active, key=lambda name: -curves[name].mean())[:MOST_CURVES]
     title = "Embedding"
     if not written:

@@ -49,7 +49,7 @@ def write_page(result: ScenarioResult, pictures: Sequence[Path], path: Path) -> 
         parts.append(f"<tr><td>{html.escape(name)}<td>{html.escape(value)}<td>{html.escape(allowed)}")
     parts.append("</table>")
     known = {picture.name: picture for picture in pictures}
-    captions = _CAPTIONS | ({"psi.png": "Embedding"} if scenario.method == "written" else {})
+    captions = _CAPTIONS | ({"psi.png": "Embedding"} if scenario.method == "custom" else {})
     for name, caption in captions.items():
         if name in known:
             kind = "gif" if name.endswith("gif") else "png"

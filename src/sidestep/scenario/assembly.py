@@ -55,10 +55,10 @@ class Assembly:
 
     Attributes:
         robot, body: as the scenario asks.
-        mover: the `Controller`, or for the method "written" its geometric system. driver: it, in a simulation.
+        mover: the `Controller`, or for the method "custom" its geometric system. driver: it, in a simulation.
         objects: the solid obstacles, for physics and exact clearance.
         start, start_velocity: (nv,) [rad | m].
-        posture: the goal; for a pose the start, or for "written" the posture that is gone to.
+        posture: the goal; for a pose the start, or for "custom" the posture that is gone to.
         pose: that is to be reached, in place of a configuration.
         seen: what the mover sees; a function of time [s] where an obstacle starts or stops.
     """
@@ -102,12 +102,12 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         things = _at(f"obstacles[{index}]", scenario, partial(solids, scenario, item, name))
         objects += things
         for thing in things:
-            look = partial(view_of, item, thing, bare=scenario.method == "written")
+            look = partial(view_of, item, thing, bare=scenario.method == "custom")
             views.append(_at(f"obstacles[{index}]", scenario, look))
     _at("obstacles", scenario, partial(check_scene, objects))
     scripted = any(item.motion is not None for item in scenario.obstacles)
     seen = partial(seen_at, tuple(views)) if scripted else seen_at(tuple(views), 0.0)
-    written = scenario.method == "written"
+    written = scenario.method == "custom"
     if not written:
         settings = _at("method", scenario, partial(controller_settings_of, scenario))
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
@@ -271,7 +271,7 @@ def _mesh(path: Path, scale: float) -> trimesh.Trimesh:
 
 def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
     choice = scenario.body
-    if scenario.method != "written":
+    if scenario.method != "custom":
         return Body.cover(robot, components=choice.ellipsoids, progress=progress)
     return Body.fit(
         robot,

@@ -46,7 +46,7 @@ class ScenarioResult:
     def switched(self) -> bool:
         """Whether a switch weighed the motion; barriers have none, whatever the file says."""
         scenario = self.scenario
-        return scenario.method == "written" and scenario.system.switch.type in (
+        return scenario.method == "custom" and scenario.system.switch.type in (
             "binary",
             "sigmoid",
             "distance",
@@ -67,7 +67,7 @@ class ScenarioResult:
             "robot": self.run.robot.name,
             "mode": choice.mode,
             "method": self.scenario.method,
-            "switch": self.scenario.system.switch.type if self.scenario.method == "written" else None,
+            "switch": self.scenario.system.switch.type if self.scenario.method == "custom" else None,
             "success": self.success,
             **self.evaluation.to_dict(),
             "tolerance_rad": choice.tolerance if turning else None,

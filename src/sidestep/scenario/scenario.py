@@ -22,7 +22,7 @@ SwitchType = Literal["none", "harmonic_only", "geodesic_only", "binary", "sigmoi
 
 FORMAT_VERSION = 1
 MAX_STEPS = 2_000_000  # of one run: ten minutes at 0.3 ms; every step is kept for the report
-MethodChoice = Literal["written", "controller", "barrier", "reactive"]
+MethodChoice = Literal["custom", "controller", "barrier", "reactive"]
 
 
 @dataclass(frozen=True)
@@ -173,12 +173,12 @@ class Scenario:
 
     Args:
         name: letters, digits, dot, dash, underscore.
-        method: "written": body, embedding and system as this file says; in place of them the `Controller`, which sees
+        method: "custom": body, embedding and system as this file says; in place of them the `Controller`, which sees
             the real size of the obstacles: "controller", "barrier" (without planner), "reactive" (without planner, look
             ahead and sub-goals).
         robot, start, goal, body, obstacles, embedding, system, simulation: the parts, see their classes.
         controller: what differs from the defaults of `ControllerSettings`, as a mapping of its tree where None leaves a
-            part out: {"barriers": {"activation": 0.2}, "planner": None}. Method "written": of the torque program.
+            part out: {"barriers": {"activation": 0.2}, "planner": None}. Method "custom": of the torque program.
         description, source: what happens, and where it comes from.
         folder: what relative file names refer to; not part of the file.
     """
@@ -189,7 +189,7 @@ class Scenario:
     goal: JointState | PoseChoice
     description: str = ""
     source: str = ""
-    method: MethodChoice = "written"
+    method: MethodChoice = "custom"
     body: BodyChoice = field(default_factory=BodyChoice)
     obstacles: tuple[Obstacle, ...] = ()
     embedding: EmbeddingChoice = field(default_factory=EmbeddingChoice)

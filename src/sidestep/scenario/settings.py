@@ -31,7 +31,7 @@ PROGRAM = tuple(name for name in FIELDS if "." not in name and name not in _OF_C
 def section_schema() -> dict[str, Any]:
     """The JSON schema of the section."""
     usual = ControllerSettings()
-    whole = _object("The settings of the Controller; of method written, those of its torque program.")
+    whole = _object("The settings of the Controller; of method custom, those of its torque program.")
     for name, field in FIELDS.items():
         if name in ELSEWHERE:
             continue

@@ -15,12 +15,12 @@ from sidestep.simulation.joint_words import in_words
 
 def method_in_words(scenario: Scenario) -> str:
     """How the arm is moved."""
-    if scenario.method != "written":
+    if scenario.method != "custom":
         missing = left_out(scenario.controller, scenario.method)
         if missing == OPTIONAL:
             return "barriers alone"
         return f"controller without {' and '.join(missing).replace('_', ' ')}" if missing else "controller"
-    return f"as written, switch: {scenario.system.switch.type.replace('_', ' ')}"
+    return f"custom, switch: {scenario.system.switch.type.replace('_', ' ')}"
 
 
 def seen_in_words(seen: Obstacles, *, num_solids: int) -> str:
@@ -82,7 +82,7 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
 
 def _step_words(scenario: Scenario) -> tuple[str, str]:
     """What the two columns of step by step words are of."""
-    return ("system", "torque program") if scenario.method == "written" else ("activity", "safety")
+    return ("system", "torque program") if scenario.method == "custom" else ("activity", "safety")
 
 
 def _physics(run: SimulationRun) -> list[tuple[str, str, str]]:

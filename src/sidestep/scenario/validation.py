@@ -33,6 +33,7 @@ MOVED = {  # keys of release 0.1.0, and what is in their place
     "torque": "controller",
     "torque.safety": "controller.safety",
 }
+RENAMED = {"guided": "controller", "written": "custom"}  # methods of release 0.1.0
 _BASE: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C where PyYAML has it
 
 
@@ -91,8 +92,8 @@ def check_document(document: dict[str, Any], *, file: str) -> None:
                 f"{file}: {_dotted(place)} is {shown(value)}; at most {MAX_NUMBER:g} in size is allowed"
             )
     moved = [f"{old} as {new}" for old, new in MOVED.items() if _has(document, old)]
-    if document.get("method") == "guided":
-        moved.append("method: guided as method: controller")
+    if document.get("method") in RENAMED:
+        moved.append(f"method: {document['method']} as method: {RENAMED[document['method']]}")
     if moved:
         raise ScenarioError(f"{file}: has keys of release 0.1.0; write {', '.join(moved)}")
     error = mismatch(document, schema_text())

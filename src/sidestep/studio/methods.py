@@ -22,7 +22,7 @@ from sidestep.studio.parameters import (
 )
 from sidestep.thesis import ThesisNumbers
 
-WRITTEN = "written"  # the method of a scenario file that says itself how the arm is moved
+CUSTOM = "custom"  # the method of a scenario file that says itself how the arm is moved
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ METHODS: dict[str, Method] = {
             _DENSITY,
         ),
         Method(
-            WRITTEN,
+            CUSTOM,
             "as the scenario file says",
             "Body, embedding, switch and numbers of the scenario that was loaded, as its file has them; without any "
             "in a file, one density without a switch. Choose another method to tune it here.",

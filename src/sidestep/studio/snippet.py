@@ -56,7 +56,7 @@ def python_snippet(snapshot: Snapshot) -> str:
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
-    code = _controller_code if method.controlled else _written_code
+    code = _controller_code if method.controlled else _custom_code
     lines = code(snapshot, written)
     used = set(re.findall(r"(?<!\.)\b[A-Z]\w+(?=\()", "\n".join(lines)))
     imports = [
@@ -92,7 +92,7 @@ def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
     ]
 
 
-def _written_code(snapshot: Snapshot, written: Scenario) -> list[str]:
+def _custom_code(snapshot: Snapshot, written: Scenario) -> list[str]:
     torque = program_from(written.controller)
     safety = next(own for _, _, own, _ in parts_of(torque.pop("safety"), "safety."))
     period = f"period={written.simulation.period!r}"

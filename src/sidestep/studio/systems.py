@@ -21,7 +21,7 @@ from sidestep.scenario.scenario import (
     SwitchChoice,
     SystemChoice,
 )
-from sidestep.studio.methods import METHODS, WRITTEN, Method, in_range
+from sidestep.studio.methods import CUSTOM, METHODS, Method, in_range
 from sidestep.studio.mover import ControllerMover, Mover, SystemMover
 from sidestep.studio.parameters import Numbers, Value, set_in
 from sidestep.thesis.custom import custom_system
@@ -41,8 +41,8 @@ Recipe = Covering | BodyChoice  # of a body
 
 def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Scenario:
     """The scenario with a method and its numbers as a file has them; what the method has no numbers for stays."""
-    if method.name == WRITTEN:
-        return dataclasses.replace(scenario, method="written")
+    if method.name == CUSTOM:
+        return dataclasses.replace(scenario, method="custom")
     if method.controlled:
         held = dataclasses.replace(scenario.simulation, integrator="semi_implicit_euler")
         written = dataclasses.replace(scenario, method=cast("MethodChoice", method.name), simulation=held)
@@ -51,7 +51,7 @@ def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> S
         embedding = EmbeddingChoice(joint_limits=JointLimitChoice())
         written = dataclasses.replace(
             scenario,
-            method="written",
+            method="custom",
             body=dataclasses.replace(BodyChoice(), ellipsoids=scenario.body.ellipsoids),
             embedding=embedding,
             system=system,
@@ -134,9 +134,9 @@ def build_mover(
 def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
     """The method that a scenario file asks for, and the numbers it has for it.
 
-    That is one of the page's where the file says exactly what one of them with its numbers is; else `WRITTEN`.
+    That is one of the page's where the file says exactly what one of them with its numbers is; else `CUSTOM`.
     """
-    if scenario.method != "written":
+    if scenario.method != "custom":
         method = METHODS[scenario.method]
         return method.name, {parameter.name: parameter.of(scenario) for parameter in method.parameters}
     switched = _switch_numbers(scenario.system.switch)
@@ -145,10 +145,10 @@ def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
             p.name: switched.get(p.name, p.default) if p.place == SWITCH else p.of(scenario)
             for p in method.parameters
         }
-        own = not method.controlled and method.name != WRITTEN
+        own = not method.controlled and method.name != CUSTOM
         if own and in_range(method, numbers) and as_file(method, numbers, scenario) == scenario:
             return method.name, numbers
-    return WRITTEN, {}
+    return CUSTOM, {}
 
 
 def _switch_numbers(choice: SwitchChoice) -> Numbers:
