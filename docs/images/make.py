@@ -12,7 +12,7 @@ from pathlib import Path
 from PIL import Image
 
 HERE = Path(__file__).parent
-STUDIO = ("sidestep", "studio", "thesis-6.2.3", "--method", "thesis", "--headless")
+STUDIO = ("sidestep", "studio", "thesis-6.2.3", "--method", "controller", "--headless")
 
 
 def demo(folder: Path) -> None:
@@ -22,7 +22,7 @@ def demo(folder: Path) -> None:
 
 
 def studio(folder: Path) -> None:
-    """The studio's page, while the arm passes under the balls."""
+    """The studio's page, when the arm has passed over the balls."""
     screen = folder / "studio.png"
     subprocess.run([*STUDIO, "--screenshot", screen, "--duration", "4"], check=True)
     keep(screen, HERE / "studio.png")
@@ -30,7 +30,7 @@ def studio(folder: Path) -> None:
 
 def animation(folder: Path) -> None:
     """The same motion until the arm has passed."""
-    subprocess.run([*STUDIO, "--video", HERE / "studio.webp", "--duration", "9"], check=True)
+    subprocess.run([*STUDIO, "--video", HERE / "studio.webp", "--duration", "5"], check=True)
 
 
 def keep(source: Path, target: Path) -> None:
