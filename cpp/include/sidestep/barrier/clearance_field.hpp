@@ -24,7 +24,7 @@ namespace sidestep {
 ///
 /// The points are reduced to one clearance by the Boltzmann mean (see boltzmann_mean.hpp), so that the result does not
 /// depend on how densely a surface is sampled, of those within a window above the nearest; and to what approaches (see
-/// approach_mean.hpp). What does not matter is left out in steps, by bounds from below: nodes of the tree over the points by
+/// stopping_clearance.hpp). What does not matter is left out in steps, by bounds from below: nodes of the tree over the points by
 /// balls and boxes around them and by a ball around the ellipsoids of a link; leaves, for every ellipsoid, by the plane that
 /// touches it where it is nearest to the middle of a leaf, beyond which all of the leaf's box is h ≥ n·y − √(nᵀ S n); and
 /// points by the same plane of their own, with a direction and so a rate that is known as well as n is. All this is done in
