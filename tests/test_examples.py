@@ -79,9 +79,19 @@ def test_examples_are_short_and_say_what_they_show() -> None:
         assert len(text.splitlines()) < 80, path.name
 
 
-def test_07_the_controller_arrives() -> None:
+def test_07_the_controller_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(EXAMPLES.parent)
     output = run("07")
     assert output.startswith("arrived, largest torque ")
-    assert (
-        10.0 < number_after("largest torque", output) < 87.0
-    )  # it holds itself, within the limit of the fr3
+    assert 0.0 < number_after("largest torque", output) < 19.44  # [Nm] limit of the first joint
+
+
+def test_07_is_as_short_as_it_says() -> None:
+    """Lines that say something: at most 8 of Python, 20 of C++."""
+    for name, comment, most in (
+        ("07_hello_controller.py", "#", 8),
+        ("cpp/07_hello_controller.cpp", "//", 20),
+    ):
+        text = (EXAMPLES / name).read_text(encoding="utf-8").split('"""')[-1]
+        lines = [line for line in text.splitlines() if line.strip() and not line.strip().startswith(comment)]
+        assert len(lines) <= most, name

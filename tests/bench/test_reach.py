@@ -100,5 +100,5 @@ def test_poses_are_reached_in_any_posture() -> None:
 
 
 def test_the_thesis_has_no_pose_goals() -> None:
-    with pytest.raises(ValueError, match="pose goals are for the methods 'controller' and 'reactive'"):
+    with pytest.raises(ValueError, match="pose goals are for the methods 'controller' and 'barrier'"):
         run_bench(replace(SETTINGS, motion=MotionSettings(duration=5.0, poses=True)))

@@ -1,5 +1,5 @@
-// One motion, as C++ makes it: `motion ARM.arm acceleration|torque STEPS SEED` reads start and goal (nv), then balls, each
-// with centre, radius and velocity, as numbers; it prints acceleration and torque (nv, nv) of every step in hexadecimal.
+// One motion, as C++ makes it: `motion ARM.arm acceleration|torque STEPS PERIOD SEED` reads numbers: start and goal (nv),
+// then centre, radius and velocity of each ball. It prints acceleration and torque (nv, nv) of every step in hexadecimal.
 #include <cstdio>
 #include <iostream>
 #include <sidestep/sidestep.hpp>
@@ -11,7 +11,8 @@ int main(int, char** argv) {
   settings.synchronous = true;
   settings.output = argv[2] == std::string("torque") ? sidestep::ControllerSettings::Output::torque
                                                      : sidestep::ControllerSettings::Output::acceleration;
-  settings.seed = std::stoull(argv[4]);
+  settings.period = std::stod(argv[4]);
+  settings.seed = std::stoull(argv[5]);
   sidestep::Controller controller(sidestep::Arm::load(argv[1]), settings);
 
   std::vector<double> numbers;

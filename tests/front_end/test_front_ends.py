@@ -31,7 +31,8 @@ from sidestep.studio.systems import make_body
 
 Array = npt.NDArray[np.float64]
 
-STEPS, SEED = 1000, 3
+PERIOD, STEPS, SEED = 0.002, 500, 3  # none is a default
+DURATION = STEPS * PERIOD
 START = np.array([-0.8, 0.2, 0.0, -2.0, 0.0, 2.2, 0.8])
 GOAL = np.array([0.8, 0.3, 0.0, -1.9, 0.0, 2.2, 0.8])
 CENTRES = np.array([[0.5, 0.02, 0.5], [0.27, -0.05, 0.46]])  # in the way, and coming at the forearm
@@ -53,12 +54,12 @@ obstacles:
     position: {CENTRES[1].tolist()}
     velocity: {VELOCITIES[1].tolist()}
 controller: {{seed: {SEED}}}
-simulation: {{mode: MODE, period: 0.001, duration: 1.0}}
+simulation: {{mode: MODE, period: {PERIOD}, duration: {DURATION}}}
 """
 
 
-def scenario(mode: str) -> Scenario:
-    return Scenario.from_text(FILE.replace("MODE", mode))
+def scenario(mode: str, method: str = "controller") -> Scenario:
+    return Scenario.from_text(FILE.replace("MODE", mode).replace("method: controller", f"method: {method}"))
 
 
 def problem() -> ReachProblem:
@@ -67,7 +68,7 @@ def problem() -> ReachProblem:
 
 def controller(output: str) -> ss.Controller:
     made = ss.Controller(
-        ss.Arm.load("fr3"), ss.ControllerSettings(synchronous=True, seed=SEED, output=output)
+        ss.Arm.load("fr3"), ss.ControllerSettings(synchronous=True, seed=SEED, output=output, period=PERIOD)
     )
     made.set_goal(GOAL)
     made.set_obstacles(ss.Obstacles(CENTRES, RADII, VELOCITIES))
@@ -101,15 +102,17 @@ def of_batch() -> Array:
     return motions[1].acceleration
 
 
-def of_scenario() -> Array:
-    run = run_scenario(scenario("kinematic")).run
+def of_scenario(method: str = "controller") -> Array:
+    run = run_scenario(scenario("kinematic", method)).run
     assert isinstance(run, KinematicRun)
     return run.achieved
 
 
-def of_bench() -> Array:
+def of_bench(method: str = "controller") -> Array:
     return (
-        build_mover(Method.controller, ss.Robot.named("fr3")).move(problem(), MotionSettings(duration=1.0)).a
+        build_mover(Method(method), ss.Robot.named("fr3"))
+        .move(problem(), MotionSettings(period=PERIOD, duration=DURATION))
+        .a
     )
 
 
@@ -121,7 +124,7 @@ def of_studio() -> Array:
     mover.set_goal(None, GOAL, thorough=True)
     q, v, found = START, np.zeros(7), []
     for k in range(STEPS):
-        seen = ss.Obstacles(CENTRES + 1e-3 * k * VELOCITIES, RADII, VELOCITIES)
+        seen = ss.Obstacles(CENTRES + PERIOD * k * VELOCITIES, RADII, VELOCITIES)
         mover.step(q, v, np.eye(7), np.zeros(7), seen)
         command = mover._controller.command
         found.append(command.acceleration)
@@ -139,7 +142,7 @@ def of_cpp(output: str) -> tuple[Array, Array]:
     balls = np.column_stack([CENTRES, RADII, VELOCITIES])
     told = " ".join(float(value).hex() for value in (*START, *GOAL, *balls.ravel()))
     run = subprocess.run(
-        [program, str(file), output, str(STEPS), str(SEED)],
+        [program, str(file), output, str(STEPS), str(PERIOD), str(SEED)],
         input=told,
         capture_output=True,
         text=True,
@@ -165,6 +168,13 @@ def test_accelerations_are_those_of_the_python_api(way: str) -> None:
     found = WAYS[way]()
     assert found.shape == (STEPS, 7)
     np.testing.assert_array_equal(found, stepped("acceleration")[0])
+
+
+def test_a_method_is_the_same_in_a_file_and_in_the_benchmark() -> None:
+    """Without planner the arm moves otherwise, by both in the same way."""
+    found = of_bench("barrier")
+    np.testing.assert_array_equal(found, of_scenario("barrier"))
+    assert not np.array_equal(found, stepped("acceleration")[0])
 
 
 def test_torques_by_the_arms_own_masses_are_those_of_cpp() -> None:
@@ -195,8 +205,8 @@ def simulated() -> Measured:
     """Through `Simulation`, which the other ways have to repeat: they get the same states only by the same torques."""
     driver = Watched(controller("torque"), ss.Obstacles(CENTRES, RADII, VELOCITIES))
     driver.told = []
-    simulation = Simulation(ss.Robot.named("fr3"), problem().objects, visuals=False)
-    run = simulation.run(driver, START, GOAL, 1.0, arrival=None)
+    simulation = Simulation(ss.Robot.named("fr3"), problem().objects, timestep=PERIOD, visuals=False)
+    run = simulation.run(driver, START, GOAL, DURATION, arrival=None)
     assert len(run.contacts) == 0
     return Measured(driver.told, run.torque)
 
@@ -214,7 +224,7 @@ def torques_of_scenario() -> Array:
 
 def torques_of_bench() -> Array:
     mover = build_mover(Method.controller, ss.Robot.named("fr3"))
-    motion = mover.move(problem(), MotionSettings(duration=1.0, torque=True))
+    motion = mover.move(problem(), MotionSettings(period=PERIOD, duration=DURATION, torque=True))
     assert motion.torque is not None
     return motion.torque
 
@@ -236,7 +246,6 @@ def torques_of_snippet() -> Array:
     variables: dict[str, Any] = {}
     exec(python_snippet(session().snapshot()), variables)
     variables["settings"].synchronous = True
-    variables["settings"].seed = SEED
     one = ss.Controller(variables["arm"], variables["settings"])
     one.set_goal(variables["goal"])
     one.set_obstacles(ss.Obstacles(CENTRES, RADII, VELOCITIES))

@@ -8,6 +8,7 @@ from sidestep.bench.method import Method
 from sidestep.bench.motion import ControllerMover, Mover, SystemMover
 from sidestep.body import Body
 from sidestep.robot import Robot
+from sidestep.scenario.settings import ABLATIONS
 from sidestep.thesis import ThesisNumbers, thesis_system
 
 
@@ -26,10 +27,7 @@ def build_mover(method: Method, robot: Robot, body: Body | None = None) -> Mover
             return SystemMover(robot, thesis_system(robot, body))
         case Method.unswitched:
             return SystemMover(robot, thesis_system(robot, body, switched=False))
-        case Method.controller:
-            return ControllerMover(robot, Arm.from_robot(robot, body))
-        case Method.reactive:
-            return ControllerMover(robot, Arm.from_robot(robot, body), {"planner": None})
+    return ControllerMover(robot, Arm.from_robot(robot, body), dict.fromkeys(ABLATIONS[method]))
 
 
 def barrier_system(
