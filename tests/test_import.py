@@ -168,7 +168,7 @@ def test_the_extras_hold_what_the_errors_say() -> None:
         ("yaml", "import sidestep as ss; ss.Scenario.load('thesis-6.2.3')", "simulation"),
         ("trimesh", "import sidestep as ss; ss.run_scenario", "simulation"),
         ("matplotlib", "from sidestep.report import write_report", "simulation"),
-        ("trimesh", "import sidestep.studio.stage", "studio"),
+        ("trimesh", "import sidestep.studio.simulated_scene", "studio"),
         (
             "viser",
             "from sidestep.studio.studio import Studio, _server; _server('127.0.0.1', 0, None)",

@@ -11,7 +11,7 @@ from sidestep.distance import SceneObject
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import assemble, solids
-from sidestep.scenario.seen import seen_at, view_of
+from sidestep.scenario.perception import seen_at, view_of
 
 BASE = """\
 format: 1

@@ -16,9 +16,9 @@ from sidestep.control import SafetySettings
 from sidestep.controller import controller_settings_fields
 from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
 from sidestep.scenario import scenario as module
-from sidestep.scenario.parts import controller_settings_of, torque_program_of
-from sidestep.scenario.settings import OPTIONAL, program_from
+from sidestep.scenario.config import OPTIONAL, controller_settings_of
 from sidestep.scenario.validation import check_document
+from sidestep.thesis.custom import program_from, torque_qp_of
 
 BASE = """\
 format: 1
@@ -56,15 +56,15 @@ def test_every_value_of_a_file_arrives() -> None:
         None,
     )
     assert (scenario.goal.unit, scenario.goal.position) == ("rad", (0.5, 0.25))
-    assert scenario.body == module.BodyChoice(components=3, covariance="diagonal", seed=7)
+    assert scenario.body == module.BodyConfig(components=3, covariance="diagonal", seed=7)
     (ball,) = scenario.obstacles
     assert ball.shape == module.Shape("sphere", radius=0.05)
     assert ball.motion == module.StraightMove(to=(0.9, 0.2, 0.0), begin=1.0, end=2.0)
     assert (ball.points, ball.free, ball.spacing) == ("surface", False, 0.03)
     assert scenario.system.stiffness == 2.0
     assert scenario.system.damping == 1.5
-    assert scenario.system.switch == module.SwitchChoice("distance", thresholds=(0.1, 0.2), slope=30.0)
-    assert scenario.simulation == module.SimulationChoice(mode="kinematic", period=0.002)
+    assert scenario.system.switch == module.SwitchConfig("distance", thresholds=(0.1, 0.2), slope=30.0)
+    assert scenario.simulation == module.SimulationConfig(mode="kinematic", period=0.002)
 
 
 @pytest.mark.parametrize(
@@ -242,7 +242,7 @@ def test_a_pose_and_the_numbers_of_barriers_arrive_and_survive_saving(tmp_path: 
     numbers = "controller: {barriers: {activation: 0.15, floor: 0.003, temperature: 0.001234567890123}}"
     posture = POSE.replace("45]", "45], posture: {unit: deg, position: [10, 20]}")
     scenario = parse(BASE.replace(GOAL, f"{posture}\nmethod: controller\n{numbers}"))
-    assert scenario.goal == module.PoseChoice(
+    assert scenario.goal == module.PoseConfig(
         "tip", (1.0, 0.5, 0.0), (0.0, 0.0, 45.0), module.JointState("deg", (10.0, 20.0))
     )
     assert scenario.method == "controller"
@@ -313,10 +313,10 @@ def test_the_schema_is_valid_and_states_the_defaults_of_the_classes() -> None:
     schema = json.loads(schema_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     parts = {
-        "body": module.BodyChoice(),
-        "embedding": module.EmbeddingChoice(),
-        "system": module.SystemChoice(),
-        "simulation": module.SimulationChoice(),
+        "body": module.BodyConfig(),
+        "embedding": module.EmbeddingConfig(),
+        "system": module.SystemConfig(),
+        "simulation": module.SimulationConfig(),
     }
     for key, value in parts.items():
         for field in dataclasses.fields(value):
@@ -418,7 +418,7 @@ def test_the_thesis_s_torque_program_has_the_numbers_of_the_section() -> None:
     assert numbers["slack_weight"] == 50.5
     assert numbers["stop_time"] == ss.ControllerSettings().stop_time
     assert (safety.margin, safety.rate) == (0.02, SafetySettings().rate)
-    assert torque_program_of(scenario, ss.Robot.named("planar2")).num_coordinates == 2
+    assert torque_qp_of(scenario, ss.Robot.named("planar2")).num_coordinates == 2
 
 
 def test_what_python_gives_a_section_is_checked_by_the_core() -> None:

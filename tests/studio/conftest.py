@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from sidestep import Scenario
-from sidestep.scenario.scenario import RobotChoice
+from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
 from sidestep.studio.headless import browser, driver
 from sidestep.studio.session import Session
@@ -24,7 +24,7 @@ SMALL = 2  # ellipsoids per link: a second of work, and kept for all tests
 @pytest.fixture
 def scenario() -> Scenario:
     """planar2 turns past a ball."""
-    return scenario_of(RobotChoice(name="planar2"))
+    return scenario_of(RobotConfig(name="planar2"))
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def studio(folder: Path) -> Iterator[Studio]:
-    scenario = scenario_of(RobotChoice(name="planar2"))
+    scenario = scenario_of(RobotConfig(name="planar2"))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         with Studio(scenario, port=0, ellipsoids=SMALL) as running:

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from sidestep.robot.pose import from_quaternion
-from sidestep.scenario.scenario import RobotChoice
+from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
 from sidestep.studio.headless import Window, find_chromium, go_to, new_page, picture
 from sidestep.studio.page.view import MAIN_WIDTH, PLOT_WIDTH
@@ -188,7 +188,7 @@ def run_to(studio: Studio, time: float) -> m.Snapshot:
 def reset(studio: Studio) -> None:
     """Puts planar2 at its start, paused, with one ball, shown live."""
     studio.view.recorder.show_live()
-    studio.send(m.Load(scenario_of(RobotChoice(name="planar2")), "controller"))
+    studio.send(m.Load(scenario_of(RobotConfig(name="planar2")), "controller"))
     studio.send(m.Restart(until=0.0))
     until(lambda: len(last(studio).things) == 1 and last(studio).time == 0.0, "the start")
 

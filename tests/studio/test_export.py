@@ -16,14 +16,14 @@ from sidestep import Scenario
 from sidestep.scenario import shipped_scenarios
 from sidestep.scenario.assembly import assemble
 from sidestep.scenario.scenario import (
-    BodyChoice,
-    EmbeddingChoice,
-    JointLimitChoice,
+    BodyConfig,
+    EmbeddingConfig,
+    JointLimitConfig,
     JointState,
-    RobotChoice,
+    RobotConfig,
     StraightMove,
-    SwitchChoice,
-    SystemChoice,
+    SwitchConfig,
+    SystemConfig,
 )
 from sidestep.studio import messages as m
 from sidestep.studio.export import (
@@ -35,10 +35,10 @@ from sidestep.studio.export import (
 )
 from sidestep.studio.methods import CUSTOM, METHODS
 from sidestep.studio.parameters import Parameter
+from sidestep.studio.scene_obstacle import CLOUD_LIMIT, CLOUD_RADIUS, box, cloud, scattered, thinned
 from sidestep.studio.session import Session
 from sidestep.studio.snippet import python_snippet
 from sidestep.studio.systems import as_file, numbers_of
-from sidestep.studio.things import CLOUD_LIMIT, CLOUD_RADIUS, box, cloud, scattered, thinned
 from sidestep.system import GeometricSystem
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
@@ -132,7 +132,7 @@ def test_the_saved_file_and_the_snippet_move_the_arm_as_before(
 def test_the_thresholds_of_seven_joints_survive() -> None:
     numbers = tuned("thesis")
     state = JointState("rad", (0.0,) * 7)
-    mine = Scenario("mine", RobotChoice("fr3"), state, state)
+    mine = Scenario("mine", RobotConfig("fr3"), state, state)
     mine = as_file(METHODS["thesis"], numbers, mine)
     assert numbers_of(mine) == ("thesis", numbers)
     # What no method of the page is exactly stays what the file says.
@@ -144,7 +144,7 @@ def test_the_thresholds_of_seven_joints_survive() -> None:
         replace(mine, system=replace(mine.system, stiffness=50.0)),  # out of its range
     ):
         assert numbers_of(other) == (CUSTOM, {})
-    fall = replace(mine, system=SystemChoice(switch=SwitchChoice("geodesic_only")))
+    fall = replace(mine, system=SystemConfig(switch=SwitchConfig("geodesic_only")))
     own = {p.name: numbers[p.name] for p in METHODS["geodesic_only"].parameters}
     assert numbers_of(fall) == ("geodesic_only", own)
 
@@ -213,11 +213,11 @@ def test_a_shipped_scenario_is_saved_as_it_was_loaded(
 
 STRANGE: dict[str, Any] = {
     "method": "custom",
-    "body": BodyChoice(components=3, covariance="diagonal", seed=1),
-    "embedding": EmbeddingChoice(
-        density="average", joint_limits=JointLimitChoice(slope=20.0), combine="stack"
+    "body": BodyConfig(components=3, covariance="diagonal", seed=1),
+    "embedding": EmbeddingConfig(
+        density="average", joint_limits=JointLimitConfig(slope=20.0), combine="stack"
     ),
-    "system": SystemChoice(stiffness=12.0, damping=0.3, damping_form="metric"),
+    "system": SystemConfig(stiffness=12.0, damping=0.3, damping_form="metric"),
 }
 
 
@@ -250,7 +250,7 @@ def test_what_the_page_has_no_controls_for_moves_the_arm_and_is_kept(
 def test_numbers_beyond_their_sliders_are_kept_and_others_can_be_moved(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
 ) -> None:
-    stiff = replace(scenario, controller={"barriers": {"stiffness": 50.0}}, body=BodyChoice(ellipsoids=2))
+    stiff = replace(scenario, controller={"barriers": {"stiffness": 50.0}}, body=BodyConfig(ellipsoids=2))
     session = make_session(stiff)
     assert session.snapshot().numbers["controller"]["stiffness"] == 50.0
     kept = Scenario.load(save_scenario(scenario_now(session.snapshot(), name="kept"), tmp_path))
@@ -285,11 +285,11 @@ def test_obstacles_go_on_as_they_moved(
     free = replace(ball, name="free", free=True, position=(-0.4, -0.9, 0.0))
     several = replace(scenario, obstacles=(ball, scripted, drifting, free))
     session = make_session(several, method="unswitched")
-    session.handle(m.ThrowThing("ball", np.array([0.0, 0.3, 0.1])))
+    session.handle(m.ThrowObstacle("ball", np.array([0.0, 0.3, 0.1])))
     for _ in range(400):
         session.step()
     assert not_kept(session.snapshot()) == ""
-    session.handle(m.ThrowThing("free", np.array([0.2, 0.0, 0.0])))
+    session.handle(m.ThrowObstacle("free", np.array([0.2, 0.0, 0.0])))
     now = session.snapshot()
     assert not_kept(now) == "At rest in a file, as free obstacles are: free."
     loaded = Scenario.load(save_scenario(scenario_now(now, name="kept"), tmp_path))
@@ -334,7 +334,7 @@ def test_a_loaded_file_brings_its_method_a_shipped_scenario_leaves_it(
 def test_a_pose_goal_survives_saving_and_loading(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path
 ) -> None:
-    session = make_session(replace(scenario, robot=RobotChoice(name="planar3"), **SMALL_ARM))
+    session = make_session(replace(scenario, robot=RobotConfig(name="planar3"), **SMALL_ARM))
     aim = session.robot.pose(np.array([0.3, 0.5, -0.4]), session.tip)
     session.handle(m.SetPoseGoal(aim))
     assert session.snapshot().posture is None  # it is looked for in the next step
@@ -360,7 +360,7 @@ def test_a_cloud_is_saved_beside_its_scenario(
     source.parent.mkdir()
     np.save(source, points)
     session = make_session(scenario)
-    session.handle(m.AddThing(cloud("wall", np.array([-0.9, 0.0, 0.0]), source, 0.01)))
+    session.handle(m.AddObstacle(cloud("wall", np.array([-0.9, 0.0, 0.0]), source, 0.01)))
     assert len(session._obstacles()) == 1 + len(points)
     np.testing.assert_allclose(
         session._obstacles().points[1:], points + np.array([-0.9, 0.0, 0.0]), atol=1e-12
@@ -388,7 +388,7 @@ def test_a_download_is_complete_by_itself(
         source = tmp_path / f"folder{k}" / "cloud.npy"
         source.parent.mkdir()
         np.save(source, own)
-        session.handle(m.AddThing(cloud(f"wall{k}", np.array([-0.9 - k, 0.0, 0.0]), source, 0.01)))
+        session.handle(m.AddObstacle(cloud(f"wall{k}", np.array([-0.9 - k, 0.0, 0.0]), source, 0.01)))
     now = session.snapshot()
     name, content = packed_scenario(scenario_now(now, name="mine"))
     assert name == "mine.zip"
@@ -410,7 +410,7 @@ def test_a_download_is_complete_by_itself(
 
 
 def test_a_download_that_would_not_be_complete_is_refused(scenario: Scenario, tmp_path: Path) -> None:
-    mine = replace(scenario, robot=RobotChoice(urdf="arm.urdf"), folder=tmp_path)
+    mine = replace(scenario, robot=RobotConfig(urdf="arm.urdf"), folder=tmp_path)
     with pytest.raises(ValueError, match=r"the robot is the file .*arm\.urdf, .* use Save"):
         packed_scenario(mine)
 
@@ -437,7 +437,7 @@ def test_a_box_is_seen_as_a_run_sees_it(
     make_session: Callable[..., Session], scenario: Scenario, tmp_path: Path, method: str
 ) -> None:
     session = make_session(scenario, method=method)
-    session.handle(m.AddThing(box("crate", np.array([0.5, 0.5, 0.0]), np.full(3, 0.1))))
+    session.handle(m.AddObstacle(box("crate", np.array([0.5, 0.5, 0.0]), np.full(3, 0.1))))
     seen = session._obstacles()
     run = assemble(Scenario.load(save_scenario(scenario_now(session.snapshot(), name="mine"), tmp_path))).seen
     order = [np.lexsort(np.array(o.points).T) for o in (seen, run)]

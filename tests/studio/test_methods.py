@@ -11,10 +11,10 @@ from sidestep import Scenario
 from sidestep.bench.method import Method as BenchMethod
 from sidestep.controller import controller_settings_fields
 from sidestep.scenario.scenario import (
-    BodyChoice,
-    EmbeddingChoice,
-    JointLimitChoice,
-    SystemChoice,
+    BodyConfig,
+    EmbeddingConfig,
+    JointLimitConfig,
+    SystemConfig,
 )
 from sidestep.studio.methods import METHODS, check_numbers
 from sidestep.studio.page.tuning import add_control, show_value, unit_for, value_of
@@ -46,10 +46,10 @@ def every_parameter() -> dict[str, Parameter]:
 @pytest.mark.parametrize(
     ("kind", "place"),
     [
-        (SystemChoice, "system"),
-        (EmbeddingChoice, "embedding"),
-        (JointLimitChoice, "embedding.joint_limits"),
-        (BodyChoice, "body"),
+        (SystemConfig, "system"),
+        (EmbeddingConfig, "embedding"),
+        (JointLimitConfig, "embedding.joint_limits"),
+        (BodyConfig, "body"),
     ],
 )
 def test_every_number_of_a_scenario_file_can_be_set(kind: type, place: str) -> None:

@@ -12,9 +12,10 @@ import pytest
 from PIL import Image
 
 from sidestep import ExactClearance, Scenario
-from sidestep.scenario.scenario import RobotChoice
+from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import headless
 from sidestep.studio import messages as m
+from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.headless import ANIMATION_WIDTH, FRAME, Window, take_pictures
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import RIGHT
@@ -26,7 +27,6 @@ from sidestep.studio.page.words import WORDS_HEIGHT, in_box, stamped
 from sidestep.studio.snippet import python_snippet
 from sidestep.studio.start import scenario_of
 from sidestep.studio.studio import Studio
-from sidestep.studio.truth import solid_poses
 from studio.looker import ON_THE_PAGE, PANELS, Looker, differ, last, run_to, until
 
 pytestmark = [*ON_THE_PAGE, pytest.mark.slow]
@@ -133,7 +133,7 @@ def test_a_scenario_is_saved_and_loaded_on_the_page(studio: Studio, looker: Look
     saved = Scenario.load(folder / "kept.yaml")
     np.testing.assert_allclose(saved.start.position, before.q, atol=1e-12)
     np.testing.assert_allclose(saved.obstacles[0].position, before.poses[0][:3, 3], atol=1e-12)
-    studio.send(m.RemoveThing("ball"))
+    studio.send(m.RemoveObstacle("ball"))
     until(lambda: not last(studio).things, "the removal")
     looker.press("Save")
     looker.answer("Keep it")
@@ -306,7 +306,7 @@ def test_a_ghost_is_not_drawn_where_the_arm_is(studio: Studio, looker: Looker) -
 def test_a_body_has_the_colours_of_its_links(studio: Studio, looker: Looker) -> None:
     tip = studio.view.robot.pose(last(studio).q, studio.view.tip)
     tip[1, 3] -= 0.15  # [m] the second link is near, the first is not
-    studio.send(m.DragThing("ball", tip))
+    studio.send(m.DragObstacle("ball", tip))
     body = studio.view._body
     assert body is not None
     until(lambda: studio.view.arm.shades.get("link2", 0) > 5, "a colour")
@@ -352,7 +352,7 @@ def test_pictures_show_the_motion_from_its_start(
     monkeypatch.setattr(headless, "browser", lambda _: nullcontext(chromium))
     monkeypatch.setattr(headless.os, "nice", politeness.append)  # would be of all tests that follow
     end, way, window = tmp_path / "end.png", tmp_path / "way.gif", Window(900, 480)
-    scenario, options = scenario_of(RobotChoice(name="planar2")), {"method": "unswitched", "ellipsoids": 3}
+    scenario, options = scenario_of(RobotConfig(name="planar2")), {"method": "unswitched", "ellipsoids": 3}
     studio.send(m.SetRunning(True))  # it begins again
     take_pictures(scenario, **options, duration=2 * FRAME, screenshot=end, video=way, window=window)  # type: ignore[arg-type]
     assert asked == [(scenario, {**options, "port": 0})]

@@ -11,10 +11,10 @@ import pytest
 
 from sidestep import ExactClearance, Scenario
 from sidestep.studio import messages as m
+from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.page.placing import CLEAR
+from sidestep.studio.scene_obstacle import things_of
 from sidestep.studio.studio import Studio
-from sidestep.studio.things import things_of
-from sidestep.studio.truth import solid_poses
 from studio.looker import ON_THE_PAGE, Looker, differ, last, run_to, until
 
 pytestmark = [*ON_THE_PAGE, pytest.mark.slow]

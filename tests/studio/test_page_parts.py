@@ -17,6 +17,7 @@ import pytest
 from sidestep import Body, ExactClearance, Obstacles, Robot, Scenario
 from sidestep.robot.pose import pose_at
 from sidestep.studio import messages as m
+from sidestep.studio.clearance_monitor import ExactClearanceMonitor, solid_poses
 from sidestep.studio.methods import METHODS
 from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page import colours, obstacle_panel
@@ -43,10 +44,9 @@ from sidestep.studio.page.surface import (
 )
 from sidestep.studio.page.view import begins_anew, live_row
 from sidestep.studio.page.words import begun
+from sidestep.studio.scene_obstacle import ball, cloud, thing_of
 from sidestep.studio.session import Session
 from sidestep.studio.systems import build_mover
-from sidestep.studio.things import ball, cloud, thing_of
-from sidestep.studio.truth import Truth, solid_poses
 
 MakeSession = Callable[..., Session]
 
@@ -85,14 +85,14 @@ def test_the_surface_is_of_the_system_that_the_loop_runs(
     place = session.robot.pose(goal, session.tip)
     place[1, 3] += 0.16  # [m] the goal lies within the activation distance
     session.handle(m.SetRunning(False))
-    session.handle(m.DragThing("ball", place))
+    session.handle(m.DragObstacle("ball", place))
     body, method = Body.cover(session.robot, components=2), METHODS["reactive"]
     axis, rest = np.linspace(-np.pi, np.pi, CELLS + 1), np.zeros(2)
     cell = [int(np.abs(axis - angle).argmin()) for angle in goal]
     q = axis[cell]  # of the grid, next to the goal
     found = []
     for velocity in (0.0, 2.0):  # [m/s] with which it could be at the arm in a second
-        session.handle(m.ThrowThing("ball", np.array([0.0, velocity, 0.0])))
+        session.handle(m.ThrowObstacle("ball", np.array([0.0, velocity, 0.0])))
         now = session.snapshot()
         system = build_mover(
             method, session.robot, body, now.numbers["reactive"], scenario, synchronous=True
@@ -321,7 +321,7 @@ def test_a_recording_keeps_time_motion_and_obstacles(make_session: MakeSession, 
     for _ in range(100):
         session.step()
     rows = list(session.snapshot().rows)
-    session.handle(m.RemoveThing("ball"))
+    session.handle(m.RemoveObstacle("ball"))
     for _ in range(100):
         session.step()
     rows += session.snapshot().rows
@@ -337,7 +337,7 @@ def test_the_nearest_of_each_link_agrees_with_the_nearest_of_all(
     make_session: MakeSession, scenario: Scenario
 ) -> None:
     session = make_session(scenario, method="unswitched")
-    session.handle(m.DragThing("ball", pose_at([0.5, 0.4, 0.0])))
+    session.handle(m.DragObstacle("ball", pose_at([0.5, 0.4, 0.0])))
     for _ in range(500):
         session.step()
     snapshot = session.snapshot()
@@ -369,7 +369,7 @@ def test_a_measurement_that_fails_is_reported_and_the_next_one_is_made(
         found.append(answer)
         heard.set()
 
-    truth = Truth(tell, report)
+    truth = ExactClearanceMonitor(tell, report)
     truth.look(session.robot, bad, 1)
     assert heard.wait(PATIENCE)
     assert not found
@@ -417,7 +417,7 @@ def test_a_surface_that_cannot_be_computed_is_reported_and_the_next_one_is(
     assert (what, str(error)) == ("computing the curved space failed", "no room")
     heard.clear()
     session.handle(m.SetRunning(False))
-    session.handle(m.DragThing("ball", pose_at([0.6, 0.5, 0.0])))
+    session.handle(m.DragObstacle("ball", pose_at([0.6, 0.5, 0.0])))
     surface.show(session.snapshot(), session.robot, body, (0, 1), place)
     assert heard.wait(PATIENCE)
     surface.stop()
@@ -500,7 +500,7 @@ def test_the_least_clearance_is_of_one_motion(make_session: MakeSession, scenari
     assert begins_anew(first, session.snapshot())
     session.step()
     before = session.snapshot()
-    session.handle(m.RemoveThing("ball"))
+    session.handle(m.RemoveObstacle("ball"))
     session.step()
     assert not begins_anew(before, session.snapshot())  # an obstacle less, and the same motion
     session.handle(m.Restart())
@@ -522,7 +522,7 @@ def test_the_place_of_an_obstacle_that_flies_is_followed(
         _followed=0.0,
     )
     panel.follow(view.last)
-    session.handle(m.ThrowThing("ball", np.array([0.0, 0.5, 0.0])))
+    session.handle(m.ThrowObstacle("ball", np.array([0.0, 0.5, 0.0])))
     shown = []
     for _ in range(4):
         for _ in range(100):

@@ -10,11 +10,11 @@ import pytest
 from sidestep import ExactClearance, Robot
 from sidestep.robot import tip_of
 from sidestep.robot.pose import pose_at
+from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.page.camera import HALF, RIGHT, UP, VIEW, Viewpoint
 from sidestep.studio.page.placing import CLEAR, Camera, free_place
+from sidestep.studio.scene_obstacle import SceneObstacle, ball, box, cloud, scattered
 from sidestep.studio.start import ends
-from sidestep.studio.things import Thing, ball, box, cloud, scattered
-from sidestep.studio.truth import solid_poses
 
 DOWN = np.diag([1.0, -1.0, -1.0])  # axes of a camera that looks down
 
@@ -29,7 +29,7 @@ def test_what_is_added_time_and_again_is_free_of_arm_and_goal_and_in_sight(name:
     gizmo = robot.pose(goal, tip_of(robot))[:3, 3], 0.2
     np.save(tmp_path / "plate.npy", scattered(0.2, seed=0))
     nowhere = np.zeros(3)
-    added: list[Thing] = []
+    added: list[SceneObstacle] = []
     for k in range(6):
         made = (
             ball(f"new{k}", nowhere, 0.06),

@@ -15,16 +15,16 @@ from sidestep import ExactClearance, Robot, Scenario
 from sidestep.robot import tip_of
 from sidestep.robot.pose import pose_at
 from sidestep.scenario.runner import run_scenario
-from sidestep.scenario.scenario import RobotChoice
+from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
+from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.export import save_scenario, scenario_now
 from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page.arm import link_meshes, short_names
+from sidestep.studio.scene_obstacle import ball, box
 from sidestep.studio.session import Session
-from sidestep.studio.stage import DRAG_ACCELERATION, DRAG_SPEED
+from sidestep.studio.simulated_scene import DRAG_ACCELERATION, DRAG_SPEED
 from sidestep.studio.start import BEND, ends, scenario_of, starting_scenario
-from sidestep.studio.things import ball, box
-from sidestep.studio.truth import solid_poses
 
 MakeSession = Callable[..., Session]
 
@@ -66,7 +66,7 @@ def test_a_ball_drawn_into_the_arm_at_rest_does_not_touch_it(
     here = session.stage.state()[0]
     session.handle(m.SetJointGoal(here))
     tip = session.robot.pose(here, session.tip)[:3, 3]
-    session.handle(m.DragThing("ball", pose_at(tip)))
+    session.handle(m.DragObstacle("ball", pose_at(tip)))
     last, clearance = record(session, 3.0)
     moved = np.abs(last.q - here).max()
     assert clearance > 0.0
@@ -80,7 +80,7 @@ def test_a_ball_drawn_into_the_arm_at_rest_does_not_touch_it(
 def test_a_drawn_ball_moves_as_a_hand_does(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario, method="unswitched")
     place = session.snapshot().poses[0][:3, 3] + np.array([0.4, 0.3, 0.0])
-    session.handle(m.DragThing("ball", pose_at(place)))
+    session.handle(m.DragObstacle("ball", pose_at(place)))
     velocities = [np.zeros(3)]
     for _ in range(1500):
         session.step()
@@ -102,7 +102,7 @@ def test_a_ball_drawn_while_paused_is_put_there_and_what_is_said_follows(
     before = run(session, 0.2)
     session.handle(m.SetRunning(False))
     beside = session.robot.pose(before.q, session.tip)[:3, 3] + np.array([0.0, -0.10, 0.0])
-    session.handle(m.DragThing("ball", pose_at(beside)))
+    session.handle(m.DragObstacle("ball", pose_at(beside)))
     now = session.snapshot()
     np.testing.assert_array_equal(now.poses[0], pose_at(beside))
     np.testing.assert_array_equal(now.velocities, np.zeros((1, 3)))
@@ -111,9 +111,9 @@ def test_a_ball_drawn_while_paused_is_put_there_and_what_is_said_follows(
     truth = exact.distance(now.q, solid_poses(now.things, now.poses)).distance
     # A covering body is larger than the arm, by a centimetre or two with few ellipsoids.
     assert truth - 0.03 < now.nearest[1] < truth < 0.05
-    session.handle(m.DragThing("ball", pose_at(session.robot.pose(before.q, session.tip)[:3, 3])))
+    session.handle(m.DragObstacle("ball", pose_at(session.robot.pose(before.q, session.tip)[:3, 3])))
     assert session.snapshot().contacts == ("link2 - ball",)
-    session.handle(m.DragThing("ball", before.poses[0]))
+    session.handle(m.DragObstacle("ball", before.poses[0]))
     np.testing.assert_array_equal(run(session, 0.1).poses[0], before.poses[0])  # and stays there
 
 
@@ -121,12 +121,12 @@ def test_a_free_ball_drawn_while_paused_stays_at_rest(make_session: MakeSession,
     free = replace(scenario, obstacles=(replace(scenario.obstacles[0], free=True),))
     session = make_session(free, method="unswitched")
     session.handle(m.SetRunning(False))
-    session.handle(m.DragThing("ball", pose_at([-0.7, 0.2, 0.1])))
+    session.handle(m.DragObstacle("ball", pose_at([-0.7, 0.2, 0.1])))
     np.testing.assert_allclose(run(session, 0.1).poses[0], pose_at([-0.7, 0.2, 0.1]), atol=1e-12)
 
 
 def test_restart_and_loading_end_a_recording(make_session: MakeSession, scenario: Scenario) -> None:
-    for command in (m.Restart(), m.Load(replace(scenario_of(RobotChoice(name="planar3")), obstacles=()))):
+    for command in (m.Restart(), m.Load(replace(scenario_of(RobotConfig(name="planar3")), obstacles=()))):
         session = make_session(scenario, method="unswitched")
         session.handle(m.SetRecording(True))
         for _ in range(100):
@@ -144,7 +144,7 @@ def test_a_thrown_ball_flies_straight_and_is_told_to_the_controller(
     session = make_session(scenario)
     start = session.snapshot().poses[0][:3, 3].copy()
     velocity = np.array([0.5, 0.2, 0.1])
-    session.handle(m.ThrowThing("ball", velocity))
+    session.handle(m.ThrowObstacle("ball", velocity))
     last = run(session, 0.4)
     np.testing.assert_allclose(last.poses[0][:3, 3], start + 0.4 * velocity, atol=1e-9)  # sums of 400 steps
     np.testing.assert_array_equal(last.velocities[0], velocity)
@@ -154,23 +154,23 @@ def test_a_thrown_ball_flies_straight_and_is_told_to_the_controller(
 def test_things_come_and_go_while_the_arm_moves(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
     before = run(session, 0.5)
-    session.handle(m.AddThing(box("crate", np.array([-0.8, 0.0, 0.0]), np.array([0.1, 0.2, 0.3]))))
-    session.handle(m.AddThing(ball("second", np.array([0.0, -0.9, 0.0]), 0.05)))
+    session.handle(m.AddObstacle(box("crate", np.array([-0.8, 0.0, 0.0]), np.array([0.1, 0.2, 0.3]))))
+    session.handle(m.AddObstacle(ball("second", np.array([0.0, -0.9, 0.0]), 0.05)))
     after = session.snapshot()
     np.testing.assert_array_equal(after.q, before.q)
     np.testing.assert_array_equal(after.v, before.v)
     assert [thing.name for thing in after.things] == ["ball", "crate", "second"]
     assert after.edition == before.edition + 2
     with pytest.raises(ValueError, match="two obstacles are called 'second'"):
-        session.handle(m.AddThing(ball("second", np.zeros(3), 0.05)))
-    session.handle(m.RemoveThing("crate"))
+        session.handle(m.AddObstacle(ball("second", np.zeros(3), 0.05)))
+    session.handle(m.RemoveObstacle("crate"))
     assert [thing.name for thing in run(session, 0.1).things] == ["ball", "second"]
     with pytest.raises(ValueError, match="no obstacle 'crate'; there are: ball, second"):
-        session.handle(m.RemoveThing("crate"))
+        session.handle(m.RemoveObstacle("crate"))
 
 
 def test_a_pose_goal_is_reached(make_session: MakeSession) -> None:
-    session = make_session(replace(scenario_of(RobotChoice(name="planar3")), obstacles=()))
+    session = make_session(replace(scenario_of(RobotConfig(name="planar3")), obstacles=()))
     aim = session.robot.pose(np.array([0.3, 0.5, -0.4]), session.tip)
     session.handle(m.SetPoseGoal(aim))
     last = run(session, 5.0)
@@ -203,7 +203,7 @@ def test_a_goal_that_is_itself_blocked_is_said_and_the_arm_rests(
     session = make_session(scenario, method=method)
     goal = session.stage.state()[0] + np.array([1.0, 0.0])
     session.handle(m.SetJointGoal(goal))
-    session.handle(m.DragThing("ball", session.robot.pose(goal, session.tip)))
+    session.handle(m.DragObstacle("ball", session.robot.pose(goal, session.tip)))
     last = run(session, 6.0)
     found = re.fullmatch(
         r"at the goal 'link2' is (\d+) mm deep in ball; it goes on when that is free", last.words
@@ -214,7 +214,7 @@ def test_a_goal_that_is_itself_blocked_is_said_and_the_arm_rests(
     again = run(session, 3.0)
     np.testing.assert_allclose(again.q, last.q, atol=0.02)  # [rad] no sub-goals: none leads anywhere
     assert again.touched == 0
-    session.handle(m.DragThing("ball", pose_at([-0.9, 0.0, 0.0])))
+    session.handle(m.DragObstacle("ball", pose_at([-0.9, 0.0, 0.0])))
     assert run(session, 8.0).words == "arrived"
 
 
@@ -312,10 +312,10 @@ def test_the_controller_is_told_of_what_moves_otherwise_than_it_was_told(
         return len(told) - before
 
     assert counted(0.2) == 1
-    session.handle(m.ThrowThing("ball", np.array([0.0, 0.3, 0.1])))
+    session.handle(m.ThrowObstacle("ball", np.array([0.0, 0.3, 0.1])))
     assert counted(0.2) == 1  # it flies on as it was told
     place = session.snapshot().poses[0] @ pose_at([0.2, 0.0, 0.0])
-    session.handle(m.DragThing("ball", place))
+    session.handle(m.DragObstacle("ball", place))
     assert 20 < counted(1.0) < 1000  # it speeds up, slows down, and rests
     assert counted(0.2) == 0
 
@@ -331,7 +331,7 @@ def test_a_goal_outside_the_limits_is_refused(make_session: MakeSession, scenari
 def test_restart_puts_everything_back(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
     first = session.snapshot()
-    session.handle(m.ThrowThing("ball", np.array([0.0, 0.0, 1.0])))
+    session.handle(m.ThrowObstacle("ball", np.array([0.0, 0.0, 1.0])))
     run(session, 0.3)
     session.handle(m.Restart())
     again = session.snapshot()
@@ -366,8 +366,8 @@ def test_what_is_saved_is_what_is_there(
     make_session: MakeSession, scenario: Scenario, tmp_path: object
 ) -> None:
     session = make_session(scenario)
-    session.handle(m.AddThing(box("crate", np.array([-0.8, 0.1, 0.2]), np.array([0.1, 0.2, 0.3]))))
-    session.handle(m.ThrowThing("ball", np.array([0.1, 0.0, 0.3])))
+    session.handle(m.AddObstacle(box("crate", np.array([-0.8, 0.1, 0.2]), np.array([0.1, 0.2, 0.3]))))
+    session.handle(m.ThrowObstacle("ball", np.array([0.1, 0.0, 0.3])))
     last = run(session, 0.5)
     now = scenario_now(last, name="kept")
     file = tmp_path / "kept.yaml"  # type: ignore[operator]
@@ -404,7 +404,7 @@ def test_a_density_does_not_tell_what_is_in_the_way(make_session: MakeSession, s
     session = make_session(scenario, method="unswitched")
     here = session.stage.state()[0]
     tip = session.robot.pose(here, session.tip)[:3, 3]
-    session.handle(m.AddThing(ball("second", tip + np.array([-0.1, 0.15, 0.0]), 0.03)))
+    session.handle(m.AddObstacle(ball("second", tip + np.array([-0.1, 0.15, 0.0]), 0.03)))
     session.handle(m.SetJointGoal(here + np.array([1.0, 0.0])))
     words = run(session, 0.3).words
     assert words == "the arm slides along an obstacle or a limit (a density does not tell which)"
@@ -415,7 +415,7 @@ def test_a_diagnosis_names_links_and_obstacles(make_session: MakeSession, scenar
     here = session.stage.state()[0]
     session.handle(m.SetJointGoal(here))
     middle = session.robot.pose(here + np.array([0.5, 0.0]), session.tip)[:3, 3]
-    session.handle(m.DragThing("ball", pose_at(0.8 * middle)))
+    session.handle(m.DragObstacle("ball", pose_at(0.8 * middle)))
     run(session, 1.5)
     session.handle(m.SetJointGoal(here + np.array([1.0, 0.0])))
     words = run(session, 3.0).words

@@ -18,7 +18,7 @@ from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 if TYPE_CHECKING:
     from sidestep.scenario import Scenario
     from sidestep.scenario.result import ScenarioResult
-    from sidestep.scenario.scenario import SwitchChoice, SwitchType
+    from sidestep.scenario.scenario import SwitchConfig, SwitchType
 
 DEMO_SCENARIO = "thesis-6.2.3"
 
@@ -48,13 +48,13 @@ SWITCH_FORMS = {  # how --switch is written, and what its numbers are
 }
 
 
-def parse_switch(text: str) -> SwitchChoice:
+def parse_switch(text: str) -> SwitchConfig:
     """A switch as the command line writes it, such as "none" or "sigmoid:0.5:10" (threshold, slope).
 
     Raises:
         typer.BadParameter: naming the text and the allowed forms.
     """
-    from sidestep.scenario.scenario import SwitchChoice
+    from sidestep.scenario.scenario import SwitchConfig
 
     kind, *numbers = text.split(":")
     names = SWITCH_FORMS.get(kind)
@@ -67,7 +67,7 @@ def parse_switch(text: str) -> SwitchChoice:
     except ValueError:
         forms = ", ".join(":".join((form, *map(str.upper, of))) for form, of in SWITCH_FORMS.items())
         raise typer.BadParameter(f"{text!r} is not one of: {forms} (finite numbers, SLOPE > 0)") from None
-    return SwitchChoice(
+    return SwitchConfig(
         cast("SwitchType", kind), threshold=values.get("threshold"), slope=values.get("slope")
     )
 

@@ -23,22 +23,22 @@ from sidestep.obstacles.shapes import EXTENT
 from sidestep.robot.degrees import degrees_hint
 from sidestep.robot.mesh import read_mesh
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
-from sidestep.scenario.parts import controller_settings_of, torque_program_of
+from sidestep.scenario.config import controller_settings_of
+from sidestep.scenario.perception import View, seen_at, view_of
 from sidestep.scenario.scenario import (
     BasePose,
     JointState,
     Obstacle,
-    PoseChoice,
-    RobotChoice,
+    PoseConfig,
+    RobotConfig,
     Scenario,
     Shape,
 )
-from sidestep.scenario.seen import View, seen_at, view_of
 from sidestep.scenario.validation import ScenarioError
 from sidestep.simulation import ControllerDriver
 from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
 from sidestep.system import GeometricSystem
-from sidestep.thesis.custom import custom_system
+from sidestep.thesis.custom import custom_system, torque_qp_of
 from sidestep.thesis.driver import SystemDriver
 
 Array = npt.NDArray[np.float64]
@@ -111,7 +111,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
     if not written:
         settings = _at("method", scenario, partial(controller_settings_of, scenario))
     body = _at("body", scenario, partial(_fit, scenario, robot, progress))
-    program = _at("controller", scenario, partial(torque_program_of, scenario, robot))
+    program = _at("controller", scenario, partial(torque_qp_of, scenario, robot))
     pose = _at("goal", scenario, partial(_target, scenario, robot))
     posture = IkSolution(start)
     if pose is None or written:
@@ -151,7 +151,7 @@ def _target(scenario: Scenario, robot: Robot) -> PoseTarget | None:
     return PoseTarget(robot, choice.frame, pose_of(choice), rest=rest)
 
 
-def _check_frame(choice: PoseChoice, robot: Robot) -> None:
+def _check_frame(choice: PoseConfig, robot: Robot) -> None:
     links = [frame.name for frame in robot.frames if frame.joint >= 0]
     if choice.frame not in links:
         raise ValueError(f"goal.frame is {choice.frame!r}; allowed: {', '.join(links)}")
@@ -173,7 +173,7 @@ def goal_posture(scenario: Scenario, robot: Robot, start: Array) -> IkSolution:
 
 def load_robot(scenario: Scenario) -> Robot:
     """The robot that a scenario asks for; raises ValueError or FileNotFoundError that says what is wrong."""
-    choice: RobotChoice = scenario.robot
+    choice: RobotConfig = scenario.robot
     if choice.name is not None:
         extras = [key for key in ("package_dirs", "tip", "locked", "base") if getattr(choice, key)]
         if extras:
@@ -301,7 +301,7 @@ def _turns(robot: Robot) -> list[int]:
     return sorted({joint.coordinate for joint in robot.joints if joint.type == JointType.revolute})
 
 
-def pose_of(thing: BasePose | Obstacle | PoseChoice) -> Array:
+def pose_of(thing: BasePose | Obstacle | PoseConfig) -> Array:
     """The pose (4, 4) in the world of what a file places."""
     roll, pitch, yaw = np.deg2rad(thing.rotation_deg)
     return pose_at(thing.position, from_roll_pitch_yaw((roll, pitch, yaw)))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import yaml
 
-from sidestep.scenario.settings import MAX_LOOK_STEPS, Section, check_steps, section_of, value_in
+from sidestep.scenario.config import MAX_LOOK_STEPS, Section, check_steps, section_of, value_in
 from sidestep.scenario.validation import MAX_CHARACTERS, ScenarioError, check_document, parse_yaml
 
 Vector3 = tuple[float, float, float]
@@ -34,7 +34,7 @@ class BasePose:
 
 
 @dataclass(frozen=True)
-class RobotChoice:
+class RobotConfig:
     """A robot by name, or by URDF file with the joints `locked` [rad | m], a `tip` and a `base`."""
 
     name: str | None = None
@@ -55,7 +55,7 @@ class JointState:
 
 
 @dataclass(frozen=True)
-class PoseChoice:
+class PoseConfig:
     """Pose of a frame of the robot in the world: position [m], roll, pitch, yaw about fixed x, y, z [deg].
 
     posture: a configuration that the joints are drawn to as well; left out: one with that pose, found from the start.
@@ -68,7 +68,7 @@ class PoseChoice:
 
 
 @dataclass(frozen=True)
-class BodyChoice:
+class BodyConfig:
     """How the Gaussian mixtures of the links are fitted; of the controller, how many ellipsoids cover each link.
 
     ellipsoids: left out: as many as it takes.
@@ -119,7 +119,7 @@ class Obstacle:
 
 
 @dataclass(frozen=True)
-class JointLimitChoice:
+class JointLimitConfig:
     """Slope and height of the joint-limit potential (thesis, equation 5.7)."""
 
     slope: float = 30.0
@@ -127,16 +127,16 @@ class JointLimitChoice:
 
 
 @dataclass(frozen=True)
-class EmbeddingChoice:
+class EmbeddingConfig:
     """The extra coordinates of the embedded joint space."""
 
     density: Literal["sum", "average"] = "sum"
-    joint_limits: JointLimitChoice | None = None
+    joint_limits: JointLimitConfig | None = None
     combine: Literal["sum", "stack"] = "sum"
 
 
 @dataclass(frozen=True)
-class SwitchChoice:
+class SwitchConfig:
     """Between the harmonic and the geodesic term: threshold of psi, or of each link's distance [m]."""
 
     type: SwitchType = "none"
@@ -146,17 +146,17 @@ class SwitchChoice:
 
 
 @dataclass(frozen=True)
-class SystemChoice:
+class SystemConfig:
     """Stiffness, damping and switch of the dynamical system."""
 
     stiffness: float = 0.5
     damping: float = 1.5
     damping_form: Literal["plain", "metric"] = "plain"
-    switch: SwitchChoice = field(default_factory=SwitchChoice)
+    switch: SwitchConfig = field(default_factory=SwitchConfig)
 
 
 @dataclass(frozen=True)
-class SimulationChoice:
+class SimulationConfig:
     """How the run is simulated: mode, control period [s], longest time [s], integrator, tolerance [rad]; a pose also
     has to be reached within 1 cm."""
 
@@ -184,18 +184,18 @@ class Scenario:
     """
 
     name: str
-    robot: RobotChoice
+    robot: RobotConfig
     start: JointState
-    goal: JointState | PoseChoice
+    goal: JointState | PoseConfig
     description: str = ""
     source: str = ""
     method: MethodChoice = "custom"
-    body: BodyChoice = field(default_factory=BodyChoice)
+    body: BodyConfig = field(default_factory=BodyConfig)
     obstacles: tuple[Obstacle, ...] = ()
-    embedding: EmbeddingChoice = field(default_factory=EmbeddingChoice)
-    system: SystemChoice = field(default_factory=SystemChoice)
+    embedding: EmbeddingConfig = field(default_factory=EmbeddingConfig)
+    system: SystemConfig = field(default_factory=SystemConfig)
     controller: Section = field(default_factory=dict)
-    simulation: SimulationChoice = field(default_factory=SimulationChoice)
+    simulation: SimulationConfig = field(default_factory=SimulationConfig)
     folder: Path = field(default_factory=Path.cwd, compare=False, repr=False)
 
     @classmethod

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sidestep._core import Obstacles
+from sidestep.scenario.config import OPTIONAL, left_out
 from sidestep.scenario.result import ScenarioResult, tolerance_units
 from sidestep.scenario.scenario import Scenario
-from sidestep.scenario.settings import OPTIONAL, left_out
 from sidestep.simulation import SimulationRun
 from sidestep.simulation.evaluation import POSE_TOLERANCE
 from sidestep.simulation.joint_words import in_words

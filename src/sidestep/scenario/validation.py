@@ -44,7 +44,7 @@ class ScenarioError(ValueError):
 @cache
 def schema_text() -> str:
     """The published JSON schema of scenario files, with the section `controller` as the core states its settings."""
-    from sidestep.scenario.settings import section_schema
+    from sidestep.scenario.config import section_schema
 
     text = (resources.files("sidestep.scenario") / "schema.json").read_text(encoding="utf-8")
     schema = json.loads(text)

@@ -17,15 +17,15 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.scenario import (
     JointState,
     Obstacle,
-    PoseChoice,
+    PoseConfig,
     StraightMove,
     Vector3,
 )
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
 from sidestep.studio.mover import STILL
+from sidestep.studio.scene_obstacle import written_pose
 from sidestep.studio.systems import as_file
-from sidestep.studio.things import written_pose
 
 Array = npt.NDArray[np.float64]
 
@@ -86,13 +86,13 @@ def _vector(values: Array) -> Vector3:
     return x, y, z
 
 
-def _goal(snapshot: Snapshot) -> JointState | PoseChoice:
+def _goal(snapshot: Snapshot) -> JointState | PoseConfig:
     if snapshot.goal is not None:
         return _state(snapshot.goal)
     assert snapshot.goal_pose is not None
     posture = snapshot.posture
     found = _state(posture.q) if posture is not None and posture.found else None
-    return PoseChoice(snapshot.tip, *written_pose(snapshot.goal_pose), found)
+    return PoseConfig(snapshot.tip, *written_pose(snapshot.goal_pose), found)
 
 
 def save_scenario(scenario: Scenario, folder: Path, *, replace: bool = False) -> Path:

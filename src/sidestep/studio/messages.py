@@ -12,7 +12,7 @@ import numpy.typing as npt
 from sidestep.scenario import Scenario
 from sidestep.simulation.pose_target import IkSolution
 from sidestep.studio.parameters import Numbers
-from sidestep.studio.things import Thing
+from sidestep.studio.scene_obstacle import SceneObstacle
 
 Array = npt.NDArray[np.float64]
 Course = Literal["file", "held", "left"]
@@ -35,21 +35,21 @@ class SetPoseGoal:
 
 
 @dataclass(frozen=True)
-class AddThing:
+class AddObstacle:
     """A new obstacle."""
 
-    thing: Thing
+    thing: SceneObstacle
 
 
 @dataclass(frozen=True)
-class RemoveThing:
+class RemoveObstacle:
     """The obstacle called `name` goes away."""
 
     name: str
 
 
 @dataclass(frozen=True)
-class DragThing:
+class DragObstacle:
     """The obstacle called `name` is drawn to a pose (4, 4), or put there while the loop is paused; None lets go."""
 
     name: str
@@ -57,7 +57,7 @@ class DragThing:
 
 
 @dataclass(frozen=True)
-class ThrowThing:
+class ThrowObstacle:
     """The obstacle called `name` flies on with a velocity (3,) [m/s]."""
 
     name: str
@@ -124,10 +124,10 @@ class Drawn:
 Command: TypeAlias = (
     SetJointGoal
     | SetPoseGoal
-    | AddThing
-    | RemoveThing
-    | DragThing
-    | ThrowThing
+    | AddObstacle
+    | RemoveObstacle
+    | DragObstacle
+    | ThrowObstacle
     | SetMethod
     | SetNumbers
     | SetRunning
@@ -187,7 +187,7 @@ class Snapshot:
     posture: IkSolution | None
     goal_written: bool
     tip: str
-    things: tuple[Thing, ...]
+    things: tuple[SceneObstacle, ...]
     poses: Array
     velocities: Array
     courses: tuple[Course, ...]
@@ -214,7 +214,7 @@ class Row:
 
     time: float
     q: Array
-    things: tuple[Thing, ...]
+    things: tuple[SceneObstacle, ...]
     poses: Array
     metric: Array
 

@@ -11,14 +11,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from sidestep.scenario.config import FIELDS, PROGRAM, value_in, with_values
 from sidestep.scenario.scenario import (
-    BodyChoice,
-    EmbeddingChoice,
-    JointLimitChoice,
+    BodyConfig,
+    EmbeddingConfig,
+    JointLimitConfig,
     Scenario,
-    SystemChoice,
+    SystemConfig,
 )
-from sidestep.scenario.settings import FIELDS, PROGRAM, value_in, with_values
 from sidestep.thesis import ThesisNumbers
 
 Value: TypeAlias = float | int | str | None
@@ -179,7 +179,7 @@ BARRIERS: tuple[Parameter, ...] = (
     *_part("barriers", ""),
     *_stated(name for name in FIELDS if "." not in name and name not in PROGRAM),
     _choice(
-        BodyChoice,
+        BodyConfig,
         "body",
         "ellipsoids",
         (None, 1, 2, 3, 4, 6, 8, 12),
@@ -198,7 +198,7 @@ ARRIVAL = _part("arrival", "arrival_")
 SAFETY = _part("safety", "safety_")
 TORQUE = _stated(PROGRAM, "torque_")
 
-_y = _number(SystemChoice, "system")
+_y = _number(SystemConfig, "system")
 
 
 def spring(stiffness: str, damping: str) -> tuple[Parameter, ...]:
@@ -207,7 +207,7 @@ def spring(stiffness: str, damping: str) -> tuple[Parameter, ...]:
         dataclasses.replace(_y("stiffness", "1/s²", 0.1, 10.0, stiffness), default=ThesisNumbers.stiffness),
         dataclasses.replace(_y("damping", "1/s", 0.5, 10.0, damping), default=ThesisNumbers.damping),
         _choice(
-            SystemChoice,
+            SystemConfig,
             "system",
             "damping_form",
             ("plain", "metric"),
@@ -221,17 +221,17 @@ def switch(name: str, unit: str, lower: float, upper: float, default: float, sen
     return Parameter(name, "system.switch", name, unit, lower, upper, default, sentence)
 
 
-_l = _number(JointLimitChoice, "embedding.joint_limits", "limit_")
+_l = _number(JointLimitConfig, "embedding.joint_limits", "limit_")
 DENSITY: tuple[Parameter, ...] = (
     _choice(
-        EmbeddingChoice,
+        EmbeddingConfig,
         "embedding",
         "density",
         ("sum", "average"),
         "sum: every point adds to ψ, so finer views push harder; average: they do not, and few of many vanish.",
     ),
     _choice(
-        EmbeddingChoice,
+        EmbeddingConfig,
         "embedding",
         "combine",
         ("sum", "stack"),
@@ -240,7 +240,7 @@ DENSITY: tuple[Parameter, ...] = (
     _l("slope", "1/rad", 5.0, 100.0, "Higher rises later and steeper before a joint limit."),
     _l("height", "", 0.05, 10.0, "Higher turns away from joint limits more."),
     _choice(
-        BodyChoice,
+        BodyConfig,
         "body",
         "components",
         (1, 2, 3, 4, 5, 6, 8, "aic", "bic"),
@@ -249,7 +249,7 @@ DENSITY: tuple[Parameter, ...] = (
         body=True,
     ),
     _choice(
-        BodyChoice,
+        BodyConfig,
         "body",
         "covariance",
         ("spherical", "diagonal", "full"),

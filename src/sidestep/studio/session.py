@@ -23,9 +23,9 @@ from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS, Method, check_numbers, method_named
 from sidestep.studio.mover import STILL, Account, Mover
 from sidestep.studio.parameters import Numbers
-from sidestep.studio.stage import Actor, Stage
+from sidestep.studio.scene_obstacle import check_names, things_of
+from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
 from sidestep.studio.systems import Recipe, build_mover, numbers_of, recipe_of
-from sidestep.studio.things import check_names, things_of
 from sidestep.studio.tip import at_tip
 from sidestep.studio.words import named
 
@@ -57,7 +57,7 @@ class Session:
 
     robot: Robot
     tip: str
-    stage: Stage
+    stage: SimulatedScene
     period: float
     time: float
     running: bool
@@ -99,20 +99,20 @@ class Session:
                 last = None if self._goal[0] is None else self._mover.posture
                 near = self.stage.state()[0] if last is None else last.q
                 self._set_goal(finite(pose, "the pose of the goal"), near, thorough=thorough)
-            case m.AddThing(thing):
+            case m.AddObstacle(thing):
                 check_names([*(actor.thing for actor in self.stage.actors), thing])
-                self._set_actors([*self.stage.actors, Actor(thing)])
-            case m.RemoveThing(name):
+                self._set_actors([*self.stage.actors, MovableObstacle(thing)])
+            case m.RemoveObstacle(name):
                 gone = self.actor(name)
                 self._set_actors([actor for actor in self.stage.actors if actor is not gone])
-            case m.DragThing(name, place):
+            case m.DragObstacle(name, place):
                 if place is None:
                     self.stage.throw(self.actor(name), np.zeros(3))
                 elif self.running:
                     self.stage.draw(self.actor(name), finite(place, f"the place of {name}"))
                 else:
                     self.stage.put(self.actor(name), finite(place, f"the place of {name}"))
-            case m.ThrowThing(name, velocity):
+            case m.ThrowObstacle(name, velocity):
                 self.stage.throw(self.actor(name), finite(velocity, f"the velocity of {name}"))
             case m.SetMethod(name):
                 self._use(method_named(name), self._numbers[name])
@@ -201,7 +201,7 @@ class Session:
             rows=rows,
         )
 
-    def actor(self, name: str) -> Actor:
+    def actor(self, name: str) -> MovableObstacle:
         """The obstacle called `name`; raises ValueError that lists them."""
         for actor in self.stage.actors:
             if actor.thing.name == name:
@@ -223,7 +223,7 @@ class Session:
         end = goal if isinstance(goal, JointState) else goal.posture
         place = "goal.position" if pose is None else "goal.posture.position"
         near = start if end is None else coordinates(end, robot, place)
-        stage = Stage(robot, things_of(scenario), period=scenario.simulation.period)
+        stage = SimulatedScene(robot, things_of(scenario), period=scenario.simulation.period)
         numbers = self._numbers_for(scenario, given)
         mover = self._mover_of(method, numbers[method.name], scenario, robot, bodies)
         mover.set_goal(pose, near, thorough=True)
@@ -253,14 +253,14 @@ class Session:
         self._torque = np.zeros(self.robot.num_coordinates)
         self._times = deque(maxlen=TIMED_STEPS)
         self._recording = False  # time goes back: a recording is of one motion
-        self._set_actors([Actor(actor.thing) for actor in self.stage.actors])
+        self._set_actors([MovableObstacle(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(*self._start)
 
     def _set_goal(self, pose: Array | None, q: Array, *, thorough: bool = True) -> None:
         self._mover.set_goal(pose, q, thorough=thorough)
         self._goal, self._goal_written = (pose, q), False
 
-    def _set_actors(self, actors: list[Actor]) -> None:
+    def _set_actors(self, actors: list[MovableObstacle]) -> None:
         self.stage.set_things(actors)
         self.edition += 1
         self._look()

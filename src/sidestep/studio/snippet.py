@@ -9,11 +9,12 @@ from typing import Any
 
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import pose_of
-from sidestep.scenario.scenario import RobotChoice, SwitchChoice
-from sidestep.scenario.settings import parts_of, program_from
+from sidestep.scenario.config import parts_of
+from sidestep.scenario.scenario import RobotConfig, SwitchConfig
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
 from sidestep.studio.systems import as_file, fit_arguments, settings_of
+from sidestep.thesis.custom import program_from
 
 WIDTH = 80  # [characters] that a window on the page shows
 
@@ -140,7 +141,7 @@ def _arm_code(written: Scenario, ellipsoids: int | None) -> str:
     return f"ss.Arm.from_robot(robot := {robot}, ss.Body.cover(robot{count}))"
 
 
-def _robot_code(robot: RobotChoice, scenario: Scenario) -> str:
+def _robot_code(robot: RobotConfig, scenario: Scenario) -> str:
     if robot.name is not None:
         return f"ss.Robot.named({robot.name!r})"
     assert robot.urdf is not None
@@ -196,7 +197,7 @@ def _system_code(written: Scenario) -> list[str]:
     ]
 
 
-def _switch_code(switch: SwitchChoice) -> str:
+def _switch_code(switch: SwitchConfig) -> str:
     match switch.type:
         case "distance":
             return f"thesis.DistanceSwitch({list(switch.thresholds or ())!r}, {switch.slope!r})"

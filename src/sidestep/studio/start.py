@@ -11,7 +11,7 @@ import numpy.typing as npt
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
-from sidestep.scenario.scenario import JointState, Obstacle, RobotChoice, Shape
+from sidestep.scenario.scenario import JointState, Obstacle, RobotConfig, Shape
 
 Array = npt.NDArray[np.float64]
 
@@ -39,14 +39,14 @@ def starting_scenario(
     if scenario is not None:
         return Scenario.load(scenario)
     choice = (
-        RobotChoice(name=robot or DEFAULT_ROBOT)
+        RobotConfig(name=robot or DEFAULT_ROBOT)
         if urdf is None
-        else RobotChoice(urdf=str(urdf), package_dirs=tuple(str(folder) for folder in package_dirs))
+        else RobotConfig(urdf=str(urdf), package_dirs=tuple(str(folder) for folder in package_dirs))
     )
     return scenario_of(choice)
 
 
-def scenario_of(choice: RobotChoice) -> Scenario:
+def scenario_of(choice: RobotConfig) -> Scenario:
     """A robot that turns its first joint past a ball."""
     empty = JointState("rad", ())
     arm = load_robot(Scenario("studio", choice, empty, empty))

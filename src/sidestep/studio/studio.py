@@ -14,8 +14,8 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import load_robot
 from sidestep.studio import guard as g
 from sidestep.studio import messages as m
-from sidestep.studio.loop import Beginning, Loop
-from sidestep.studio.truth import Truth
+from sidestep.studio.clearance_monitor import ExactClearanceMonitor
+from sidestep.studio.session_process import Beginning, SessionProcess
 
 if TYPE_CHECKING:
     from sidestep.studio.page.view import View
@@ -72,9 +72,9 @@ class Studio:
         self._stopping = threading.Event()
         self.snapshot: m.Snapshot | None = None
         self.error = ""
-        self._loop = Loop(Beginning(scenario, method, dict(numbers or {}), ellipsoids))
+        self._loop = SessionProcess(Beginning(scenario, method, dict(numbers or {}), ellipsoids))
         self.view: View = View(server, scenario, robot, self.send)
-        self._truth = Truth(self.view.take_clearances, self.view.report)
+        self._truth = ExactClearanceMonitor(self.view.take_clearances, self.view.report)
         self._last_truth = 0.0
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()

@@ -12,19 +12,19 @@ from sidestep.arm import Arm
 from sidestep.body import Body
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
-from sidestep.scenario.parts import controller_settings_of, torque_program_of
+from sidestep.scenario.config import controller_settings_of
 from sidestep.scenario.scenario import (
-    BodyChoice,
-    EmbeddingChoice,
-    JointLimitChoice,
+    BodyConfig,
+    EmbeddingConfig,
+    JointLimitConfig,
     MethodChoice,
-    SwitchChoice,
-    SystemChoice,
+    SwitchConfig,
+    SystemConfig,
 )
 from sidestep.studio.methods import CUSTOM, METHODS, Method, in_range
 from sidestep.studio.mover import ControllerMover, Mover, SystemMover
 from sidestep.studio.parameters import Numbers, Value, set_in
-from sidestep.thesis.custom import custom_system
+from sidestep.thesis.custom import custom_system, torque_qp_of
 
 SWITCH = "system.switch"  # of several forms, with numbers of their own
 
@@ -36,7 +36,7 @@ class Covering:
     ellipsoids: int | None
 
 
-Recipe = Covering | BodyChoice  # of a body
+Recipe = Covering | BodyConfig  # of a body
 
 
 def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Scenario:
@@ -47,12 +47,12 @@ def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> S
         held = dataclasses.replace(scenario.simulation, integrator="semi_implicit_euler")
         written = dataclasses.replace(scenario, method=cast("MethodChoice", method.name), simulation=held)
     else:
-        system = SystemChoice(switch=switch_of(method.name, numbers, len(scenario.start.position)))
-        embedding = EmbeddingChoice(joint_limits=JointLimitChoice())
+        system = SystemConfig(switch=switch_of(method.name, numbers, len(scenario.start.position)))
+        embedding = EmbeddingConfig(joint_limits=JointLimitConfig())
         written = dataclasses.replace(
             scenario,
             method="custom",
-            body=dataclasses.replace(BodyChoice(), ellipsoids=scenario.body.ellipsoids),
+            body=dataclasses.replace(BodyConfig(), ellipsoids=scenario.body.ellipsoids),
             embedding=embedding,
             system=system,
         )
@@ -65,22 +65,22 @@ def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> S
     return written
 
 
-def switch_of(method: str, numbers: Mapping[str, Any], num_coordinates: int) -> SwitchChoice:
+def switch_of(method: str, numbers: Mapping[str, Any], num_coordinates: int) -> SwitchConfig:
     """The switch of one of the thesis's methods as a scenario file has it."""
     match method:
         case "thesis":
             ends = {0, 1, num_coordinates - 1}
             thresholds = tuple(numbers["outer" if k in ends else "inner"] for k in range(num_coordinates))
-            return SwitchChoice("distance", thresholds=thresholds, slope=numbers["slope"])
+            return SwitchConfig("distance", thresholds=thresholds, slope=numbers["slope"])
         case "sigmoid":
-            return SwitchChoice("sigmoid", threshold=numbers["threshold"], slope=numbers["slope"])
+            return SwitchConfig("sigmoid", threshold=numbers["threshold"], slope=numbers["slope"])
         case "binary":
-            return SwitchChoice("binary", threshold=numbers["threshold"])
+            return SwitchConfig("binary", threshold=numbers["threshold"])
         case "harmonic_only":
-            return SwitchChoice("harmonic_only")
+            return SwitchConfig("harmonic_only")
         case "geodesic_only":
-            return SwitchChoice("geodesic_only")
-    return SwitchChoice("none")
+            return SwitchConfig("geodesic_only")
+    return SwitchConfig("none")
 
 
 def recipe_of(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Recipe:
@@ -97,7 +97,7 @@ def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], 
     return Body.fit(robot, **fit_arguments(recipe), progress=progress)
 
 
-def fit_arguments(choice: BodyChoice) -> dict[str, Any]:
+def fit_arguments(choice: BodyConfig) -> dict[str, Any]:
     """The arguments of `Body.fit` for a body of a scenario file."""
     return {name: value for name, value in dataclasses.asdict(choice).items() if name != "ellipsoids"}
 
@@ -127,7 +127,7 @@ def build_mover(
         settings = settings_of(written, synchronous=synchronous)
         return ControllerMover(robot, Arm.from_robot(robot, body), settings, tip)
     system = custom_system(written.embedding, written.system, robot, body)
-    program = torque_program_of(written, robot)
+    program = torque_qp_of(written, robot)
     return SystemMover(robot, system, program, tip)
 
 
@@ -151,7 +151,7 @@ def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
     return CUSTOM, {}
 
 
-def _switch_numbers(choice: SwitchChoice) -> Numbers:
+def _switch_numbers(choice: SwitchConfig) -> Numbers:
     """The numbers of a file's switch by the names that the methods have for them."""
     values: Numbers = {}
     if choice.thresholds:

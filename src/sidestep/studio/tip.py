@@ -7,12 +7,12 @@ import numpy.typing as npt
 
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario.assembly import pose_of
-from sidestep.scenario.scenario import PoseChoice
+from sidestep.scenario.scenario import PoseConfig
 
 Array = npt.NDArray[np.float64]
 
 
-def at_tip(choice: PoseChoice, robot: Robot) -> Array:
+def at_tip(choice: PoseConfig, robot: Robot) -> Array:
     """The pose (4, 4) of the tip that puts the frame of a file's goal at its pose.
 
     Raises ValueError where a joint lies between that frame and the tip.

@@ -7,10 +7,10 @@ import re
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.studio.things import Thing
+from sidestep.studio.scene_obstacle import SceneObstacle
 
 
-def named(sentence: str, *, owners: npt.NDArray[np.intp], things: tuple[Thing, ...]) -> str:
+def named(sentence: str, *, owners: npt.NDArray[np.intp], things: tuple[SceneObstacle, ...]) -> str:
     """A sentence about a step with the names of obstacles in place of the numbers of their points.
 
     Args:

@@ -1,8 +1,9 @@
-"""The geometric system of a scenario that says itself how the arm is moved: its density, embedding and switch."""
+"""What moves the arm of a scenario of method `custom`: its density, embedding and switch, and a torque QP."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from collections.abc import Mapping
+from typing import Any, TypeAlias
 
 from sidestep._core import (
     BinarySwitch,
@@ -13,19 +14,22 @@ from sidestep._core import (
     GeometricSystem,
     HarmonicOnly,
     JointLimitPotential,
+    SafetySettings,
     SigmoidSwitch,
     Sum,
+    TorqueController,
     Unswitched,
 )
 from sidestep.body import Body
 from sidestep.robot import Robot
-from sidestep.scenario.scenario import EmbeddingChoice, SwitchChoice, SystemChoice
+from sidestep.scenario.config import PROGRAM, made, value_in
+from sidestep.scenario.scenario import EmbeddingConfig, Scenario, SwitchConfig, SystemConfig
 
 Switch: TypeAlias = Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch
 
 
 def custom_system(
-    embedding: EmbeddingChoice, system: SystemChoice, robot: Robot, body: Body
+    embedding: EmbeddingConfig, system: SystemConfig, robot: Robot, body: Body
 ) -> GeometricSystem:
     """The system that a file writes out; raises ValueError where its switch does not fit the robot."""
     return GeometricSystem(
@@ -37,7 +41,7 @@ def custom_system(
     )
 
 
-def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[Embedding]:
+def _embeddings(choice: EmbeddingConfig, robot: Robot, body: Body) -> list[Embedding]:
     parts: list[Embedding] = [CollisionDensity(robot, body, average=choice.density == "average")]
     if choice.joint_limits is not None:
         parts.append(
@@ -46,19 +50,19 @@ def _embeddings(choice: EmbeddingChoice, robot: Robot, body: Body) -> list[Embed
     return [Sum(parts)] if choice.combine == "sum" and len(parts) > 1 else parts
 
 
-def _switch(choice: SwitchChoice, robot: Robot) -> Switch:
+def _switch(choice: SwitchConfig, robot: Robot) -> Switch:
     match choice:
-        case SwitchChoice(type="none"):
+        case SwitchConfig(type="none"):
             return Unswitched()
-        case SwitchChoice(type="harmonic_only"):
+        case SwitchConfig(type="harmonic_only"):
             return HarmonicOnly()
-        case SwitchChoice(type="geodesic_only"):
+        case SwitchConfig(type="geodesic_only"):
             return GeodesicOnly()
-        case SwitchChoice(type="binary", threshold=float(threshold)):
+        case SwitchConfig(type="binary", threshold=float(threshold)):
             return BinarySwitch(threshold=threshold)
-        case SwitchChoice(type="sigmoid", threshold=float(threshold), slope=float(slope)):
+        case SwitchConfig(type="sigmoid", threshold=float(threshold), slope=float(slope)):
             return SigmoidSwitch(threshold=threshold, slope=slope)
-        case SwitchChoice(type="distance", thresholds=tuple(thresholds), slope=float(slope)):
+        case SwitchConfig(type="distance", thresholds=tuple(thresholds), slope=float(slope)):
             if len(thresholds) != robot.num_coordinates:
                 raise ValueError(
                     f"switch.thresholds has {len(thresholds)} values; robot {robot.name!r} has "
@@ -66,3 +70,18 @@ def _switch(choice: SwitchChoice, robot: Robot) -> Switch:
                 )
             return DistanceSwitch(thresholds=thresholds, slope=slope)
     raise ValueError(f"switch of type {choice.type!r} lacks a number it needs, got {choice}")
+
+
+def torque_qp_of(scenario: Scenario, robot: Robot) -> TorqueController:
+    """The torque QP that a scenario asks for; raises ValueError that names the number at fault."""
+    return TorqueController(robot, period=scenario.simulation.period, **program_from(scenario.controller))
+
+
+def program_from(section: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of a `TorqueController`, but for robot and period.
+
+    Raises:
+        ValueError: names the setting, its value and what is allowed.
+    """
+    numbers = {name: value_in(section, name) for name in PROGRAM}
+    return numbers | {"safety": made(SafetySettings(), section.get("safety", {}))}

@@ -17,7 +17,7 @@ from sidestep.robot.pose import from_quaternion, pose_at
 from sidestep.studio import messages as m
 from sidestep.studio.page.note import add_note
 from sidestep.studio.page.placing import Ball, Camera, free_place
-from sidestep.studio.things import CLOUD_RADIUS, Thing, ball, box, cloud, scattered, thinned
+from sidestep.studio.scene_obstacle import CLOUD_RADIUS, SceneObstacle, ball, box, cloud, scattered, thinned
 
 if TYPE_CHECKING:
     import viser
@@ -125,7 +125,7 @@ class ObstaclePanel:
         if event.client is None or index is None or last is None:
             return
         self._view.send(
-            m.DragThing(self._chosen.value, pose_at(self._place.value, last.poses[index][:3, :3]))
+            m.DragObstacle(self._chosen.value, pose_at(self._place.value, last.poses[index][:3, :3]))
         )
 
     def _add(self, event: Any) -> None:
@@ -151,7 +151,7 @@ class ObstaclePanel:
                 points, radius = thinned(np.array(load_point_cloud(path).points))
             self._put(self._cloud(self._new_name("cloud"), points, radius), event.client, as_written=True)
 
-    def _put(self, thing: Thing, client: Any, *, as_written: bool = False) -> None:
+    def _put(self, thing: SceneObstacle, client: Any, *, as_written: bool = False) -> None:
         """Adds a thing where it is free; `as_written`: where its file has it, if it is free there."""
         view, last = self._view, self._view.last
         if last is None:
@@ -171,9 +171,9 @@ class ObstaclePanel:
             first=(thing.middle,) if as_written else (),
         )
         self._sent.append((thing.name, (place, thing.size)))
-        view.send(m.AddThing(thing.at(pose_at(place - thing.middle))))
+        view.send(m.AddObstacle(thing.at(pose_at(place - thing.middle))))
 
-    def _cloud(self, name: str, points: Array, radius: float = CLOUD_RADIUS) -> Thing:
+    def _cloud(self, name: str, points: Array, radius: float = CLOUD_RADIUS) -> SceneObstacle:
         path = self._folder / f"{name}.npy"
         np.save(path, points)
         return cloud(name, np.zeros(3), path, radius)
@@ -192,8 +192,8 @@ class ObstaclePanel:
         way = self._view.robot.pose(last.q, self._view.tip)[:3, 3] - last.poses[index][:3, 3]
         length = float(np.linalg.norm(way))
         if length > 0.0:
-            self._view.send(m.ThrowThing(self._chosen.value, self._speed.value * way / length))
+            self._view.send(m.ThrowObstacle(self._chosen.value, self._speed.value * way / length))
 
     def _remove(self, _: Any) -> None:
         if self._index() is not None:
-            self._view.send(m.RemoveThing(self._chosen.value))
+            self._view.send(m.RemoveObstacle(self._chosen.value))

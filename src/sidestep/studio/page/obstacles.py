@@ -12,7 +12,7 @@ import numpy.typing as npt
 from sidestep.robot.pose import from_quaternion, pose_at, pose_vector
 from sidestep.studio import messages as m
 from sidestep.studio.page import colours
-from sidestep.studio.things import Thing
+from sidestep.studio.scene_obstacle import SceneObstacle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ class ObstacleViews:
         self._server, self._send, self._on_select = server, send, on_select
         self._views: dict[str, _View] = {}
 
-    def set_things(self, things: tuple[Thing, ...]) -> None:
+    def set_things(self, things: tuple[SceneObstacle, ...]) -> None:
         """Shows these obstacles and no others."""
         for name, view in list(self._views.items()):
             if view.thing not in things:
@@ -45,7 +45,7 @@ class ObstacleViews:
             if thing.name not in self._views:
                 self._views[thing.name] = _View(self._server, thing, self._send, self._on_select)
 
-    def show(self, things: tuple[Thing, ...], poses: Array) -> None:
+    def show(self, things: tuple[SceneObstacle, ...], poses: Array) -> None:
         """Puts them where they are, poses (N, 4, 4)."""
         for thing, pose in zip(things, poses, strict=True):
             view = self._views.get(thing.name)
@@ -61,7 +61,7 @@ class _View:
     def __init__(
         self,
         server: viser.ViserServer,
-        thing: Thing,
+        thing: SceneObstacle,
         send: Callable[[m.Command], None],
         on_select: Callable[[str], None],
     ) -> None:
@@ -121,9 +121,9 @@ class _View:
         while len(self._path) > LEAST_PATH and now - self._path[0][0] > THROW_MEMORY:
             self._path.popleft()
         if event.phase == "end" and event.modifier == "shift":
-            self._send(m.ThrowThing(self.thing.name, throw_velocity(list(self._path))))
+            self._send(m.ThrowObstacle(self.thing.name, throw_velocity(list(self._path))))
         else:
-            self._send(m.DragThing(self.thing.name, pose_at(hand + self._grip, self._pose[:3, :3])))
+            self._send(m.DragObstacle(self.thing.name, pose_at(hand + self._grip, self._pose[:3, :3])))
 
 
 def throw_velocity(path: list[tuple[float, Array]]) -> Array:

@@ -34,8 +34,8 @@ from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
 from sidestep.studio.page.words import begun, in_box, stamped
+from sidestep.studio.scene_obstacle import SceneObstacle, thing_of
 from sidestep.studio.systems import Recipe, make_body, numbers_of, recipe_of
-from sidestep.studio.things import Thing, thing_of
 
 if TYPE_CHECKING:
     import viser
@@ -79,7 +79,7 @@ class View:
         panel.set_width(PLOT_WIDTH)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(MAIN_WIDTH)
-        self._run = gui.add_button_group("Loop", ("Run", "Pause", "Restart"))
+        self._run = gui.add_button_group("SessionProcess", ("Run", "Pause", "Restart"))
         self._run.on_click(self._on_loop)
         tabs = gui.add_tab_group()
         self._goal_tab = tabs.add_tab("Goal")
@@ -221,7 +221,7 @@ class View:
             if isinstance(note, m.Preparing):
                 self._say(in_box(f"preparing: {html.escape(note.note)} …"))
                 return
-            if isinstance(note.refused, m.AddThing):
+            if isinstance(note.refused, m.AddObstacle):
                 self.obstacle_panel.refused(note.refused.thing.name)
             if isinstance(note.refused, m.SetNumbers):
                 self.tuning.refused()
@@ -260,7 +260,7 @@ class View:
             now, f"Replay of {row.time:.2f} s", [*self._nearest_facts(row.things), "the loop is paused"]
         )
 
-    def _nearest_facts(self, things: tuple[Thing, ...], more: str = "") -> list[str]:
+    def _nearest_facts(self, things: tuple[SceneObstacle, ...], more: str = "") -> list[str]:
         if not self._clearances:
             return []
         first = self._clearances[0]

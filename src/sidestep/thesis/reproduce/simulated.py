@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sidestep.scenario import Scenario, ScenarioResult, run_scenario
-from sidestep.scenario.scenario import SwitchChoice
+from sidestep.scenario.scenario import SwitchConfig
 from sidestep.simulation import SimulationRun
 from sidestep.thesis.reproduce import style
 from sidestep.thesis.reproduce.item import Caption, Figure, Item, Table
@@ -18,9 +18,9 @@ from sidestep.thesis.reproduce.seven_joints import KAPPA, SLOPE
 
 FREE, CLUSTER, DIAGONAL = "thesis-6.2.2", "thesis-6.2.3", "thesis-6.2.4"
 OTHER_SWITCHES = {
-    "none": SwitchChoice("none"),
-    "binary": SwitchChoice("binary", threshold=KAPPA),
-    "sigmoid": SwitchChoice("sigmoid", threshold=KAPPA, slope=SLOPE),
+    "none": SwitchConfig("none"),
+    "binary": SwitchConfig("binary", threshold=KAPPA),
+    "sigmoid": SwitchConfig("sigmoid", threshold=KAPPA, slope=SLOPE),
 }
 _SETTING = (
     "Franka Research 3 without hand, MuJoCo with torque motors and the real meshes at 1 kHz, torque from the "

@@ -9,9 +9,12 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from sidestep._core import ControllerSettings, SafetySettings, controller_settings_fields
+from sidestep._core import ControllerSettings, controller_settings_fields
+
+if TYPE_CHECKING:
+    from sidestep.scenario.scenario import Scenario
 
 Section: TypeAlias = dict[str, Any]
 
@@ -118,34 +121,29 @@ def left_out(section: Mapping[str, Any], method: str) -> tuple[str, ...]:
     return tuple(name for name in OPTIONAL if name in ABLATIONS[method] or section.get(name, {}) is None)
 
 
-def settings_from(section: Mapping[str, Any], method: str, **elsewhere: Any) -> ControllerSettings:
-    """The settings of a method with a section, and those that are said elsewhere.
+def controller_settings_of(scenario: Scenario, *, synchronous: bool = True) -> ControllerSettings:
+    """The settings of the `Controller` that a scenario asks for.
 
     Raises:
         ValueError: names the setting, its value and what is allowed.
     """
-    settings: ControllerSettings = _made(
-        ControllerSettings(), {**section, **dict.fromkeys(left_out(section, method)), **elsewhere}
-    )
+    run = scenario.simulation
+    if run.integrator != "semi_implicit_euler":
+        raise ValueError(
+            f"simulation.integrator is {run.integrator!r}; the controller's commands are held for a "
+            "period: allowed is semi_implicit_euler"
+        )
+    missing = dict.fromkeys(left_out(scenario.controller, scenario.method))
+    output = "torque" if run.mode == "torque" else "acceleration"
+    elsewhere = {"synchronous": synchronous, "period": run.period, "output": output}
+    settings: ControllerSettings = made(ControllerSettings(), {**scenario.controller, **missing, **elsewhere})
     return settings
 
 
-def program_from(section: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments of a `TorqueController`, but for robot and period.
-
-    Raises:
-        ValueError: names the setting, its value and what is allowed.
-    """
-    numbers = {name: value_in(section, name) for name in PROGRAM}
-    return numbers | {"safety": _made(SafetySettings(), section.get("safety", {}))}
-
-
-def _made(usual: Any, values: Mapping[str, Any]) -> Any:
+def made(usual: Any, values: Mapping[str, Any]) -> Any:
     """Settings of the class of `usual` with these values, mappings for their parts."""
     given = {
-        key: _made(getattr(usual, key), value)
-        if isinstance(value, Mapping) and hasattr(usual, key)
-        else value
+        key: made(getattr(usual, key), value) if isinstance(value, Mapping) and hasattr(usual, key) else value
         for key, value in values.items()
     }
     try:

@@ -12,7 +12,7 @@ from sidestep.robot import Robot
 from sidestep.robot.pose import from_quaternion, pose_at, pose_vector
 from sidestep.simulation.model import build_model
 from sidestep.studio.messages import Course
-from sidestep.studio.things import Thing, thing_of
+from sidestep.studio.scene_obstacle import SceneObstacle, thing_of
 
 Array = npt.NDArray[np.float64]
 
@@ -23,7 +23,7 @@ THERE = 1e-4  # [m] from its target a drawn obstacle is put there
 FAR = 3.0  # [m] from the origin; a thrown obstacle stops there
 
 
-class Actor:
+class MovableObstacle:
     """Where a thing is and how it moves now.
 
     Attributes:
@@ -31,7 +31,7 @@ class Actor:
         target: pose it is drawn to, or None.
     """
 
-    def __init__(self, thing: Thing) -> None:
+    def __init__(self, thing: SceneObstacle) -> None:
         self.thing = thing
         self.pose = thing.start.copy()
         self.velocity = np.array(thing.obstacle.velocity, dtype=float)
@@ -83,7 +83,7 @@ class Actor:
             self.target, self.velocity = None, np.zeros(3)
 
 
-class Stage:
+class SimulatedScene:
     """The arm and the obstacles in MuJoCo, one control period at a time.
 
     Args:
@@ -95,9 +95,9 @@ class Stage:
         ValueError: see `build_model`.
     """
 
-    def __init__(self, robot: Robot, things: Sequence[Thing], *, period: float) -> None:
+    def __init__(self, robot: Robot, things: Sequence[SceneObstacle], *, period: float) -> None:
         self.robot, self.period = robot, period
-        self.actors: list[Actor] = [Actor(thing) for thing in things]
+        self.actors: list[MovableObstacle] = [MovableObstacle(thing) for thing in things]
         self._build(np.array(robot.neutral), np.zeros(robot.num_coordinates))
 
     def _build(self, q: Array, v: Array) -> None:
@@ -106,7 +106,7 @@ class Stage:
         self.data = mujoco.MjData(self.built.model)
         self.built.set_state(self.data, q, v)
         model = self.built.model
-        self._free: list[tuple[Actor, int, int]] = []  # and its places in qpos and qvel
+        self._free: list[tuple[MovableObstacle, int, int]] = []  # and its places in qpos and qvel
         mocap: list[int] = []
         self._driven = [actor for actor in self.actors if not actor.free]
         bodies = iter(self.built.object_bodies)
@@ -126,7 +126,7 @@ class Stage:
         self._write_driven()
         mujoco.mj_forward(model, self.data)
 
-    def set_things(self, actors: Sequence[Actor]) -> None:
+    def set_things(self, actors: Sequence[MovableObstacle]) -> None:
         """Other obstacles; the arm goes on as it is. Raises ValueError when two share a name."""
         q, v = self.state()
         before, self.actors = self.actors, list(actors)
@@ -175,11 +175,11 @@ class Stage:
         bad = self.data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number
         return not bad and bool(np.isfinite(self.data.qvel).all())
 
-    def draw(self, actor: Actor, pose: Array) -> None:
+    def draw(self, actor: MovableObstacle, pose: Array) -> None:
         """Draws an obstacle to a pose (4, 4), as a hand does."""
         actor.target, actor.touched = np.array(pose, dtype=float), True
 
-    def put(self, actor: Actor, pose: Array) -> None:
+    def put(self, actor: MovableObstacle, pose: Array) -> None:
         """Puts an obstacle at a pose (4, 4), at rest."""
         actor.target, actor.touched, actor.velocity = None, True, np.zeros(3)
         actor.pose = np.array(pose, dtype=float)
@@ -191,7 +191,7 @@ class Stage:
         self._write_driven()
         mujoco.mj_forward(self.built.model, self.data)
 
-    def throw(self, actor: Actor, velocity: Array) -> None:
+    def throw(self, actor: MovableObstacle, velocity: Array) -> None:
         """Lets an obstacle fly on with a velocity (3,) [m/s]."""
         actor.target, actor.touched = None, True
         actor.velocity = np.array(velocity, dtype=float)

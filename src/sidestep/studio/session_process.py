@@ -1,6 +1,6 @@
 """The session in a process of its own, so that nothing the page does can hold the loop up.
 
-python -m sidestep.studio.loop ADDRESS      (started by `Loop`; the key comes on stdin)
+python -m sidestep.studio.session_process ADDRESS      (started by `SessionProcess`; the key comes on stdin)
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sidestep.extras import MissingExtraError
 from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
-from sidestep.studio.outbox import Outbox, add
+from sidestep.studio.command_queue import CommandQueue, add
 from sidestep.studio.session import Session
 from sidestep.studio.systems import Covering, Recipe, make_body
 
@@ -48,7 +48,7 @@ class Beginning:
     ellipsoids: int | None = None
 
 
-class Loop:
+class SessionProcess:
     """The page's end: sends commands, has the latest snapshot.
 
     Args:
@@ -65,7 +65,9 @@ class Loop:
         address = listener.address
         assert isinstance(address, str)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "sidestep.studio.loop", address], stdin=subprocess.PIPE, env=environment
+            [sys.executable, "-m", "sidestep.studio.session_process", address],
+            stdin=subprocess.PIPE,
+            env=environment,
         )
         assert self._process.stdin is not None
         self._process.stdin.write(key.hex().encode() + b"\n")
@@ -78,13 +80,13 @@ class Loop:
         self._rows: list[m.Row] = []
         self.ended = False
         self._connection.send(beginning)
-        self._outbox = Outbox(self._connection)
+        self._queue = CommandQueue(self._connection)
         self._thread = threading.Thread(target=self._receive, daemon=True)
         self._thread.start()
 
     def send(self, command: m.Command) -> None:
-        """Hands a command to the loop and never waits, see `Outbox`; of a loop that has ended nothing is heard."""
-        self._outbox.put(command)
+        """Hands a command to the loop and never waits; of a loop that has ended nothing is heard."""
+        self._queue.put(command)
 
     def wait(self, timeout: float) -> m.Snapshot | None:
         """The next snapshot, or None when there was none within `timeout` [s]."""
@@ -108,8 +110,8 @@ class Loop:
 
     def stop(self) -> None:
         """Ends the process."""
-        self._outbox.stop()
-        self._outbox.join(timeout=0.2)  # longer where the loop is busy and the connection full
+        self._queue.stop()
+        self._queue.join(timeout=0.2)  # longer where the loop is busy and the connection full
         with contextlib.suppress(OSError):
             self._connection.close()
         try:
@@ -117,7 +119,7 @@ class Loop:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._outbox.join(timeout=2.0)
+        self._queue.join(timeout=2.0)
         if self._process.stdin is not None:
             self._process.stdin.close()
 

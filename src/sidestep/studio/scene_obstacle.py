@@ -16,8 +16,8 @@ from sidestep.obstacles import load_point_cloud, merge_in_voxels
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import solids
+from sidestep.scenario.perception import View, view_of
 from sidestep.scenario.scenario import Obstacle, Shape, Vector3
-from sidestep.scenario.seen import View, view_of
 
 Array = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ CLOUD_LIMIT = 400  # points: each is a ball for the physics, and the scene is bu
 
 
 @dataclass(frozen=True)
-class Thing:
+class SceneObstacle:
     """An obstacle on the stage.
 
     Args:
@@ -43,8 +43,8 @@ class Thing:
     obstacle: Obstacle
     folder: Path
 
-    def __reduce__(self) -> tuple[type[Thing], tuple[str, Obstacle, Path]]:
-        return Thing, (self.name, self.obstacle, self.folder)  # without what can be made again
+    def __reduce__(self) -> tuple[type[SceneObstacle], tuple[str, Obstacle, Path]]:
+        return SceneObstacle, (self.name, self.obstacle, self.folder)  # without what can be made again
 
     @cached_property
     def start(self) -> Array:
@@ -129,7 +129,7 @@ class Thing:
             np.linalg.norm(self.offsets - self.middle, axis=1).max() + self.solids[0].bounding_radius
         )
 
-    def at(self, pose: Array) -> Thing:
+    def at(self, pose: Array) -> SceneObstacle:
         """The same thing, starting at another pose (4, 4), at rest."""
         position, rotation_deg = written_pose(pose)
         item = dataclasses.replace(
@@ -139,20 +139,20 @@ class Thing:
             velocity=(0.0, 0.0, 0.0),
             motion=None,
         )
-        return Thing(self.name, item, self.folder)
+        return SceneObstacle(self.name, item, self.folder)
 
 
-def things_of(scenario: Scenario) -> tuple[Thing, ...]:
+def things_of(scenario: Scenario) -> tuple[SceneObstacle, ...]:
     """The obstacles of a scenario; raises ValueError where two share a name."""
     things = tuple(
-        Thing(item.name or f"obstacle{index}", item, scenario.folder)
+        SceneObstacle(item.name or f"obstacle{index}", item, scenario.folder)
         for index, item in enumerate(scenario.obstacles)
     )
     check_names(things)
     return things
 
 
-def check_names(things: Iterable[Thing]) -> None:
+def check_names(things: Iterable[SceneObstacle]) -> None:
     """Raises ValueError where two obstacles share a name."""
     names: set[str] = set()
     for thing in things:
@@ -161,28 +161,30 @@ def check_names(things: Iterable[Thing]) -> None:
         names.add(thing.name)
 
 
-def thing_of(solid: str, things: Iterable[Thing]) -> str:
+def thing_of(solid: str, things: Iterable[SceneObstacle]) -> str:
     """The name of the thing that a solid is a part of; its own where it is of none."""
     whole = solid.rpartition(".")[0]
     return whole if any(thing.name == whole and thing.cloud is not None for thing in things) else solid
 
 
-def ball(name: str, position: Array, radius: float) -> Thing:
+def ball(name: str, position: Array, radius: float) -> SceneObstacle:
     """A ball at a position (3,) [m] in the world."""
-    return Thing(name, Obstacle(Shape("sphere", radius=radius), _vector(position), points="ball"), Path.cwd())
+    return SceneObstacle(
+        name, Obstacle(Shape("sphere", radius=radius), _vector(position), points="ball"), Path.cwd()
+    )
 
 
-def box(name: str, position: Array, size: Array) -> Thing:
+def box(name: str, position: Array, size: Array) -> SceneObstacle:
     """A box with edge lengths (3,) [m] around a position (3,) [m]."""
-    return Thing(
+    return SceneObstacle(
         name, Obstacle(Shape("box", size=_vector(size)), _vector(position), points="surface"), Path.cwd()
     )
 
 
-def cloud(name: str, position: Array, file: Path, radius: float) -> Thing:
+def cloud(name: str, position: Array, file: Path, radius: float) -> SceneObstacle:
     """The points of a file (see `load_point_cloud`) around a position, each a ball [m]."""
     shape = Shape("points", file=str(file.resolve()), radius=radius)
-    return Thing(name, Obstacle(shape, _vector(position), points="ball"), Path.cwd())
+    return SceneObstacle(name, Obstacle(shape, _vector(position), points="ball"), Path.cwd())
 
 
 def scattered(size: float, *, seed: int) -> Array:

@@ -13,12 +13,12 @@ from sidestep.distance.clearance import Clearance
 from sidestep.robot import Robot
 from sidestep.robot.pose import pose_vector
 from sidestep.studio.messages import Row
-from sidestep.studio.things import Thing
+from sidestep.studio.scene_obstacle import SceneObstacle
 
 Array = npt.NDArray[np.float64]
 
 
-class Truth:
+class ExactClearanceMonitor:
     """Measures the clearance of every link, in a thread of its own: the latest state is taken, others are dropped.
 
     Args:
@@ -36,7 +36,7 @@ class Truth:
         self._next: tuple[Robot, Row, int] | None = None
         self._stopping = False
         self._robot: Robot | None = None
-        self._things: tuple[Thing, ...] | None = None
+        self._things: tuple[SceneObstacle, ...] | None = None
         self._exact: ExactClearance | None = None
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -72,7 +72,7 @@ class Truth:
                 self._report("measuring clearances failed", error)
 
     def _measure(
-        self, robot: Robot, things: tuple[Thing, ...], q: Array, poses: Array
+        self, robot: Robot, things: tuple[SceneObstacle, ...], q: Array, poses: Array
     ) -> tuple[Clearance, ...]:
         if not things:
             return ()
@@ -84,7 +84,7 @@ class Truth:
         return self._exact.of_links(q, solid_poses(things, poses))
 
 
-def solid_poses(things: tuple[Thing, ...], poses: Array) -> Array:
+def solid_poses(things: tuple[SceneObstacle, ...], poses: Array) -> Array:
     """Positions and quaternions (num_solids, 7) of what things at poses (N, 4, 4) are made of."""
     vectors = []
     for thing, pose in zip(things, poses, strict=True):

@@ -15,12 +15,12 @@ import pytest
 
 from sidestep import Scenario
 from sidestep.robot.pose import pose_at
-from sidestep.studio import loop as loop_module
 from sidestep.studio import messages as m
+from sidestep.studio import session_process
+from sidestep.studio.command_queue import CommandQueue, add
 from sidestep.studio.headless import Window, check_files, save_animation
-from sidestep.studio.loop import FRAME, IDLE_FRAME, Beginning, Loop, _Pacer, serve
-from sidestep.studio.outbox import Outbox, add
 from sidestep.studio.session import Session
+from sidestep.studio.session_process import FRAME, IDLE_FRAME, Beginning, SessionProcess, _Pacer, serve
 from sidestep.studio.studio import address_of, check_port
 
 PATIENCE = 120.0  # [s] at most for anything
@@ -33,7 +33,7 @@ def until(condition: Callable[[], bool], what: str) -> None:
         clock.sleep(0.01)
 
 
-def wait_for(loop: Loop, condition: Callable[[m.Snapshot], bool]) -> m.Snapshot:
+def wait_for(loop: SessionProcess, condition: Callable[[m.Snapshot], bool]) -> m.Snapshot:
     end = clock.monotonic() + PATIENCE
     while clock.monotonic() < end:
         snapshot = loop.wait(0.2)
@@ -43,12 +43,12 @@ def wait_for(loop: Loop, condition: Callable[[m.Snapshot], bool]) -> m.Snapshot:
 
 
 def test_a_loop_runs_answers_and_ends(scenario: Scenario) -> None:
-    loop = Loop(Beginning(scenario, "unswitched", {}, 2))
+    loop = SessionProcess(Beginning(scenario, "unswitched", {}, 2))
     try:
         first = wait_for(loop, lambda _: True)
         later = wait_for(loop, lambda snapshot: snapshot.time > first.time + 0.2)
         assert later.timing.median > 0.0
-        loop.send(m.RemoveThing("nobody"))
+        loop.send(m.RemoveObstacle("nobody"))
         refusals: list[m.Failed] = []
 
         def refused() -> bool:
@@ -85,13 +85,13 @@ def test_a_loop_that_cannot_start_says_why(scenario: Scenario) -> None:
     assert failure.message.startswith("no robot is named 'nobody'")
 
 
-def drag(name: str, x: float) -> m.DragThing:
-    return m.DragThing(name, pose_at([x, 0.0, 0.0]))
+def drag(name: str, x: float) -> m.DragObstacle:
+    return m.DragObstacle(name, pose_at([x, 0.0, 0.0]))
 
 
 def test_of_a_stream_of_places_the_latest_is_kept_and_nothing_else_is_lost() -> None:
     waiting: list[m.Command] = []
-    throw, pose = m.ThrowThing("ball", np.ones(3)), m.SetPoseGoal(np.eye(4), thorough=False)
+    throw, pose = m.ThrowObstacle("ball", np.ones(3)), m.SetPoseGoal(np.eye(4), thorough=False)
     final = m.SetPoseGoal(np.eye(4))
     sent: tuple[m.Command, ...] = (
         drag("ball", 0.0),
@@ -101,21 +101,21 @@ def test_of_a_stream_of_places_the_latest_is_kept_and_nothing_else_is_lost() -> 
         drag("ball", 2.0),
         final,
     )
-    for command in (*sent, throw, drag("ball", 3.0), drag("ball", 4.0), m.DragThing("ball", None)):
+    for command in (*sent, throw, drag("ball", 3.0), drag("ball", 4.0), m.DragObstacle("ball", None)):
         add(waiting, command)
     assert [type(command) for command in waiting] == [
-        m.DragThing,
+        m.DragObstacle,
         m.Seen,
-        m.DragThing,
+        m.DragObstacle,
         m.SetPoseGoal,
-        m.ThrowThing,
-        m.DragThing,
-        m.DragThing,
+        m.ThrowObstacle,
+        m.DragObstacle,
+        m.DragObstacle,
     ]
     places = [
         (command.name, None if command.pose is None else command.pose[0, 3])
         for command in waiting
-        if isinstance(command, m.DragThing)
+        if isinstance(command, m.DragObstacle)
     ]
     assert places == [("box", 1.0), ("ball", 2.0), ("ball", 4.0), ("ball", None)]
     assert waiting[3] is final
@@ -124,7 +124,7 @@ def test_of_a_stream_of_places_the_latest_is_kept_and_nothing_else_is_lost() -> 
 def test_the_page_does_not_wait_for_a_loop_that_is_busy() -> None:
     """While a body is made nobody reads; a hand goes on for minutes."""
     here, there = Pipe()
-    outbox = Outbox(here)
+    outbox = CommandQueue(here)
     drags = 20_000  # some hundred fill the connection
     for k in range(drags):
         outbox.put(drag("ball", float(k)))
@@ -182,7 +182,7 @@ def paced(session: Session, monkeypatch: pytest.MonkeyPatch, duration: float) ->
     """What a loop sends in so many seconds of a clock of its own."""
     clock = Clock()
     hand = Hand(clock, duration)
-    monkeypatch.setattr(loop_module, "clock", clock)
+    monkeypatch.setattr(session_process, "clock", clock)
     with pytest.raises(EOFError):
         _Pacer(session, hand).run()  # type: ignore[arg-type]
     return hand.sent
@@ -228,8 +228,8 @@ def test_a_scenario_that_is_loaded_waits_for_the_page(
     """But no longer than the limit, here half a second: there may be no page."""
     session = make_session(scenario, method="unswitched")
     clock = Clock()
-    monkeypatch.setattr(loop_module, "clock", clock)
-    monkeypatch.setattr(loop_module, "LONGEST_HOLD", 0.5)
+    monkeypatch.setattr(session_process, "clock", clock)
+    monkeypatch.setattr(session_process, "LONGEST_HOLD", 0.5)
     page = LoadingPage(clock, scenario, drawn)
     with pytest.raises(EOFError):
         _Pacer(session, page).run()  # type: ignore[arg-type]
@@ -276,8 +276,8 @@ def test_a_loop_that_fails_holds_the_arm_and_says_why(
 @pytest.mark.parametrize(
     "command",
     [
-        m.DragThing("ball", np.full((4, 4), np.nan)),
-        m.ThrowThing("ball", np.array([np.inf, 0.0, 0.0])),
+        m.DragObstacle("ball", np.full((4, 4), np.nan)),
+        m.ThrowObstacle("ball", np.array([np.inf, 0.0, 0.0])),
         m.SetPoseGoal(np.full((4, 4), np.nan)),
         m.SetJointGoal(np.array([np.nan, 0.0])),
     ],

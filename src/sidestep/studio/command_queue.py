@@ -10,7 +10,7 @@ from typing import Any
 from sidestep.studio import messages as m
 
 
-class Outbox:
+class CommandQueue:
     """Commands on their way through a connection; `put` never waits, however long the other end does.
 
     Args:
@@ -76,7 +76,7 @@ def add(waiting: list[m.Command], command: m.Command) -> None:
 def stream_of(command: m.Command) -> tuple[str, str] | None:
     """What a command is a new value of; None of one that has to be done in any case."""
     match command:
-        case m.DragThing(name, pose) if pose is not None:
+        case m.DragObstacle(name, pose) if pose is not None:
             return "place", name
         case m.SetJointGoal() | m.SetPoseGoal():
             return "goal", ""
