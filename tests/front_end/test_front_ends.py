@@ -20,6 +20,7 @@ from sidestep.bench.method import Method
 from sidestep.bench.methods import build_mover
 from sidestep.bench.motion import MotionSettings
 from sidestep.bench.problems import ReachProblem
+from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import run_scenario
 from sidestep.scenario.assembly import assemble
 from sidestep.simulation import ControllerDriver, Drive, KinematicRun, Simulation, SimulationRun
@@ -274,3 +275,25 @@ def test_torques_in_physics_are_those_of_the_simulation(way: str) -> None:
     found = TORQUES[way]()
     assert found.shape == (STEPS, 7)
     np.testing.assert_array_equal(found, simulated().torques)
+
+
+def test_a_pose_goal_is_the_same_in_a_file_in_the_studio_and_in_python() -> None:
+    place = "{frame: fr3_hand_tcp, position: [0.43, 0.44, 0.24], rotation_deg: [180, 10, 30]}"
+    joints = f"{{unit: rad, position: {GOAL.tolist()}}}"
+    text = FILE.replace(f"goal: {joints}", f"goal: {place}")
+    assert place in text
+    run = run_scenario(Scenario.from_text(text.replace("MODE", "torque"))).run
+    assert isinstance(run, SimulationRun)
+    posed = Session(Scenario.from_text(text.replace("MODE", "torque")), prepare=make_body, synchronous=True)
+    found = []
+    for _ in range(STEPS):
+        posed.step()
+        found.append(posed._torque)
+    np.testing.assert_array_equal(found, run.torque)
+
+    one, robot = controller("acceleration"), ss.Robot.named("fr3")
+    pose = pose_at([0.43, 0.44, 0.24], from_roll_pitch_yaw(np.deg2rad([180.0, 10.0, 30.0]).tolist()))
+    one.set_goal(ss.PoseGoal(robot, "fr3_hand_tcp", pose))
+    motion = ss.integrate(one, START, np.zeros(7), steps=STEPS)
+    run = run_scenario(Scenario.from_text(text.replace("MODE", "kinematic"))).run
+    np.testing.assert_array_equal(motion.acceleration, run.achieved)
