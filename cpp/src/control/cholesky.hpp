@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "sidestep/kinematics/vectors.hpp"
+
 namespace sidestep {
 
 /// Writes the lower triangular L with A = L L' into the corner of `L` that has A's size (above the diagonal untouched),
@@ -11,19 +13,28 @@ namespace sidestep {
 inline bool cholesky(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>& A, Eigen::MatrixXd& L) noexcept {
   // A pivot below this fraction of its diagonal entry is all cancellation.
   constexpr double singular = 1e-14;
-  const Eigen::Index n = A.rows();
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const double pivot = A(j, j) - L.row(j).head(j).squaredNorm();
-    if (!(pivot > singular * A(j, j)) || !(A(j, j) > 0.0)) {
-      return false;
+  return with_size(A.rows(), [&](auto n) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      double pivot = 0.0;
+      for (Eigen::Index k = 0; k < j; ++k) {
+        pivot += L(j, k) * L(j, k);
+      }
+      pivot = A(j, j) - pivot;
+      if (!(pivot > singular * A(j, j)) || !(A(j, j) > 0.0)) {
+        return false;
+      }
+      const double diagonal = std::sqrt(pivot);
+      L(j, j) = diagonal;
+      for (Eigen::Index i = j + 1; i < n; ++i) {
+        double product = 0.0;
+        for (Eigen::Index k = 0; k < j; ++k) {
+          product += L(i, k) * L(j, k);
+        }
+        L(i, j) = (A(i, j) - product) / diagonal;
+      }
     }
-    const double diagonal = std::sqrt(pivot);
-    L(j, j) = diagonal;
-    for (Eigen::Index i = j + 1; i < n; ++i) {
-      L(i, j) = (A(i, j) - L.row(i).head(j).dot(L.row(j).head(j))) / diagonal;
-    }
-  }
-  return true;
+    return true;
+  });
 }
 
 /// x := A x with the factor L of A. Allocates nothing.

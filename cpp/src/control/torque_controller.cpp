@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "../finite.hpp"
 #include "../settings.hpp"
 #include "cholesky.hpp"
 
@@ -126,6 +127,7 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       wide_upper_(Eigen::VectorXd::Zero(nv_)),
       mass_(Eigen::MatrixXd::Zero(nv_, nv_)),
       mass_cholesky_(Eigen::MatrixXd::Zero(nv_, nv_)),
+      weighted_(Eigen::VectorXd::Zero(nv_)),
       velocity_(Eigen::VectorXd::Zero(nv_)),
       wanted_(Eigen::VectorXd::Zero(nv_)),
       bias_(Eigen::VectorXd::Zero(nv_)) {
@@ -153,10 +155,10 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
                                      const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
                                      ConstVectorRef bias, const Clearances* clearances,
                                      TorqueSolution& solution) noexcept {
-  const auto usable = [this](const auto& x) { return x.size() == nv_ && x.allFinite(); };
+  const auto usable = [this](const auto& x) { return x.size() == nv_ && all_finite(x); };
   const bool q_known = usable(q), v_known = usable(v), wanted_known = usable(acceleration), bias_known = usable(bias);
   const bool clear = clearances == nullptr || rows_.usable(*clearances);
-  bool mass_known = mass_matrix.rows() == nv_ && mass_matrix.cols() == nv_ && mass_matrix.allFinite();
+  bool mass_known = mass_matrix.rows() == nv_ && mass_matrix.cols() == nv_ && all_finite(mass_matrix);
   if (mass_known) {
     mass_ = mass_matrix;
     mass_known = factorise_mass();
@@ -259,22 +261,26 @@ void TorqueController::add_active(int i, double at_upper, double at_lower, doubl
 
 bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
   // H = Q + M R' M,  g = -Q a + M R' h   with R' = R / effort limit^2.
-  for (int j = 0; j < nv_; ++j) {
-    for (int i = j; i < nv_; ++i) {
-      double value = i == j ? tracking_weight_[i] : 0.0;
-      for (int k = 0; k < nv_; ++k) {
-        value += mass_(k, i) * torque_cost_[k] * mass_(k, j);
+  with_size(nv_, [&](auto nv) {
+    auto weighted = sized(weighted_, nv);
+    const auto bias = sized(bias_, nv);
+    for (Eigen::Index i = 0; i < nv; ++i) {
+      weighted = sized(mass_.col(i), nv).cwiseProduct(sized(torque_cost_, nv));
+      for (Eigen::Index j = 0; j <= i; ++j) {
+        const auto column = sized(mass_.col(j), nv);
+        double value = i == j ? tracking_weight_[i] : 0.0;
+        for (Eigen::Index k = 0; k < nv; ++k) {
+          value += weighted[k] * column[k];
+        }
+        hard_data_.H(i, j) = hard_data_.H(j, i) = value;
       }
-      hard_data_.H(i, j) = hard_data_.H(j, i) = value;
+      double value = -tracking_weight_[i] * wanted_[i];
+      for (Eigen::Index k = 0; k < nv; ++k) {
+        value += weighted[k] * bias[k];
+      }
+      hard_data_.g[i] = value;
     }
-  }
-  for (int i = 0; i < nv_; ++i) {
-    double value = -tracking_weight_[i] * wanted_[i];
-    for (int k = 0; k < nv_; ++k) {
-      value += mass_(k, i) * torque_cost_[k] * bias_[k];
-    }
-    hard_data_.g[i] = value;
-  }
+  });
   hard_data_.lower = bounds_.lower;
   hard_data_.upper = bounds_.upper;
   hard_data_.A.topRows(nv_) = mass_;

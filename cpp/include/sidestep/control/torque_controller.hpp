@@ -201,6 +201,7 @@ class TorqueController {
   Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
   Eigen::VectorXd wide_lower_, wide_upper_;        // box of the programs after the first
   Eigen::MatrixXd mass_, mass_cholesky_;
+  Eigen::VectorXd weighted_;                       // a column of the mass matrix, by the cost of torques
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
   std::int64_t counts_[7] = {};
 };
