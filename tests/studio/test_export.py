@@ -33,13 +33,14 @@ from sidestep.studio.export import (
     scenario_now,
     unpacked_scenario,
 )
-from sidestep.studio.methods import CUSTOM, METHODS
+from sidestep.studio.methods import METHODS
 from sidestep.studio.parameters import Parameter
 from sidestep.studio.scene_obstacle import CLOUD_LIMIT, CLOUD_RADIUS, box, cloud, scattered, thinned
 from sidestep.studio.session import Session
 from sidestep.studio.snippet import python_snippet
 from sidestep.studio.systems import as_file, numbers_of
 from sidestep.system import GeometricSystem
+from sidestep.thesis.studio.methods import CUSTOM
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
 SMALL_ARM: dict[str, Any] = {

@@ -3,58 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from sidestep.studio.parameters import (
     ARRIVAL,
     BARRIERS,
-    DENSITY,
     LOCAL_MINIMUM,
     LOOK_AHEAD,
     PLANNER,
     SAFETY,
     TORQUE,
+    Method,
     Numbers,
-    Parameter,
-    spring,
-    switch,
 )
-from sidestep.thesis import ThesisNumbers
-
-CUSTOM = "custom"  # the method of a scenario file that says itself how the arm is moved
-
-
-@dataclass(frozen=True)
-class Method:
-    """A way to move the arm.
-
-    Attributes:
-        name: on the command line. label: on the page. sentence: what it is.
-        parameters: its numbers.
-        controlled: by the `Controller`, which needs a covering body and sees obstacles as they are; otherwise a
-            geometric system moves the arm, with a fitted body.
-    """
-
-    name: str
-    label: str
-    sentence: str
-    parameters: tuple[Parameter, ...]
-    controlled: bool = False
-
-    @property
-    def defaults(self) -> Numbers:
-        """The numbers as they are recommended, or stated in the thesis."""
-        return {parameter.name: parameter.default for parameter in self.parameters}
-
-
-_SPRING = spring(
-    "Higher arrives sooner, and climbs higher onto obstacles.",
-    "Higher is calmer and slower; lower overshoots the goal.",
-)
-_THRESHOLD = switch("threshold", "psi", 0.01, 5.0, 0.5, "Lower lets go of the goal farther from obstacles.")
-_DENSITY = (*DENSITY, *TORQUE)
-
+from sidestep.thesis.studio.methods import METHODS_OF_THESIS
 
 METHODS: dict[str, Method] = {
     method.name: method
@@ -82,74 +44,7 @@ METHODS: dict[str, Method] = {
             (*BARRIERS, *ARRIVAL, *SAFETY, *TORQUE),
             controlled=True,
         ),
-        Method(
-            "thesis",
-            "thesis: distance switch",
-            "One summed density; near obstacles a switch takes the pull to the goal away, joint by joint (T6.2).",
-            (
-                *_SPRING,
-                switch(
-                    "outer",
-                    "m",
-                    0.02,
-                    0.5,
-                    ThesisNumbers.outer,
-                    "Distance at which the first two joints and the last let go.",
-                ),
-                switch(
-                    "inner",
-                    "m",
-                    0.02,
-                    0.5,
-                    ThesisNumbers.inner,
-                    "Distance at which the joints between let go.",
-                ),
-                switch("slope", "1/m", 1.0, 100.0, ThesisNumbers.slope, "Higher switches more abruptly."),
-                *_DENSITY,
-            ),
-        ),
-        Method(
-            "unswitched",
-            "thesis: unswitched",
-            "One summed density, pull and bending added without a switch (T2.12).",
-            (*_SPRING, *_DENSITY),
-        ),
-        Method(
-            "sigmoid",
-            "thesis: sigmoid switch",
-            "One summed density; where psi is high the pull to the goal fades (thesis 6.1.1).",
-            (
-                *_SPRING,
-                _THRESHOLD,
-                switch("slope", "1/psi", 0.5, 50.0, 10.0, "Higher switches more abruptly."),
-                *_DENSITY,
-            ),
-        ),
-        Method(
-            "binary",
-            "thesis: binary switch",
-            "One summed density; where psi is above the threshold there is no pull to the goal (T5.5).",
-            (*_SPRING, _THRESHOLD, *_DENSITY),
-        ),
-        Method(
-            "harmonic_only",
-            "spring alone: no avoidance",
-            "The damped spring on the curved space without the bending of paths, for comparison: it touches.",
-            (*_SPRING, *_DENSITY),
-        ),
-        Method(
-            "geodesic_only",
-            "geodesics alone: no goal",
-            "Free fall along a geodesic of the curved space (T5.3), for comparison: it knows no goal.",
-            _DENSITY,
-        ),
-        Method(
-            CUSTOM,
-            "as the scenario file says",
-            "Body, embedding, switch and numbers of the scenario that was loaded, as its file has them; without any "
-            "in a file, one density without a switch. Choose another method to tune it here.",
-            (),
-        ),
+        *METHODS_OF_THESIS,
     )
 }
 
@@ -159,11 +54,6 @@ def method_named(name: str) -> Method:
     if name not in METHODS:
         raise ValueError(f"no method is called {name!r}; known: {', '.join(METHODS)}")
     return METHODS[name]
-
-
-def in_range(method: Method, numbers: Mapping[str, Any]) -> bool:
-    """Whether all numbers are within the ranges of the page's sliders and choices."""
-    return all(p.allows(numbers[p.name]) for p in method.parameters if p.name in numbers)
 
 
 def check_numbers(

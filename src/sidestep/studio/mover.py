@@ -1,4 +1,4 @@
-"""What moves the arm: the `Controller`, or one of the thesis's systems with a torque program."""
+"""What moves the arm: the `Controller`."""
 
 from __future__ import annotations
 
@@ -8,20 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import (
-    Controller,
-    ControllerSettings,
-    GeometricSystem,
-    Obstacles,
-    PoseGoal,
-    Step,
-    TorqueController,
-    TorqueSolution,
-)
+from sidestep._core import Controller, ControllerSettings, GeometricSystem, Obstacles, PoseGoal
 from sidestep.arm import Arm
 from sidestep.robot import Robot
-from sidestep.scenario.assembly import POSTURE_STARTS
-from sidestep.simulation.pose_target import IkSolution, PoseTarget, solve_ik
+from sidestep.simulation.pose_target import IkSolution, PoseTarget
 from sidestep.simulation.run import status_name
 
 Array = npt.NDArray[np.float64]
@@ -130,58 +120,6 @@ class ControllerMover:
             step.metric,
             self._said.activations,
         )
-
-
-class SystemMover:
-    """A geometric system, whose acceleration a torque program tracks; nothing keeps clearances.
-
-    Args:
-        robot: the arm. tip: the frame whose pose is a goal.
-    """
-
-    def __init__(self, robot: Robot, system: GeometricSystem, program: TorqueController, tip: str) -> None:
-        self.system = system
-        self._robot, self._program, self._tip = robot, program, tip
-        self._step: Step | None = None
-        self._solution: TorqueSolution | None = None
-
-    def set_goal(self, pose: Array | None, q: Array, *, thorough: bool) -> None:
-        """The same; thorough: the posture is looked for from everywhere, not only from q."""
-        self.posture = IkSolution(q)
-        if pose is not None:
-            starts = POSTURE_STARTS if thorough else 1
-            self.posture = solve_ik(self._robot, self._tip, pose, q, starts=starts)
-
-    def step(self, q: Array, v: Array, mass_matrix: Array, bias: Array, obstacles: Obstacles) -> Array:
-        """The torque (nv,) [Nm | N] of one period."""
-        self.look(q, v, obstacles)
-        assert self._step is not None
-        self._solution = self._program.solve(q, v, self._step.acceleration, mass_matrix, bias)
-        return self._solution.torque
-
-    def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
-        """A step of the system alone."""
-        self._step = self.system.acceleration(q, v, self.posture.q, obstacles)
-
-    @property
-    def metric(self) -> Array:
-        """(nv, nv) of the last step."""
-        assert self._step is not None
-        return self._step.metric
-
-    def account(self) -> Account | None:
-        """Of the last step; None before one."""
-        step, solution = self._step, self._solution
-        if step is None:
-            return None
-        status = f"system {status_name(step.status)}"
-        if solution is not None:
-            status += f", torque program {status_name(solution.status)}"
-        words = self.posture.in_words(step.diagnosis.describe())
-        return Account(words, status, values=step.values, metric=step.metric)
-
-
-Mover = ControllerMover | SystemMover
 
 
 def alike(told: Obstacles, seen: Obstacles) -> bool:

@@ -7,28 +7,22 @@ those that the controller itself states, of the thesis's methods those here.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from sidestep.scenario.config import FIELDS, PROGRAM, value_in, with_values
-from sidestep.scenario.scenario import (
-    BodyConfig,
-    EmbeddingConfig,
-    JointLimitConfig,
-    Scenario,
-    SystemConfig,
-)
-from sidestep.thesis import ThesisNumbers
+from sidestep.scenario.scenario import BodyConfig, Scenario
 
 Value: TypeAlias = float | int | str | None
 Numbers: TypeAlias = dict[str, Any]  # values by the names of parameters; as a file has them
 
 AROUND = 10.0  # times the default, and that part of it, are the ends of a slider, within the range
+SWITCH = "system.switch"  # of several forms, with numbers of their own
 FOLDERS = {  # on the page, by places in a scenario file
     "controller.barriers": "Pull and barriers",
     "system": "Pull to the goal",
-    "system.switch": "Switch",
+    SWITCH: "Switch",
     "embedding": "Curved space",
     "embedding.joint_limits": "Curved space",
     "controller.local_minimum": "Sub-goals",
@@ -117,6 +111,43 @@ class Parameter:
         return value
 
 
+@dataclass(frozen=True)
+class Method:
+    """A way to move the arm.
+
+    Attributes:
+        name: on the command line. label: on the page. sentence: what it is.
+        parameters: its numbers.
+        controlled: by the `Controller`, which needs a covering body and sees obstacles as they are; otherwise a
+            geometric system moves the arm, with a fitted body.
+    """
+
+    name: str
+    label: str
+    sentence: str
+    parameters: tuple[Parameter, ...]
+    controlled: bool = False
+
+    @property
+    def defaults(self) -> Numbers:
+        """The numbers as they are recommended, or stated in the thesis."""
+        return {parameter.name: parameter.default for parameter in self.parameters}
+
+    def in_range(self, numbers: Mapping[str, Any]) -> bool:
+        """Whether all numbers are within the ranges of the page's sliders and choices."""
+        return all(p.allows(numbers[p.name]) for p in self.parameters if p.name in numbers)
+
+    def write(self, numbers: Mapping[str, Any], scenario: Scenario) -> Scenario:
+        """The scenario with these numbers, but for those of a switch."""
+        places: dict[str, dict[str, Value]] = {}
+        for parameter in self.parameters:
+            if parameter.place != SWITCH:
+                places.setdefault(parameter.place, {})[parameter.field] = numbers[parameter.name]
+        for place, values in places.items():
+            scenario = set_in(scenario, place, values)
+        return scenario
+
+
 def set_in(thing: Any, place: str, values: dict[str, Value]) -> Any:
     """A scenario with other values of the fields of the part at a place in it, names with dots between them."""
     name, _, rest = place.partition(".")
@@ -129,24 +160,16 @@ def set_in(thing: Any, place: str, values: dict[str, Value]) -> Any:
     return dataclasses.replace(thing, **{name: inner})
 
 
-def _default(kind: type, field: str) -> Any:
+def default_of(kind: type, field: str) -> Any:
+    """The default of a field of a dataclass."""
     return next(entry.default for entry in dataclasses.fields(kind) if entry.name == field)
 
 
-def _number(kind: type, place: str, prefix: str = "") -> Any:
-    def make(field: str, unit: str, lower: float, upper: float, sentence: str) -> Parameter:
-        default = _default(kind, field)
-        name = field if field.startswith(prefix) else f"{prefix}{field}"
-        whole = isinstance(default, int)
-        return Parameter(name, place, field, unit, lower, upper, default, sentence, whole=whole)
-
-    return make
-
-
-def _choice(
+def choice(
     kind: type, place: str, field: str, options: tuple[Value, ...], sentence: str, **more: Any
 ) -> Parameter:
-    default = more.pop("default", _default(kind, field))
+    """A choice of a part of a scenario file, whose default is that of its class."""
+    default = more.pop("default", default_of(kind, field))
     return Parameter(field, place, field, "", 0.0, 0.0, default, sentence, options=options, **more)
 
 
@@ -178,7 +201,7 @@ def _part(name: str, prefix: str) -> tuple[Parameter, ...]:
 BARRIERS: tuple[Parameter, ...] = (
     *_part("barriers", ""),
     *_stated(name for name in FIELDS if "." not in name and name not in PROGRAM),
-    _choice(
+    choice(
         BodyConfig,
         "body",
         "ellipsoids",
@@ -197,63 +220,3 @@ LOCAL_MINIMUM = _part("local_minimum", "local_minimum_")
 ARRIVAL = _part("arrival", "arrival_")
 SAFETY = _part("safety", "safety_")
 TORQUE = _stated(PROGRAM, "torque_")
-
-_y = _number(SystemConfig, "system")
-
-
-def spring(stiffness: str, damping: str) -> tuple[Parameter, ...]:
-    """Stiffness, damping and its form, by sentences of what the first two trade, with the thesis's numbers."""
-    return (
-        dataclasses.replace(_y("stiffness", "1/s²", 0.1, 10.0, stiffness), default=ThesisNumbers.stiffness),
-        dataclasses.replace(_y("damping", "1/s", 0.5, 10.0, damping), default=ThesisNumbers.damping),
-        _choice(
-            SystemConfig,
-            "system",
-            "damping_form",
-            ("plain", "metric"),
-            "plain: D v, the same everywhere; metric: G⁻¹ D v, weaker where space is steep.",
-        ),
-    )
-
-
-def switch(name: str, unit: str, lower: float, upper: float, default: float, sentence: str) -> Parameter:
-    """A number of the switch of one of the thesis's methods."""
-    return Parameter(name, "system.switch", name, unit, lower, upper, default, sentence)
-
-
-_l = _number(JointLimitConfig, "embedding.joint_limits", "limit_")
-DENSITY: tuple[Parameter, ...] = (
-    _choice(
-        EmbeddingConfig,
-        "embedding",
-        "density",
-        ("sum", "average"),
-        "sum: every point adds to ψ, so finer views push harder; average: they do not, and few of many vanish.",
-    ),
-    _choice(
-        EmbeddingConfig,
-        "embedding",
-        "combine",
-        ("sum", "stack"),
-        "sum: obstacles and limits make one ψ, in which they can cancel; stack: one coordinate each.",
-    ),
-    _l("slope", "1/rad", 5.0, 100.0, "Higher rises later and steeper before a joint limit."),
-    _l("height", "", 0.05, 10.0, "Higher turns away from joint limits more."),
-    _choice(
-        BodyConfig,
-        "body",
-        "components",
-        (1, 2, 3, 4, 5, 6, 8, "aic", "bic"),
-        "Gaussians per link: more fit it closer, and cost time in every step; aic and bic choose.",
-        default=ThesisNumbers.components,
-        body=True,
-    ),
-    _choice(
-        BodyConfig,
-        "body",
-        "covariance",
-        ("spherical", "diagonal", "full"),
-        "Shape of the Gaussians: simpler ones need more of them.",
-        body=True,
-    ),
-)

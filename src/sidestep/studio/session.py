@@ -20,12 +20,12 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
 from sidestep.studio import messages as m
-from sidestep.studio.methods import METHODS, Method, check_numbers, method_named
-from sidestep.studio.mover import STILL, Account, Mover
-from sidestep.studio.parameters import Numbers
+from sidestep.studio.methods import METHODS, check_numbers, method_named
+from sidestep.studio.mover import STILL, Account
+from sidestep.studio.parameters import Method, Numbers
 from sidestep.studio.scene_obstacle import check_names, things_of
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
-from sidestep.studio.systems import Recipe, build_mover, numbers_of, recipe_of
+from sidestep.studio.systems import Mover, Recipe, build_mover, numbers_of, recipe_of
 from sidestep.studio.tip import at_tip
 from sidestep.studio.words import named
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from typing import Any
@@ -10,11 +9,10 @@ from typing import Any
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.config import parts_of
-from sidestep.scenario.scenario import RobotConfig, SwitchConfig
+from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
-from sidestep.studio.systems import as_file, fit_arguments, settings_of
-from sidestep.thesis.custom import program_from
+from sidestep.studio.systems import as_file, settings_of
 
 WIDTH = 80  # [characters] that a window on the page shows
 
@@ -57,7 +55,9 @@ def python_snippet(snapshot: Snapshot) -> str:
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
-    code = _controller_code if method.controlled else _custom_code
+    from sidestep.thesis.studio.snippet import custom_code
+
+    code = _controller_code if method.controlled else custom_code
     lines = code(snapshot, written)
     used = set(re.findall(r"(?<!\.)\b[A-Z]\w+(?=\()", "\n".join(lines)))
     imports = [
@@ -75,7 +75,7 @@ def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
             given.append(f"output={thing.output.name!r}")
         finite = {key: value for key, value in own.items() if math.isfinite(value)}
         head = f"{name.rpartition('.')[2] or 'settings'} = {_spelled(type(thing).__name__)}"
-        lines += _call(head, finite, *given)
+        lines += call(head, finite, *given)
     return [
         *lines,
         "controller = ss.Controller(arm, settings)",
@@ -87,37 +87,18 @@ def _controller_code(snapshot: Snapshot, written: Scenario) -> list[str]:
         "controller.set_obstacles(ss.Obstacles.none())",
         "",
         "# once a period: what is measured, perhaps with mass matrix and bias",
-        *_state_code(snapshot),
+        *state_code(snapshot),
         "command = controller.step(q, v)",
         "# command.torque goes to the arm; controller.explain() says what it does, and why",
     ]
 
 
-def _custom_code(snapshot: Snapshot, written: Scenario) -> list[str]:
-    torque = program_from(written.controller)
-    safety = next(own for _, _, own, _ in parts_of(torque.pop("safety"), "safety."))
-    period = f"period={written.simulation.period!r}"
-    return [
-        f"robot = {_robot_code(written.robot, written)}",
-        *_system_code(written),
-        *_call("safety = SafetySettings", safety),
-        *_call("controller = TorqueController", torque, "robot", period, "safety=safety"),
-        *_goal_code(snapshot),
-        "",
-        "# what is seen: ss.Obstacles(points, radii), of (n, 3) and (n,) [m]",
-        "obstacles = ss.Obstacles.none()",
-        "# what is measured",
-        *_state_code(snapshot),
-        "step = system.acceleration(q, v, goal, obstacles)",
-        "# controller.solve(q, v, step.acceleration, mass_matrix, bias).torque",
-    ]
-
-
-def _state_code(snapshot: Snapshot) -> list[str]:
+def state_code(snapshot: Snapshot) -> list[str]:
+    """The measured state."""
     return [f"q = {snapshot.q.tolist()}", f"v = {snapshot.v.tolist()}"]
 
 
-def _call(head: str, values: dict[str, Any], *first: str) -> list[str]:
+def call(head: str, values: dict[str, Any], *first: str) -> list[str]:
     """`head(first, name=value, ...)`, in as many lines as it takes."""
     arguments = [*first, *(f"{name}={value!r}" for name, value in values.items())]
     whole = f"{head}({', '.join(arguments)})"
@@ -136,12 +117,13 @@ def _arm_code(written: Scenario, ellipsoids: int | None) -> str:
     name = written.robot.name
     if name is not None and ellipsoids is None:
         return f"ss.Arm.load({name!r})"
-    robot = _robot_code(written.robot, written)
+    robot = robot_code(written.robot, written)
     count = "" if ellipsoids is None else f", components={ellipsoids}"
     return f"ss.Arm.from_robot(robot := {robot}, ss.Body.cover(robot{count}))"
 
 
-def _robot_code(robot: RobotConfig, scenario: Scenario) -> str:
+def robot_code(robot: RobotConfig, scenario: Scenario) -> str:
+    """The robot of a scenario."""
     if robot.name is not None:
         return f"ss.Robot.named({robot.name!r})"
     assert robot.urdf is not None
@@ -161,52 +143,7 @@ def _goal_code(snapshot: Snapshot) -> list[str]:
     if snapshot.goal is not None:
         return ["# [rad | m]", f"goal = {snapshot.goal.tolist()}"]
     assert snapshot.goal_pose is not None
-    method = METHODS[snapshot.method]
     posture = None if snapshot.posture is None else snapshot.posture.q.tolist()
     pose = ["pose = [", *(f"    {row}," for row in snapshot.goal_pose.tolist()), "]"]
-    if method.controlled:
-        near = ["# near which a posture for it is looked for", f"rest = {posture}"]
-        return [*pose, *near, f"goal = ss.PoseGoal(arm.robot, {snapshot.tip!r}, pose, rest=rest)"]
-    says = "that has the pose of the tip"
-    if snapshot.posture is None or not snapshot.posture.found:
-        says = "the nearest found to the pose of the tip, which is out of reach"
-    return [f"# the posture {says} [rad | m]", f"goal = {posture}"]
-
-
-def _system_code(written: Scenario) -> list[str]:
-    body, embedding, system = written.body, written.embedding, written.system
-    density = f"density = thesis.CollisionDensity(robot, body, average={embedding.density == 'average'})"
-    lines, names = [density], "density"
-    if embedding.joint_limits is not None:
-        lines += _call(
-            "limits = thesis.JointLimitPotential", dataclasses.asdict(embedding.joint_limits), "robot"
-        )
-        names += ", limits"
-    together = f"[thesis.Sum([{names}])]" if embedding.combine == "sum" and len(lines) > 1 else f"[{names}]"
-    spring = {
-        "stiffness": system.stiffness,
-        "damping": system.damping,
-        "damping_form": system.damping_form,
-    }
-    return [
-        *_call("body = ss.Body.fit", fit_arguments(body), "robot"),
-        *lines,
-        f"psi = {together}",
-        f"switch = {_switch_code(system.switch)}",
-        *_call("system = GeometricSystem", spring, "psi", "switch=switch"),
-    ]
-
-
-def _switch_code(switch: SwitchConfig) -> str:
-    match switch.type:
-        case "distance":
-            return f"thesis.DistanceSwitch({list(switch.thresholds or ())!r}, {switch.slope!r})"
-        case "sigmoid":
-            return f"thesis.SigmoidSwitch({switch.threshold!r}, {switch.slope!r})"
-        case "binary":
-            return f"thesis.BinarySwitch({switch.threshold!r})"
-        case "harmonic_only":
-            return "thesis.HarmonicOnly()"
-        case "geodesic_only":
-            return "thesis.GeodesicOnly()"
-    return "None"
+    near = ["# near which a posture for it is looked for", f"rest = {posture}"]
+    return [*pose, *near, f"goal = ss.PoseGoal(arm.robot, {snapshot.tip!r}, pose, rest=rest)"]

@@ -18,11 +18,11 @@ from sidestep.robot import Robot
 from sidestep.robot.pose import pose_vector
 from sidestep.scenario import Scenario
 from sidestep.studio.messages import Snapshot
-from sidestep.studio.methods import Method, method_named
+from sidestep.studio.methods import method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import short_names
 from sidestep.studio.page.camera import Viewpoint
-from sidestep.studio.parameters import Numbers
+from sidestep.studio.parameters import Method, Numbers
 from sidestep.studio.systems import build_mover
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 from sidestep.studio import messages as m
-from sidestep.studio.methods import METHODS, Method, method_named
+from sidestep.studio.methods import METHODS, method_named
 from sidestep.studio.page.note import add_note
-from sidestep.studio.parameters import Numbers, Parameter
+from sidestep.studio.parameters import Method, Numbers, Parameter
 from sidestep.studio.snippet import python_snippet
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""The thesis's methods in the studio."""
