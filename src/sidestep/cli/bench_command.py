@@ -8,6 +8,18 @@ from typing import Annotated, Any
 import typer
 
 from sidestep.bench.method import Method
+from sidestep.cli.bench_output import (
+    DurationOption,
+    FailuresOption,
+    JobsOption,
+    MethodOption,
+    PeriodOption,
+    RobotOption,
+    SeedOption,
+    TorqueOption,
+    figures_table,
+    with_bar,
+)
 from sidestep.cli.bench_scenes_command import dynamic, motion_bench_maker
 from sidestep.cli.bench_step_command import compare, peers, points, qp, realtime, step
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
@@ -25,31 +37,27 @@ app.command("realtime")(realtime)
 
 @app.command("reach")
 def reach(
-    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    robot: RobotOption = "fr3",
     obstacles: Annotated[int, typer.Option(min=0, help="Balls per problem.")] = 10,
     problems: Annotated[int, typer.Option(min=1, help="Number of problems.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the problems.")] = 0,
-    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.controller,
+    seed: SeedOption = 0,
+    method: MethodOption = Method.controller,
     moving: Annotated[
         float, typer.Option(min=0.0, metavar="SPEED", help="Balls drift at up to this speed [m/s].")
     ] = 0.0,
-    torque: Annotated[
-        bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
-    ] = False,
+    torque: TorqueOption = False,
     poses: Annotated[
         bool,
         typer.Option("--poses", help="Goals are poses of the tip, within 1 mm and 0.5°, in any posture."),
     ] = False,
-    duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 30.0,
-    period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
+    duration: DurationOption = 30.0,
+    period: PeriodOption = 0.001,
+    jobs: JobsOption = None,
     problems_file: Annotated[
         Path | None, typer.Option(help="Run the problems of this file, written by --export.")
     ] = None,
     export: Annotated[Path | None, typer.Option(help="Write the problems to this file (JSON).")] = None,
-    failures: Annotated[
-        bool, typer.Option("--failures", help="List the problems that went wrong, and why.")
-    ] = False,
+    failures: FailuresOption = False,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -68,7 +76,6 @@ def reach(
         run_bench,
         write_problems,
     )
-    from sidestep.cli.bench_progress import with_bar
 
     given = None if problems_file is None else read_problems(problems_file)
     settings = BenchSettings(
@@ -97,12 +104,7 @@ def reach(
 
 
 def _table(document: dict[str, Any]) -> object:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
-    table.add_column(style="dim")
-    table.add_column(justify="right")
+    table = figures_table("", "", show_header=False)
     count = document["problems"]
     for key in ("success", "collision", "self_collision", "stuck", "limit_violations"):
         share = f"{100.0 * document[key] / count:.1f} %"

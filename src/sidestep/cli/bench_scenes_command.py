@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -10,10 +10,26 @@ import typer
 
 from sidestep.bench.method import Method
 from sidestep.bench.points import POINT_RADIUS, SPACING
+from sidestep.cli.bench_output import (
+    DurationOption,
+    FailuresOption,
+    JobsOption,
+    MethodOption,
+    PeriodOption,
+    PointRadiusOption,
+    RobotOption,
+    SeedOption,
+    SpacingOption,
+    ToleranceOption,
+    TorqueOption,
+    figures_table,
+    with_bar,
+)
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 if TYPE_CHECKING:
     from sidestep.bench import SceneResult, SceneSettings
+    from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 
 COLUMNS = (  # title, key of the figures, decimals, which quantiles
     ("first path [ms]", "first_path_ms", 2, ("median", "p95", "p99")),
@@ -30,10 +46,8 @@ def motion_bench_maker(
         Path, typer.Argument(help="Folder of sets, or one set: sceneNNNN.yaml, requestNNNN.yaml.")
     ],
     robot: Annotated[str, typer.Option(help="A name from `sidestep robots`, or a URDF file.")] = "panda",
-    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.controller,
-    torque: Annotated[
-        bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
-    ] = False,
+    method: MethodOption = Method.controller,
+    torque: TorqueOption = False,
     problems: Annotated[
         int | None, typer.Option(min=1, help="Only so many of each set, the first ones.")
     ] = None,
@@ -41,17 +55,13 @@ def motion_bench_maker(
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Measure starts and goals only, move nothing.")
     ] = False,
-    spacing: Annotated[float, typer.Option(min=1e-4, help="Of the points on surfaces [m].")] = SPACING,
-    point_radius: Annotated[float, typer.Option(min=0.0, help="Of those points [m].")] = POINT_RADIUS,
-    duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 30.0,
-    tolerance: Annotated[
-        float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
-    ] = 0.05,
-    period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
-    failures: Annotated[
-        bool, typer.Option("--failures", help="List the problems that were not solved, and why.")
-    ] = False,
+    spacing: SpacingOption = SPACING,
+    point_radius: PointRadiusOption = POINT_RADIUS,
+    duration: DurationOption = 30.0,
+    tolerance: ToleranceOption = 0.05,
+    period: PeriodOption = 0.001,
+    jobs: JobsOption = None,
+    failures: FailuresOption = False,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -61,33 +71,17 @@ def motion_bench_maker(
     Solved: arrived, nothing touched, no limit broken. Joints that are not planned, such as fingers, stand where
     the request puts them. Exit code: 0 when nothing was touched and no limit broken, 1 when not, 2 on bad input.
     """
-    from sidestep.bench import (
-        MotionSettings,
-        SceneSettings,
-        default_jobs,
-        read_motion_bench_maker,
-        run_scenes,
-    )
+    from sidestep.bench import read_motion_bench_maker, run_scenes
 
     found = read_motion_bench_maker(folder)
     sets = list(dict.fromkeys(item.set for item in found))
     unknown = [name for name in only or () if name not in sets]
     if unknown:
         raise ValueError(f"--only {unknown[0]!r} is no set of {folder}; its sets are: {', '.join(sets)}")
-    chosen = [
-        item
-        for name in only or sets
-        for item in [problem for problem in found if problem.set == name][:problems]
-    ]
-    settings = SceneSettings(
-        robot=robot,
-        method=method,
-        motion=MotionSettings(period=period, duration=duration, tolerance=tolerance, torque=torque),
-        jobs=jobs or default_jobs(),
-        spacing=spacing,
-        point_radius=point_radius,
-        only_clearances=clearances,
-    )
+    chosen = _first_of_sets(found, only or sets, problems)
+    motion = {"period": period, "duration": duration, "tolerance": tolerance, "torque": torque}
+    points = {"spacing": spacing, "point_radius": point_radius}
+    settings = _settings(robot, method, jobs, motion, **points, only_clearances=clearances)
     run_and_report(
         settings,
         lambda show: run_scenes(settings, chosen, progress=show),
@@ -98,29 +92,23 @@ def motion_bench_maker(
 
 
 def dynamic(
-    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    robot: RobotOption = "fr3",
     problems: Annotated[int, typer.Option(min=0, help="Random problems of each kind.")] = 10,
     obstacles: Annotated[int, typer.Option(min=0, help="Balls at rest in each of them.")] = 5,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the problems and of what moves.")] = 0,
+    seed: SeedOption = 0,
     scenes: Annotated[
         Path | None, typer.Option(help="A folder of MotionBenchMaker: also in its scenes.")
     ] = None,
     scene_problems: Annotated[int, typer.Option(min=1, help="How many of each of its sets.")] = 1,
-    method: Annotated[Method, typer.Option(help="How the arm is moved.")] = Method.controller,
-    torque: Annotated[
-        bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
-    ] = False,
-    spacing: Annotated[float, typer.Option(min=1e-4, help="Of the points on surfaces [m].")] = SPACING,
-    point_radius: Annotated[float, typer.Option(min=0.0, help="Of those points [m].")] = POINT_RADIUS,
-    duration: Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")] = 20.0,
-    tolerance: Annotated[
-        float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
-    ] = 0.05,
-    period: Annotated[float, typer.Option(min=1e-5, help="Control period [s].")] = 0.001,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes [default: one per processor].")] = None,
-    failures: Annotated[
-        bool, typer.Option("--failures", help="List the problems that went wrong, and why.")
-    ] = False,
+    method: MethodOption = Method.controller,
+    torque: TorqueOption = False,
+    spacing: SpacingOption = SPACING,
+    point_radius: PointRadiusOption = POINT_RADIUS,
+    duration: DurationOption = 20.0,
+    tolerance: ToleranceOption = 0.05,
+    period: PeriodOption = 0.001,
+    jobs: JobsOption = None,
+    failures: FailuresOption = False,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -130,29 +118,12 @@ def dynamic(
     or becomes free; where it stays blocked, not arrived. At a goal that the ball is in at first, arrived is within 0.01
     rad or m. Exit code as for motionbenchmaker.
     """
-    from sidestep.bench import (
-        MotionSettings,
-        SceneSettings,
-        default_jobs,
-        read_motion_bench_maker,
-        run_dynamic,
-    )
+    from sidestep.bench import read_motion_bench_maker, run_dynamic
 
     published = () if scenes is None else read_motion_bench_maker(scenes)
-    sets = dict.fromkeys(item.set for item in published)
-    chosen = [
-        item
-        for name in sets
-        for item in [problem for problem in published if problem.set == name][:scene_problems]
-    ]
-    settings = SceneSettings(
-        robot=robot,
-        method=method,
-        motion=MotionSettings(period=period, duration=duration, tolerance=tolerance, torque=torque),
-        jobs=jobs or default_jobs(),
-        spacing=spacing,
-        point_radius=point_radius,
-    )
+    chosen = _first_of_sets(published, dict.fromkeys(item.set for item in published), scene_problems)
+    motion = {"period": period, "duration": duration, "tolerance": tolerance, "torque": torque}
+    settings = _settings(robot, method, jobs, motion, spacing=spacing, point_radius=point_radius)
     run_and_report(
         settings,
         lambda show: run_dynamic(
@@ -165,6 +136,22 @@ def dynamic(
     )
 
 
+def _settings(
+    robot: str, method: Method, jobs: int | None, motion: dict[str, Any], **more: Any
+) -> SceneSettings:
+    from sidestep.bench import MotionSettings, SceneSettings, default_jobs
+
+    return SceneSettings(
+        robot=robot, method=method, motion=MotionSettings(**motion), jobs=jobs or default_jobs(), **more
+    )
+
+
+def _first_of_sets(
+    problems: Sequence[MotionBenchMakerProblem], sets: Iterable[str], count: int | None
+) -> list[MotionBenchMakerProblem]:
+    return [item for name in sets for item in [p for p in problems if p.set == name][:count]]
+
+
 def run_and_report(
     settings: SceneSettings,
     run: Callable[[Callable[[int, int, str], None]], SceneResult],
@@ -175,8 +162,6 @@ def run_and_report(
     extra: dict[str, Any] | None = None,
 ) -> NoReturn:
     """Runs with a bar, prints the tables, writes the JSON, and ends the command with its exit code."""
-    from sidestep.cli.bench_progress import with_bar
-
     terminal = console(quiet=quiet, to_stderr=json == "-")
     result = with_bar(terminal, f"{settings.robot} {settings.method.value}", run)
     document = result.to_document(failures=failures)
@@ -199,17 +184,9 @@ def _rows(document: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
 
 
 def _motions(document: dict[str, Any]) -> object:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(
-        box=box.SIMPLE, pad_edge=False, caption="median, 95 %, 99 % of solved; clearance: min, 5 %, median"
-    )
-    table.add_column("set", style="dim")
-    for title in ("solved", "touched", "limits"):
-        table.add_column(title, justify="right")
-    for title, *_ in COLUMNS:
-        table.add_column(title, justify="right")
+    caption = "median, 95 %, 99 % of solved; clearance: min, 5 %, median"
+    titles = (title for title, *_ in COLUMNS)
+    table = figures_table("set", "solved", "touched", "limits", *titles, caption=caption)
     for name, figures in _rows(document):
         cells = [f"{figures['solved']} of {figures['problems']}"]
         cells += [str(figures["collision"] + figures["self_collision"]), str(figures["limit_violations"])]
@@ -221,13 +198,8 @@ def _motions(document: dict[str, Any]) -> object:
 
 
 def _ends(document: dict[str, Any]) -> object:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE, pad_edge=False, caption="clearance at the ends: min, 5 %, median")
-    table.add_column("set", style="dim")
-    for title in ("start [mm]", "goal [mm]", "goal of body [mm]", "goals inside body", "beyond limits"):
-        table.add_column(title, justify="right")
+    columns = ("start [mm]", "goal [mm]", "goal of body [mm]", "goals inside body", "beyond limits")
+    table = figures_table("set", *columns, caption="clearance at the ends: min, 5 %, median")
     for name, figures in _rows(document):
         cells = []
         for key in ("start_clearance_mm", "goal_clearance_mm", "goal_clearance_of_body_mm"):

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sidestep.cli.bench_output import RobotOption, RowSecondsOption, SeedOption, figures_table, with_status
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 
@@ -14,12 +15,12 @@ def step(
     steps: Annotated[
         int, typer.Option(min=1, help="Steps per row, unless the time is over before.")
     ] = 1_000_000,
-    seconds: Annotated[float, typer.Option(min=0.001, help="Longest time per row [s].")] = 10.0,
-    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    seconds: RowSecondsOption = 10.0,
+    robot: RobotOption = "fr3",
     points: Annotated[
         str, typer.Option(metavar="N,N,...", help="Numbers of points around the whole arm.")
     ] = "1,100,1000,10000,100000",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of states, goals and points.")] = 0,
+    seed: SeedOption = 0,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -31,9 +32,6 @@ def step(
     Kept is the longest step of the motions during which the core was kept: given to no other program. Last, the kernel
     that leaves no point out, as a share of what a core does that only multiplies and adds.
     """
-    from rich import box
-    from rich.table import Table
-
     from sidestep.bench import StepSettings, run_step_bench
 
     try:
@@ -42,14 +40,11 @@ def step(
         raise ValueError(f"--points is '{points}', must be numbers with commas between") from None
     settings = StepSettings(steps=steps, seconds=seconds, robot=robot, points=numbers, seed=seed)
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    with terminal.status("") as status:
-        document = run_step_bench(
-            settings, progress=lambda done, in_all, name: status.update(f"{done + 1} of {in_all}: {name}")
-        )
-    table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {document['instruction_set']}")
-    table.add_column("one step [us]", min_width=18)  # narrow terminals wrap the names, never a number
-    for name in ("", "median", "p95", "p99", "p99.9", "max", "kept", "steps/s"):
-        table.add_column(name, justify="right", no_wrap=True)
+    document = with_status(terminal, lambda show: run_step_bench(settings, progress=show))
+    title = f"{document['cpu']}, {document['instruction_set']}"
+    columns = ("", "median", "p95", "p99", "p99.9", "max", "kept", "steps/s")
+    table = figures_table("one step [us]", *columns, title=title)
+    table.columns[0].no_wrap, table.columns[0].min_width = False, 18  # narrow terminals wrap the names alone
     for row in document["results"]:
         names = ("median", "p95", "p99", "p99.9", "max", "undisturbed_max")
         times = [_microseconds(row[f"{name}_us"]) for name in names]
@@ -84,16 +79,10 @@ def compare(
     """Compares the medians of two results of `sidestep bench step`, row by row."""
     from json import loads
 
-    from rich import box
-    from rich.table import Table
-
     from sidestep.bench import compare_steps
 
     rows = compare_steps(loads(before.read_text("utf-8")), loads(after.read_text("utf-8")))
-    table = Table(box=box.SIMPLE, pad_edge=False)
-    table.add_column("median of one step [us]", no_wrap=True)
-    for name in ("", "before", "after", "after/before"):
-        table.add_column(name, justify="right")
+    table = figures_table("median of one step [us]", "", "before", "after", "after/before")
     for row in rows:
         table.add_row(
             row["name"],
@@ -106,14 +95,14 @@ def compare(
 
 
 def peers(
-    seconds: Annotated[float, typer.Option(min=0.001, help="For each way [s].")] = 3.0,
+    seconds: RowSecondsOption = 3.0,
     fabrics: Annotated[
         str | None,
         typer.Option(
             metavar="PYTHON", help="An interpreter with `fabrics`, which needs an environment of its own."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of bodies and balls.")] = 0,
+    seed: SeedOption = 0,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -122,20 +111,14 @@ def peers(
     The thesis's equations by dense tensors in NumPy, by torch.autograd and by JAX; and among ten balls CBFpy's filter,
     fabrics and a distance query of Coal. What is not installed is left out, and named.
     """
-    from rich import box
-    from rich.table import Table
-
     from sidestep.bench import PeerSettings, run_peers
 
     settings = PeerSettings(seconds=seconds, seed=seed, fabrics=fabrics)
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    with terminal.status("") as status:
-        document = run_peers(settings, progress=lambda name: status.update(name))
+    document = with_status(terminal, lambda show: run_peers(settings, progress=show))
     for group in document["groups"]:
-        table = Table(box=box.SIMPLE, pad_edge=False, title=f"{group['name']}: {document['cpu']}")
-        table.add_column("", no_wrap=True)
-        for name in ("median us", "p99 us", "times slower"):
-            table.add_column(name, justify="right")
+        title = f"{group['name']}: {document['cpu']}"
+        table = figures_table("", "median us", "p99 us", "times slower", title=title)
         table.add_column("work")
         for row in group["rows"]:
             if "missing" in row:
@@ -149,9 +132,9 @@ def peers(
 
 
 def qp(
-    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    robot: RobotOption = "fr3",
     programs: Annotated[int, typer.Option(min=1, help="Programs, from motions of the robot.")] = 5_000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of places, goals and points.")] = 0,
+    seed: SeedOption = 0,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -160,20 +143,14 @@ def qp(
     The core's, DAQP, PIQP and ProxQP, each from scratch, by the time that they measure themselves. Programs are those
     of the filter above a table; most have no constraint that holds. What is not installed is left out, and named.
     """
-    from rich import box
-    from rich.table import Table
-
     from sidestep.bench import QuadraticProgramSettings, run_quadratic_programs
 
     settings = QuadraticProgramSettings(programs=programs, robot=robot, seed=seed)
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    with terminal.status("") as status:
-        document = run_quadratic_programs(settings, progress=lambda name: status.update(name))
+    document = with_status(terminal, lambda show: run_quadratic_programs(settings, progress=show))
     title = f"{document['programs']:,} programs, {document['constrained']:,} constrained: {document['cpu']}"
-    table = Table(box=box.SIMPLE, pad_edge=False, title=title)
-    table.add_column("one program [us]", no_wrap=True)
-    for name in ("all: median", "p99", "constrained: median", "p99", "max", "wrong"):
-        table.add_column(name, justify="right")
+    columns = ("all: median", "p99", "constrained: median", "p99", "max", "wrong")
+    table = figures_table("one program [us]", *columns, title=title)
     for row in document["rows"]:
         if "missing" in row:
             table.add_row(row["name"], row["missing"])
@@ -187,34 +164,27 @@ def qp(
 
 
 def points(
-    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    robot: RobotOption = "fr3",
     most: Annotated[int, typer.Option(min=10, help="Points; 10, 100, ... up to so many.")] = 1_000_000,
-    seconds: Annotated[float, typer.Option(min=0.001, help="For each row [s].")] = 1.0,
+    seconds: RowSecondsOption = 1.0,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw a picture, as .png, .svg or .pdf.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of points and configuration.")] = 0,
+    seed: SeedOption = 0,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """What a step costs against the number of points: 0.5 m and more out of reach, and 5 to 10 cm from the body."""
-    from rich import box
-    from rich.table import Table
-
     from sidestep.bench import CloudSizeSettings, draw_cloud_sizes, run_cloud_size_bench
 
     settings = CloudSizeSettings(robot=robot, most=most, seconds=seconds, seed=seed)
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    with terminal.status("") as status:
-        document = run_cloud_size_bench(
-            settings, progress=lambda done, in_all, name: status.update(f"{done + 1} of {in_all}: {name}")
-        )
-    table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {document['instruction_set']}")
-    for name in ("points", "", "median us", "p99 us", "p99.9 us", "max us"):
-        table.add_column(name, justify="left" if name == "" else "right")
+    document = with_status(terminal, lambda show: run_cloud_size_bench(settings, progress=show))
+    title = f"{document['cpu']}, {document['instruction_set']}"
+    table = figures_table("where", "points", "median us", "p99 us", "p99.9 us", "max us", title=title)
     for row in document["results"]:
         times = [f"{row[f'{name}_us']:,.1f}" for name in ("median", "p99", "p99.9", "max")]
-        table.add_row(f"{row['points']:,}", row["where"], *times)
+        table.add_row(row["where"], f"{row['points']:,}", *times)
     terminal.print(table)
     if plot is not None:
         draw_cloud_sizes(document, plot)
@@ -223,11 +193,11 @@ def points(
 
 
 def realtime(
-    robot: Annotated[str, typer.Option(help="A name from `sidestep robots`.")] = "fr3",
+    robot: RobotOption = "fr3",
     points: Annotated[int, typer.Option(min=1, help="Of the cloud of a table with objects.")] = 10_000,
-    seconds: Annotated[float, typer.Option(min=0.001, help="Of each row [s].")] = 60.0,
+    seconds: RowSecondsOption = 60.0,
     refresh: Annotated[float, typer.Option(min=0.001, help="Clouds per second.")] = 60.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of goals, points and planner.")] = 0,
+    seed: SeedOption = 0,
     json: JsonOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -237,32 +207,22 @@ def realtime(
     it begins; it misses its deadline if it ends after the next one is due. Real-time scheduling is used where the
     machine allows it. Exit code 0: misses are figures, not errors.
     """
-    from rich import box
-    from rich.table import Table
-
     from sidestep.bench import RealTimeBenchSettings, run_real_time_bench
 
     settings = RealTimeBenchSettings(robot=robot, points=points, seconds=seconds, refresh=refresh, seed=seed)
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    with terminal.status("") as status:
-        document = run_real_time_bench(
-            settings, progress=lambda done, in_all, name: status.update(f"{done + 1} of {in_all}: {name}")
-        )
+    document = with_status(terminal, lambda show: run_real_time_bench(settings, progress=show))
     rows = document["results"]
     scheduled = "real-time scheduling" if rows[0]["real_time_scheduling"] else "no real-time scheduling"
-    table = Table(box=box.SIMPLE, pad_edge=False, title=f"{document['cpu']}, {scheduled}")
-    table.add_column("beside", no_wrap=True)
-    for name in ("steps", "missed", "us", "median", "p99", "p99.9", "max"):
-        table.add_column(name, justify="right")
+    columns = ("steps", "missed", "us", "median", "p99", "p99.9", "max")
+    table = figures_table("beside", *columns, title=f"{document['cpu']}, {scheduled}")
     for row in rows:
         for what, times in (("late", row["late_us"]), ("step", row["step_us"])):
             first = (row["beside"], f"{row['steps']:,}", str(row["missed"])) if what == "late" else ("",) * 3
             table.add_row(*first, what, *(f"{times[name]:.1f}" for name in ("median", "p99", "p99.9", "max")))
     terminal.print(table)
-    histogram = Table(box=box.SIMPLE, pad_edge=False, title="steps by how late they began")
-    histogram.add_column("up to, us", justify="right")
-    for row in rows:
-        histogram.add_column(row["beside"], justify="right")
+    beside = (row["beside"] for row in rows)
+    histogram = figures_table("up to, us", *beside, title="steps by how late they began")
     edges = [*(str(edge) for edge in rows[0]["late_histogram"]["edges_us"]), "more"]
     for edge, *counts in zip(edges, *(row["late_histogram"]["counts"] for row in rows), strict=True):
         histogram.add_row(edge, *(f"{count:,}" for count in counts))

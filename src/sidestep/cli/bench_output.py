@@ -1,0 +1,83 @@
+"""What the commands of `sidestep bench` share: options, a bar that counts problems, tables of figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
+
+import typer
+
+from sidestep.bench.method import Method
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+Result = TypeVar("Result")
+
+RobotOption: TypeAlias = Annotated[str, typer.Option(help="A name from `sidestep robots`.")]
+SeedOption: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of all that is random.")]
+MethodOption: TypeAlias = Annotated[Method, typer.Option(help="How the arm is moved.")]
+TorqueOption: TypeAlias = Annotated[
+    bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
+]
+SpacingOption: TypeAlias = Annotated[float, typer.Option(min=1e-4, help="Of the points on surfaces [m].")]
+PointRadiusOption: TypeAlias = Annotated[float, typer.Option(min=0.0, help="Of those points [m].")]
+DurationOption: TypeAlias = Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")]
+ToleranceOption: TypeAlias = Annotated[
+    float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
+]
+PeriodOption: TypeAlias = Annotated[float, typer.Option(min=1e-5, help="Control period [s].")]
+JobsOption: TypeAlias = Annotated[
+    int | None, typer.Option(min=1, help="Processes [default: one per processor].")
+]
+FailuresOption: TypeAlias = Annotated[
+    bool, typer.Option("--failures", help="List the problems that were not solved, and why.")
+]
+RowSecondsOption: TypeAlias = Annotated[float, typer.Option(min=0.001, help="Longest time per row [s].")]
+
+
+def with_bar(
+    terminal: Console, title: str, run: Callable[[Callable[[int, int, str], None]], Result]
+) -> Result:
+    """What `run` returns; it is given a function to call with how many are done, of all, and a word."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("[dim]{task.fields[last]}"),
+        console=terminal,
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task(title, total=None, last="")
+
+        def show(done: int, in_all: int, last: str) -> None:
+            bar.update(task, completed=done, total=in_all, last=last)
+
+        return run(show)
+
+
+def with_status(terminal: Console, run: Callable[[Callable[..., None]], Result]) -> Result:
+    """What `run` returns; it is given a function to call with a word, or with how many are done, of all, and a word."""
+    with terminal.status("") as status:
+
+        def show(*told: Any) -> None:
+            status.update(told[0] if len(told) == 1 else f"{told[0] + 1} of {told[1]}: {told[2]}")
+
+        return run(show)
+
+
+def figures_table(first: str, *figures: str, **options: Any) -> Table:
+    """A table with a column of names, which is not wrapped, and columns of figures."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE, pad_edge=False, **options)
+    table.add_column(first, no_wrap=True)
+    for name in figures:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
