@@ -8,7 +8,7 @@ from sidestep.bench.method import Method
 from sidestep.bench.motion import ControllerMover, Mover, SystemMover
 from sidestep.body import Body
 from sidestep.robot import Robot
-from sidestep.scenario.settings import ABLATIONS
+from sidestep.scenario.config import ABLATIONS
 from sidestep.thesis import ThesisNumbers, thesis_system
 
 
