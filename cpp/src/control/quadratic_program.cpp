@@ -207,16 +207,16 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
     if (!(violation > 0.0)) {
       continue;
     }
+    const double distance = norm > 0.0 ? violation / norm : infinity;
+    if (!(distance > worst)) {
+      continue;
+    }
     // What cancels in x_i = J_i y is |J_i| |y|, with |y|² = x' H x, at most: a slack of zero is the difference of much more.
     if (i < n_ && size < 0.0) {
       size = energy_norm(data);
     }
     const double terms = i < n_ ? J_.row(i).norm() * size : data.A.row(i - n_).cwiseAbs().dot(x_.cwiseAbs().transpose());
-    if (!(violation > feasibility_tolerance * (terms + std::abs(side)))) {
-      continue;
-    }
-    const double distance = norm > 0.0 ? violation / norm : infinity;
-    if (distance > worst) {
+    if (violation > feasibility_tolerance * (terms + std::abs(side))) {
       worst = distance;
       constraint = i;
       sign = below ? 1.0 : -1.0;
