@@ -105,6 +105,7 @@ def reach(
 
 def _table(document: dict[str, Any]) -> object:
     table = figures_table("", "", show_header=False)
+    table.columns[0].no_wrap = False
     count = document["problems"]
     for key in ("success", "collision", "self_collision", "stuck", "limit_violations"):
         share = f"{100.0 * document[key] / count:.1f} %"

@@ -79,5 +79,5 @@ def figures_table(first: str, *figures: str, **options: Any) -> Table:
     table = Table(box=box.SIMPLE, pad_edge=False, **options)
     table.add_column(first, no_wrap=True)
     for name in figures:
-        table.add_column(name, justify="right", no_wrap=True)
+        table.add_column(name, justify="right")
     return table

@@ -44,7 +44,9 @@ def step(
     title = f"{document['cpu']}, {document['instruction_set']}"
     columns = ("", "median", "p95", "p99", "p99.9", "max", "kept", "steps/s")
     table = figures_table("one step [us]", *columns, title=title)
-    table.columns[0].no_wrap, table.columns[0].min_width = False, 18  # narrow terminals wrap the names alone
+    for column in table.columns:
+        column.no_wrap = column is not table.columns[0]  # narrow terminals wrap the names, never a number
+    table.columns[0].min_width = 18
     for row in document["results"]:
         names = ("median", "p95", "p99", "p99.9", "max", "undisturbed_max")
         times = [_microseconds(row[f"{name}_us"]) for name in names]
