@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -42,20 +41,6 @@ def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str) -> P
 
 
 def stored_or_made(path: Path, make: Callable[[], _core.Arm]) -> _core.Arm:
-    """The arm of a file or, without one, what `make` gives, which is stored there.
-
-    Warns about a file that cannot be read or written: an arm without a cache is still an arm.
-    """
-    try:
-        return _core.Arm.read(path)
-    except FileNotFoundError:
-        pass
-    except (ValueError, OSError) as error:
-        warnings.warn(f"the cached arm is prepared again: {error}", RuntimeWarning, stacklevel=4)
-    arm = make()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        arm.save(path)
-    except OSError as error:
-        warnings.warn(f"the prepared arm is not cached: {error}", RuntimeWarning, stacklevel=4)
-    return arm
+    """The arm of a file or, without one, what `make` gives, which is stored there."""
+    warning = "arm is prepared again", "the prepared arm is not cached"
+    return body_cache.stored_or_made(path, _core.Arm.read, make, lambda file, arm: arm.save(file), warning)

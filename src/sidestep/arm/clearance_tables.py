@@ -78,13 +78,13 @@ def clearance_tables(robot: Robot, *, progress: Progress | None = None) -> Clear
         measured = {(table.first, table.second) for table in shipped.tables}
         found = (pair for pair, _, _ in _pairs_of_two(robot, SelfCollision(robot)))
         return ClearanceTables(tuple(shipped.tables), tuple(pair for pair in found if pair not in measured))
-    path = stored_at(robot)
-    stored = cache.read_stored(path, _read, "the cached clearance tables are unreadable and are made again")
-    if stored is not None:
-        return stored
-    tables = _measure(robot, progress)
-    cache.write_stored(path, lambda file: _write(file, tables), "the clearance tables are not cached")
-    return tables
+    return cache.stored_or_made(
+        stored_at(robot),
+        _read,
+        lambda: _measure(robot, progress),
+        _write,
+        ("clearance tables are unreadable and are made again", "the clearance tables are not cached"),
+    )
 
 
 def stored_at(robot: Robot) -> Path:

@@ -46,14 +46,13 @@ def barrier_pairs(robot: Robot, body: Body, *, progress: Progress | None = None)
         robot: with collision meshes. body: a covering body of it.
         progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
     """
-    path = stored_at(robot, body)
-    stored = cache.read_stored(
-        path, _read_pairs, "the cached pairs of links are unreadable and are made again"
+    stored = cache.stored_or_made(
+        stored_at(robot, body),
+        _read_pairs,
+        lambda: _find_pairs(robot, body, progress),
+        lambda file, pairs: write_text(file, json.dumps(pairs, indent=1) + "\n"),
+        ("pairs of links are unreadable and are made again", "the pairs of links are not cached"),
     )
-    if stored is None:
-        stored = _find_pairs(robot, body, progress)
-        text = json.dumps(stored, indent=1) + "\n"
-        cache.write_stored(path, lambda file: write_text(file, text), "the pairs of links are not cached")
     apart = clearance_tables(robot).apart
     return tuple(pair for pair in stored if pair[:2] not in apart)
 

@@ -10,7 +10,6 @@ from .motion import ControllerMover as ControllerMover
 from .motion import Motion as Motion
 from .motion import MotionSettings as MotionSettings
 from .motion import Mover as Mover
-from .motion import SystemMover as SystemMover
 from .motion_bench_maker import MotionBenchMakerProblem as MotionBenchMakerProblem
 from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_maker
 from .outcome import Judge as Judge

@@ -5,11 +5,12 @@ from __future__ import annotations
 from sidestep._core import BarrierSettings, Controller, ControllerSettings, GeometricSystem
 from sidestep.arm import Arm
 from sidestep.bench.method import Method
-from sidestep.bench.motion import ControllerMover, Mover, SystemMover
+from sidestep.bench.motion import ControllerMover, Mover
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario.config import ABLATIONS
 from sidestep.thesis import ThesisNumbers, thesis_system
+from sidestep.thesis.bench import SystemMover
 
 
 def build_body(method: Method, robot: Robot) -> Body:

@@ -15,17 +15,13 @@ from sidestep import _core
 from sidestep._core import (
     Controller,
     ControllerSettings,
-    GeometricSystem,
     PlanStatus,
-    TorqueController,
     integrate,
-    rollout,
 )
 from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot, tip_of
 from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation
 from sidestep.simulation.pose_target import PoseTarget
-from sidestep.thesis.driver import SystemDriver
 
 Array = npt.NDArray[np.float64]
 
@@ -113,49 +109,6 @@ class Mover(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class SystemMover:
-    """A geometric system alone, as the thesis's methods are; under torque its acceleration is tracked."""
-
-    robot: Robot
-    system: GeometricSystem
-
-    def move(self, problem: Problem, settings: MotionSettings) -> Motion:
-        """Runs one problem."""
-        if settings.poses:
-            raise ValueError("pose goals are for the methods 'controller' and 'barrier'; the thesis has none")
-        if settings.torque:
-            program = TorqueController(self.robot, period=settings.period)
-            return _under_torque(
-                self.robot,
-                SystemDriver(self.system, problem.goal, problem.obstacles_at, program),
-                problem,
-                settings,
-            )
-        columns = _Columns(problem, settings)
-        q, v = problem.start, np.zeros_like(problem.start)
-        while steps := columns.next_steps(CHUNK):
-            part = rollout(
-                self.system,
-                q,
-                v,
-                problem.goal,
-                problem.obstacles_at(columns.done * settings.period),
-                period=settings.period,
-                steps=steps,
-                time_steps=True,
-            )
-            columns.add(
-                part.q[:-1],
-                part.v[:-1],
-                part.acceleration[:-1],
-                part.step_seconds[:-1],
-                columns.near(part.q[:-1]),
-            )
-            q, v = part.q[-1], part.v[-1]
-        return columns.motion(problem)
-
-
-@dataclass(frozen=True, eq=False)
 class ControllerMover:
     """The `Controller`, one for every problem, with the settings given in place of its defaults."""
 
@@ -182,9 +135,9 @@ class ControllerMover:
         controller.set_goal(problem.goal if pose is None else pose.goal)
         if settings.torque:
             driver = ControllerDriver(controller, _Changing(problem))
-            motion = _under_torque(self.robot, driver, problem, settings, pose)
+            motion = under_torque(self.robot, driver, problem, settings, pose)
             return _told(motion, _planned(controller), controller, pose)
-        columns = _Columns(problem, settings)
+        columns = Columns(problem, settings)
         q, v = problem.start, np.zeros_like(problem.start)
         seen = _Changing(problem)
         planned = _planned(controller)
@@ -255,7 +208,7 @@ class _Changing:
         return self._problem.obstacles_at(time)
 
 
-class _Columns:
+class Columns:
     """The rows of a motion as it is integrated, up to arrival."""
 
     def __init__(self, problem: Problem, settings: MotionSettings) -> None:
@@ -311,13 +264,14 @@ class _Timed:
         return result
 
 
-def _under_torque(
+def under_torque(
     robot: Robot,
     driver: Driver,
     problem: Problem,
     settings: MotionSettings,
     pose: PoseTarget | None = None,
 ) -> Motion:
+    """Runs one problem in MuJoCo; pose: in place of the goal configuration."""
     simulation = Simulation(robot, problem.objects, timestep=settings.period, visuals=False)
     timed = _Timed(driver)
     run = simulation.run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -124,19 +124,15 @@ class Body(_core.Body):
             max_components=max_components,
         )
         settings.validate(robot)
-        stored = fit_cache.read(robot, settings) if cache else None
-        if stored is not None:
-            return cls._from_contents(stored)
-        fits = fit_links(robot, settings, progress)
-        contents = body_file.BodyContents(
-            robot_name=robot.name,
-            fingerprint=robot.fingerprint,
-            settings=settings,
-            links=tuple(body_file.LinkContents.of(fit, mixture) for fit, mixture in fits),
+        return cls._made(
+            robot,
+            settings,
+            lambda: (
+                body_file.LinkContents.of(fit, mixture)
+                for fit, mixture in fit_links(robot, settings, progress)
+            ),
+            cache=cache,
         )
-        if cache:
-            fit_cache.write(robot, settings, contents)
-        return cls._from_contents(contents)
 
     @classmethod
     def cover(
@@ -183,23 +179,17 @@ class Body(_core.Body):
         shipped = shipped_arms.with_body_of(robot) if cache and settings == CoverSettings() else None
         if shipped is not None:
             return cls._shipped(shipped, robot, settings)
-        stored = fit_cache.read(robot, settings) if cache else None
-        if stored is not None:
-            return cls._from_contents(stored)
-        contents = body_file.BodyContents(
-            robot_name=robot.name,
-            fingerprint=robot.fingerprint,
-            settings=settings,
-            links=tuple(
+        return cls._made(
+            robot,
+            settings,
+            lambda: (
                 body_file.LinkContents(
                     fit, mixture.weights, mixture.means, mixture.covariances, levels, cover
                 )
                 for fit, mixture, levels, cover in cover_mixtures(robot, settings, progress)
             ),
+            cache=cache,
         )
-        if cache:
-            fit_cache.write(robot, settings, contents)
-        return cls._from_contents(contents)
 
     def save(self, path: str | Path) -> None:
         """Writes the body to a versioned JSON file.
@@ -269,6 +259,23 @@ class Body(_core.Body):
             ]
 
         return cls(**_contents_of(arm), robot_name=robot.name, settings=settings, link_fits=fits)
+
+    @classmethod
+    def _made(
+        cls,
+        robot: Robot,
+        settings: FitSettings | CoverSettings,
+        links: Callable[[], Iterable[body_file.LinkContents]],
+        *,
+        cache: bool,
+    ) -> Body:
+        """The body of these links, or of the user's cache."""
+
+        def make() -> body_file.BodyContents:
+            return body_file.BodyContents(robot.name, robot.fingerprint, settings, tuple(links()))
+
+        contents = fit_cache.stored_or_fitted(robot, settings, make) if cache else make()
+        return cls._from_contents(contents)
 
     @classmethod
     def _from_contents(cls, contents: body_file.BodyContents) -> Body:

@@ -48,42 +48,41 @@ def cache_path(robot: Robot, settings: FitSettings | CoverSettings) -> Path:
     return cache_directory() / f"{key}.json"
 
 
-def read(robot: Robot, settings: FitSettings | CoverSettings) -> body_file.BodyContents | None:
-    """The stored fit, or None if there is none; warns about an entry that cannot be read."""
-    return read_stored(
+def stored_or_fitted(
+    robot: Robot, settings: FitSettings | CoverSettings, fit: Callable[[], body_file.BodyContents]
+) -> body_file.BodyContents:
+    """The stored fit; without one what `fit` gives, which is stored."""
+    return stored_or_made(
         cache_path(robot, settings),
-        lambda stored: body_file.read(stored, robot),
-        "cached body is unreadable and is fitted again",
+        lambda path: body_file.read(path, robot),
+        fit,
+        body_file.write,
+        ("body is unreadable and is fitted again", "the fitted body is not cached"),
     )
 
 
-def write(robot: Robot, settings: FitSettings | CoverSettings, contents: body_file.BodyContents) -> None:
-    """Stores a fit; warns if the cache cannot be written, because a fit without a cache is still a fit."""
-    write_stored(
-        cache_path(robot, settings),
-        lambda path: body_file.write(path, contents),
-        "the fitted body is not cached",
-    )
+def stored_or_made(
+    path: Path,
+    read: Callable[[Path], Contents],
+    make: Callable[[], Contents],
+    write: Callable[[Path, Contents], None],
+    warning: tuple[str, str],
+) -> Contents:
+    """What `read` finds in the user's file; without one what `make` gives, which `write` puts there.
 
-
-def read_stored(path: Path, reader: Callable[[Path], Contents], warning: str) -> Contents | None:
-    """What `reader` makes of the user's file; None without one.
-
-    A file that `reader` refuses by an OSError, ValueError or TypeError gives `warning` and None.
+    Warns, by the first text, about a file that `read` refuses by an OSError, ValueError or TypeError, and by the second
+    about an OSError of `write`: what is not cached is still of use.
     """
     try:
-        return reader(path)
+        return read(path)
     except FileNotFoundError:
         pass
     except (ValueError, TypeError, OSError) as error:
-        warnings.warn(f"{warning}: {path}: {error}", RuntimeWarning, stacklevel=4)
-    return None
-
-
-def write_stored(path: Path, writer: Callable[[Path], None], warning: str) -> None:
-    """Has `writer` write the user's file; an OSError gives `warning`."""
+        warnings.warn(f"the cached {warning[0]}: {path}: {error}", RuntimeWarning, stacklevel=4)
+    made = make()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        writer(path)
+        write(path, made)
     except OSError as error:
-        warnings.warn(f"{warning}: {error}", RuntimeWarning, stacklevel=4)
+        warnings.warn(f"{warning[1]}: {error}", RuntimeWarning, stacklevel=4)
+    return made

@@ -1,0 +1,58 @@
+"""What moves an arm through the problems of the benchmarks by one of the thesis's methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sidestep._core import GeometricSystem, TorqueController, rollout
+from sidestep.bench.motion import CHUNK, Columns, Motion, MotionSettings, under_torque
+from sidestep.bench.problem import Problem
+from sidestep.robot import Robot
+from sidestep.thesis.driver import SystemDriver
+
+
+@dataclass(frozen=True, eq=False)
+class SystemMover:
+    """A geometric system alone, as the thesis's methods are; under torque its acceleration is tracked."""
+
+    robot: Robot
+    system: GeometricSystem
+
+    def move(self, problem: Problem, settings: MotionSettings) -> Motion:
+        """Runs one problem."""
+        if settings.poses:
+            raise ValueError(
+                "pose goals are for the methods 'controller' and 'barrier'; the thesis has none"
+            )
+        if settings.torque:
+            program = TorqueController(self.robot, period=settings.period)
+            return under_torque(
+                self.robot,
+                SystemDriver(self.system, problem.goal, problem.obstacles_at, program),
+                problem,
+                settings,
+            )
+        columns = Columns(problem, settings)
+        q, v = problem.start, np.zeros_like(problem.start)
+        while steps := columns.next_steps(CHUNK):
+            part = rollout(
+                self.system,
+                q,
+                v,
+                problem.goal,
+                problem.obstacles_at(columns.done * settings.period),
+                period=settings.period,
+                steps=steps,
+                time_steps=True,
+            )
+            columns.add(
+                part.q[:-1],
+                part.v[:-1],
+                part.acceleration[:-1],
+                part.step_seconds[:-1],
+                columns.near(part.q[:-1]),
+            )
+            q, v = part.q[-1], part.v[-1]
+        return columns.motion(problem)
