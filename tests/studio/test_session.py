@@ -206,7 +206,7 @@ def test_a_goal_that_is_itself_blocked_is_said_and_the_arm_rests(
     session.handle(m.DragObstacle("ball", session.robot.pose(goal, session.tip)))
     last = run(session, 6.0)
     found = re.fullmatch(
-        r"at the goal 'link2' is (\d+) mm deep in ball; it goes on when that is free", last.words
+        r"at the goal 'link2' is (\d+) mm deep in 'ball'; it goes on when that is free", last.words
     )
     assert found is not None
     assert int(found[1]) > 50  # [mm] the ball's radius and more
@@ -420,7 +420,7 @@ def test_a_diagnosis_names_links_and_obstacles(make_session: MakeSession, scenar
     session.handle(m.SetJointGoal(here + np.array([1.0, 0.0])))
     words = run(session, 3.0).words
     assert words.startswith("stuck ")
-    assert re.search(r": link2 against ball, \d+ mm away$", words)
+    assert re.search(r": link2 against 'ball', \d+ mm away$", words)
 
 
 URDF = """<robot name="two">{links}

@@ -125,7 +125,8 @@ class ControllerMover:
 def alike(told: Obstacles, seen: Obstacles) -> bool:
     """Whether what was told, moved on along its velocities, is still what is seen."""
     return (
-        np.array_equal(told.radii, seen.radii)
+        told.groups == seen.groups
+        and np.array_equal(told.radii, seen.radii)
         and float(np.abs(told.points - seen.points).max(initial=0.0)) <= ASIDE
         and float(np.abs(told.velocities - seen.velocities).max(initial=0.0)) <= STILL
     )

@@ -5,6 +5,7 @@ It knows nothing of the page. `loop` runs it in a process of its own, tests call
 
 from __future__ import annotations
 
+import re
 import time as clock
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -27,7 +28,6 @@ from sidestep.studio.scene_obstacle import check_names, things_of
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
 from sidestep.studio.systems import Mover, Recipe, build_mover, numbers_of, recipe_of
 from sidestep.studio.tip import at_tip
-from sidestep.studio.words import named
 
 Array = npt.NDArray[np.float64]
 Prepare = Callable[[Robot, Recipe], Body]
@@ -171,7 +171,7 @@ class Session:
         limits = self.robot.limits
         rows, self._rows = tuple(self._rows), []
         account = self._mover.account() or Account("at the start", metric=np.eye(len(q)))
-        words = named(account.words, owners=self._owners, things=self._things)
+        words = re.sub(r"\blink (?=\S*link)", "", account.words)  # such names say it themselves
         pose, near = self._goal
         return m.Snapshot(
             scenario=self.scenario,
@@ -303,7 +303,8 @@ class Session:
         ]
         velocities = np.array([actor.velocity for actor in actors])
         velocities[np.linalg.norm(velocities, axis=1) < STILL] = 0.0
-        return Obstacles(np.concatenate(points), self._radii, velocities[self._owners])
+        seen = Obstacles(np.concatenate(points), self._radii, velocities[self._owners])
+        return seen.named([thing.name for thing in self._things], [len(view) for view in self._views])
 
     def _poses(self) -> Array:
         return np.array([actor.pose for actor in self.stage.actors]).reshape(-1, 4, 4)
