@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -123,10 +122,6 @@ class Evaluation:
         cleaned = _finite(record)
         assert isinstance(cleaned, dict)
         return cleaned
-
-    def to_json(self, *, indent: int | None = 2) -> str:
-        """The figures as JSON, without NaN."""
-        return json.dumps(self.to_dict(), indent=indent, allow_nan=False)
 
 
 def evaluate(

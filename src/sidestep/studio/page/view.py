@@ -79,7 +79,7 @@ class View:
         panel.set_width(PLOT_WIDTH)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(MAIN_WIDTH)
-        self._run = gui.add_button_group("SessionProcess", ("Run", "Pause", "Restart"))
+        self._run = gui.add_button_group("Loop", ("Run", "Pause", "Restart"))
         self._run.on_click(self._on_loop)
         tabs = gui.add_tab_group()
         self._goal_tab = tabs.add_tab("Goal")
