@@ -23,9 +23,7 @@ class SystemMover:
     def move(self, problem: Problem, settings: MotionSettings) -> Motion:
         """Runs one problem."""
         if settings.poses:
-            raise ValueError(
-                "pose goals are for the methods 'controller' and 'barrier'; the thesis has none"
-            )
+            raise ValueError("pose goals are for the methods 'controller' and 'barrier'; the thesis has none")
         if settings.torque:
             program = TorqueController(self.robot, period=settings.period)
             return under_torque(
