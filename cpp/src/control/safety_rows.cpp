@@ -104,7 +104,8 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
       depths(Eigen::VectorXd::Zero(normals.rows())),
       settings_(settings),
       urgency_(Eigen::VectorXd::Zero(normals.rows())),
-      response_(Eigen::VectorXd::Zero(num_coordinates)) {}
+      response_(Eigen::VectorXd::Zero(num_coordinates)),
+      responses_(RowMatrix::Zero(num_coordinates, normals.rows())) {}
 
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
@@ -125,14 +126,41 @@ bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   return true;
 }
 
-double SafetyRows::hardest_by_torque(ConstVectorRef gradient, const JointLimits& limits,
-                                     const BrakingTorque& torque) noexcept {
-  response_ = gradient;
-  solve_in_place(torque.mass_cholesky, response_);
+void SafetyRows::find_responses(const ClearanceState& approach, const Eigen::MatrixXd& L) noexcept {
+  const Eigen::Index nv = responses_.rows();
+  for (int row = 0; row < size_; ++row) {
+    responses_.col(row) = approach.gradients.col(coordinates[static_cast<std::size_t>(row)]);
+  }
+  const auto divide = [&](Eigen::Index i) {
+    for (int row = 0; row < size_; ++row) {
+      responses_(i, row) /= L(i, i);
+    }
+  };
+  const auto subtract = [&](Eigen::Index i, double factor, Eigen::Index k) {
+    for (int row = 0; row < size_; ++row) {
+      responses_(i, row) -= factor * responses_(k, row);
+    }
+  };
+  for (Eigen::Index i = 0; i < nv; ++i) {
+    for (Eigen::Index k = 0; k < i; ++k) {
+      subtract(i, L(i, k), k);
+    }
+    divide(i);
+  }
+  for (Eigen::Index i = nv - 1; i >= 0; --i) {
+    for (Eigen::Index k = i + 1; k < nv; ++k) {
+      subtract(i, L(k, i), k);
+    }
+    divide(i);
+  }
+}
+
+double SafetyRows::hardest_by_torque(int row, const JointLimits& limits, const BrakingTorque& torque) const noexcept {
   double hardest = 0.0;
-  for (Eigen::Index j = 0; j < gradient.size(); ++j) {
-    if (response_[j] != 0.0) {
-      hardest += std::abs(response_[j]) * limits.effort[j] - response_[j] * torque.bias[j];
+  for (Eigen::Index j = 0; j < responses_.rows(); ++j) {
+    const double response = responses_(j, row);
+    if (response != 0.0) {
+      hardest += std::abs(response) * limits.effort[j] - response * torque.bias[j];
     }
   }
   return hardest;
@@ -194,12 +222,15 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     urgency_[at] = urgency;
     coordinates[static_cast<std::size_t>(at)] = static_cast<int>(k);
   }
+  if (torque != nullptr) {
+    find_responses(approach, torque->mass_cholesky);
+  }
   double hardest_stop = 0.0;
   int hardest_row = -1;  // that a stop along the path is for
   for (int row = 0; row < size_; ++row) {
     const int k = coordinates[static_cast<std::size_t>(row)];
     const auto gradient = approach.gradients.col(k);
-    const double by_torque = torque == nullptr ? infinity : hardest_by_torque(gradient, limits, *torque);
+    const double by_torque = torque == nullptr ? infinity : hardest_by_torque(row, limits, *torque);
     const double by_limits = largest_product(gradient, -limits.acceleration, limits.acceleration);
     const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,

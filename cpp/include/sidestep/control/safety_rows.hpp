@@ -153,13 +153,15 @@ class SafetyRows {
  private:
   /// τ [s], see above.
   double stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept;
-  double hardest_by_torque(ConstVectorRef gradient, const JointLimits& limits,
-                           const BrakingTorque& torque) noexcept;
+  /// Writes M⁻¹ ∇h of the rows chosen, side by side: divisions of one wait for each other.
+  void find_responses(const ClearanceState& approach, const Eigen::MatrixXd& mass_cholesky) noexcept;
+  double hardest_by_torque(int row, const JointLimits& limits, const BrakingTorque& torque) const noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
   Eigen::VectorXd urgency_;  // (max) predicted room of the rows chosen, ascending
-  Eigen::VectorXd response_; // (nv) M⁻¹ ∇h or M v
+  Eigen::VectorXd response_; // (nv) M v
+  RowMatrix responses_;      // (nv, max) M⁻¹ ∇h of the rows chosen
 };
 
 }  // namespace sidestep
