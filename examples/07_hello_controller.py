@@ -12,4 +12,4 @@ controller.set_obstacles(ss.Obstacles([[1.0, 0.5, 0.0]], radii=0.05))
 q, v = arm.neutral, 0.0 * arm.neutral
 while (command := controller.step(q, v)).activity != ss.Activity.arrived:
     q, v = command.position, command.velocity
-print(f"{controller.explain()}, largest torque {abs(command.torque).max():.2f} Nm")
+print(f"{controller.explain()}, torque there up to {abs(command.torque).max():.6f} Nm")

@@ -82,8 +82,8 @@ def test_examples_are_short_and_say_what_they_show() -> None:
 def test_07_the_controller_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(EXAMPLES.parent)
     output = run("07")
-    assert output.startswith("arrived, largest torque ")
-    assert 0.0 < number_after("largest torque", output) < 19.44  # [Nm] limit of the first joint
+    assert output.startswith("arrived, torque there up to ")
+    assert 0.0 < number_after("torque there up to", output) < 19.44  # [Nm] limit of the first joint
 
 
 def test_07_is_as_short_as_it_says() -> None:

@@ -181,7 +181,13 @@ def test_the_thesis_s_scenarios_arrive_by_the_barriers(name: str) -> None:
 
 @pytest.mark.parametrize("mode", ["kinematic", "torque"])
 @pytest.mark.parametrize(
-    "how", ["velocity: [0, 0.5, 0]", "motion: {to: [-0.5, 1.4, 0], begin: 0.0, end: 5.0}"]
+    "how",
+    [
+        "velocity: [0, 0.4, 0]",
+        "velocity: [0, 0.5, 0]",
+        "velocity: [0, 0.6, 0]",
+        "motion: {to: [-0.5, 1.4, 0], begin: 0.0, end: 5.0}",
+    ],
 )
 def test_an_arm_steps_out_of_the_way_of_what_moves(mode: str, how: str) -> None:
     """A ball presses the arm against a joint's limit, unless it looks ahead."""
@@ -194,9 +200,8 @@ start: {{unit: rad, position: [-2.89, 0.0]}}
 goal: {{unit: rad, position: [-2.9, 0.0]}}
 obstacles:
   - {{shape: {{type: sphere, radius: 0.1}}, position: [-0.5, -1.1, 0.0], {how}}}
-controller: {{look_ahead: {{clearance: 0.01}}}}
 simulation: {{mode: {mode}, period: 0.002, duration: 4.0, tolerance: 1.0e-7}}
-"""  # it has not arrived before the ball comes; its torques give less than its accelerations
+"""  # it has not arrived before the ball comes; in torque mode its torques give less than its acceleration limits
     scenario = Scenario.from_text(text)
     aside = run_scenario(scenario).evaluation
     assert aside.collision_free

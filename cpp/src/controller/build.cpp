@@ -163,7 +163,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
   if (settings.look_ahead) {
     LookAheadSettings look = *settings.look_ahead;
     look.seed = settings.seed;
-    evasion_ = std::make_unique<LookAhead>(system, look);
+    evasion_ = std::make_unique<LookAhead>(system, look, dynamics_);
   }
   ends_.emplace(body_, settings.planner ? settings.planner->search : PlannerSettings{});
   for (const Joint& joint : arm.robot().joints()) {

@@ -69,17 +69,35 @@ void LookAheadSettings::validate() const {
   require(period <= delay, "look_ahead: period", period, "no longer than the delay");
 }
 
-LookAhead::Stepper::Stepper(const Robot& robot, double period) : period(period), filter(robot, filter_settings(period)) {}
+LookAhead::Stepper::Stepper(const Robot& robot, double period, bool by_torque)
+    : period(period), filter(robot, filter_settings(period)) {
+  if (by_torque) {
+    TorqueControllerSettings settings;
+    settings.period = period;
+    program.emplace(robot, settings);
+  }
+}
 
-LookAhead::LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings)
+LookAhead::LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings,
+                     std::optional<RigidBodyDynamics> dynamics)
     : system_(std::move(system)),
       settings_(validated(settings)),
       workspace_(checked(system_)),
       periods_(static_cast<int>(std::ceil(settings.delay / settings.period - rounding))),
-      fine_(system_->robot(), settings.delay / periods_),
-      coarse_(system_->robot(), std::max(fine_.period, std::min(coarse_period, settings.horizon / least_steps))),
+      dynamics_(std::move(dynamics)),
+      mass_(num_coordinates(), num_coordinates()),
+      bias_(num_coordinates()),
+      fine_(system_->robot(), settings.delay / periods_, dynamics_.has_value()),
+      coarse_(system_->robot(), std::max(fine_.period, std::min(coarse_period, settings.horizon / least_steps)),
+              dynamics_.has_value()),
       filtered_(num_coordinates()),
       random_(settings.seed) {
+  if (dynamics_) {
+    if (!dynamics_->robot().same_joints(system_->robot())) {
+      throw std::invalid_argument("look_ahead: the dynamics are of another robot");
+    }
+    dynamics_workspace_.emplace(*dynamics_);
+  }
   for (std::size_t k = 0; k < system_->labels().size(); ++k) {
     if (system_->labels()[k].kind == CoordinateLabel::Kind::obstacle) {
       of_obstacles_.push_back(static_cast<Eigen::Index>(k));
@@ -188,7 +206,13 @@ double LookAhead::advance(Motion& motion, Stepper& stepper) {
   ++stepper.steps;
   const double clearance = sees ? obstacle_clearance() : -infinity;
   const Clearances* clearances = sees ? &workspace_.clearances : nullptr;
-  static_cast<void>(stepper.filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
+  if (stepper.program) {
+    dynamics_->mass_matrix(motion.q, *dynamics_workspace_, mass_);
+    dynamics_->bias(motion.q, motion.v, *dynamics_workspace_, bias_);
+    static_cast<void>(stepper.program->solve(motion.q, motion.v, wanted, mass_, bias_, clearances, filtered_));
+  } else {
+    static_cast<void>(stepper.filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
+  }
   motion.v += period * filtered_.acceleration;
   motion.q += period * motion.v;
   motion.obstacles.advance(period);

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
+#include "sidestep/control/torque_controller.hpp"
+#include "sidestep/model/dynamics.hpp"
 #include "sidestep/lookahead/avoidance_trajectory.hpp"
 #include "sidestep/system/geometric_system.hpp"
 #include "sidestep/system/goal.hpp"
@@ -47,7 +49,7 @@ const std::vector<Field<LookAheadSettings>>& fields();
 ///
 /// A trajectory is no motion of the system, whose barriers would push the arm off it. The filter or the torque controller,
 /// which have to be there, keep the arm off obstacles and itself, and within limits. Where nothing moves, nothing is
-/// looked at. Predictions have acceleration limits, not torque limits.
+/// looked at. Predictions keep acceleration limits and, where the dynamics are given, torque limits by a TorqueController.
 ///
 /// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
 ///
@@ -60,8 +62,9 @@ class LookAhead {
   using Leader = std::function<void(const Eigen::VectorXd& q, double duration, Goal& goal)>;
 
   /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
-  /// which it names.
-  explicit LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings = {});
+  /// which it names. `dynamics`: of an arm that is moved by torque; of the system's robot.
+  explicit LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings = {},
+                     std::optional<RigidBodyDynamics> dynamics = std::nullopt);
 
   /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the trajectory that is
   /// followed, if there is one. What is to be followed from `delay` on: a trajectory, or the system to the goal where
@@ -104,9 +107,10 @@ class LookAhead {
   struct Stepper {
     double period;
     AccelerationFilter filter;
-    int steps = 0;  // integrated so far
+    std::optional<TorqueController> program;  // in place of the filter, where the dynamics are given
+    int steps = 0;                            // integrated so far
 
-    Stepper(const Robot& robot, double period);
+    Stepper(const Robot& robot, double period, bool by_torque);
   };
 
   void check_interrupted() const;
@@ -126,6 +130,10 @@ class LookAhead {
   LookAheadSettings settings_;
   GeometricSystem::Workspace workspace_;
   int periods_;  // of a delay
+  std::optional<RigidBodyDynamics> dynamics_;
+  std::optional<RigidBodyDynamics::Workspace> dynamics_workspace_;
+  Eigen::MatrixXd mass_;  // of the state that is looked at
+  Eigen::VectorXd bias_;
   Stepper fine_, coarse_;
   TorqueSolution filtered_;
   std::vector<Eigen::Index> of_obstacles_;  // coordinates
