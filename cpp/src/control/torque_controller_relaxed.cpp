@@ -19,9 +19,6 @@ constexpr double least_gradient_squared = 0.05 * 0.05;
 // The least that a shortfall counts. A clearance of little leverage falls short by much: more would fling joints about.
 constexpr double least_weight = 1e-9;
 
-// Curvature of the price of a shortfall, which else is its size [s²]: so small that few fall short, and by as much as it takes.
-constexpr double uneven = 1e-4;
-
 }  // namespace
 
 void TorqueController::widen_bounds() noexcept {
@@ -81,18 +78,10 @@ bool TorqueController::solve_least(LeastShortfall& least, bool of_lost, TorqueSo
   for (int i = 0; i < nv_; ++i) {
     data.g[i] = of_lost ? -lost_regularisation * std::clamp(wanted_[i], bounds_.lower[i], bounds_.upper[i]) : 0.0;
   }
-  data.g.tail(least.num_rows).setZero();
-  data.lower.tail(least.num_rows).setConstant(-infinity);
   for (int n = 0; n < num_rows_used_; ++n) {
     const int row = rows_used_[static_cast<std::size_t>(n)];
     const bool lost = rows_.depths[row] > 0.0, shared = lost == of_lost;
     data.A(nv_ + n, nv_ + n) = shared ? 1.0 : 0.0;
-    // What is not lost is kept whole where it can be, rather than all a little short.
-    data.g[nv_ + n] = shared && !of_lost ? 1.0 : 0.0;
-    data.lower[nv_ + n] = shared && !of_lost ? 0.0 : -infinity;
-    if (!lost) {
-      data.H(nv_ + n, nv_ + n) = of_lost ? 1.0 : uneven;
-    }
     data.row_lower[nv_ + n] = shared ? rows_.lower[row] : of_lost ? lowered(n, true) : -infinity;
   }
   if (least.program.solve(data) != QuadraticProgramStatus::solved) {

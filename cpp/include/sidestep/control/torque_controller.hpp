@@ -104,8 +104,8 @@ struct TorqueControllerSettings {
 /// to the bounds, within a box of the overruns and of position limits, at the cost p's with a price p far above the
 /// task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
 /// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of those
-/// that are not below zero, then of those that are, w times their depth over the largest. What pulls two ways is shared, and an arm that cannot get out comes
-/// to rest. Where the torque does not reach the box, it is first widened by the least squares that do. So there always
+/// that are not below zero, then of those that are, w times their depth over the largest. What pulls two ways is shared,
+/// and an arm that cannot get out comes to rest. Where the torque does not reach the box, it is first widened by the least squares that do. So there always
 /// is a solution.
 ///
 /// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
