@@ -125,7 +125,7 @@ class SceneOutcome:
         if self.goal_beyond_limits > self.tolerance:
             found.append(f"the goal is {self.goal_beyond_limits:.3f} rad beyond the position limits")
         if found and self.ended:
-            found.append(f"the guide says {self.ended}")
+            found.append(f"the controller says {self.ended}")
         covered = self.goal.covered
         if found and covered is not None and covered.distance <= 0.0:
             found.append(

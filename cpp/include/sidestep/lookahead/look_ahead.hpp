@@ -10,13 +10,13 @@
 
 #include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/control/torque_controller.hpp"
-#include "sidestep/model/dynamics.hpp"
-#include "sidestep/lookahead/avoidance_trajectory.hpp"
-#include "sidestep/system/geometric_system.hpp"
-#include "sidestep/system/goal.hpp"
 #include "sidestep/fields.hpp"
 #include "sidestep/interruption.hpp"
+#include "sidestep/lookahead/avoidance_trajectory.hpp"
+#include "sidestep/model/dynamics.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/system/goal.hpp"
 
 namespace sidestep {
 
@@ -37,8 +37,8 @@ const std::vector<Field<LookAheadSettings>>& fields();
 /// Leads an arm out of the way of what moves, in time: a barrier backs off along the line of approach until a joint
 /// limit stops the arm, where a step aside would have let it pass.
 ///
-/// In a look the system, with clearances and joint limits as an AccelerationFilter keeps them, is integrated from
-/// where the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal
+/// In a look the system, with clearances and limits as an AccelerationFilter keeps them or, where the dynamics are given, a
+/// TorqueController, is integrated from where the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal
 /// that comes nearer to an obstacle than `clearance`, and so does the trajectory that is followed already,
 /// trajectories to random configurations are drawn: near ones, far ones and such as are near that of the trajectory
 /// followed. They are filtered in three stages. Those come first whose references, without a filter, get farthest
@@ -49,7 +49,7 @@ const std::vector<Field<LookAheadSettings>>& fields();
 ///
 /// A trajectory is no motion of the system, whose barriers would push the arm off it. The filter or the torque controller,
 /// which have to be there, keep the arm off obstacles and itself, and within limits. Where nothing moves, nothing is
-/// looked at. Predictions keep acceleration limits and, where the dynamics are given, torque limits by a TorqueController.
+/// looked at.
 ///
 /// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
 ///
