@@ -135,7 +135,11 @@ void bind_acceleration_bounds(nb::module_& m) {
       .value("acceleration_lower", Limit::acceleration_lower)
       .value("acceleration_upper", Limit::acceleration_upper)
       .value("torque_lower", Limit::torque_lower)
-      .value("torque_upper", Limit::torque_upper);
+      .value("torque_upper", Limit::torque_upper)
+      .value("jerk_lower", Limit::jerk_lower)
+      .value("jerk_upper", Limit::jerk_upper)
+      .value("torque_rate_lower", Limit::torque_rate_lower)
+      .value("torque_rate_upper", Limit::torque_rate_upper);
 
   m.def(
       "acceleration_bounds",
@@ -158,7 +162,7 @@ void bind_acceleration_bounds(nb::module_& m) {
           throw nb::value_error("limits must have the same number of entries each");
         }
         AccelerationBounds bounds(nv);
-        bounds.update(limits, position, velocity, period, position_margin);
+        bounds.update(limits, position, velocity, period, {position_margin, 1.0, 1.0});
         return nb::make_tuple(to_numpy(bounds.lower), to_numpy(bounds.upper));
       },
       nb::arg("limits"), nb::arg("q"), nb::arg("v"), nb::arg("period"), nb::kw_only(), nb::arg("position_margin") = 0.0,
@@ -373,7 +377,7 @@ void bind_acceleration_filter(nb::module_& m) {
           [](AccelerationFilter* self, const Robot& robot, double period, double position_margin, double stop_time,
              const SafetySettings* safety) {
             new (self) AccelerationFilter(
-                robot, {period, position_margin, stop_time, safety == nullptr ? SafetySettings() : *safety});
+                robot, {period, position_margin, 1.0, stop_time, safety == nullptr ? SafetySettings() : *safety});
           },
           nb::arg("robot"), nb::kw_only(), nb::arg("period") = defaults.period,
           nb::arg("position_margin") = defaults.position_margin, nb::arg("stop_time") = defaults.stop_time,

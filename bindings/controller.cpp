@@ -43,6 +43,10 @@ void bind_settings_tree(nb::module_& m) {
   using S = ControllerSettings;
   bind_settings<BarrierSettings>(m, "BarrierSettings", "The spring that pulls to the goal, and the barriers that bend its way.");
   bind_settings<ArrivalSettings>(m, "ArrivalSettings", "When a goal counts as reached.");
+  bind_settings<TrackingSettings>(
+      m, "TrackingSettings",
+      "How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 w (v_r - v), with what the disturbance\n"
+      "observer found. Not for outputs of position and velocity, which the arm's own drives track.");
   bind_settings<OnlinePlannerSettings>(
       m, "OnlinePlannerSettings", "The planner that runs beside the loop: how it searches, and how its paths are followed.",
       {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "TimedPathSettings", &OnlinePlannerSettings::route)})
@@ -51,23 +55,29 @@ void bind_settings_tree(nb::module_& m) {
   bind_settings<LookAheadSettings>(m, "LookAheadSettings", "Trajectories out of the way of what moves, see Controller.");
   bind_settings<LocalMinimumSettings>(m, "LocalMinimumSettings", "Sub-goals where the arm is stuck and there is no path.");
 
-  nb::enum_<S::Output>(m, "Output", "What a controller's program solves for.")
+  nb::enum_<S::Output>(m, "Output",
+                       "What is sent to the arm. Torque and acceleration are tracked by the controller, from the measured state;\n"
+                       "position and velocity by the arm's own drives.")
       .value("automatic", S::Output::automatic, "Torque where the arm has inertias and effort limits.")
       .value("torque", S::Output::torque)
-      .value("acceleration", S::Output::acceleration);
+      .value("acceleration", S::Output::acceleration)
+      .value("velocity", S::Output::velocity)
+      .value("position", S::Output::position);
 
   auto c = bind_settings<S>(
       m, "ControllerSettings",
       "All settings of a Controller. Every part is on by default; `planner=None`, `look_ahead=None` and `local_minimum=None`\n"
       "leave a part out, for comparisons.",
       {part("barriers", "BarrierSettings", &S::barriers), part("safety", "SafetySettings", &S::safety),
-       part("arrival", "ArrivalSettings", &S::arrival), part("planner", "OnlinePlannerSettings | None", &S::planner),
+       part("arrival", "ArrivalSettings", &S::arrival), part("tracking", "TrackingSettings", &S::tracking),
+       part("planner", "OnlinePlannerSettings | None", &S::planner),
        part("look_ahead", "LookAheadSettings | None", &S::look_ahead),
        part("local_minimum", "LocalMinimumSettings | None", &S::local_minimum),
        {"output", "Output | str", [](S& s, nb::handle value) { s.output = as_enum<S::Output>(value, "output"); }}});
   c.def_rw("barriers", &S::barriers)
       .def_rw("safety", &S::safety)
       .def_rw("arrival", &S::arrival)
+      .def_rw("tracking", &S::tracking)
       .def_rw("output", &S::output)
       .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.")
       .def("__copy__", [](const S& s) { return S(s); });
@@ -83,6 +93,7 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<BarrierSettings>(rows, "barriers.");
         describe_fields<SafetySettings>(rows, "safety.");
         describe_fields<ArrivalSettings>(rows, "arrival.");
+        describe_fields<TrackingSettings>(rows, "tracking.");
         describe_fields<OnlinePlannerSettings>(rows, "planner.", true);
         describe_fields<PlannerSettings>(rows, "planner.search.", true);
         describe_fields<TimedPathSettings>(rows, "planner.route.", true);
@@ -99,7 +110,7 @@ void bind_command(nb::module_& m) {
   nb::enum_<SafetyStatus>(m, "SafetyStatus", nb::is_arithmetic(), "How safe a command is, by severity. Every command may be sent.")
       .value("ok", SafetyStatus::ok, "The motion is what the goal asks for.")
       .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
-      .value("relaxed", SafetyStatus::relaxed, "Velocity or acceleration limits gave way to clearances, position or torque limits.")
+      .value("relaxed", SafetyStatus::relaxed, "Jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits.")
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");
@@ -115,12 +126,18 @@ void bind_command(nb::module_& m) {
       .def_ro("status", &Command::status)
       .def_ro("activity", &Command::activity)
       .def_prop_ro("torque", [](const Command& c) { return to_numpy(c.torque); },
-                   "(nv,) [Nm | N], gravity included; zero where the output is acceleration.")
-      .def_prop_ro("acceleration", [](const Command& c) { return to_numpy(c.acceleration); }, "(nv,) [rad/s^2 | m/s^2].")
+                   "(nv,) [Nm | N], gravity included; zero where the output is not torque.")
+      .def_prop_ro("torque_without_gravity", [](const Command& c) { return to_numpy(c.torque_without_gravity); },
+                   "(nv,) the same for arms that hold themselves, such as Franka's; nan where the arm has no inertias.")
+      .def_prop_ro("acceleration", [](const Command& c) { return to_numpy(c.acceleration); },
+                   "(nv,) of the arm: the reference's with feedback [rad/s^2 | m/s^2].")
       .def_prop_ro("wanted", [](const Command& c) { return to_numpy(c.wanted); },
                    "(nv,) acceleration that was asked for, before any limit [rad/s^2 | m/s^2].")
-      .def_prop_ro("velocity", [](const Command& c) { return to_numpy(c.velocity); }, "(nv,) after one period [rad/s | m/s].")
-      .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); }, "(nv,) after one period [rad | m]; nan until a state was known.")
+      .def_prop_ro("velocity", [](const Command& c) { return to_numpy(c.velocity); },
+                   "(nv,) of the reference after this period [rad/s | m/s].")
+      .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); },
+                   "(nv,) of the reference after this period [rad | m]; nan until a state was known.")
+      .def_ro("tracking_error", &Command::tracking_error, "Largest difference of the arm from the reference [rad | m].")
       .def_ro("clearance", &Command::clearance, "The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.")
       .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")
       .def_ro("point", &Command::point, "The obstacle point, where it is one; else -1.")

@@ -1,3 +1,4 @@
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -67,22 +68,28 @@ void bind_kinematics(nb::module_& m) {
 
   nb::class_<JointLimits>(m, "JointLimits",
                           "Per-coordinate limits: position [rad | m], velocity [/s], acceleration [/s^2], "
-                          "effort [Nm | N]. Each (nv,); position bounds may be infinite, the others are positive.")
+                          "effort [Nm | N], jerk [/s^3], effort rate [Nm/s | N/s]. Each (nv,); position bounds may be "
+                          "infinite, the others are positive. Without `jerk` it is 100/s times the acceleration; without "
+                          "`effort_rate` there is no limit.")
       .def(
           "__init__",
           [](JointLimits* self, const ArrayLike& lower, const ArrayLike& upper, const ArrayLike& velocity, const ArrayLike& acceleration,
-             const ArrayLike& effort) {
+             const ArrayLike& effort, const std::optional<ArrayLike>& jerk, const std::optional<ArrayLike>& effort_rate) {
             new (self) JointLimits{as_vector(lower, "lower"), as_vector(upper, "upper"),
                                    as_vector(velocity, "velocity"), as_vector(acceleration, "acceleration"),
-                                   as_vector(effort, "effort")};
+                                   as_vector(effort, "effort"),
+                                   jerk ? as_vector(*jerk, "jerk") : Eigen::VectorXd(),
+                                   effort_rate ? as_vector(*effort_rate, "effort_rate") : Eigen::VectorXd()};
           },
           nb::kw_only(), nb::arg("lower"), nb::arg("upper"), nb::arg("velocity"), nb::arg("acceleration"),
-          nb::arg("effort"))
+          nb::arg("effort"), nb::arg("jerk") = nb::none(), nb::arg("effort_rate") = nb::none())
       .def_prop_ro("lower", [](const JointLimits& l) { return to_numpy(l.lower); })
       .def_prop_ro("upper", [](const JointLimits& l) { return to_numpy(l.upper); })
       .def_prop_ro("velocity", [](const JointLimits& l) { return to_numpy(l.velocity); })
       .def_prop_ro("acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); })
-      .def_prop_ro("effort", [](const JointLimits& l) { return to_numpy(l.effort); });
+      .def_prop_ro("effort", [](const JointLimits& l) { return to_numpy(l.effort); })
+      .def_prop_ro("jerk", [](const JointLimits& l) { return to_numpy(l.jerk); })
+      .def_prop_ro("effort_rate", [](const JointLimits& l) { return to_numpy(l.effort_rate); });
 
   nb::class_<Robot>(m, "Robot", "The immutable kinematic model of an arm, in the core.")
       .def(nb::init<std::string, std::vector<Joint>, std::vector<Frame>, std::vector<std::string>, JointLimits>(),

@@ -78,27 +78,123 @@ AccelerationInterval acceleration_interval(double q, double v, const ScalarLimit
   return interval;
 }
 
+double jerk_braking_distance(double v, double a, double A, double J) noexcept {
+  // From rest of the acceleration: a ramp, a hold and a ramp, symmetric, so that the mean speed is half of the first.
+  const auto from_rest = [A, J](double speed) {
+    if (!(speed > 0.0)) {
+      return 0.0;
+    }
+    const double ramp = A / J;
+    return speed >= A * ramp ? 0.5 * speed * (speed / A + ramp) : speed * std::sqrt(speed / J);
+  };
+  const double time = std::abs(a) / J;  // until, or since, no acceleration
+  if (a > 0.0) {
+    const double way = time * (v + a * time / 3.0);
+    return std::max(0.0, way + from_rest(v + 0.5 * a * time));
+  }
+  if (v <= 0.0) {
+    return 0.0;
+  }
+  if (v < -0.5 * a * time) {  // braking harder than that: it turns back before the acceleration is gone
+    const double until = (-a - std::sqrt(std::max(a * a - 2.0 * J * v, 0.0))) / J;
+    return until * (v + until * (0.5 * a + J * until / 6.0));
+  }
+  // As if it had begun to brake `time` ago.
+  const double first = v - 0.5 * a * time;
+  return from_rest(first) - time * (first + a * time / 6.0);
+}
+
+SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval, const ScalarLimits& limits,
+                               double jerk, double period) noexcept {
+  const double step = jerk * period, A = limits.acceleration;
+  SmoothInterval smooth{interval.lower, interval.upper, interval.lower_limit, interval.upper_limit};
+  if (!(step < infinity)) {
+    return smooth;
+  }
+  // The largest x towards an upper limit, of a state that may be mirrored; `largest` where nothing is in its way.
+  const auto viable_up_to = [&](double room, double speed, double least, double largest, Limit at_velocity, Limit at_position,
+                                Limit& limit) {
+    double x = largest;
+    const double half = 0.5 * step;
+    // v + xT <= V, or with y = x - JT/2 > 0:  v + JT²/2 + yT + y²/2J <= V
+    const double left = limits.velocity - speed;
+    double by_velocity = left / period;
+    if (by_velocity > half) {
+      by_velocity = half + jerk * (std::sqrt(std::max(period * period + 2.0 * (left - half * period) / jerk, 0.0)) - period);
+    }
+    if (by_velocity < x) {
+      x = by_velocity;
+      limit = at_velocity;
+    }
+    const auto fits = [&](double candidate) {
+      const double next = speed + candidate * period, then = std::max(candidate - half, -A);
+      const double fastest = then > 0.0 ? next + 0.5 * then * then / jerk : next;  // of the profile
+      return (std::max(next, 0.5 * (next + speed)) + 0.5 * std::max(fastest, 0.0)) * period +
+                 jerk_braking_distance(next, then, A, jerk) <= room;
+    };
+    if (room < infinity && !fits(x)) {
+      limit = at_position;
+      double low = least, high = x;
+      constexpr int halvings = 24;
+      for (int k = 0; k < halvings && high > low; ++k) {
+        const double middle = 0.5 * (low + high);
+        (fits(middle) ? low : high) = middle;
+      }
+      x = low;
+    }
+    return x;
+  };
+  Limit upper_limit = Limit::jerk_upper, lower_limit = Limit::jerk_lower;
+  const double upper = viable_up_to(limits.upper - q, v, before - step, before + step, Limit::velocity_upper, Limit::position_upper, upper_limit);
+  const double lower = -viable_up_to(q - limits.lower, -v, -before - step, -before + step, Limit::velocity_lower, Limit::position_lower, lower_limit);
+  if (upper < smooth.upper) {
+    smooth.upper = std::max(upper, before - step);
+    smooth.upper_limit = upper_limit;
+  }
+  if (lower > smooth.lower) {
+    smooth.lower = std::min(lower, before + step);
+    smooth.lower_limit = lower_limit;
+  }
+  smooth.upper = std::clamp(smooth.upper, interval.lower, interval.upper);
+  smooth.lower = std::clamp(smooth.lower, interval.lower, interval.upper);
+  if (smooth.lower > smooth.upper) {  // both ways at once, of a state that was not reached this way
+    smooth.lower = smooth.upper = std::clamp(std::clamp(0.0, smooth.upper, smooth.lower), before - step, before + step);
+    smooth.lower = smooth.upper = std::clamp(smooth.lower, interval.lower, interval.upper);
+  }
+  return smooth;
+}
+
 AccelerationBounds::AccelerationBounds(int num_coordinates)
     : lower(Eigen::VectorXd::Constant(num_coordinates, -infinity)),
       upper(Eigen::VectorXd::Constant(num_coordinates, infinity)),
       lower_limit(static_cast<std::size_t>(num_coordinates), Limit::none),
       upper_limit(static_cast<std::size_t>(num_coordinates), Limit::none),
+      smooth_lower(lower),
+      smooth_upper(upper),
+      smooth_lower_limit(lower_limit),
+      smooth_upper_limit(upper_limit),
       position_lower(lower),
       position_upper(upper) {}
 
-void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q,
-                                ConstVectorRef v, double period,
-                                double position_margin) noexcept {
+void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, ConstVectorRef v, double period, const LimitMargins& margins,
+                                const Eigen::VectorXd* before) noexcept {
   for (Eigen::Index i = 0; i < lower.size(); ++i) {
-    const ScalarLimits joint{limits.lower[i] + position_margin, limits.upper[i] - position_margin, limits.velocity[i],
-                             limits.acceleration[i]};
+    const ScalarLimits joint{limits.lower[i] + margins.position, limits.upper[i] - margins.position,
+                             margins.velocity_share * limits.velocity[i], limits.acceleration[i]};
     const AccelerationInterval interval = acceleration_interval(q[i], v[i], joint, period);
+    const auto at = static_cast<std::size_t>(i);
     lower[i] = interval.lower;
     upper[i] = interval.upper;
     position_lower[i] = interval.position_lower;
     position_upper[i] = interval.position_upper;
-    lower_limit[static_cast<std::size_t>(i)] = interval.lower_limit;
-    upper_limit[static_cast<std::size_t>(i)] = interval.upper_limit;
+    lower_limit[at] = interval.lower_limit;
+    upper_limit[at] = interval.upper_limit;
+    const double jerk = before == nullptr ? infinity : margins.jerk_share * limits.jerk[i];
+    const SmoothInterval smooth = smooth_interval(q[i], v[i], before == nullptr ? 0.0 : (*before)[i], interval, joint, jerk, period);
+    smooth_lower[i] = smooth.lower;
+    smooth_upper[i] = smooth.upper;
+    smooth_lower_limit[at] = smooth.lower_limit;
+    smooth_upper_limit[at] = smooth.upper_limit;
   }
 }
 

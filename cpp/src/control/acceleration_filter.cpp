@@ -9,6 +9,7 @@ namespace {
 Robot of_unlimited_effort(const Robot& robot) {
   JointLimits limits = robot.limits();
   limits.effort.setConstant(std::numeric_limits<double>::infinity());
+  limits.effort_rate = limits.effort;
   return Robot(robot.name(), robot.joints(), robot.frames(), robot.coordinate_names(), std::move(limits));
 }
 
@@ -16,6 +17,7 @@ TorqueControllerSettings controller_settings(const AccelerationFilterSettings& s
   TorqueControllerSettings result;
   result.period = settings.period;
   result.position_margin = settings.position_margin;
+  result.velocity_share = settings.velocity_share;
   result.stop_time = settings.stop_time;
   result.safety = settings.safety;
   result.torque_weight.setZero();

@@ -102,6 +102,7 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
       coordinates(static_cast<std::size_t>(normals.rows())),
       nearest(static_cast<std::size_t>(normals.rows())),
       depths(Eigen::VectorXd::Zero(normals.rows())),
+      along_path(static_cast<std::size_t>(normals.rows())),
       settings_(settings),
       urgency_(Eigen::VectorXd::Zero(normals.rows())),
       response_(Eigen::VectorXd::Zero(num_coordinates)),
@@ -126,18 +127,18 @@ bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   return true;
 }
 
-void SafetyRows::find_responses(const ClearanceState& approach, const Eigen::MatrixXd& L) noexcept {
+void SafetyRows::find_responses(int first, const ClearanceState& approach, const Eigen::MatrixXd& L) noexcept {
   const Eigen::Index nv = responses_.rows();
-  for (int row = 0; row < size_; ++row) {
+  for (int row = first; row < size_; ++row) {
     responses_.col(row) = approach.gradients.col(coordinates[static_cast<std::size_t>(row)]);
   }
   const auto divide = [&](Eigen::Index i) {
-    for (int row = 0; row < size_; ++row) {
+    for (int row = first; row < size_; ++row) {
       responses_(i, row) /= L(i, i);
     }
   };
   const auto subtract = [&](Eigen::Index i, double factor, Eigen::Index k) {
-    for (int row = 0; row < size_; ++row) {
+    for (int row = first; row < size_; ++row) {
       responses_(i, row) -= factor * responses_(k, row);
     }
   };
@@ -188,8 +189,8 @@ double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits
   return std::clamp(by_torque, by_limits, longest_stop * by_limits);
 }
 
-void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
-                        const AccelerationBounds& bounds, double period, const BrakingTorque* torque) noexcept {
+void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
+                     const AccelerationBounds& bounds, double period, const BrakingTorque* torque) noexcept {
   const double tau = stop_time(v, limits, torque);
   const double rate = tau * settings_.rate > 1.0 ? 1.0 / tau : settings_.rate;
   const ClearanceState& approach = clearances.approach;
@@ -197,7 +198,7 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     return approach.values[k] - std::min(settings_.margin, clearances.margins[k]);
   };
   // Insert into the list of the most critical, which is kept sorted; it is short.
-  clear();
+  const int first = size_ = std::min(size_, max_size() - max_size() / 2);
   for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
     if (clearances.nearest[k] < 0 || max_size() == 0) {
       continue;
@@ -211,11 +212,11 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
       continue;
     }
     const double urgency = room_of(k) + approach.rates[k] / rate;
-    if (size_ == max_size() && urgency >= urgency_[size_ - 1]) {
+    if (size_ == max_size() && (size_ == first || urgency >= urgency_[size_ - 1])) {
       continue;
     }
     int at = size_ < max_size() ? size_++ : size_ - 1;
-    for (; at > 0 && urgency_[at - 1] > urgency; --at) {
+    for (; at > first && urgency_[at - 1] > urgency; --at) {
       urgency_[at] = urgency_[at - 1];
       coordinates[static_cast<std::size_t>(at)] = coordinates[static_cast<std::size_t>(at) - 1];
     }
@@ -223,11 +224,12 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     coordinates[static_cast<std::size_t>(at)] = static_cast<int>(k);
   }
   if (torque != nullptr) {
-    find_responses(approach, torque->mass_cholesky);
+    find_responses(first, approach, torque->mass_cholesky);
   }
   double hardest_stop = 0.0;
   int hardest_row = -1;  // that a stop along the path is for
-  for (int row = 0; row < size_; ++row) {
+  for (int row = first; row < size_; ++row) {
+    along_path[static_cast<std::size_t>(row)] = 0;
     const int k = coordinates[static_cast<std::size_t>(row)];
     const auto gradient = approach.gradients.col(k);
     const double by_torque = torque == nullptr ? infinity : hardest_by_torque(row, limits, *torque);
@@ -271,7 +273,8 @@ void SafetyRows::update(const Clearances& clearances, const Eigen::VectorXd& v, 
     depths[row] = std::max(-approach.values[k], 0.0);
   }
   if (hardest_row >= 0) {
-    const int row = along_path = size_ < max_size() ? size_++ : size_ - 1;
+    const int row = size_ < max_size() ? size_++ : size_ - 1;
+    along_path[static_cast<std::size_t>(row)] = 1;
     const double speed = v.norm();
     normals.row(row) = -v.transpose() / speed;
     lower[row] = hardest_stop * speed / tau;

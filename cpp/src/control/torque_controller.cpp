@@ -130,7 +130,9 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       weighted_(Eigen::VectorXd::Zero(nv_)),
       velocity_(Eigen::VectorXd::Zero(nv_)),
       wanted_(Eigen::VectorXd::Zero(nv_)),
-      bias_(Eigen::VectorXd::Zero(nv_)) {
+      bias_(Eigen::VectorXd::Zero(nv_)),
+      rate_lower_(bias_),
+      rate_upper_(bias_) {
   // Over x = (q̈, s): q̈ - s <= upper, q̈ + s >= lower, the torque rows, normals q̈ >= lower; s >= 0.
   comfort_data_.A.topLeftCorner(nv_, nv_).setIdentity();
   comfort_data_.A.block(0, nv_, nv_, nv_).diagonal().setConstant(-1.0);
@@ -153,11 +155,12 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
                                      ConstVectorRef v,
                                      ConstVectorRef acceleration,
                                      const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                     ConstVectorRef bias, const Clearances* clearances,
-                                     TorqueSolution& solution) noexcept {
+                                     ConstVectorRef bias, const Clearances* clearances, const SecondState& second,
+                                     const LastCommand& last, TorqueSolution& solution) noexcept {
   const auto usable = [this](const auto& x) { return x.size() == nv_ && all_finite(x); };
   const bool q_known = usable(q), v_known = usable(v), wanted_known = usable(acceleration), bias_known = usable(bias);
-  const bool clear = clearances == nullptr || rows_.usable(*clearances);
+  const bool two = second.clearances != nullptr;
+  const bool clear = (clearances == nullptr || rows_.usable(*clearances)) && (!two || rows_.usable(*second.clearances));
   bool mass_known = mass_matrix.rows() == nv_ && mass_matrix.cols() == nv_ && all_finite(mass_matrix);
   if (mass_known) {
     mass_ = mass_matrix;
@@ -181,7 +184,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   solution.slack.setZero();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (q_known && v_known) {
-    bounds_.update(limits_, q, v, settings_.period, settings_.position_margin);
+    bounds_.update(limits_, q, v, settings_.period,
+                   {settings_.position_margin, settings_.velocity_share, mass_known && last.torque != nullptr ? jerk_share() : 1.0},
+                   last.acceleration);
     solution.lower = bounds_.lower;
     solution.upper = bounds_.upper;
   } else {
@@ -194,25 +199,53 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   row_multipliers_.setZero();
   solution.num_safety_rows = 0;
   solution.dominant = -1;
+  solution.least_clearance = infinity;
+  solution.least_coordinate = solution.least_nearest = -1;
   report_clearance(clearances, solution);
+  report_clearance(second.clearances, solution);
   if (q_known && v_known && mass_known && bias_known) {
     if (clearances != nullptr && clear) {
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr);
+      if (two) {
+        rows_.add(*second.clearances, *second.velocity, limits_, bounds_, settings_.period, limited ? &braking : nullptr);
+      }
     }
     if (wanted_known && clear) {
       wanted_ = acceleration;
     } else {
       wanted_ = -velocity_ / settings_.stop_time;
     }
-    if (solve_within_bounds(solution) && !presses_for_lost()) {
+    const bool smooth = last.acceleration != nullptr || last.torque != nullptr;
+    write_cost();
+    write_torque_rows(&last);
+    bool solved = solve_within_bounds(true, solution), kept = true;
+    if (!solved && smooth) {
+      // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond.
+      wanted_ = wanted_.cwiseMax(bounds_.smooth_lower).cwiseMin(bounds_.smooth_upper);
+      write_cost();
+      write_torque_rows(nullptr);
+      solved = solve_within_bounds(false, solution);
+      kept = false;
+    }
+    if (solved && !presses_for_lost()) {
       const bool free = std::all_of(solution.active.begin(), solution.active.end(),
                                     [](Limit limit) { return limit == Limit::none; });
-      status = free && row_multipliers_.isZero(0.0) ? TorqueStatus::ok : TorqueStatus::limited;
+      status = !kept                                  ? TorqueStatus::relaxed
+               : free && row_multipliers_.isZero(0.0) ? TorqueStatus::ok
+                                                      : TorqueStatus::limited;
     } else {
+      write_torque_rows(nullptr);
+      kept = kept && !smooth;
       status = solve_relaxed(solution);
+      if (status < TorqueStatus::relaxed && !kept) {
+        status = TorqueStatus::relaxed;
+      }
+    }
+    if (last.acceleration != nullptr) {
+      report_jerk(solution);
     }
     report_safety(solution);
     if (rows_.helpless >= 0 && status < TorqueStatus::relaxed_safety) {
@@ -247,19 +280,58 @@ bool TorqueController::factorise_mass() noexcept {
   return cholesky(mass_, mass_cholesky_);
 }
 
-void TorqueController::add_active(int i, double at_upper, double at_lower, double at_effort,
+double TorqueController::jerk_share() const noexcept {
+  // |M j| T <= share of the rate: what is left is for the change of the bias.
+  constexpr double of_rate = 0.8;
+  double share = 1.0;
+  for (int i = 0; i < nv_; ++i) {
+    double most = 0.0;
+    for (int j = 0; j < nv_; ++j) {
+      most += std::abs(mass_(i, j)) * limits_.jerk[j];
+    }
+    if (most * share > of_rate * limits_.effort_rate[i]) {
+      share = of_rate * limits_.effort_rate[i] / most;
+    }
+  }
+  return share;
+}
+
+void TorqueController::write_torque_rows(const LastCommand* last) noexcept {
+  hard_data_.A.topRows(nv_) = mass_;
+  rate_lower_ = -limits_.effort - bias_;
+  rate_upper_ = limits_.effort - bias_;
+  if (last != nullptr && last->torque != nullptr) {
+    for (int i = 0; i < nv_; ++i) {
+      const double step = limits_.effort_rate[i] * settings_.period, before = (*last->torque)[i] - bias_[i];
+      const double change = last->gravity_change == nullptr ? 0.0 : (*last->gravity_change)[i];
+      const double lower = std::max(before, before + change) - step, upper = std::min(before, before + change) + step;
+      if (lower <= upper && upper >= rate_lower_[i] && lower <= rate_upper_[i]) {
+        rate_lower_[i] = std::max(rate_lower_[i], lower);
+        rate_upper_[i] = std::min(rate_upper_[i], upper);
+      }
+    }
+  }
+  hard_data_.row_lower.head(nv_) = rate_lower_;
+  hard_data_.row_upper.head(nv_) = rate_upper_;
+}
+
+void TorqueController::add_active(int i, double at_upper, double at_lower, double at_effort, bool smooth,
                                   TorqueSolution& solution) const noexcept {
   const auto joint = static_cast<std::size_t>(i);
+  const auto& upper = smooth ? bounds_.smooth_upper_limit : bounds_.upper_limit;
+  const auto& lower = smooth ? bounds_.smooth_lower_limit : bounds_.lower_limit;
+  const bool by_rate_up = smooth && hard_data_.row_upper[i] < limits_.effort[i] - bias_[i];
+  const bool by_rate_down = smooth && hard_data_.row_lower[i] > -limits_.effort[i] - bias_[i];
   solution.active[joint] = solution.active[joint] |
-                           (at_upper > 0.0   ? bounds_.upper_limit[joint]
-                            : at_lower < 0.0 ? bounds_.lower_limit[joint]
+                           (at_upper > 0.0   ? upper[joint]
+                            : at_lower < 0.0 ? lower[joint]
                                              : Limit::none) |
-                           (at_effort > 0.0   ? Limit::torque_upper
-                            : at_effort < 0.0 ? Limit::torque_lower
+                           (at_effort > 0.0   ? by_rate_up ? Limit::torque_rate_upper : Limit::torque_upper
+                            : at_effort < 0.0 ? by_rate_down ? Limit::torque_rate_lower : Limit::torque_lower
                                               : Limit::none);
 }
 
-bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
+void TorqueController::write_cost() noexcept {
   // H = Q + M R' M,  g = -Q a + M R' h   with R' = R / effort limit^2.
   with_size(nv_, [&](auto nv) {
     auto weighted = sized(weighted_, nv);
@@ -281,14 +353,18 @@ bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
       hard_data_.g[i] = value;
     }
   });
-  hard_data_.lower = bounds_.lower;
-  hard_data_.upper = bounds_.upper;
-  hard_data_.A.topRows(nv_) = mass_;
-  hard_data_.row_lower.head(nv_) = -limits_.effort - bias_;
-  hard_data_.row_upper.head(nv_) = limits_.effort - bias_;
+}
+
+bool TorqueController::solve_within_bounds(bool smooth, TorqueSolution& solution) noexcept {
+  const Eigen::VectorXd& lower = smooth ? bounds_.smooth_lower : bounds_.lower;
+  const Eigen::VectorXd& upper = smooth ? bounds_.smooth_upper : bounds_.upper;
+  std::fill(solution.active.begin(), solution.active.end(), Limit::none);
+  row_multipliers_.setZero();
+  hard_data_.lower = lower;
+  hard_data_.upper = upper;
   hard_data_.row_lower.tail(rows_.max_size()).setConstant(-infinity);
   for (int k = 0; k < rows_.size(); ++k) {
-    if (!rows_.satisfied_within(k, bounds_.lower, bounds_.upper)) {
+    if (!rows_.satisfied_within(k, lower, upper)) {
       hard_data_.A.row(nv_ + k) = rows_.normals.row(k);
       hard_data_.row_lower[nv_ + k] = rows_.lower[k];
     }
@@ -296,20 +372,18 @@ bool TorqueController::solve_within_bounds(TorqueSolution& solution) noexcept {
   if (hard_.solve(hard_data_) != QuadraticProgramStatus::solved) {
     return false;
   }
-  solution.acceleration = hard_.solution().cwiseMax(bounds_.lower).cwiseMin(bounds_.upper);  // rounding
+  solution.acceleration = hard_.solution().cwiseMax(lower).cwiseMin(upper);  // rounding
   for (int k = 0; k < rows_.size(); ++k) {
     row_multipliers_[k] = std::max(-hard_.multipliers()[2 * nv_ + k], 0.0);
   }
   for (int i = 0; i < nv_; ++i) {
     const double at_bound = hard_.multipliers()[i];
-    add_active(i, at_bound, at_bound, hard_.multipliers()[nv_ + i], solution);
+    add_active(i, at_bound, at_bound, hard_.multipliers()[nv_ + i], smooth, solution);
   }
   return accept(solution);
 }
 
 void TorqueController::report_clearance(const Clearances* clearances, TorqueSolution& solution) const noexcept {
-  solution.least_clearance = infinity;
-  solution.least_coordinate = solution.least_nearest = -1;
   if (clearances == nullptr) {
     return;
   }
@@ -331,12 +405,24 @@ void TorqueController::report_safety(TorqueSolution& solution) noexcept {
     const auto at = static_cast<std::size_t>(k);
     const double short_by = rows_.lower[k] - rows_.normals.row(k).dot(solution.acceleration.transpose());
     const bool rounding = short_by <= slack_tolerance * (1.0 + std::abs(rows_.lower[k]) + wanted_.norm());
-    solution.safety[at] = {rows_.coordinates[at], rows_.nearest[at], k == rows_.along_path,
+    solution.safety[at] = {rows_.coordinates[at], rows_.nearest[at], rows_.along_path[at] != 0,
                            rows_.lengths[k] * rows_.lower[k], rounding ? 0.0 : rows_.lengths[k] * short_by,
                            row_multipliers_[k]};
     if (row_multipliers_[k] > largest) {
       largest = row_multipliers_[k];
       solution.dominant = k;
+    }
+  }
+}
+
+void TorqueController::report_jerk(TorqueSolution& solution) const noexcept {
+  for (int i = 0; i < nv_; ++i) {
+    const auto joint = static_cast<std::size_t>(i);
+    const double x = solution.acceleration[i], rounding = slack_tolerance * (1.0 + std::abs(x));
+    if (x > bounds_.smooth_upper[i] + rounding && bounds_.smooth_upper_limit[joint] == Limit::jerk_upper) {
+      solution.active[joint] = solution.active[joint] | Limit::jerk_upper;
+    } else if (x < bounds_.smooth_lower[i] - rounding && bounds_.smooth_lower_limit[joint] == Limit::jerk_lower) {
+      solution.active[joint] = solution.active[joint] | Limit::jerk_lower;
     }
   }
 }

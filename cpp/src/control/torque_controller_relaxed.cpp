@@ -97,7 +97,7 @@ bool TorqueController::solve_least(LeastShortfall& least, bool of_lost, TorqueSo
   }
   for (int i = 0; i < nv_; ++i) {  // what the shortfalls are due to
     const Eigen::VectorXd& multipliers = least.program.multipliers();
-    add_active(i, multipliers[i], multipliers[i], multipliers[nv_ + least.num_rows + i], solution);
+    add_active(i, multipliers[i], multipliers[i], multipliers[nv_ + least.num_rows + i], false, solution);
   }
   return true;
 }
@@ -181,7 +181,7 @@ bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noe
   const int first_row = 2 * nv_;  // multipliers of the bounds come before those of the rows
   for (int i = 0; i < nv_; ++i) {
     add_active(i, std::max(multipliers[i], multipliers[first_row + i]),
-               std::min(multipliers[i], multipliers[first_row + nv_ + i]), multipliers[first_row + 2 * nv_ + i], solution);
+               std::min(multipliers[i], multipliers[first_row + nv_ + i]), multipliers[first_row + 2 * nv_ + i], false, solution);
   }
   for (int n = 0; n < num_rows_used_; ++n) {
     row_multipliers_[rows_used_[static_cast<std::size_t>(n)]] = std::max(-multipliers[first_row + 3 * nv_ + n], 0.0);

@@ -118,9 +118,25 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       here_(body_),
       q_(Eigen::VectorXd::Zero(arm.num_coordinates())),
       v_(q_),
-      last_q_(Eigen::VectorXd::Constant(q_.size(), std::numeric_limits<double>::quiet_NaN())),
+      a_(q_),
       wanted_(q_),
+      next_q_(q_),
+      next_v_(q_),
+      arm_q_(q_),
+      arm_v_(q_),
+      last_arm_q_(Eigen::VectorXd::Constant(q_.size(), std::numeric_limits<double>::quiet_NaN())),
+      last_arm_v_(q_),
       turns_(q_),
+      drives_track_(settings.output == ControllerSettings::Output::position || settings.output == ControllerSettings::Output::velocity),
+      reference_torque_(q_),
+      last_torque_(q_),
+      last_acceleration_(q_),
+      disturbance_(q_),
+      surplus_(q_),
+      feedback_(q_),
+      gravity_(q_),
+      arm_workspace_(*system),
+      tracked_(arm.num_coordinates(), settings.safety.max_rows),
       mass_(Eigen::MatrixXd::Constant(q_.size(), q_.size(), std::numeric_limits<double>::quiet_NaN())),
       bias_(q_),
       is_sliding_(static_cast<std::size_t>(q_.size()), false),
@@ -137,6 +153,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       worker_workspace_(*system),
       look_period_(settings.planner ? settings.planner->period : default_look_period) {
   guide = make_guide(body_, settings);
+  const double velocity_share = settings.speed * (1.0 - settings.velocity_margin);
   if (torque) {
     TorqueControllerSettings program;
     program.period = settings.period;
@@ -148,14 +165,18 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     program.slack_weight = settings.slack_weight;
     program.velocity_overrun = settings.velocity_overrun;
     program.acceleration_overrun = settings.acceleration_overrun;
+    tracking_program_.emplace(arm.robot(), program);
+    program.velocity_share = velocity_share;
     torque_program_.emplace(arm.robot(), program);
     if (arm.has_dynamics()) {
       dynamics_.emplace(arm.dynamics());
       dynamics_workspace_.emplace(*dynamics_);
     }
   } else {
-    filter_.emplace(arm.robot(), AccelerationFilterSettings{settings.period, settings.position_margin, settings.stop_time,
-                                                            settings.safety});
+    AccelerationFilterSettings program{settings.period, settings.position_margin, 1.0, settings.stop_time, settings.safety};
+    tracking_filter_.emplace(arm.robot(), program);
+    program.velocity_share = velocity_share;
+    filter_.emplace(arm.robot(), program);
   }
   if (settings.local_minimum) {
     escape_.emplace(arm.robot(), seeded(*settings.local_minimum, settings.seed));

@@ -28,6 +28,7 @@ const char* to_string(Activity activity) noexcept {
 
 Command::Command(int num_coordinates)
     : torque(Eigen::VectorXd::Zero(num_coordinates)),
+      torque_without_gravity(torque),
       wanted(torque),
       acceleration(torque),
       velocity(torque),

@@ -101,8 +101,17 @@ class Controller::Impl {
   void choose_reference() noexcept;
   void leave_room(bool looks) noexcept;
   void avoid() noexcept;
-  void solve(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias, bool known,
-             ConstVectorRef q, ConstVectorRef v) noexcept;
+  using MassMatrix = const Eigen::Ref<const Eigen::MatrixXd>*;
+  using Bias = const Eigen::Ref<const Eigen::VectorXd>*;
+  void begin_reference() noexcept;
+  void follow_arm() noexcept;
+  void observe() noexcept;
+  void take_dynamics(const KinematicState& state, MassMatrix mass_matrix, Bias bias) noexcept;
+  void solve_reference(MassMatrix mass_matrix, Bias bias) noexcept;
+  void track(MassMatrix mass_matrix, Bias bias) noexcept;
+  void stop(MassMatrix mass_matrix, Bias bias, ConstVectorRef q, ConstVectorRef v) noexcept;
+  void advance_reference() noexcept;
+  void write_gravity(bool known) noexcept;
   void report(bool known) noexcept;
   Activity judge_activity() noexcept;
   bool at_goal() noexcept;
@@ -146,12 +155,20 @@ class Controller::Impl {
   // Of the step.
   std::optional<RigidBodyDynamics> dynamics_;
   std::optional<RigidBodyDynamics::Workspace> dynamics_workspace_;
-  std::optional<TorqueController> torque_program_;
-  std::optional<AccelerationFilter> filter_;
+  std::optional<TorqueController> torque_program_, tracking_program_;  // of the reference, of the arm
+  std::optional<AccelerationFilter> filter_, tracking_filter_;
   std::optional<LocalMinimumRecovery> escape_;
   BodyClearance body_;
   BodyClearance::Workspace here_;
-  Eigen::VectorXd q_, v_, last_q_, wanted_, turns_;
+  Eigen::VectorXd q_, v_, a_, wanted_;          // the reference: now, and its acceleration in the last period or this one
+  Eigen::VectorXd next_q_, next_v_;             // after this period
+  Eigen::VectorXd arm_q_, arm_v_, last_arm_q_, last_arm_v_, turns_;  // measured
+  bool apart_ = false;                          // the arm is not exactly where the reference is
+  bool drives_track_ = false;                   // the output is position or velocity
+  bool has_last_torque_ = false;
+  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, disturbance_, surplus_, feedback_, gravity_;
+  GeometricSystem::Workspace arm_workspace_;
+  TorqueSolution tracked_;
   Eigen::MatrixXd mass_;
   Eigen::VectorXd bias_;
   std::vector<bool> is_sliding_, is_unlimited_;

@@ -47,6 +47,21 @@ const std::vector<Field<ArrivalSettings>>& fields() {
 }
 
 template <>
+const std::vector<Field<TrackingSettings>>& fields() {
+  using S = TrackingSettings;
+  static const std::vector<Field<S>> all{
+      {"frequency", &S::frequency, "1/s", 1.0, 300.0, "of the feedback to the reference: larger is stiffer, and shakes with noise and delay"},
+      {"observer_time", &S::observer_time, "s", 0.005, none,
+       "in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay"},
+      {"observer_share", &S::observer_share, "-", 0.0, 1.0, "of the effort limits that the observer may make up for"},
+      {"largest_error", &S::largest_error, "rad", 0.001, 10.0, "between arm and reference, from which the reference begins anew"},
+      {"servo_lag", &S::servo_lag, "rad", 0.001, 10.0, "the same where the arm's own drives track position or velocity"},
+      {"drift_gain", &S::drift_gain, "1/s", 0.0, 50.0, "by which an output of velocity returns to the reference"},
+  };
+  return all;
+}
+
+template <>
 const std::vector<Field<OnlinePlannerSettings>>& fields() {
   using S = OnlinePlannerSettings;
   static const std::vector<Field<S>> all{
@@ -62,6 +77,8 @@ const std::vector<Field<ControllerSettings>>& fields() {
   using S = ControllerSettings;
   static const std::vector<Field<S>> all{
       {"period", &S::period, "s", 1e-4, 0.1, "between two calls of step; limits and clearances hold at samples so far apart"},
+      {"speed", &S::speed, "-", 0.01, 1.0, "share of the velocity and acceleration limits that motions use: less is slower and calmer"},
+      {"velocity_margin", &S::velocity_margin, "-", 0.0, 0.5, "share of the velocity limits that is left for noise and delay"},
       {"position_margin", &S::position_margin, "rad", 0.0, 1.0, "by which position limits are moved inwards"},
       {"stop_time", &S::stop_time, "s", 0.005, 10.0, "time constant of the damped stop"},
       {"stop_damping", &S::stop_damping, "-", 1e-3, 10.0,
@@ -85,6 +102,7 @@ void ControllerSettings::validate() const {
   check_fields("controller: barriers.", barriers);
   check_fields("controller: safety.", safety);
   check_fields("controller: arrival.", arrival);
+  check_fields("controller: tracking.", tracking);
   if (!(barriers.floor < barriers.activation && barriers.floor < barriers.self_activation)) {
     throw std::invalid_argument("controller: barriers.floor is " + std::to_string(barriers.floor) +
                                 " m, allowed: below barriers.activation and barriers.self_activation");

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 #include "../settings.hpp"
@@ -16,11 +15,12 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   const bool known = take_state(q, v);
   take_orders();
   if (!known) {
-    wanted_.setZero();
-    solve(mass_matrix, bias, false, q, v);
+    stop(mass_matrix, bias, q, v);
     report(false);
     return command;
   }
+  observe();
+  follow_arm();
   const bool looks = time_ >= next_look_ || begins_goal_;
   if (looks) {
     next_look_ = time_ + look_period_ - 0.5 * settings.period;
@@ -41,7 +41,9 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   if (is_stale()) {
     wanted_ = -v_ / settings.stop_time;
   }
-  solve(mass_matrix, bias, true, q_, v_);
+  solve_reference(mass_matrix, bias);
+  advance_reference();
+  track(mass_matrix, bias);
   report(true);
   if (!settings.synchronous && (looks || wakes_worker_)) {
     write_snapshot();
@@ -50,29 +52,12 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
     }
   }
   known_before_ = true;
-  last_q_ = q_;
+  last_arm_q_ = arm_q_;
+  last_arm_v_ = arm_v_;
+  last_torque_ = command.torque;
+  last_acceleration_ = command.acceleration;
+  has_last_torque_ = torque;
   return command;
-}
-
-bool Controller::Impl::take_state(ConstVectorRef q, ConstVectorRef v) noexcept {
-  if (q.size() != q_.size() || v.size() != q_.size() || !q.allFinite() || !v.allFinite()) {
-    return false;
-  }
-  q_ = q;
-  v_ = v;
-  for (Eigen::Index j = 0; j < q_.size(); ++j) {
-    if (!is_unlimited_[static_cast<std::size_t>(j)]) {
-      continue;
-    }
-    // An encoder that wraps at a turn: no velocity explains a jump of more than half of one.
-    q_[j] += turns_[j];
-    if (known_before_) {
-      const double turn = 2.0 * std::numbers::pi * std::round((last_q_[j] - q_[j]) / (2.0 * std::numbers::pi));
-      turns_[j] += turn;
-      q_[j] += turn;
-    }
-  }
-  return true;
 }
 
 void Controller::Impl::take_orders() noexcept {
@@ -99,32 +84,14 @@ void Controller::Impl::take_orders() noexcept {
   }
 }
 
-void Controller::Impl::solve(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias, bool known,
-                             ConstVectorRef q, ConstVectorRef v) noexcept {
-  const Clearances* clearances = known ? &workspace.clearances : nullptr;
-  if (!torque) {
-    command.program = filter_->apply(q, v, wanted_, clearances, solution);
-    return;
-  }
-  // Without inertias of its own, an arm has to be told them in every step: `mass_` is not a number then.
-  if (mass_matrix != nullptr) {
-    command.program = torque_program_->solve(q, v, wanted_, *mass_matrix, *bias, clearances, solution);
-    return;
-  }
-  if (known && dynamics_) {
-    dynamics_->mass_matrix(workspace.state(), *dynamics_workspace_, mass_);
-    dynamics_->bias(workspace.state(), *dynamics_workspace_, bias_);
-  }
-  command.program = torque_program_->solve(q, v, wanted_, mass_, bias_, clearances, solution);
-}
-
 void Controller::Impl::report(bool known) noexcept {
   command.torque.setZero();
   if (torque) {
-    command.torque = solution.torque;
+    command.torque = tracked_.torque;
   }
+  write_gravity(known);
   command.wanted = wanted_;
-  command.acceleration = solution.acceleration;
+  command.acceleration = tracked_.acceleration;
   if (!command.acceleration.allFinite()) {
     command.acceleration.setZero();
   }
@@ -139,20 +106,31 @@ void Controller::Impl::report(bool known) noexcept {
     command.system = StepStatus::invalid_state;
     command.activity = is_stale() ? Activity::stale : has_goal() ? Activity::waiting : Activity::no_goal;
     command.velocity.setZero();
-    command.position = last_q_ - turns_;
+    command.position = last_arm_q_ - turns_;
     return;
   }
-  command.velocity = v_ + settings.period * command.acceleration;
-  command.position = q_ - turns_ + settings.period * command.velocity;
-  for (const Eigen::Index k : metric_coordinates_) {
-    if (workspace.clearances.least[k] < command.clearance) {
-      command.clearance = workspace.clearances.least[k];
-      command.coordinate = static_cast<int>(k);
+  command.velocity = next_v_;
+  if (settings.output == ControllerSettings::Output::velocity) {
+    command.velocity += settings.tracking.drift_gain * (q_ - arm_q_);
+  }
+  command.position = next_q_ - turns_;
+  const Clearances* nearest = &workspace.clearances;
+  const auto take_nearest = [&](const Clearances& clearances) {
+    for (const Eigen::Index k : metric_coordinates_) {
+      if (clearances.least[k] < command.clearance) {
+        command.clearance = clearances.least[k];
+        command.coordinate = static_cast<int>(k);
+        nearest = &clearances;
+      }
     }
+  };
+  take_nearest(workspace.clearances);
+  if (apart_) {
+    take_nearest(arm_workspace_.clearances);
   }
   if (command.coordinate >= 0 && system->labels()[static_cast<std::size_t>(command.coordinate)].kind ==
                                      CoordinateLabel::Kind::obstacle) {
-    command.point = workspace.clearances.nearest[command.coordinate];
+    command.point = nearest->nearest[command.coordinate];
   }
   switch (command.program) {
     case TorqueStatus::ok: command.status = SafetyStatus::ok; break;
@@ -172,17 +150,26 @@ void Controller::Impl::report(bool known) noexcept {
   command.activity = judge_activity();
 }
 
+void Controller::Impl::write_gravity(bool known) noexcept {
+  if (torque && known && dynamics_) {
+    dynamics_->gravity(apart_ ? arm_workspace_.state() : workspace.state(), *dynamics_workspace_, gravity_);
+    command.torque_without_gravity = command.torque - gravity_;
+  } else {
+    command.torque_without_gravity.setConstant(torque ? std::numeric_limits<double>::quiet_NaN() : 0.0);
+  }
+}
+
 bool Controller::Impl::at_goal() noexcept {
   const ArrivalSettings& near = settings.arrival;
-  if (v_.cwiseAbs().maxCoeff() > near.speed) {
+  if (arm_v_.cwiseAbs().maxCoeff() > near.speed) {
     return false;
   }
   if (const PoseGoal* pose = pose_goal()) {
-    const PoseError error = pose_error(*pose, workspace.state());
+    const PoseError error = pose_error(*pose, apart_ ? arm_workspace_.state() : workspace.state());
     return error.position <= near.position && error.rotation <= near.rotation;
   }
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
-    const double error = std::abs(q_[j] - std::get<JointGoal>(*goal_).position[j]);
+    const double error = std::abs(arm_q_[j] - std::get<JointGoal>(*goal_).position[j]);
     if (!(error <= (is_sliding_[static_cast<std::size_t>(j)] ? near.sliding : near.joint))) {
       return false;
     }
@@ -209,7 +196,7 @@ Activity Controller::Impl::judge_activity() noexcept {
   if (!has_target_) {
     return Activity::waiting;
   }
-  const bool at_rest = v_.cwiseAbs().maxCoeff() < settings.arrival.speed;
+  const bool at_rest = arm_v_.cwiseAbs().maxCoeff() < settings.arrival.speed;
   const bool out_of_reach = !posture_found_;
   const bool no_way = guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision ||
                       (!guide && target_blocked_);

@@ -79,7 +79,7 @@ std::uint64_t hash_of(const std::vector<Joint>& joints, const std::vector<std::s
 JointLimits JointLimits::unlimited(int num) {
   const double infinity = std::numeric_limits<double>::infinity();
   const Eigen::VectorXd upper = Eigen::VectorXd::Constant(num, infinity);
-  return {-upper, upper, upper, upper, upper};
+  return {-upper, upper, upper, upper, upper, upper, upper};
 }
 
 Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> frames,
@@ -130,6 +130,14 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
   check_limit(limits_.velocity, "velocity", coordinate_names_);
   check_limit(limits_.acceleration, "acceleration", coordinate_names_);
   check_limit(limits_.effort, "effort", coordinate_names_);
+  if (limits_.jerk.size() == 0) {
+    limits_.jerk = JointLimits::default_jerk * limits_.acceleration;
+  }
+  if (limits_.effort_rate.size() == 0) {
+    limits_.effort_rate.setConstant(nv, std::numeric_limits<double>::infinity());
+  }
+  check_limit(limits_.jerk, "jerk", coordinate_names_);
+  check_limit(limits_.effort_rate, "effort rate", coordinate_names_);
   if (limits_.lower.size() != nv || limits_.upper.size() != nv) {
     throw std::invalid_argument("position limits: expected one value per coordinate (" + std::to_string(nv) + ")");
   }

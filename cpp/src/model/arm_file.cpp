@@ -28,7 +28,8 @@ namespace sidestep {
 namespace {
 
 constexpr std::string_view magic{"\x89SSARM\r\n", 8};  // not text; a transfer that changes line ends breaks it
-constexpr std::uint32_t version = 1;
+constexpr std::uint32_t version = 2;
+constexpr std::uint32_t oldest_version = 1;  // without jerk limits and rates of effort: they are the defaults
 constexpr std::size_t header_size = 8 + 4 + 8 + 32;
 constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 30;  // [B] an arm has less than a thousandth of it
 constexpr const char* advice = "; prepare the arm again: sidestep prepare NAME -o FILE";
@@ -202,12 +203,13 @@ void write_robot(Writer& out, const Robot& robot) {
     out.text(name);
   }
   const JointLimits& limits = robot.limits();
-  for (const auto* limit : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.effort}) {
+  for (const auto* limit : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.effort,
+                            &limits.jerk, &limits.effort_rate}) {
     out.numbers(*limit);
   }
 }
 
-Robot read_robot(Reader& in) {
+Robot read_robot(Reader& in, std::uint32_t of_version) {
   std::string name = in.text();
   std::vector<Joint> joints(in.count(smallest_joint));
   for (Joint& joint : joints) {
@@ -233,6 +235,10 @@ Robot read_robot(Reader& in) {
   JointLimits limits;
   for (auto* limit : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.effort}) {
     *limit = in.numbers(names.size(), 1);
+  }
+  if (of_version > 1) {
+    limits.jerk = in.numbers(names.size(), 1);
+    limits.effort_rate = in.numbers(names.size(), 1);
   }
   return Robot(std::move(name), std::move(joints), std::move(frames), std::move(names), std::move(limits));
 }
@@ -469,9 +475,10 @@ Arm decode_arm(std::span<const std::byte> file) {
     throw std::invalid_argument(std::string("it is not an arm file") + advice);
   }
   header.raw(magic.size());
-  if (const auto found = header.integer<std::uint32_t>(); found != version) {
-    throw std::invalid_argument("it has format version " + std::to_string(found) + ", this Sidestep reads version " +
-                                std::to_string(version) +
+  const auto found = header.integer<std::uint32_t>();
+  if (found < oldest_version || found > version) {
+    throw std::invalid_argument("it has format version " + std::to_string(found) + ", this Sidestep reads versions " +
+                                std::to_string(oldest_version) + " to " + std::to_string(version) +
                                 (found > version ? "; install a newer Sidestep, or prepare the arm again with this one"
                                                  : advice));
   }
@@ -482,11 +489,11 @@ Arm decode_arm(std::span<const std::byte> file) {
     throw std::invalid_argument("it holds " + std::to_string(payload.size()) + " bytes of content where " +
                                 std::to_string(size) + " must be: it was cut off or changed" + advice);
   }
-  if (const Sha256 found = sha256(payload); !std::equal(found.begin(), found.end(), hash.begin())) {
+  if (const Sha256 of_content = sha256(payload); !std::equal(of_content.begin(), of_content.end(), hash.begin())) {
     throw std::invalid_argument(std::string("its content does not have the hash that it states: it is damaged") + advice);
   }
   Reader in(payload);
-  Robot robot = in.section("ROBT", read_robot);
+  Robot robot = in.section("ROBT", [found](Reader& section) { return read_robot(section, found); });
   std::vector<Inertial> inertials = in.section("INRT", read_inertials);
   Body body = in.section("BODY", read_body);
   ArmDetails details;

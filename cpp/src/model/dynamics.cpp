@@ -147,6 +147,24 @@ void RigidBodyDynamics::bias(const KinematicState& state, Workspace& workspace,
     forces[i].linear = inertial.mass * (acceleration - gravity_);
     forces[i].angular = turned(link.bias.angular) + omega.cross(turned(omega)) + com.cross(forces[i].linear);
   }
+  project(state, workspace, force);
+}
+
+void RigidBodyDynamics::gravity(const KinematicState& state, Workspace& workspace,
+                                Eigen::Ref<Eigen::VectorXd> force) const noexcept {
+  auto& forces = workspace.forces_;
+  for (std::size_t i = 0; i < forces.size(); ++i) {
+    const KinematicState::Link& link = state.link(static_cast<int>(i));
+    const Eigen::Vector3d com = link.p_WL + link.R_WL * inertials_[i].com;
+    forces[i].linear = -inertials_[i].mass * gravity_;
+    forces[i].angular = com.cross(forces[i].linear);
+  }
+  project(state, workspace, force);
+}
+
+void RigidBodyDynamics::project(const KinematicState& state, Workspace& workspace,
+                                Eigen::Ref<Eigen::VectorXd> force) const noexcept {
+  auto& forces = workspace.forces_;
   force.setZero();
   for (int i = robot_.num_joints() - 1; i >= 0; --i) {
     const KinematicState::Link& link = state.link(i);

@@ -234,9 +234,81 @@ BOOST_AUTO_TEST_CASE(update_applies_the_margin_and_allocates_nothing) {
   limits.acceleration.setConstant(10.0);
   AccelerationBounds bounds(2);
   const Eigen::VectorXd q = Eigen::Vector2d(0.95, 0.0), v = Eigen::Vector2d::Zero();
-  BOOST_TEST(test::allocations_of([&] { bounds.update(limits, q, v, 0.001, 0.1); }) == 0u);
+  BOOST_TEST(test::allocations_of([&] { bounds.update(limits, q, v, 0.001, {0.1, 1.0, 1.0}); }) == 0u);
   BOOST_TEST(bounds.upper[0] == -10.0);  // outside by the margin: steer back
   BOOST_TEST(bounds.upper[1] == 10.0);
   bounds.update(limits, q, v, 0.001);
   BOOST_TEST(bounds.upper[0] == 10.0);
 }
+
+BOOST_AUTO_TEST_SUITE(smooth_bounds)
+
+// The way of the smooth profile, against its own integration in small steps.
+BOOST_AUTO_TEST_CASE(the_way_to_rest_is_that_of_the_profile) {
+  Random random(71);
+  for (int k = 0; k < 400; ++k) {
+    const double A = random.magnitude(0.5, 20.0), J = A * random.magnitude(2.0, 1e3);
+    const double a = random.uniform(-A, A), v = random.uniform(0.0, 3.0);
+    const double found = jerk_braking_distance(v, a, A, J);
+    // The acceleration falls to -A, or to where the way back to zero takes the rest of the speed.
+    const double h = 2e-6 * std::sqrt(1.0 + 1e3 / J);
+    double x = 0.0, speed = v, b = a, farthest = 0.0;
+    while (speed > 0.0) {
+      const double lost = b < 0.0 ? 0.5 * b * b / J : 0.0;  // while the acceleration goes back to zero
+      b = speed <= lost ? std::min(b + J * h, 0.0) : std::max(b - J * h, -A);
+      if (b == 0.0 && speed < 1e-4) {
+        break;
+      }
+      x += h * speed + 0.5 * b * h * h;
+      speed += b * h;
+      farthest = std::max(farthest, x);
+    }
+    BOOST_TEST_CONTEXT("A " << A << " J " << J << " a " << a << " v " << v) {
+      BOOST_TEST(std::abs(found - farthest) < 1e-3 * (0.01 + farthest));
+    }
+  }
+}
+
+// Whoever takes any acceleration of the interval, for ever, keeps every limit: position, velocity, acceleration, jerk.
+BOOST_AUTO_TEST_CASE(every_limit_is_kept_for_ever) {
+  Random random(72);
+  for (int k = 0; k < 3000; ++k) {
+    const double period = random.magnitude(5e-4, 1e-2);
+    ScalarLimits limits{};
+    limits.acceleration = random.magnitude(0.5, 50.0);
+    limits.velocity = random.magnitude(0.05, 5.0);
+    limits.lower = random.uniform(-3.0, 3.0);
+    limits.upper = limits.lower + random.magnitude(0.05, 6.0);
+    const double jerk = limits.acceleration / period * random.magnitude(0.01, 3.0);
+    double q = random.uniform(limits.lower, limits.upper), v = 0.0, a = 0.0;
+    const Integrator integrator = random.chance(0.5) ? Integrator::exact : Integrator::semi_implicit;
+    const int kind = static_cast<int>(random.uniform(0.0, 4.0));
+    double worst_jerk = 0.0, worst_a = 0.0, worst_v = 0.0, worst_q = 0.0;
+    double way = 1.0;
+    for (int n = 0; n < 600; ++n) {
+      const AccelerationInterval interval = acceleration_interval(q, v, limits, period);
+      const SmoothInterval smooth = smooth_interval(q, v, a, interval, limits, jerk, period);
+      BOOST_REQUIRE(smooth.lower <= smooth.upper);
+      if (random.chance(0.01)) {
+        way = -way;
+      }
+      const double share = kind == 0 ? (way > 0.0 ? 1.0 : 0.0) : kind == 1 ? random.uniform(0.0, 1.0) : kind == 2 ? 1.0 : (n / 40) % 2;
+      const double x = smooth.lower + share * (smooth.upper - smooth.lower);
+      worst_jerk = std::max(worst_jerk, std::abs(x - a) / (jerk * period) - 1.0);
+      step(q, v, x, period, integrator);
+      a = x;
+      worst_a = std::max(worst_a, std::abs(x) / limits.acceleration - 1.0);
+      worst_v = std::max(worst_v, std::abs(v) / limits.velocity - 1.0);
+      worst_q = std::max({worst_q, q - limits.upper, limits.lower - q});
+    }
+    BOOST_TEST_CONTEXT("case " << k << " period " << period << " A " << limits.acceleration << " V " << limits.velocity << " range "
+                               << limits.upper - limits.lower << " ramp [periods] " << limits.acceleration / jerk / period) {
+      BOOST_TEST(worst_jerk < 1e-6);
+      BOOST_TEST(worst_a < 1e-12);
+      BOOST_TEST(worst_v < 1e-9);
+      BOOST_TEST(worst_q < 1e-9);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -419,7 +419,7 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   BOOST_TEST((rows.normals.row(1) + v.transpose() / v.norm()).norm() == 0.0, boost::test_tools::tolerance(1e-15));
   BOOST_TEST(rows.lower[1] == hardness * v.norm() / 0.2, close);
   BOOST_TEST(rows.lengths[1] == 1.0, close);
-  BOOST_TEST(rows.along_path == 1);
+  BOOST_TEST((rows.along_path[0] == 0 && rows.along_path[1] == 1));
   BOOST_TEST(rows.coordinates[1] == 0);
   BOOST_TEST(rows.nearest[1] == 4);
   // −κ v/τ meets both.
@@ -460,12 +460,12 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   clearances.mind_nearest();
   one.update(clearances, v, limits, bounds, 0.001);
   BOOST_REQUIRE(one.size() == 1);
-  BOOST_TEST(one.along_path == 0);
+  BOOST_TEST((one.along_path[0] == 1));
 
   // What comes by itself does not stop with the arm.
   update(0.08, 0.5, -20.0);
   BOOST_REQUIRE(rows.size() == 1);
-  BOOST_TEST(rows.along_path == -1);
+  BOOST_TEST((rows.along_path[0] == 0));
   BOOST_TEST(rows.lower[0] == asked(0.08, 0.5, -20.0), close);
 
   // M = diag(4, 1): joint 1 needs 8 Nm s over the 44 Nm that a bias of −14 Nm leaves to stop in, or over 16 Nm.

@@ -257,7 +257,7 @@ BOOST_AUTO_TEST_CASE(complaints_say_what_is_wrong) {
   BOOST_TEST(contains(complaint(Bytes{}), "it is not an arm file"));
   file = good;
   file[version_place] = std::byte{9};
-  BOOST_TEST(contains(complaint(file), "format version 9, this Sidestep reads version 1; install a newer Sidestep"));
+  BOOST_TEST(contains(complaint(file), "format version 9, this Sidestep reads versions 1 to 2; install a newer Sidestep"));
   file = good;
   file[hash_place + 3] ^= std::byte{1};
   BOOST_TEST(contains(complaint(file), "does not have the hash that it states: it is damaged; prepare the arm again"));

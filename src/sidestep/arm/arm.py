@@ -61,6 +61,8 @@ class Arm(_core.Arm):
         acceleration_limits: ArrayLike | None = None,
         velocity_limits: ArrayLike | None = None,
         effort_limits: ArrayLike | None = None,
+        jerk_limits: ArrayLike | None = None,
+        effort_rate_limits: ArrayLike | None = None,
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
         allowed: Sequence[tuple[str, str]] = (),
@@ -76,7 +78,7 @@ class Arm(_core.Arm):
         Args:
             source: a name of `sidestep.robots()`, the path of an `.arm` file, or a URDF or xacro file (or URDF text).
             package_dirs, base_pose, tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits,
-                effort_limits, name, xacro_arguments: of a description, as in `Robot.from_urdf`; of a name
+                effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments: of a description, as in `Robot.from_urdf`; of a name
                 `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
             allowed: pairs of links that may touch: they get no clearance.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
@@ -98,6 +100,8 @@ class Arm(_core.Arm):
             "acceleration_limits": acceleration_limits,
             "velocity_limits": velocity_limits,
             "effort_limits": effort_limits,
+            "jerk_limits": jerk_limits,
+            "effort_rate_limits": effort_rate_limits,
             "name": name,
             "xacro_arguments": xacro_arguments,
         }

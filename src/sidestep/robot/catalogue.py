@@ -51,6 +51,8 @@ class Recipe:
     acceleration_limits: Limits | None = None
     velocity_limits: Limits | None = None
     effort_limits: Limits | None = None
+    jerk_limits: Limits | None = None
+    effort_rate_limits: Limits | None = None
     overrides_reason: str = ""
 
     def source(self) -> str | Path:
@@ -68,7 +70,8 @@ def _degrees(*values: float) -> Limits:
 
 _FRANKA_OPEN = 0.04  # [m] opening of one finger, its upper limit
 _FR3_REASON = (
-    "acceleration (no place in URDF): 10 rad/s^2 on every joint, Franka Control Interface, limits of FR3"
+    "no place in URDF: acceleration 10 rad/s^2, jerk 5000 rad/s^3, torque rate 1000 Nm/s on every joint, Franka "
+    "Control Interface, limits of FR3"
 )
 
 # Every correction of a robot's file stands in this table. Known and left as it is: the UR5's file gives its
@@ -82,6 +85,8 @@ RECIPES: tuple[Recipe, ...] = (
         file="franka_robot_model/fr3.urdf",
         locked={"fr3_finger_joint1": _FRANKA_OPEN},
         acceleration_limits=(10.0,) * 7,
+        jerk_limits=(5000.0,) * 7,
+        effort_rate_limits=(1000.0,) * 7,
         overrides_reason=_FR3_REASON,
     ),
     Recipe(
@@ -92,6 +97,8 @@ RECIPES: tuple[Recipe, ...] = (
         file="franka_robot_model/fr3.urdf",
         tip="fr3_link8",
         acceleration_limits=(10.0,) * 7,
+        jerk_limits=(5000.0,) * 7,
+        effort_rate_limits=(1000.0,) * 7,
         overrides_reason=_FR3_REASON,
     ),
     Recipe(
@@ -102,7 +109,9 @@ RECIPES: tuple[Recipe, ...] = (
         file="panda_description/urdf/panda.urdf",
         locked={"panda_finger_joint1": _FRANKA_OPEN},
         acceleration_limits=(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
-        overrides_reason="acceleration (no place in URDF): Franka Control Interface, limits of Panda",
+        jerk_limits=(7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),
+        effort_rate_limits=(1000.0,) * 7,
+        overrides_reason="no place in URDF: acceleration, jerk, torque rate of the Franka Control Interface, limits of Panda",
     ),
     Recipe("ur5", "Universal Robots UR5", "example-robot-data", 6, file="ur_description/urdf/ur5_robot.urdf"),
     Recipe(

@@ -60,6 +60,8 @@ class Robot(_core.Robot):
         acceleration_limits: ArrayLike | None = None,
         velocity_limits: ArrayLike | None = None,
         effort_limits: ArrayLike | None = None,
+        jerk_limits: ArrayLike | None = None,
+        effort_rate_limits: ArrayLike | None = None,
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
     ) -> Robot:
@@ -80,6 +82,8 @@ class Robot(_core.Robot):
             acceleration_limits: number or (nv,) [rad/s^2 | m/s^2]; 10 by default (URDF has none).
             velocity_limits: number or (nv,) [rad/s | m/s], in place of the file's.
             effort_limits: number or (nv,) [Nm | N], in place of the file's.
+            jerk_limits: number or (nv,) [rad/s^3 | m/s^3]; 100/s times the acceleration limits by default.
+            effort_rate_limits: number or (nv,) [Nm/s | N/s]; none by default.
             name: in place of the file's.
             xacro_arguments: values of `<xacro:arg>`.
 
@@ -98,6 +102,8 @@ class Robot(_core.Robot):
             acceleration_limits=acceleration_limits,
             velocity_limits=velocity_limits,
             effort_limits=effort_limits,
+            jerk_limits=jerk_limits,
+            effort_rate_limits=effort_rate_limits,
         )
         return cls(name or urdf.name, tree)
 
@@ -124,6 +130,8 @@ class Robot(_core.Robot):
             acceleration_limits=recipe.acceleration_limits,
             velocity_limits=recipe.velocity_limits,
             effort_limits=recipe.effort_limits,
+            jerk_limits=recipe.jerk_limits,
+            effort_rate_limits=recipe.effort_rate_limits,
             name=name,
         )
 

@@ -54,6 +54,8 @@ def build_tree(
     acceleration_limits: ArrayLike | None,
     velocity_limits: ArrayLike | None,
     effort_limits: ArrayLike | None,
+    jerk_limits: ArrayLike | None,
+    effort_rate_limits: ArrayLike | None,
 ) -> KinematicTree:
     """Folds `urdf` into moving joints and frames; see `Robot.from_urdf` for the arguments and the rules."""
     drives = _drives(urdf, _checked_locks(urdf, locked or {}, beyond_limits=locked_beyond_limits))
@@ -106,6 +108,8 @@ def build_tree(
         acceleration=DEFAULT_ACCELERATION_LIMIT if acceleration_limits is None else acceleration_limits,
         velocity=velocity_limits,
         effort=effort_limits,
+        jerk=jerk_limits,
+        effort_rate=effort_rate_limits,
     )
     frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
     return KinematicTree(
@@ -233,6 +237,8 @@ def _limits(
     acceleration: ArrayLike,
     velocity: ArrayLike | None,
     effort: ArrayLike | None,
+    jerk: ArrayLike | None,
+    effort_rate: ArrayLike | None,
 ) -> JointLimits:
     unlimited = math.inf
     for joint in joints:
@@ -267,6 +273,8 @@ def _limits(
             "effort_limits",
             names,
         ),
+        jerk=None if jerk is None else _per_coordinate(jerk, "jerk_limits", names),
+        effort_rate=None if effort_rate is None else _per_coordinate(effort_rate, "effort_rate_limits", names),
     )
 
 

@@ -7,6 +7,7 @@ namespace sidestep {
 struct AccelerationFilterSettings {
   double period = 0.001;         ///< time for which the acceleration is held [s]
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
+  double velocity_share = 1.0;   ///< of the velocity limits that is used [-]
   double stop_time = 0.1;        ///< time constant of the damped stop q̈ = -v/stop_time [s]
   SafetySettings safety = {};
 };
@@ -25,7 +26,13 @@ class AccelerationFilter {
                                    ConstVectorRef v,
                                    ConstVectorRef acceleration, const Clearances* clearances,
                                    TorqueSolution& solution) noexcept {
-    return controller_.solve(q, v, acceleration, unit_mass_, no_bias_, clearances, solution);
+    return apply(q, v, acceleration, clearances, {}, {}, solution);
+  }
+
+  /// The same near the last command, and with the clearances at another state.
+  [[nodiscard]] TorqueStatus apply(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration, const Clearances* clearances,
+                                   const SecondState& second, const LastCommand& last, TorqueSolution& solution) noexcept {
+    return controller_.solve(q, v, acceleration, unit_mass_, no_bias_, clearances, second, last, solution);
   }
 
   double period() const noexcept { return controller_.settings().period; }

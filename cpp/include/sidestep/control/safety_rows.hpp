@@ -120,7 +120,6 @@ class SafetyRows {
 
   void clear() noexcept {
     size_ = 0;
-    along_path = -1;
     helpless = -1;
   }
 
@@ -131,7 +130,14 @@ class SafetyRows {
   /// given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. `bounds` are those of now.
   /// No allocation.
   void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
-              const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr) noexcept;
+              const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr) noexcept {
+    clear();
+    add(clearances, v, limits, bounds, period, torque);
+  }
+
+  /// Adds those at another state: where both are too many, either keeps at least half of the rows.
+  void add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, const AccelerationBounds& bounds,
+           double period, const BrakingTorque* torque = nullptr) noexcept;
 
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
   bool satisfied_within(int k, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) const noexcept;
@@ -147,14 +153,14 @@ class SafetyRows {
   std::vector<int> coordinates;     ///< (max) which clearance a row belongs to, most critical first
   std::vector<int> nearest;         ///< (max) its nearest obstacle point
   Eigen::VectorXd depths;           ///< (max) [m] how far below zero the clearance is, else 0: that of what approaches
-  int along_path = -1;              ///< the row that asks for a stop along the path, the last; -1: none
+  std::vector<char> along_path;     ///< (max) whether a row asks for a stop along the path
   int helpless = -1;                ///< a clearance that asks for something and that no joint changes; -1: none
 
  private:
   /// τ [s], see above.
   double stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept;
   /// Writes M⁻¹ ∇h of the rows chosen, side by side: divisions of one wait for each other.
-  void find_responses(const ClearanceState& approach, const Eigen::MatrixXd& mass_cholesky) noexcept;
+  void find_responses(int first, const ClearanceState& approach, const Eigen::MatrixXd& mass_cholesky) noexcept;
   double hardest_by_torque(int row, const JointLimits& limits, const BrakingTorque& torque) const noexcept;
 
   SafetySettings settings_;

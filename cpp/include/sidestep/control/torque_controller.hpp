@@ -16,7 +16,7 @@ namespace sidestep {
 enum class TorqueStatus {
   ok,                      ///< the wanted acceleration is tracked, no limit in the way
   limited,                 ///< optimal within the limits, and at least one of them is in the way
-  relaxed,                 ///< velocity or acceleration limits gave way to clearances, position or torque limits
+  relaxed,                 ///< jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits
   relaxed_safety,          ///< not all clearances and position limits can be kept (see safety, slack)
   clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest
   fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
@@ -59,6 +59,20 @@ struct TorqueSolution {
   int least_coordinate = -1, least_nearest = -1;   ///< which clearance that is, and its nearest point; -1: none
 };
 
+/// What the last period's command was, where jerk and torque rate are to keep their limits; null leaves a limit out.
+struct LastCommand {
+  const Eigen::VectorXd* acceleration = nullptr;  ///< (nv) [/s^2]
+  const Eigen::VectorXd* torque = nullptr;        ///< (nv) [Nm | N]
+  const Eigen::VectorXd* gravity_change = nullptr;  ///< (nv) of the bias's gravity since then [Nm | N]: the rate is kept with and without it
+};
+
+/// Clearances at another state, which bound the same acceleration: those of the arm itself where its reference is what is
+/// solved for.
+struct SecondState {
+  const Clearances* clearances = nullptr;  ///< null: none
+  const Eigen::VectorXd* velocity = nullptr;
+};
+
 struct TorqueControllerSettings {
   /// Control period [s]; the bounds hold the limits at samples this far apart.
   double period = 0.001;
@@ -81,6 +95,8 @@ struct TorqueControllerSettings {
   bool hard_bounds = false;
   /// Position limits are moved inwards by this much [rad | m].
   double position_margin = 0.0;
+  /// Share of the velocity limits that is used, in (0, 1]: noise and delay use up the rest [-].
+  double velocity_share = 1.0;
   /// Time constant of the damped stop q̈ = -v/stop_time [s].
   double stop_time = 0.1;
   /// Damping of the stop when the mass matrix is unusable, as a fraction of effort limit / velocity limit [-].
@@ -97,10 +113,12 @@ struct TorqueControllerSettings {
 ///               |torque| <= effort limit
 ///               ∇h_k·q̈ >= required_k                   (clearances, see safety_rows.hpp)
 ///               lower(q, v) <= q̈ <= upper(q, v)        (see acceleration_bounds.hpp)
+///               |q̈ - last q̈| <= jerk limit T,   |torque - last torque| <= effort rate T,   where these are given
 ///
 /// The torque is eliminated by the first constraint. What is sacrificed, in this order: the task, which is the cost;
-/// velocity and acceleration limits up to the overruns (unless hard_bounds); clearances; the overruns and position
-/// limits; torque limits never. A first program has every constraint hard. If it is infeasible, a second one adds slack
+/// jerk and torque rate; velocity and acceleration limits up to the overruns (unless hard_bounds); clearances; the overruns and position
+/// limits; torque limits never. A first program has every constraint hard. If it is infeasible, the same without jerk and torque rate is solved for the
+/// acceleration nearest to what they allow. If that is infeasible, a second one adds slack
 /// to the bounds, within a box of the overruns and of position limits, at the cost p's with a price p far above the
 /// task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
 /// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of those
@@ -136,7 +154,17 @@ class TorqueController {
                                    ConstVectorRef acceleration,
                                    const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
                                    ConstVectorRef bias, const Clearances* clearances,
-                                   TorqueSolution& solution) noexcept;
+                                   TorqueSolution& solution) noexcept {
+    return solve(q, v, acceleration, mass_matrix, bias, clearances, {}, {}, solution);
+  }
+
+  /// The same near the last command, and with the clearances at another state.
+  [[nodiscard]] TorqueStatus solve(ConstVectorRef q,
+                                   ConstVectorRef v,
+                                   ConstVectorRef acceleration,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
+                                   ConstVectorRef bias, const Clearances* clearances, const SecondState& second,
+                                   const LastCommand& last, TorqueSolution& solution) noexcept;
 
   const TorqueControllerSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return nv_; }
@@ -158,7 +186,13 @@ class TorqueController {
     QuadraticProgram program;
   };
 
-  bool solve_within_bounds(TorqueSolution& solution) noexcept;
+  /// The share of the jerk limits by which the torque keeps its rate, whatever the joints do; 1 without a rate.
+  double jerk_share() const noexcept;
+  /// Writes the torque rows: within the effort limits, and near the last torque unless null.
+  void write_torque_rows(const LastCommand* last) noexcept;
+  void write_cost() noexcept;
+  /// The first program; smooth: within the limits of jerk and torque rate.
+  bool solve_within_bounds(bool smooth, TorqueSolution& solution) noexcept;
   TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
   void widen_bounds() noexcept;
   void collect_rows() noexcept;
@@ -175,10 +209,12 @@ class TorqueController {
   /// Writes what is to be allowed, and an acceleration that falls short by no more.
   bool find_least_shortfalls(TorqueSolution& solution) noexcept;
   /// Joint i has these multipliers at its bounds and its torque.
-  void add_active(int i, double at_upper, double at_lower, double at_effort, TorqueSolution& solution) const noexcept;
+  void add_active(int i, double at_upper, double at_lower, double at_effort, bool smooth, TorqueSolution& solution) const noexcept;
   void report_clearance(const Clearances* clearances, TorqueSolution& solution) const noexcept;
   bool accept(TorqueSolution& solution) noexcept;
   void report_safety(TorqueSolution& solution) noexcept;
+  /// Names the jerk limits that gave way.
+  void report_jerk(TorqueSolution& solution) const noexcept;
   void stop(bool mass_known, TorqueSolution& solution) noexcept;
   bool factorise_mass() noexcept;
 
@@ -203,6 +239,7 @@ class TorqueController {
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd weighted_;                       // a column of the mass matrix, by the cost of torques
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
+  Eigen::VectorXd rate_lower_, rate_upper_;        // of the torque less the bias, by effort and rate
   std::int64_t counts_[7] = {};
 };
 

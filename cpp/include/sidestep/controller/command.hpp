@@ -14,7 +14,7 @@ namespace sidestep {
 enum class SafetyStatus {
   ok,              ///< the motion is what the goal asks for
   limited,         ///< a limit of the arm or a clearance bends it
-  relaxed,         ///< velocity or acceleration limits gave way to clearances, position or torque limits
+  relaxed,         ///< jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
   stopping,        ///< the input is unusable or the program was not solved: a damped stop
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
@@ -40,11 +40,13 @@ struct Command {
 
   SafetyStatus status = SafetyStatus::stopping;
   Activity activity = Activity::no_goal;
-  Eigen::VectorXd torque;        ///< (nv) [Nm | N], gravity included; zero where the output is acceleration
+  Eigen::VectorXd torque;        ///< (nv) [Nm | N], gravity included; zero where the output is not torque
+  Eigen::VectorXd torque_without_gravity;  ///< (nv) the same for arms that hold themselves; NaN where the arm has no inertias
   Eigen::VectorXd wanted;        ///< (nv) acceleration that was asked for, before any limit [rad/s² | m/s²]
-  Eigen::VectorXd acceleration;  ///< (nv) [rad/s² | m/s²]
-  Eigen::VectorXd velocity;      ///< (nv) after one period of the acceleration [rad/s | m/s]
-  Eigen::VectorXd position;      ///< (nv) after one period at that velocity [rad | m]; NaN until a state was known
+  Eigen::VectorXd acceleration;  ///< (nv) of the arm: the reference's with feedback [rad/s² | m/s²]
+  Eigen::VectorXd velocity;      ///< (nv) of the reference after this period [rad/s | m/s]
+  Eigen::VectorXd position;      ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
+  double tracking_error = 0.0;   ///< largest |q_r − q| [rad | m]
 
   double clearance = std::numeric_limits<double>::infinity();  ///< the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is unknown
   int coordinate = -1;  ///< whose clearance that is, see Controller::labels; -1: none within reach

@@ -40,13 +40,27 @@ struct OnlinePlannerSettings {
   double retry = 1.0;      ///< until a failed search is repeated in the same scene [s]
 };
 
+/// How the arm is kept on the controller's reference, see Controller: q̈ = a_r + ω² (q_r − q) + 2 ω (v_r − v), with what the
+/// disturbance observer found. Not for outputs of position and velocity, which the arm's own drives track.
+struct TrackingSettings {
+  double frequency = 30.0;       ///< ω [1/s]
+  double observer_time = 0.05;   ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
+  double observer_share = 0.5;   ///< of the effort limits that it may make up for [-]
+  double largest_error = 0.1;    ///< |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m]
+  double servo_lag = 1.0;        ///< the same where the arm's own drives track the reference [rad]
+  double drift_gain = 2.0;       ///< of the output of velocity: v = v_r + gain (q_r − q) [1/s]
+};
+
 /// All settings of a Controller. Every part is on by default; an empty optional leaves a part out, for comparisons.
 struct ControllerSettings {
-  /// What the program solves for: torque where the arm has inertias and effort limits, or acceleration.
-  enum class Output { automatic, torque, acceleration };
+  /// What is sent to the arm. Torque and acceleration are tracked by the controller, from the measured state; position and
+  /// velocity by the arm's own drives. Automatic: torque where the arm has inertias and effort limits, else acceleration.
+  enum class Output { automatic, torque, acceleration, velocity, position };
 
   double period = 0.001;         ///< between two calls of `step` [s]
   Output output = Output::automatic;
+  double speed = 1.0;            ///< share of the velocity and acceleration limits that motions use
+  double velocity_margin = 0.02; ///< share of the velocity limits that is left for noise and delay
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop [s]
   double stop_damping = 0.25;    ///< of a stop without a mass matrix, see TorqueControllerSettings; so are the next four
@@ -60,6 +74,7 @@ struct ControllerSettings {
   BarrierSettings barriers = {};
   SafetySettings safety = {};
   ArrivalSettings arrival = {};
+  TrackingSettings tracking = {};
   std::optional<OnlinePlannerSettings> planner = OnlinePlannerSettings{};
   std::optional<LookAheadSettings> look_ahead = LookAheadSettings{};
   std::optional<LocalMinimumSettings> local_minimum = LocalMinimumSettings{};  ///< sub-goals where the arm is stuck without a path
@@ -70,6 +85,7 @@ struct ControllerSettings {
 
 template <> const std::vector<Field<BarrierSettings>>& fields();
 template <> const std::vector<Field<ArrivalSettings>>& fields();
+template <> const std::vector<Field<TrackingSettings>>& fields();
 template <> const std::vector<Field<OnlinePlannerSettings>>& fields();
 template <> const std::vector<Field<ControllerSettings>>& fields();
 

@@ -36,10 +36,15 @@ struct Frame {
   Eigen::Isometry3d X_JF = Eigen::Isometry3d::Identity();
 };
 
-/// Per-coordinate limits: position [rad | m], velocity [/s], acceleration [/s^2], effort [Nm | N].
-/// Position bounds may be infinite; the others are positive, possibly infinite.
+/// Per-coordinate limits: position [rad | m], velocity [/s], acceleration [/s^2], effort [Nm | N], jerk [/s^3] and the rate
+/// of effort [Nm/s | N/s]. Position bounds may be infinite; the others are positive, possibly infinite.
+/// Left empty, jerk is `default_jerk` times the acceleration limit, and the rate of effort infinite.
 struct JointLimits {
+  /// [1/s] Ten milliseconds until the whole acceleration: no description says it, and drives that state theirs allow more.
+  static constexpr double default_jerk = 100.0;
+
   Eigen::VectorXd lower, upper, velocity, acceleration, effort;
+  Eigen::VectorXd jerk = {}, effort_rate = {};
 
   /// No limits at all, for `num` coordinates.
   static JointLimits unlimited(int num);

@@ -71,8 +71,13 @@ class RigidBodyDynamics {
   /// The same from a state of this robot that is up to date.
   void mass_matrix(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::MatrixXd> mass) const noexcept;
   void bias(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::VectorXd> force) const noexcept;
+  /// The part of the bias that is there at rest: g (nv) [Nm | N]. No allocation.
+  void gravity(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::VectorXd> force) const noexcept;
 
  private:
+  /// The coordinates' forces of the bodies' forces, which are added up along the tree.
+  void project(const KinematicState& state, Workspace& workspace, Eigen::Ref<Eigen::VectorXd> force) const noexcept;
+
   Robot robot_;
   std::vector<Inertial> inertials_;
   Eigen::Vector3d gravity_;

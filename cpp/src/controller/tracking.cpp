@@ -1,0 +1,163 @@
+// The reference that the controller integrates, the arm's tracking of it, and what disturbs the arm.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "../settings.hpp"
+#include "impl.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double sliding_share = 0.2;  // of the largest error, of joints that slide [m/rad]
+
+}  // namespace
+
+bool Controller::Impl::take_state(ConstVectorRef q, ConstVectorRef v) noexcept {
+  if (q.size() != q_.size() || v.size() != q_.size() || !q.allFinite() || !v.allFinite()) {
+    return false;
+  }
+  arm_q_ = q;
+  arm_v_ = v;
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    if (!is_unlimited_[static_cast<std::size_t>(j)]) {
+      continue;
+    }
+    // An encoder that wraps at a turn: no velocity explains a jump of more than half of one.
+    arm_q_[j] += turns_[j];
+    if (known_before_) {
+      const double turn = 2.0 * std::numbers::pi * std::round((last_arm_q_[j] - arm_q_[j]) / (2.0 * std::numbers::pi));
+      turns_[j] += turn;
+      arm_q_[j] += turn;
+    }
+  }
+  return true;
+}
+
+void Controller::Impl::begin_reference() noexcept {
+  next_q_ = arm_q_;
+  next_v_ = arm_v_;
+  a_.setZero();
+  has_last_torque_ = false;
+}
+
+void Controller::Impl::follow_arm() noexcept {
+  bool lost = !known_before_;
+  const double most = drives_track_ ? settings.tracking.servo_lag : settings.tracking.largest_error;
+  command.tracking_error = 0.0;
+  for (Eigen::Index j = 0; j < q_.size() && !lost; ++j) {
+    const double error = std::abs(next_q_[j] - arm_q_[j]);
+    command.tracking_error = std::max(command.tracking_error, error);
+    lost = error > (is_sliding_[static_cast<std::size_t>(j)] ? sliding_share : 1.0) * most;
+  }
+  if (lost) {
+    begin_reference();
+    command.tracking_error = 0.0;
+  }
+  q_ = next_q_;
+  v_ = next_v_;
+  apart_ = q_ != arm_q_ || v_ != arm_v_;
+}
+
+void Controller::Impl::observe() noexcept {
+  // v̇ measured, less what was predicted with the disturbance known so far: d changes by M of that, over the time constant.
+  const TrackingSettings& tracking = settings.tracking;
+  if (!torque || !known_before_ || !has_last_torque_ || tracking.observer_time == infinity) {
+    return;
+  }
+  surplus_ = (arm_v_ - last_arm_v_) / settings.period - command.acceleration;
+  const double share = std::min(1.0, settings.period / tracking.observer_time);
+  for (Eigen::Index i = 0; i < q_.size(); ++i) {
+    const double most = tracking.observer_share * arm.robot().limits().effort[i], found = mass_.row(i).dot(surplus_);
+    if (std::isfinite(found)) {  // the mass matrix may be missing
+      disturbance_[i] = std::clamp(disturbance_[i] + share * found, -most, most);
+    }
+  }
+}
+
+void Controller::Impl::take_dynamics(const KinematicState& state, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
+                                     const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
+  // Without inertias of its own, an arm has to be told them in every step.
+  if (mass_matrix != nullptr) {
+    const bool fits = mass_matrix->rows() == mass_.rows() && mass_matrix->cols() == mass_.cols() && bias->size() == bias_.size();
+    if (fits) {
+      mass_ = *mass_matrix;
+      bias_ = *bias;
+    } else {
+      mass_.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+  } else if (dynamics_) {
+    dynamics_->mass_matrix(state, *dynamics_workspace_, mass_);
+    dynamics_->bias(state, *dynamics_workspace_, bias_);
+  } else {
+    mass_.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  bias_ -= disturbance_;
+}
+
+void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
+                                       const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
+  SecondState second;
+  if (apart_) {
+    arm_workspace_.activations = workspace.activations;
+    if (system->embed(arm_q_, arm_v_, obstacles(), arm_workspace_)) {
+      second = {&arm_workspace_.clearances, &arm_v_};
+    }
+  }
+  const LastCommand last{&a_, torque && has_last_torque_ ? &reference_torque_ : nullptr, nullptr};
+  if (torque) {
+    // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
+    const bool told = mass_matrix != nullptr && (!apart_ || !dynamics_);
+    take_dynamics(workspace.state(), told ? mass_matrix : nullptr, told ? bias : nullptr);
+    command.program = torque_program_->solve(q_, v_, wanted_, mass_, bias_, &workspace.clearances, second, last, solution);
+    reference_torque_ = solution.torque;
+  } else {
+    command.program = filter_->apply(q_, v_, wanted_, &workspace.clearances, second, last, solution);
+  }
+}
+
+void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
+  if (!apart_ || drives_track_) {
+    tracked_.torque = solution.torque;
+    tracked_.acceleration = solution.acceleration;
+    return;
+  }
+  const double w = settings.tracking.frequency;
+  feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * w * (v_ - arm_v_);
+  TorqueStatus status;
+  if (torque) {
+    take_dynamics(arm_workspace_.state(), mass_matrix, bias);
+    const LastCommand last{nullptr, has_last_torque_ ? &last_torque_ : nullptr, nullptr};
+    status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, &arm_workspace_.clearances, {}, last, tracked_);
+  } else {
+    const LastCommand last{&last_acceleration_, nullptr, nullptr};
+    status = tracking_filter_->apply(arm_q_, arm_v_, feedback_, &arm_workspace_.clearances, {}, last, tracked_);
+  }
+  if (status > TorqueStatus::limited) {
+    command.program = std::max(command.program, status);
+  }
+}
+
+void Controller::Impl::stop(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias,
+                            ConstVectorRef q, ConstVectorRef v) noexcept {
+  wanted_.setZero();
+  if (torque && mass_matrix != nullptr) {
+    command.program = torque_program_->solve(q, v, wanted_, *mass_matrix, *bias, nullptr, solution);
+  } else if (torque) {
+    command.program = torque_program_->solve(q, v, wanted_, mass_, bias_, nullptr, solution);
+  } else {
+    command.program = filter_->apply(q, v, wanted_, nullptr, solution);
+  }
+  tracked_.torque = solution.torque;
+  tracked_.acceleration = solution.acceleration;
+  known_before_ = has_last_torque_ = false;
+}
+
+void Controller::Impl::advance_reference() noexcept {
+  a_ = solution.acceleration.allFinite() ? solution.acceleration : a_;
+  next_v_ = v_ + settings.period * a_;
+  next_q_ = q_ + settings.period * next_v_;
+}
+
+}  // namespace sidestep
