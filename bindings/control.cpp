@@ -342,23 +342,38 @@ void bind_torque_controller(nb::module_& m) {
       .def(
           "solve",
           [](TorqueController& controller, const ArrayLike& q, const ArrayLike& v, const ArrayLike& acceleration, const ArrayLike& mass_matrix,
-             const ArrayLike& bias, nb::handle clearances) {
+             const ArrayLike& bias, nb::handle clearances, const std::optional<ArrayLike>& last_acceleration,
+             const std::optional<ArrayLike>& last_torque) {
             const int nv = controller.num_coordinates();
             TorqueSolution solution(nv, controller.settings().safety.max_rows);
             nb::object keep;
+            LastCommand last;
+            Eigen::VectorXd a, torque;
+            if (last_acceleration) {
+              a = as_finite_vector(*last_acceleration, "last_acceleration", nv);
+              last.acceleration = &a;
+            }
+            if (last_torque) {
+              torque = as_finite_vector(*last_torque, "last_torque", nv);
+              last.torque = &torque;
+            }
             static_cast<void>(controller.solve(as_vector(q, "q", nv), as_vector(v, "v", nv),
                                                as_vector(acceleration, "acceleration", nv),
                                                as_matrix(mass_matrix, "mass_matrix", nv, nv),
-                                               as_vector(bias, "bias", nv), as_clearances(clearances, keep), solution));
+                                               as_vector(bias, "bias", nv), as_clearances(clearances, keep), {}, last,
+                                               solution));
             return solution;
           },
           nb::arg("q"), nb::arg("v"), nb::arg("acceleration"), nb::arg("mass_matrix"), nb::arg("bias"), nb::kw_only(),
-          nb::arg("clearances").none() = nb::none(),
+          nb::arg("clearances").none() = nb::none(), nb::arg("last_acceleration") = nb::none(), nb::arg("last_torque") = nb::none(),
           nb::sig("def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
                   "acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, "
-                  "bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution"),
+                  "bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None, "
+                  "last_acceleration: numpy.typing.ArrayLike | None = None, "
+                  "last_torque: numpy.typing.ArrayLike | None = None) -> TorqueSolution"),
           "One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),\n"
-          "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. Returns a\n"
+          "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. With the last\n"
+          "period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits. Returns a\n"
           "TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.")
       .def_prop_ro("num_coordinates", &TorqueController::num_coordinates)
       .def_prop_ro("program", [](const TorqueController& c) { return without_unbounded_rows(c.program()); }, program_doc)

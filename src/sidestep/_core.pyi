@@ -73,10 +73,10 @@ class Frame:
 
 class JointLimits:
     """
-    Per-coordinate limits: position [rad | m], velocity [/s], acceleration [/s^2], effort [Nm | N]. Each (nv,); position bounds may be infinite, the others are positive.
+    Per-coordinate limits: position [rad | m], velocity [/s], acceleration [/s^2], effort [Nm | N], jerk [/s^3], effort rate [Nm/s | N/s]. Each (nv,); position bounds may be infinite, the others are positive. Without `jerk` it is 100/s times the acceleration; without `effort_rate` there is no limit.
     """
 
-    def __init__(self, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, effort: numpy.typing.ArrayLike) -> None: ...
+    def __init__(self, *, lower: numpy.typing.ArrayLike, upper: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, effort: numpy.typing.ArrayLike, jerk: numpy.typing.ArrayLike | None = None, effort_rate: numpy.typing.ArrayLike | None = None) -> None: ...
 
     @property
     def lower(self) -> numpy.typing.NDArray[numpy.float64]: ...
@@ -92,6 +92,12 @@ class JointLimits:
 
     @property
     def effort(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def jerk(self) -> numpy.typing.NDArray[numpy.float64]: ...
+
+    @property
+    def effort_rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
 class Robot:
     """The immutable kinematic model of an arm, in the core."""
@@ -1138,6 +1144,14 @@ class Limit(enum.Flag):
 
     torque_upper = 128
 
+    jerk_lower = 256
+
+    jerk_upper = 512
+
+    torque_rate_lower = 1024
+
+    torque_rate_upper = 2048
+
 def acceleration_bounds(limits: Robot | JointLimits, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, period: float, *, position_margin: float = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Accelerations (lower, upper), each (nv,) [/s^2], that keep every joint inside its limits for ever.
@@ -1389,10 +1403,11 @@ class TorqueController:
         safety: SafetySettings, by default as they are. Raises ValueError that names the setting.
         """
 
-    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None) -> TorqueSolution:
+    def solve(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, mass_matrix: numpy.typing.ArrayLike, bias: numpy.typing.ArrayLike, *, clearances: Clearances | Step | None = None, last_acceleration: numpy.typing.ArrayLike | None = None, last_torque: numpy.typing.ArrayLike | None = None) -> TorqueSolution:
         """
         One control step: q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], mass matrix (nv, nv),
-        bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. Returns a
+        bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. With the last
+        period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits. Returns a
         TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.
         """
 
@@ -2150,6 +2165,59 @@ class ArrivalSettings:
     @speed.setter
     def speed(self, value: float, /) -> None: ...
 
+class TrackingSettings:
+    """
+    How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 w (v_r - v), with what the disturbance
+    observer found. Not for outputs of position and velocity, which the arm's own drives track.
+
+        frequency [1/s], default 30.0, allowed 1 to 300: of the feedback to the reference: larger is stiffer, and shakes with noise and delay
+        observer_time [s], default 0.05, allowed 0.005 to inf: in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay
+        observer_share, default 0.5, allowed 0 to 1: of the effort limits that the observer may make up for
+        largest_error [rad], default 0.1, allowed 0.001 to 10: between arm and reference, from which the reference begins anew
+        servo_lag [rad], default 1.0, allowed 0.001 to 10: the same where the arm's own drives track position or velocity
+        drift_gain [1/s], default 2.0, allowed 0 to 50: by which an output of velocity returns to the reference
+
+    A Controller refuses what is not allowed.
+    """
+
+    def __init__(self, *, frequency: float = 30.0, observer_time: float = 0.05, observer_share: float = 0.5, largest_error: float = 0.1, servo_lag: float = 1.0, drift_gain: float = 2.0) -> None: ...
+
+    @property
+    def frequency(self) -> float: ...
+
+    @frequency.setter
+    def frequency(self, value: float, /) -> None: ...
+
+    @property
+    def observer_time(self) -> float: ...
+
+    @observer_time.setter
+    def observer_time(self, value: float, /) -> None: ...
+
+    @property
+    def observer_share(self) -> float: ...
+
+    @observer_share.setter
+    def observer_share(self, value: float, /) -> None: ...
+
+    @property
+    def largest_error(self) -> float: ...
+
+    @largest_error.setter
+    def largest_error(self, value: float, /) -> None: ...
+
+    @property
+    def servo_lag(self) -> float: ...
+
+    @servo_lag.setter
+    def servo_lag(self, value: float, /) -> None: ...
+
+    @property
+    def drift_gain(self) -> float: ...
+
+    @drift_gain.setter
+    def drift_gain(self, value: float, /) -> None: ...
+
 class OnlinePlannerSettings:
     """
     The planner that runs beside the loop: how it searches, and how its paths are followed.
@@ -2277,7 +2345,10 @@ class LocalMinimumSettings:
     def spread(self, value: float, /) -> None: ...
 
 class Output(enum.Enum):
-    """What a controller's program solves for."""
+    """
+    What is sent to the arm. Torque and acceleration are tracked by the controller, from the measured state;
+    position and velocity by the arm's own drives.
+    """
 
     automatic = 0
     """Torque where the arm has inertias and effort limits."""
@@ -2286,12 +2357,18 @@ class Output(enum.Enum):
 
     acceleration = 2
 
+    velocity = 3
+
+    position = 4
+
 class ControllerSettings:
     """
     All settings of a Controller. Every part is on by default; `planner=None`, `look_ahead=None` and `local_minimum=None`
     leave a part out, for comparisons.
 
         period [s], default 0.001, allowed 0.0001 to 0.1: between two calls of step; limits and clearances hold at samples so far apart
+        speed, default 1.0, allowed 0.01 to 1: share of the velocity and acceleration limits that motions use: less is slower and calmer
+        velocity_margin, default 0.02, allowed 0 to 0.5: share of the velocity limits that is left for noise and delay
         position_margin [rad], default 0.0, allowed 0 to 1: by which position limits are moved inwards
         stop_time [s], default 0.1, allowed 0.005 to 10: time constant of the damped stop
         stop_damping, default 0.25, allowed 0.001 to 10: of a stop where the mass matrix is unusable, as a share of effort limit / velocity limit
@@ -2307,13 +2384,25 @@ class ControllerSettings:
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, period: float = 0.001, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
+    def __init__(self, *, period: float = 0.001, speed: float = 1.0, velocity_margin: float = 0.02, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
 
     @property
     def period(self) -> float: ...
 
     @period.setter
     def period(self, value: float, /) -> None: ...
+
+    @property
+    def speed(self) -> float: ...
+
+    @speed.setter
+    def speed(self, value: float, /) -> None: ...
+
+    @property
+    def velocity_margin(self) -> float: ...
+
+    @velocity_margin.setter
+    def velocity_margin(self, value: float, /) -> None: ...
 
     @property
     def position_margin(self) -> float: ...
@@ -2400,6 +2489,12 @@ class ControllerSettings:
     def arrival(self, arg: ArrivalSettings, /) -> None: ...
 
     @property
+    def tracking(self) -> TrackingSettings: ...
+
+    @tracking.setter
+    def tracking(self, arg: TrackingSettings, /) -> None: ...
+
+    @property
     def output(self) -> Output: ...
 
     @output.setter
@@ -2447,7 +2542,7 @@ class SafetyStatus(enum.IntEnum):
 
     relaxed = 2
     """
-    Velocity or acceleration limits gave way to clearances, position or torque limits.
+    Jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits.
     """
 
     margin_lost = 3
@@ -2491,13 +2586,17 @@ class Command:
 
     @property
     def torque(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [Nm | N], gravity included; zero where the output is not torque."""
+
+    @property
+    def torque_without_gravity(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (nv,) [Nm | N], gravity included; zero where the output is acceleration.
+        (nv,) the same for arms that hold themselves, such as Franka's; nan where the arm has no inertias.
         """
 
     @property
     def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) [rad/s^2 | m/s^2]."""
+        """(nv,) of the arm: the reference's with feedback [rad/s^2 | m/s^2]."""
 
     @property
     def wanted(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -2507,11 +2606,17 @@ class Command:
 
     @property
     def velocity(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) after one period [rad/s | m/s]."""
+        """(nv,) of the reference after this period [rad/s | m/s]."""
 
     @property
     def position(self) -> numpy.typing.NDArray[numpy.float64]:
-        """(nv,) after one period [rad | m]; nan until a state was known."""
+        """
+        (nv,) of the reference after this period [rad | m]; nan until a state was known.
+        """
+
+    @property
+    def tracking_error(self) -> float:
+        """Largest difference of the arm from the reference [rad | m]."""
 
     @property
     def clearance(self) -> float:

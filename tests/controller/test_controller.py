@@ -277,6 +277,7 @@ BARE = {
     "look_ahead": None,
     "local_minimum": None,
     "local_activation": False,
+    "velocity_margin": 0.0,
 }
 
 
@@ -300,11 +301,14 @@ def bare(arm: ss.Arm, goal: np.ndarray, seen: ss.Obstacles) -> ss.Controller:
 def test_without_its_further_parts_it_is_the_system_followed_by_the_program(planar: ss.Arm) -> None:
     robot, goal, seen = planar.robot, planar.neutral + 0.3, near_the_tip(planar)
     system, program = barrier_system(robot, planar.body), TorqueController(robot)
-    controller, bounded = bare(planar, goal, seen), 0
+    bounded = 0
     for q, v in zip(*states(planar, 20), strict=True):
+        controller = bare(planar, goal, seen)  # its reference begins at the state, without acceleration
         M, h = robot.mass_matrix(q), robot.bias(q, v)
         step = system.acceleration(q, v, goal, seen)
-        expected = program.solve(q, v, step.acceleration, M, h, clearances=step)
+        expected = program.solve(
+            q, v, step.acceleration, M, h, clearances=step, last_acceleration=np.zeros_like(q)
+        )
         found = controller.step(q, v, M, h)
         assert found.system == step.status
         assert found.program == expected.status
@@ -312,19 +316,25 @@ def test_without_its_further_parts_it_is_the_system_followed_by_the_program(plan
         np.testing.assert_array_equal(found.torque, expected.torque)
         bounded += found.bound_by >= 0
         # Its own mass matrix and bias are those of the robot, but for rounding.
-        np.testing.assert_allclose(controller.step(q, v).torque, expected.torque, rtol=1e-9, atol=1e-9)
+        own = bare(planar, goal, seen).step(q, v)
+        np.testing.assert_allclose(own.torque, expected.torque, rtol=1e-9, atol=1e-9)
     assert bounded > 0
 
 
 def test_new_goals_and_obstacles_count_from_the_next_step_on(planar: ss.Arm) -> None:
     q, v = (rows[0] for rows in states(planar, 1))
     controller = bare(planar, planar.neutral, ss.Obstacles.none())
-    free = controller.step(q, v).torque
+
+    def begins_anew() -> np.ndarray:
+        controller.step(np.full_like(q, np.nan), v)
+        return controller.step(q, v).torque
+
+    free = begins_anew()
     controller.set_obstacles(near_the_tip(planar))
-    bent = controller.step(q, v).torque
+    bent = begins_anew()
     assert not np.allclose(free, bent)
     controller.set_goal(planar.neutral + 0.5)
-    elsewhere = controller.step(q, v).torque
+    elsewhere = begins_anew()
     fresh = bare(planar, planar.neutral + 0.5, near_the_tip(planar)).step(q, v).torque
     np.testing.assert_array_equal(elsewhere, fresh)
     assert not np.allclose(elsewhere, bent)

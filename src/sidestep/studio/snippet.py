@@ -28,6 +28,7 @@ _ROOMS = {
         "OnlinePlannerSettings",
         "PlannerSettings",
         "TimedPathSettings",
+        "TrackingSettings",
     ),
     "sidestep.system": ("GeometricSystem",),
 }
