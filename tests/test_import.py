@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import subprocess
 import sys
 import tomllib
+from importlib.util import resolve_name
 from pathlib import Path
 
 import pytest
@@ -64,6 +66,40 @@ def arm_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("arms") / "planar3.arm"
     sidestep.Arm.load("planar3").save(path)
     return path
+
+
+def imported(path: Path, package: str) -> set[str]:
+    """What a module or stub of a package says it imports, wherever it does."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            module = resolve_name("." * node.level + (node.module or ""), package)
+            names |= {module} | {f"{module}.{alias.name}" for alias in node.names}
+    return names
+
+
+@pytest.mark.parametrize("front_end", ["bench", "studio", "cli"])
+def test_only_the_command_line_imports_a_front_end(front_end: str) -> None:
+    package = Path(sidestep.__file__).parent
+    files = {
+        path.relative_to(package): path for path in package.rglob("*.py*") if path.suffix in {".py", ".pyi"}
+    }
+    outside = {
+        name: path for name, path in files.items() if name.parts[0] not in {front_end, "cli", "__main__.py"}
+    }
+    assert len(outside) > 100
+    room = f"sidestep.{front_end}"
+    users = [
+        str(name)
+        for name, path in outside.items()
+        if any(
+            f"{module}.".startswith(f"{room}.")
+            for module in imported(path, ".".join(("sidestep", *name.parent.parts)))
+        )
+    ]
+    assert users == []
 
 
 def test_nothing_is_leaked_at_exit() -> None:

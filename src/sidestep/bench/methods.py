@@ -6,11 +6,11 @@ from sidestep._core import BarrierSettings, Controller, ControllerSettings, Geom
 from sidestep.arm import Arm
 from sidestep.bench.method import Method
 from sidestep.bench.motion import ControllerMover, Mover
+from sidestep.bench.thesis import SystemMover
 from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.scenario.config import ABLATIONS
 from sidestep.thesis import ThesisNumbers, thesis_system
-from sidestep.thesis.bench import SystemMover
 
 
 def build_body(method: Method, robot: Robot) -> Body:

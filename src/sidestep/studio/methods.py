@@ -16,7 +16,7 @@ from sidestep.studio.parameters import (
     Method,
     Numbers,
 )
-from sidestep.thesis.studio.methods import METHODS_OF_THESIS
+from sidestep.studio.thesis.methods import METHODS_OF_THESIS
 
 METHODS: dict[str, Method] = {
     method.name: method

@@ -56,7 +56,7 @@ def python_snippet(snapshot: Snapshot) -> str:
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
-    from sidestep.thesis.studio.snippet import custom_code
+    from sidestep.studio.thesis.snippet import custom_code
 
     code = _controller_code if method.controlled else custom_code
     lines = code(snapshot, written)

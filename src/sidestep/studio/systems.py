@@ -17,9 +17,9 @@ from sidestep.scenario.scenario import BodyConfig, MethodChoice
 from sidestep.studio.methods import METHODS
 from sidestep.studio.mover import ControllerMover
 from sidestep.studio.parameters import Method, Numbers
+from sidestep.studio.thesis.methods import custom_scenario, numbers_of_custom
+from sidestep.studio.thesis.mover import SystemMover
 from sidestep.thesis.custom import custom_system, torque_qp_of
-from sidestep.thesis.studio.methods import custom_scenario, numbers_of_custom
-from sidestep.thesis.studio.mover import SystemMover
 
 Mover = ControllerMover | SystemMover
 
