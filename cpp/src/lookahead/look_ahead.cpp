@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <utility>
+#include <variant>
 
 #include "../settings.hpp"
 #include "../system/random_configuration.hpp"
@@ -42,10 +43,19 @@ int whole_periods(double duration, double period) noexcept {
   return std::max(1, static_cast<int>(std::lround(duration / period)));
 }
 
-AccelerationFilterSettings filter_settings(double period) {
-  AccelerationFilterSettings settings;
+/// Settings of an AccelerationFilter or a TorqueController.
+template <class Settings>
+Settings with_period(double period) {
+  Settings settings;
   settings.period = period;
   return settings;
+}
+
+std::variant<AccelerationFilter, TorqueController> limiter_for(const Robot& robot, double period, bool by_torque) {
+  if (by_torque) {
+    return TorqueController(robot, with_period<TorqueControllerSettings>(period));
+  }
+  return AccelerationFilter(robot, with_period<AccelerationFilterSettings>(period));
 }
 
 }  // namespace
@@ -70,13 +80,7 @@ void LookAheadSettings::validate() const {
 }
 
 LookAhead::Stepper::Stepper(const Robot& robot, double period, bool by_torque)
-    : period(period), filter(robot, filter_settings(period)) {
-  if (by_torque) {
-    TorqueControllerSettings settings;
-    settings.period = period;
-    program.emplace(robot, settings);
-  }
-}
+    : period(period), limiter(limiter_for(robot, period, by_torque)) {}
 
 LookAhead::LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings,
                      std::optional<RigidBodyDynamics> dynamics)
@@ -206,12 +210,13 @@ double LookAhead::advance(Motion& motion, Stepper& stepper) {
   ++stepper.steps;
   const double clearance = sees ? obstacle_clearance() : -infinity;
   const Clearances* clearances = sees ? &workspace_.clearances : nullptr;
-  if (stepper.program) {
+  if (auto* program = std::get_if<TorqueController>(&stepper.limiter)) {
     dynamics_->mass_matrix(motion.q, *dynamics_workspace_, mass_);
     dynamics_->bias(motion.q, motion.v, *dynamics_workspace_, bias_);
-    static_cast<void>(stepper.program->solve(motion.q, motion.v, wanted, mass_, bias_, clearances, filtered_));
+    static_cast<void>(program->solve(motion.q, motion.v, wanted, mass_, bias_, clearances, filtered_));
   } else {
-    static_cast<void>(stepper.filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
+    auto& filter = std::get<AccelerationFilter>(stepper.limiter);
+    static_cast<void>(filter.apply(motion.q, motion.v, wanted, clearances, filtered_));
   }
   motion.v += period * filtered_.acceleration;
   motion.q += period * motion.v;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <variant>
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
@@ -106,8 +107,7 @@ class LookAhead {
   /// What integrates motions by a period [s].
   struct Stepper {
     double period;
-    AccelerationFilter filter;
-    std::optional<TorqueController> program;  // in place of the filter, where the dynamics are given
+    std::variant<AccelerationFilter, TorqueController> limiter;  // the latter where the dynamics are given
     int steps = 0;                            // integrated so far
 
     Stepper(const Robot& robot, double period, bool by_torque);
