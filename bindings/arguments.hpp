@@ -23,8 +23,9 @@ namespace sidestep::python {
 
 namespace nb = nanobind;
 
-/// Real numbers, as a numpy array of float64: not copied where it is one. Raises TypeError that names the argument and its
-/// type for what numpy would only turn into numbers (complex, bool, dates, text, objects), ValueError for masked entries.
+/// Real numbers, as a numpy array of float64: not copied where it is one. Raises TypeError that names the argument and
+/// its type for what numpy would only turn into numbers (complex, bool, dates, text, objects), ValueError for masked
+/// entries.
 nb::object real_array(nb::handle value, const char* name);
 
 /// The same, contiguous, with one dimension at least.

@@ -18,7 +18,8 @@
 namespace sidestep::python {
 namespace {
 
-/// Runs `action`; what the system refuses becomes OSError with the number that Python makes FileNotFoundError and such of.
+/// Runs `action`; what the system refuses becomes OSError with the number that Python makes FileNotFoundError and such
+/// of.
 template <class Action>
 auto with_os_errors(const std::filesystem::path& path, Action&& action) {
   try {

@@ -32,8 +32,8 @@ class SignalPoll {
   Clock::time_point looked_ = Clock::now(), asked_ = looked_;
 };
 
-/// work(interrupted) without the GIL. Where a signal's handler raises, KeyboardInterrupt at Ctrl-C, that is raised and the
-/// result dropped.
+/// work(interrupted) without the GIL. Where a signal's handler raises, KeyboardInterrupt at Ctrl-C, that is raised and
+/// the result dropped.
 template <class Work>
 auto interruptible(Work&& work) {
   SignalPoll poll;

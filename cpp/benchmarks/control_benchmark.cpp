@@ -1,7 +1,7 @@
 // Time of one TorqueController step of a 7-joint arm, on random states of three kinds: nothing in the way, states and
 // wanted accelerations at the limits, and loads so high that the bounds must be relaxed; then the same with clearances,
-// by how many of them bend the motion, for torque control and for the filter of motion without torque. Prints percentiles
-// in microseconds, steady clock included (about 0.03).
+// by how many of them bend the motion, for torque control and for the filter of motion without torque. Prints
+// percentiles in microseconds, steady clock included (about 0.03).
 #include <algorithm>
 #include <chrono>
 #include <cstdio>

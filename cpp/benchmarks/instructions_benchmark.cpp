@@ -1,7 +1,7 @@
 // Takes the given number of steps of one kind and nothing else, for instructions.cmake to count their instructions:
 //   instructions_benchmark density|barriers|filtered|cloud STEPS
-// density: Table 6.1 of the thesis; barriers: the covered arm among ten balls; filtered: the same with the filter; cloud:
-// the covered arm above a table of 10,000 points, with the filter.
+// density: Table 6.1 of the thesis; barriers: the covered arm among ten balls; filtered: the same with the filter;
+// cloud: the covered arm above a table of 10,000 points, with the filter.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

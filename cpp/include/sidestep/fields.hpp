@@ -17,9 +17,9 @@ struct Field {
   const char* trades;  ///< one sentence: what it is, and what larger and smaller values trade
 };
 
-/// The fields of a settings struct, in the order of its documentation. The one place where unit, range and meaning stand:
-/// `validate`, the Python classes, the schema of scenario files and the reference are made from it. Defaults are those of
-/// the struct.
+/// The fields of a settings struct, in the order of its documentation. The one place where unit, range and meaning
+/// stand: `validate`, the Python classes, the schema of scenario files and the reference are made from it. Defaults are
+/// those of the struct.
 template <class Settings>
 const std::vector<Field<Settings>>& fields();
 

@@ -5,7 +5,8 @@
 
 namespace sidestep {
 
-/// Asked now and then by work that takes long, in the thread that began it, whether what is worked on is no longer wanted.
+/// Asked now and then by work that takes long, in the thread that began it, whether what is worked on is no longer
+/// wanted.
 using Interrupted = std::function<bool()>;
 inline bool never_interrupted() { return false; }
 

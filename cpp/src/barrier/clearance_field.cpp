@@ -31,7 +31,8 @@ kernels::LinkMotion motion_of(const KinematicState::Link& link) noexcept {
   copy(link.bias.angular, motion.bias_angular);
   copy(link.bias.linear, motion.bias_linear);
   motion.turning = link.velocity.angular.norm();
-  Eigen::Matrix3f::Map(motion.to_link) = link.R_WL.cast<float>();  // the columns of a rotation are the rows of its inverse
+  // the columns of a rotation are the rows of its inverse
+  Eigen::Matrix3f::Map(motion.to_link) = link.R_WL.cast<float>();
   return motion;
 }
 
@@ -217,8 +218,8 @@ class ClearanceField::Search {
       take(put_off_[static_cast<std::size_t>(next++)], beyond);
     }
     collect();
-    // So may what was missed in leaves that were looked at before; and sums that were begun, for want of room, may hold what
-    // lies too far above what was found later.
+    // So may what was missed in leaves that were looked at before; and sums that were begun, for want of room, may hold
+    // what lies too far above what was found later.
     bool is_missing = goes_beyond && is_full;
     for (int pass = 0; pass < most_passes; ++pass, is_missing = false) {
       kernels::Limits again = limits(-infinity, -infinity);
@@ -353,8 +354,8 @@ class ClearanceField::Search {
     });
   }
 
-  /// Leaves are looked at many at a time; returns whether they were. Of those wider than the cluster and what is within reach
-  /// of it only points are taken that may be below the limits.
+  /// Leaves are looked at many at a time; returns whether they were. Of those wider than the cluster and what is within
+  /// reach of it only points are taken that may be below the limits.
   bool take(int leaf, const kernels::Limits& limits) noexcept {
     kernels::Leaves& leaves = group_.leaves;
     kernels::LoosePoints& loose = group_.loose;

@@ -28,8 +28,8 @@ class PairOfLinks {
         a_{first.ellipsoids, first.rows, first.centre, first.radius},
         b_{second.ellipsoids, second.rows, R_ * second.centre + p_, second.radius} {}
 
-  /// Calls act(a, b, bound) for pairs of ellipsoids of which a lower bound of the gap is below the limit, until it returns
-  /// true; returns whether it did. Most ellipsoids are too far from a ball around all of the other link.
+  /// Calls act(a, b, bound) for pairs of ellipsoids of which a lower bound of the gap is below the limit, until it
+  /// returns true; returns whether it did. Most ellipsoids are too far from a ball around all of the other link.
   template <class Act>
   bool find_below(double limit, Act&& act) const noexcept {
     if (!within(limit)) {
@@ -113,7 +113,8 @@ class PairOfLinks {
   Ellipsoids a_, b_;
 };
 
-/// The means of the gaps of two links, over pairs of ellipsoids that come in any order, with lower bounds of their gaps.
+/// The means of the gaps of two links, over pairs of ellipsoids that come in any order, with lower bounds of their
+/// gaps.
 class MeanGap {
  public:
   /// Gaps matter up to a window beyond `reach`, or beyond `reach_ahead` once the horizon is over [m].

@@ -13,8 +13,8 @@
 namespace sidestep {
 namespace {
 
-// How far each joint of a target may be from the arm's [rad | m], in turn; while a trajectory is followed, of every other
-// one from its target.
+// How far each joint of a target may be from the arm's [rad | m], in turn; while a trajectory is followed, of every
+// other one from its target.
 constexpr std::array<double, 3> spreads{0.8, 2.2, 6.3};
 constexpr double spread_of_followed = 0.5;
 constexpr double coarse_period = 0.05;  // [s] of the steps by which trajectories are compared at first
@@ -22,7 +22,8 @@ constexpr double least_steps = 10.0;    // of a coarse motion, where the fine on
 // Deeper than bodies overshoot [m]: how a motion goes on from there is not looked at. Of such the longest is the best.
 constexpr double touched = -0.02;
 constexpr std::size_t enough_references = 10;  // that go far: the others are sorted out only while there are more
-constexpr int coarse_horizons = 25;            // coarse motions in one look: so many to the horizon, more if they end before
+// coarse motions in one look: so many to the horizon, more if they end before
+constexpr int coarse_horizons = 25;
 constexpr std::size_t num_fine = 4;            // fine ones of trajectories, at most
 
 const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& system) {

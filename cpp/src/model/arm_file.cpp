@@ -21,9 +21,9 @@
 
 #include "sha256.hpp"
 
-// The file, little endian: magic (8 bytes), version (u32), size of the payload (u64), SHA-256 of the payload (32 bytes),
-// payload. The payload is a row of sections in a fixed order: tag (4 bytes), size (u64), content. A text is its size (u32)
-// and UTF-8; a list is its length (u32) and its entries; numbers are IEEE doubles, matrices by columns.
+// The file, little endian: magic (8 bytes), version (u32), size of the payload (u64), SHA-256 of the payload (32
+// bytes), payload. The payload is a row of sections in a fixed order: tag (4 bytes), size (u64), content. A text is its
+// size (u32) and UTF-8; a list is its length (u32) and its entries; numbers are IEEE doubles, matrices by columns.
 namespace sidestep {
 namespace {
 

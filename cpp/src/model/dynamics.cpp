@@ -9,8 +9,10 @@
 namespace sidestep {
 namespace {
 
-constexpr double inertia_tolerance = 1e-6;  // relative to the largest entry: files give a few digits, and bodies are thin
-constexpr double inertia_rounding = 1e-12;  // [kg m^2] per kilogram, of a kilogram at least: zeros of CAD exports and sums
+// relative to the largest entry: files give a few digits, and bodies are thin
+constexpr double inertia_tolerance = 1e-6;
+// [kg m^2] per kilogram, of a kilogram at least: zeros of CAD exports and sums
+constexpr double inertia_rounding = 1e-12;
 
 /// The inertia of a point mass about the origin, m (|c|² 1 - c cᵀ).
 Eigen::Matrix3d point_inertia(double mass, const Eigen::Vector3d& c) noexcept {

@@ -15,8 +15,9 @@ struct Item {
   int index;
 };
 
-/// Points are halved across the axis along which they spread most until no more than this is left: those of one register
-/// lie together. Where surfaces meet, halving by the variance leaves smaller boxes than halving the longest side.
+/// Points are halved across the axis along which they spread most until no more than this is left: those of one
+/// register lie together. Where surfaces meet, halving by the variance leaves smaller boxes than halving the longest
+/// side.
 constexpr std::ptrdiff_t smallest_group = 4;
 static_assert(PointTree::leaf_size % smallest_group == 0);
 

@@ -111,8 +111,8 @@ Eigen::Index OnlinePlanner::waypoint_after(double station) const {
 }
 
 bool OnlinePlanner::ahead_is_free(double station, const Obstacles& obstacles, BodyClearance::Workspace& w) const {
-  // With what the path was made with. An obstacle that comes a little nearer bends the motion, it does not block the path:
-  // half the margin is enough.
+  // With what the path was made with. An obstacle that comes a little nearer bends the motion, it does not block the
+  // path: half the margin is enough.
   Margins margins = path_margins_;
   margins.margin *= 0.5;
   margins.pair_margin *= 0.5;

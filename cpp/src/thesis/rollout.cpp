@@ -22,8 +22,8 @@ void check_size(const Eigen::VectorXd& vector, const char* name, int nv) {
   }
 }
 
-/// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t + dt.
-/// A stage that falls back brakes; the status that is recorded is that of the step's own state.
+/// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t +
+/// dt. A stage that falls back brakes; the status that is recorded is that of the step's own state.
 void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, Goal& goal,
                    ObstaclesInMotion& obstacles, double dt, const Eigen::VectorXd& a1, Eigen::VectorXd& q,
                    Eigen::VectorXd& v) {

@@ -6,8 +6,8 @@
 
 namespace sidestep {
 
-/// Throws std::invalid_argument if so many records, one motion each, would be too large together, or as `rollout` does on
-/// the period and the steps.
+/// Throws std::invalid_argument if so many records, one motion each, would be too large together, or as `rollout` does
+/// on the period and the steps.
 void check_records(const GeometricSystem& system, const RolloutSettings& settings, Eigen::Index motions);
 
 /// A rollout with all its rows, which are still to be written. Throws as `rollout` does on the period and the steps.

@@ -304,8 +304,8 @@ BOOST_AUTO_TEST_CASE(what_approaches_is_known_deep_inside) {
 }
 
 BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
-  // Of eleven points that recede and one beyond the window that comes closer than they will be, but not within reach of the
-  // horizon: the nearest is what is left to be minded.
+  // Of eleven points that recede and one beyond the window that comes closer than they will be, but not within reach of
+  // the horizon: the nearest is what is left to be minded.
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;
   const Body body({link}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1), {0.01 * Eigen::Matrix3d::Identity()},
@@ -333,8 +333,8 @@ BOOST_AUTO_TEST_CASE(what_recedes_is_minded_where_nothing_comes_within_reach) {
   }
 }
 
-// A plane that touches a flat ellipsoid says little of what is deep inside, where clearances are lower; of leaves that lie
-// across its surface as well.
+// A plane that touches a flat ellipsoid says little of what is deep inside, where clearances are lower; of leaves that
+// lie across its surface as well.
 BOOST_AUTO_TEST_CASE(clouds_that_an_ellipsoid_is_deep_in) {
   const Robot robot = test::serial_arm(test::arm_limits(2));
   const std::string link = robot.frames().back().name;
@@ -443,8 +443,8 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
   }
 }
 
-// Without a look ahead nothing else asks for what lies deep inside: a large ball at the surface is found first, and along the
-// longest axis clearances are much lower than at its depth.
+// Without a look ahead nothing else asks for what lies deep inside: a large ball at the surface is found first, and
+// along the longest axis clearances are much lower than at its depth.
 BOOST_AUTO_TEST_CASE(balls_at_the_surface_hide_no_points_deep_inside) {
   const Robot robot = test::serial_arm(test::arm_limits(1));
   const std::string link = robot.frames().back().name;

@@ -104,7 +104,8 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_finds_the_same_in_any_company) {
     BOOST_TEST_CONTEXT(name(set)) {
       gaps.solve();
       for (int k = 0; k < gaps.size(); ++k) {
-        // Normals differ by the accuracy at which the iteration ends, 1e-12, over the curvature; the same code not at all.
+        // Normals differ by the accuracy at which the iteration ends, 1e-12, over the curvature; the same code not at
+        // all.
         agree(gaps[k], alone[static_cast<std::size_t>(k)], set == before ? 0.0 : 1e-11);
       }
     }

@@ -80,7 +80,8 @@ BOOST_AUTO_TEST_CASE(wrong_arguments_are_named) {
 }
 
 BOOST_AUTO_TEST_CASE(the_mean_goes_over_from_sample_to_sample) {
-  // h = t / (1 + exp(t/T)) + const, of two samples that are equal at t = 0, one at rest: h'' = -1/(2T), and 4 of theirs.
+  // h = t / (1 + exp(t/T)) + const, of two samples that are equal at t = 0, one at rest: h'' = -1/(2T), and 4 of
+  // theirs.
   constexpr double T = 0.002;
   BoltzmannMean mean(T);
   mean.add({0.1, 0.0, 3.0, {}});

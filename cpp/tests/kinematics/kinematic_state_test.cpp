@@ -135,8 +135,8 @@ BOOST_AUTO_TEST_CASE(every_instruction_set_agrees_with_the_product_of_poses) {
             joint.parent < 0 ? Eigen::Isometry3d::Identity() : poses[static_cast<std::size_t>(joint.parent)];
         poses.push_back(parent * joint.X_PJ * X);
         const KinematicState::Link& link = state.link(static_cast<int>(poses.size()) - 1);
-        // Rounding, of rotations and of positions: multiplier and offset may be applied in one step, which rounds once less,
-        // and an angle of a million rad is known to 1e-10.
+        // Rounding, of rotations and of positions: multiplier and offset may be applied in one step, which rounds once
+        // less, and an angle of a million rad is known to 1e-10.
         BOOST_TEST((link.R_WL - poses.back().linear()).norm() < 1e-13 + 4e-15 * (1.0 + q.norm()));
         BOOST_TEST((link.p_WL - poses.back().translation()).norm() < 1e-13 * (1.0 + q.norm()));
       }

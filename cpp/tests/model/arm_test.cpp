@@ -216,7 +216,8 @@ BOOST_AUTO_TEST_CASE(every_truncation_is_found) {
 }
 
 BOOST_AUTO_TEST_CASE(sealed_damage_is_refused_or_makes_a_valid_arm) {
-  // Behind a right hash anything may stand: sizes of gigabytes, numbers that are not finite. Whatever is read is an arm.
+  // Behind a right hash anything may stand: sizes of gigabytes, numbers that are not finite. Whatever is read is an
+  // arm.
   const Bytes good = file_of(small_parts().arm());
   Random random(7);
   int refused = 0;

@@ -155,7 +155,8 @@ BOOST_AUTO_TEST_CASE(the_narrow_places_between_arm_and_attractor_are_known) {
   const TimedPathSettings settings;
   Eigen::MatrixXd path(2, 2);
   path << 0.0, 2.0, 0.0, 0.0;
-  // Beyond the tip, stretched towards 1 rad: the tip ends at 0.61 m, the points begin at 0.63 m; others follow, farther.
+  // Beyond the tip, stretched towards 1 rad: the tip ends at 0.61 m, the points begin at 0.63 m; others follow,
+  // farther.
   Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 5);
   for (Eigen::Index k = 0; k < 5; ++k) {
     const double angle = 1.0 + 0.05 * static_cast<double>(k - 2), away = k == 2 ? 0.65 : 0.655;
@@ -257,7 +258,8 @@ BOOST_AUTO_TEST_CASE(corners_are_passed_slowly_where_there_is_little_room) {
     const TimedPath route = make_route(path, body, point(distance * std::cos(1.0), distance * std::sin(1.0)), settings, w);
     return route.speed[20];  // 1 rad, by 0.05 rad
   };
-  // The tip ends at 0.61 m, the point begins 2 cm farther; the tip is 0.61 m from the first joint, 0.31 m from the second.
+  // The tip ends at 0.61 m, the point begins 2 cm farther; the tip is 0.61 m from the first joint, 0.31 m from the
+  // second.
   const double room = 0.02, swing = settings.delay * (0.61 * (1.0 - std::sqrt(0.5)) + 0.31 * std::sqrt(0.5));
   BOOST_TEST(speed(0.65) <= 1.01 * room / swing);  // the clearance is a lower bound, to 1 %
   BOOST_TEST(speed(0.65) >= 0.8 * room / swing);   // the bound of the motion knows no direction of it

@@ -12,8 +12,8 @@
 
 namespace sidestep::test {
 
-/// The serial arm with a slim ellipsoid around each of its links of 0.3 m, inertias, and pairs of all links that are not
-/// neighbours.
+/// The serial arm with a slim ellipsoid around each of its links of 0.3 m, inertias, and pairs of all links that are
+/// not neighbours.
 inline Arm covered_arm(JointLimits limits, bool has_pairs = true, bool has_dynamics = true) {
   const Robot bare = serial_arm(std::move(limits));
   const int nv = bare.num_coordinates();

@@ -11,9 +11,9 @@ namespace sidestep {
 /// An embedding whose coordinates are barriers of clearances, ψ_k = f(h_k).
 ///
 /// Every coordinate has an activation distance of its own, and whoever evaluates may ask for shorter ones
-/// (EmbeddingView::activations): where the arm has to come close, at its goal, the metric is else so steep that the pull to
-/// the goal is all but lost, and the arm creeps. The safety margin (SafetySettings) shrinks with it, of what is known and not
-/// seen: a link that has to come near another one can.
+/// (EmbeddingView::activations): where the arm has to come close, at its goal, the metric is else so steep that the
+/// pull to the goal is all but lost, and the arm creeps. The safety margin (SafetySettings) shrinks with it, of what is
+/// known and not seen: a link that has to come near another one can.
 class Barrier : public Embedding {
  public:
   int num_coordinates() const noexcept final { return static_cast<int>(activations_.size()); }

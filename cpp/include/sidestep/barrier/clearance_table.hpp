@@ -8,8 +8,8 @@ namespace sidestep {
 
 /// The clearance of two links that only two joints move relative to each other, as a function of these.
 ///
-/// A uniform cubic B-spline in either coordinate, h(x, y) = Σ_ij B_i(x) B_j(y) c_ij, so twice continuously differentiable.
-/// Beyond its ends it and its derivatives stay as they are there.
+/// A uniform cubic B-spline in either coordinate, h(x, y) = Σ_ij B_i(x) B_j(y) c_ij, so twice continuously
+/// differentiable. Beyond its ends it and its derivatives stay as they are there.
 struct ClearanceTable {
   /// Where the control points are: the one of number i at begin + i·spacing.
   struct Axis {

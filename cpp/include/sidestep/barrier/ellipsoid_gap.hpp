@@ -14,10 +14,11 @@ namespace sidestep {
 ///
 ///     h = max over |n| = 1 of φ(n),      φ(n) = n·d − s_a(n) − s_b(n):
 ///
-/// the distance of ellipsoids that are apart. Of those that overlap it is less than zero: minus the depth, or where d is
-/// much shorter than the semi-axes, that of a maximum near the line of centres. φ of any n is a lower bound of h.
+/// the distance of ellipsoids that are apart. Of those that overlap it is less than zero: minus the depth, or where d
+/// is much shorter than the semi-axes, that of a maximum near the line of centres. φ of any n is a lower bound of h.
 ///
-/// Seen from a, whose half-widths rest, h' and h'' are those of φ with n held, plus what n gains by following the maximum,
+/// Seen from a, whose half-widths rest, h' and h'' are those of φ with n held, plus what n gains by following the
+/// maximum,
 ///
 ///     h' = φ',   h'' = φ'' + gᵀ (−∂²φ)⁻¹ g,   g = (∂φ)' across n.
 struct EllipsoidGap {
@@ -32,8 +33,8 @@ class EllipsoidGaps {
  public:
   /// Of ellipsoids at rest that are given in one frame.
   EllipsoidGaps() noexcept = default;
-  /// Where the frame of b is in that of a, in which gaps are, and how it moves there: spatial velocity at the origin of a,
-  /// and its time derivative at q̈ = 0.
+  /// Where the frame of b is in that of a, in which gaps are, and how it moves there: spatial velocity at the origin of
+  /// a, and its time derivative at q̈ = 0.
   EllipsoidGaps(const Eigen::Matrix3d& R_AB, const Eigen::Vector3d& p_AB, const SpatialMotion& velocity,
                 const SpatialMotion& bias) noexcept;
 

@@ -63,8 +63,8 @@ class Embedding {
   virtual void lower_distances(Eigen::Ref<Eigen::VectorXd> distances, const KinematicState& state,
                                const Obstacles& obstacles) const noexcept;
 
-  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle; where they do not, the parts may.
-  /// Much quicker than `add_to`. False without a body. No allocation.
+  /// Whether balls inside the body's parts reach deeper than `depth` [m] into an obstacle; where they do not, the parts
+  /// may. Much quicker than `add_to`. False without a body. No allocation.
   virtual bool touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept;
 
   /// Whether `lower_distances` does anything.
@@ -73,8 +73,8 @@ class Embedding {
   /// Writes the embedding's own activation distances (m) [m | rad]; infinity where it is no barrier. No allocation.
   virtual void write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept;
 
-  /// Lowers activation distances (m) so that a configuration with these clearances (m) is left free, see Barrier. Changes
-  /// nothing where it is no barrier. No allocation.
+  /// Lowers activation distances (m) so that a configuration with these clearances (m) is left free, see Barrier.
+  /// Changes nothing where it is no barrier. No allocation.
   virtual void lower_activations(ConstVectorRef clearances, Eigen::Ref<Eigen::VectorXd> activations) const noexcept;
 
   /// The robot the embedding was made for.

@@ -13,9 +13,9 @@ namespace sidestep {
 
 /// One coordinate per pair of links that must not touch, a barrier of the clearance between their ellipsoids.
 ///
-/// The clearance of two ellipsoids is the gap between them (see ellipsoid_gap.hpp), their distance, less the gap at which
-/// the links touch (see link_pair.hpp). The pairs of ellipsoids of two links are reduced to one clearance by the Boltzmann
-/// mean (see boltzmann_mean.hpp).
+/// The clearance of two ellipsoids is the gap between them (see ellipsoid_gap.hpp), their distance, less the gap at
+/// which the links touch (see link_pair.hpp). The pairs of ellipsoids of two links are reduced to one clearance by the
+/// Boltzmann mean (see boltzmann_mean.hpp).
 class SelfCollisionBarrier final : public Barrier {
  public:
   /// Clearances are measured up to `reach` [m], at least to the activation distance, as in ClearanceBarrier. Throws

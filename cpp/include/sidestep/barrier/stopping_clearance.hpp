@@ -11,9 +11,9 @@ namespace sidestep {
 
 /// How far ahead what approaches is looked for.
 ///
-/// An arm that stops along its path in the time 2τ, every closing speed falling in proportion to time, comes to a clearance
-/// of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is smallest is
-/// the critical sample: not always the nearest, past which the arm may move.
+/// An arm that stops along its path in the time 2τ, every closing speed falling in proportion to time, comes to a
+/// clearance of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is
+/// smallest is the critical sample: not always the nearest, past which the arm may move.
 struct Horizon {
   double time = 0.0;                                           ///< τ [s]
   double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
@@ -29,8 +29,9 @@ struct Horizon {
     return std::min(time, longest);
   }
 
-  /// The speed at which what moves with v may close in on what is seen at x from it, at most: n·v, where the unit vector n
-  /// goes from somewhere in a ball to somewhere x away in it. Given along = x·v, |x|, the ball's radius and |v|.
+  /// The speed at which what moves with v may close in on what is seen at x from it, at most: n·v, where the unit
+  /// vector n goes from somewhere in a ball to somewhere x away in it. Given along = x·v, |x|, the ball's radius and
+  /// |v|.
   static double closing_speed(double along, double distance, double radius, double speed) noexcept {
     const double sine = radius / distance, component = along / distance;
     const double cosine = std::sqrt(std::max(0.0, 1.0 - sine * sine));

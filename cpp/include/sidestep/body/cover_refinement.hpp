@@ -48,8 +48,8 @@ struct CoverRefinement {
 /// steps have one length per ellipsoid, so that the descent does not depend on the frame.
 ///
 /// points (3 × N) [m]; directions: sets of unit vectors, used in turn, at which the boundary is felt; multipliers (N,)
-/// of the points, updated. The proof of the cover is made elsewhere: nothing here is a guarantee. Throws Interruption if
-/// interrupted, which is asked before every step; ellipsoids and multipliers are then those of the step before.
+/// of the points, updated. The proof of the cover is made elsewhere: nothing here is a guarantee. Throws Interruption
+/// if interrupted, which is asked before every step; ellipsoids and multipliers are then those of the step before.
 void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points,
                   const std::vector<Eigen::Matrix3Xd>& directions, const CoverRefinement& settings,
                   SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers,

@@ -96,7 +96,8 @@ void accumulate_generalised_forces(const KinematicState& state, int joint, const
   }
 }
 
-/// The same for wrenches on many links, from the last joint to the first: those of a chain go down to the base together.
+/// The same for wrenches on many links, from the last joint to the first: those of a chain go down to the base
+/// together.
 class GeneralisedForce {
  public:
   /// Adds to `generalised_force` (nv), which must outlive this.

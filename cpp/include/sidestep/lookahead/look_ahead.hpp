@@ -38,19 +38,19 @@ const std::vector<Field<LookAheadSettings>>& fields();
 /// Leads an arm out of the way of what moves, in time: a barrier backs off along the line of approach until a joint
 /// limit stops the arm, where a step aside would have let it pass.
 ///
-/// In a look the system, with clearances and limits as an AccelerationFilter keeps them or, where the dynamics are given, a
-/// TorqueController, is integrated from where the arm will be when the look has ended, with the obstacles moving on as they do. If on its way to the goal
-/// that comes nearer to an obstacle than `clearance`, and so does the trajectory that is followed already,
-/// trajectories to random configurations are drawn: near ones, far ones and such as are near that of the trajectory
-/// followed. They are filtered in three stages. Those come first whose references, without a filter, get farthest
-/// before the body is deep in an obstacle, which is quick to say. They are integrated by steps of 0.05 s, as many as
-/// there is time for; then those that keep farthest away by steps of `period`, until one is found that keeps
-/// `clearance`. If none does, that is followed whose least clearance is largest, or of those that go through an
-/// obstacle the one that comes to it last. The goal is followed again as soon as its own way is free.
+/// In a look the system, with clearances and limits as an AccelerationFilter keeps them or, where the dynamics are
+/// given, a TorqueController, is integrated from where the arm will be when the look has ended, with the obstacles
+/// moving on as they do. If on its way to the goal that comes nearer to an obstacle than `clearance`, and so does the
+/// trajectory that is followed already, trajectories to random configurations are drawn: near ones, far ones and such
+/// as are near that of the trajectory followed. They are filtered in three stages. Those come first whose references,
+/// without a filter, get farthest before the body is deep in an obstacle, which is quick to say. They are integrated by
+/// steps of 0.05 s, as many as there is time for; then those that keep farthest away by steps of `period`, until one is
+/// found that keeps `clearance`. If none does, that is followed whose least clearance is largest, or of those that go
+/// through an obstacle the one that comes to it last. The goal is followed again as soon as its own way is free.
 ///
-/// A trajectory is no motion of the system, whose barriers would push the arm off it. The filter or the torque controller,
-/// which have to be there, keep the arm off obstacles and itself, and within limits. Where nothing moves, nothing is
-/// looked at.
+/// A trajectory is no motion of the system, whose barriers would push the arm off it. The filter or the torque
+/// controller, which have to be there, keep the arm off obstacles and itself, and within limits. Where nothing moves,
+/// nothing is looked at.
 ///
 /// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
 ///
@@ -116,11 +116,12 @@ class LookAhead {
   void check_interrupted() const;
   /// Moves on by one period; the least clearance from obstacles at its beginning [m].
   double advance(Motion& motion, Stepper& stepper);
-  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that goes
-  /// through an obstacle less, by what is left of the horizon then, at 1 m/s.
+  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that
+  /// goes through an obstacle less, by what is left of the horizon then, at 1 m/s.
   double least_clearance(Motion motion, Stepper& stepper, double enough);
   double obstacle_clearance() const noexcept;
-  /// Random trajectories from a state, those first whose references get farthest before the body is deep in an obstacle.
+  /// Random trajectories from a state, those first whose references get farthest before the body is deep in an
+  /// obstacle.
   std::vector<AvoidanceTrajectory> draw_flights(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
   /// The trajectories from a state that keep farthest away in coarse steps, best first.
   std::vector<Tried> promising(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);

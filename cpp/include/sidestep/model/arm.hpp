@@ -42,21 +42,22 @@ struct ArmDetails {
   Provenance provenance;
 };
 
-/// Everything that is prepared once for a robot: kinematic tree, limits, inertias, frames, covering body with its proof,
-/// pairs of links that must not touch, clearance tables.
+/// Everything that is prepared once for a robot: kinematic tree, limits, inertias, frames, covering body with its
+/// proof, pairs of links that must not touch, clearance tables.
 ///
-/// An immutable value; copies share their content. `save` and `load` use one binary file (`.arm`) that needs no mesh, no
-/// URDF and no Python.
+/// An immutable value; copies share their content. `save` and `load` use one binary file (`.arm`) that needs no mesh,
+/// no URDF and no Python.
 class Arm {
  public:
   /// `inertials`: one per joint in the frame of the joint's child, or empty for an arm without dynamics.
-  /// Throws std::invalid_argument that names what is wrong: a body that is not calibrated, an unknown link, a table or an
-  /// inertia that does not suit the robot.
+  /// Throws std::invalid_argument that names what is wrong: a body that is not calibrated, an unknown link, a table or
+  /// an inertia that does not suit the robot.
   Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<ClearanceTable> tables,
       std::vector<Inertial> inertials, ArmDetails details = {});
 
-  /// Reads an `.arm` file. Throws std::system_error if the file cannot be read, and std::invalid_argument that names the
-  /// file, what is wrong with it and what to do: not an arm file, cut off, damaged, of a newer version, inconsistent.
+  /// Reads an `.arm` file. Throws std::system_error if the file cannot be read, and std::invalid_argument that names
+  /// the file, what is wrong with it and what to do: not an arm file, cut off, damaged, of a newer version,
+  /// inconsistent.
   static Arm load(const std::filesystem::path& path);
 
   /// Writes an `.arm` file in one piece: a reader sees the old file or the new one. Throws std::system_error.

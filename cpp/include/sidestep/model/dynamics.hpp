@@ -15,8 +15,8 @@ struct Inertial {
   Eigen::Vector3d com = Eigen::Vector3d::Zero();       ///< centre of mass [m]
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();   ///< rotational inertia about the centre of mass [kg m^2]
 
-  /// Throws std::invalid_argument that names `owner` and the quantity at fault. The mass is not negative; the rotational
-  /// inertia is symmetric and positive semidefinite.
+  /// Throws std::invalid_argument that names `owner` and the quantity at fault. The mass is not negative; the
+  /// rotational inertia is symmetric and positive semidefinite.
   void validate(const std::string& owner) const;
 };
 
@@ -31,8 +31,8 @@ inline const Eigen::Vector3d standard_gravity{0.0, 0.0, -9.81};
 
 /// The equation of motion M(q) a + h(q, v) = τ of a robot's tree, without friction and rotor inertia.
 ///
-/// The mass matrix is found by composite rigid bodies and the bias h = C(q, v) v + g(q) by recursive Newton-Euler, both in
-/// world coordinates. Joints that share a coordinate (mimic joints) are projected onto it by their screws.
+/// The mass matrix is found by composite rigid bodies and the bias h = C(q, v) v + g(q) by recursive Newton-Euler, both
+/// in world coordinates. Joints that share a coordinate (mimic joints) are projected onto it by their screws.
 /// Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 and 6.
 class RigidBodyDynamics {
  public:

@@ -18,8 +18,8 @@ class Obstacles {
   /// [m]: single precision still holds what queries make of a ball as large.
   static constexpr double largest_radius = 1e9;
 
-  /// points (3 × N) [m], radii (N) [m] >= 0 and at most `largest_radius`, velocities (3 × N) [m/s]; all finite and N >= 1.
-  /// Throws std::invalid_argument that names the first point at fault. For a free workspace use `none()`.
+  /// points (3 × N) [m], radii (N) [m] >= 0 and at most `largest_radius`, velocities (3 × N) [m/s]; all finite and N >=
+  /// 1. Throws std::invalid_argument that names the first point at fault. For a free workspace use `none()`.
   Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities);
 
   /// A workspace that is known to be free.
@@ -39,8 +39,8 @@ class Obstacles {
   const Eigen::Matrix3Xd& velocities() const noexcept { return velocities_; }
 
   /// The same points with the names of what they belong to: the first counts[0] points to names[0], and so on; an empty
-  /// name is none. Copies share the names. Throws std::invalid_argument unless there are as many counts as names, none negative, and
-  /// together as many as points.
+  /// name is none. Copies share the names. Throws std::invalid_argument unless there are as many counts as names, none
+  /// negative, and together as many as points.
   Obstacles named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const;
 
   /// Of what belongs together, in the order of the points: its name, empty where it has none, and how many.
@@ -49,7 +49,8 @@ class Obstacles {
   /// Name of what a point belongs to; empty where it has none or there is no such point.
   std::string_view name_of(Eigen::Index point) const noexcept;
 
-  /// What messages call it: "'table'" by its name, or "obstacle point 3" where it has none; "an obstacle" if there is no such point.
+  /// What messages call it: "'table'" by its name, or "obstacle point 3" where it has none; "an obstacle" if there is
+  /// no such point.
   std::string words_for(Eigen::Index point) const;
 
   /// The same points in the order and under the hierarchy that queries use; built at construction.
@@ -58,8 +59,8 @@ class Obstacles {
   /// Another number whenever points or radii may be others; copies keep it. For what is remembered about obstacles.
   std::uint64_t version() const noexcept { return version_; }
 
-  /// Moves every point along its velocity: x += s * duration. False where the duration, or where that takes a point, is not
-  /// finite: then none moves. No allocation.
+  /// Moves every point along its velocity: x += s * duration. False where the duration, or where that takes a point, is
+  /// not finite: then none moves. No allocation.
   bool advance(double duration) noexcept;
 
  private:

@@ -14,9 +14,9 @@ namespace sidestep {
 /// Points under a hierarchy of bounding balls and boxes, so that a query looks at those near it only.
 ///
 /// The points are sorted by halving them across the axis along which they spread most, and kept as structure of arrays,
-/// padded to whole leaves: point n of the tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive points, a node `fan_out` consecutive nodes
-/// below it; there are no pointers. Building sorts and allocates and belongs outside the control loop; moving the points
-/// refits the balls in place.
+/// padded to whole leaves: point n of the tree is point order()[n] of the input. A leaf holds `leaf_size` consecutive
+/// points, a node `fan_out` consecutive nodes below it; there are no pointers. Building sorts and allocates and belongs
+/// outside the control loop; moving the points refits the balls in place.
 class PointTree {
  public:
   static constexpr int leaf_size = 16;
@@ -44,7 +44,8 @@ class PointTree {
   const double* velocity(int axis) const noexcept { return columns_[static_cast<std::size_t>(4 + axis)].data(); }
   static constexpr double padding = 1e9;  ///< [m], out of every reach
 
-  /// Of the leaves, around the same centres; leaf k holds the points from k `leaf_size` on. Not of a tree without points.
+  /// Of the leaves, around the same centres; leaf k holds the points from k `leaf_size` on. Not of a tree without
+  /// points.
   Balls leaf_balls() const noexcept { return levels_.front().balls(); }
   Boxes leaf_boxes() const noexcept { return levels_.front().boxes(); }
 
@@ -54,11 +55,11 @@ class PointTree {
   };
 
   /// The point whose ball is nearest by a measure, best first. measure(Balls, first, count, limit, values) writes the
-  /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that room, and returns those
-  /// below `limit` as bits; measure(Boxes, ...) the same of boxes, which must not exceed that of a ball inside by more than
-  /// what it is content to miss. (Boxes lie close to walls; balls around many of their points would reach far out.) The
-  /// arrays go on for `leaf_size` from `first`. None from `limit` on is found, and any that is below `stop` ends the
-  /// search. No allocation.
+  /// distances of balls [first, first + count), at most `leaf_size`, into `values`, which has that room, and returns
+  /// those below `limit` as bits; measure(Boxes, ...) the same of boxes, which must not exceed that of a ball inside by
+  /// more than what it is content to miss. (Boxes lie close to walls; balls around many of their points would reach far
+  /// out.) The arrays go on for `leaf_size` from `first`. None from `limit` on is found, and any that is below `stop`
+  /// ends the search. No allocation.
   template <class Measure>
   Nearest nearest(double limit, double stop, Measure&& measure) const noexcept {
     Nearest found{limit, -1};
@@ -78,10 +79,10 @@ class PointTree {
   /// A measure of each of up to `fan_out` nodes.
   using Bounds = std::array<float, fan_out>;
 
-  /// Calls leaves(first, bits) with every group of leaves of which some matter, as do all nodes above them; of a node those
-  /// first that measure least. measure(Balls, Boxes, first, count, Bounds&) measures what is in the nodes [first, first + count),
-  /// of which arrays go on for `fan_out` from `first`, and returns those that matter as bits, what leaves(...) gets; in the upper
-  /// half of the word there may be more. No allocation.
+  /// Calls leaves(first, bits) with every group of leaves of which some matter, as do all nodes above them; of a node
+  /// those first that measure least. measure(Balls, Boxes, first, count, Bounds&) measures what is in the nodes [first,
+  /// first + count), of which arrays go on for `fan_out` from `first`, and returns those that matter as bits, what
+  /// leaves(...) gets; in the upper half of the word there may be more. No allocation.
   template <class Measure, class Leaves>
   void visit(Measure&& measure, Leaves&& leaves) const noexcept {
     if (!levels_.empty()) {

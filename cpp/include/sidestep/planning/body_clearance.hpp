@@ -48,26 +48,28 @@ struct Margins {
   double pair_margin = 0.02;  ///< of two links at most [m]: neighbours are never far apart
 };
 
-/// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no derivative.
+/// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no
+/// derivative.
 ///
-/// What must keep apart are items: a link and the obstacles, a link and a plane, two links. The clearances of planes and
-/// pairs are those of PlaneBarrier and SelfCollisionBarrier, or of ClearanceTableBarrier; that of obstacles is the distance
-/// of their balls from the ellipsoids, signed, by two steps of Newton towards the nearest place: a lower bound, as a
-/// supporting plane gives it.
+/// What must keep apart are items: a link and the obstacles, a link and a plane, two links. The clearances of planes
+/// and pairs are those of PlaneBarrier and SelfCollisionBarrier, or of ClearanceTableBarrier; that of obstacles is the
+/// distance of their balls from the ellipsoids, signed, by two steps of Newton towards the nearest place: a lower
+/// bound, as a supporting plane gives it.
 ///
-/// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): a share s of it moves no point of an item farther than
+/// An edge is judged without gaps (Schwarzer, Saha and Latombe 2005): a share s of it moves no point of an item farther
+/// than
 ///
 ///     motion(s Δq) = s Σ_i |Δq_i| R_i      and      s v + s²/2 Σ_i Σ_j |Δq_i| |Δq_j| R_max(i, j),
 ///
-/// R_i the largest distance that the item can have from the axis of joint i and v the speed of its fastest point where the
-/// motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint; of a table it is the first, with its steepest slopes for R. An
-/// interval of an edge is free as far around its middle as the
+/// R_i the largest distance that the item can have from the axis of joint i and v the speed of its fastest point where
+/// the motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint; of a table it is the first, with its steepest slopes for
+/// R. An interval of an edge is free as far around its middle as the
 /// clearance there exceeds the smaller of the two; what is left to either side is looked at in the same way.
 class BodyClearance {
  public:
   /// `pairs` as for SelfCollisionBarrier, `tables` of other pairs as for ClearanceTableBarrier. Throws
-  /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown, a
-  /// prismatic joint has no limits, or there are more than `max_items` items.
+  /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown,
+  /// a prismatic joint has no limits, or there are more than `max_items` items.
   BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {});
 
@@ -123,8 +125,8 @@ class BodyClearance {
   void clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
-  /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls around the
-  /// links; infinity where all are at rest.
+  /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls
+  /// around the links; infinity where all are at rest.
   double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time,
                         Workspace& w) const noexcept;
 

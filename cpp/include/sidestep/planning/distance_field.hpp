@@ -15,8 +15,8 @@ namespace sidestep {
 ///
 ///     distance(x) ≥ d(c) − |x − c|,
 ///
-/// which costs a look-up once somebody has asked near x. There are coarse cells for what is far away and fine ones for what
-/// is near, in blocks under a hash of their place, so that no workspace has to be stated. One per thread.
+/// which costs a look-up once somebody has asked near x. There are coarse cells for what is far away and fine ones for
+/// what is near, in blocks under a hash of their place, so that no workspace has to be stated. One per thread.
 class DistanceField {
  public:
   DistanceField();
@@ -24,8 +24,9 @@ class DistanceField {
   /// Among these obstacles from now on; forgets the others unless they are the same, see Obstacles::version().
   void follow(const Obstacles& obstacles) noexcept;
 
-  /// A lower bound of the distance of x [m] from the obstacles that `follow` was told of, which must be as they were. One that
-  /// is `enough`, or else the best that cells give: the distance less the diagonal of a fine one, 7 cm, at most.
+  /// A lower bound of the distance of x [m] from the obstacles that `follow` was told of, which must be as they were.
+  /// One that is `enough`, or else the best that cells give: the distance less the diagonal of a fine one, 7 cm, at
+  /// most.
   double bound(const Eigen::Vector3d& x, double enough, const Obstacles& obstacles) noexcept;
 
  private:

@@ -50,10 +50,10 @@ struct OnlinePlannerConfig {
 
 /// Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.
 ///
-/// One loop calls `step()` with the state and moves by a GeometricSystem towards the reference. Until there is a path, and
-/// where the straight way to the goal is free, the reference is the goal itself. In its own thread the planner looks, every
-/// `period`, whether the way ahead is still free among the newest obstacles and the arm makes progress, and searches again
-/// from where the arm is where that is not so; after a stop with a larger margin.
+/// One loop calls `step()` with the state and moves by a GeometricSystem towards the reference. Until there is a path,
+/// and where the straight way to the goal is free, the reference is the goal itself. In its own thread the planner
+/// looks, every `period`, whether the way ahead is still free among the newest obstacles and the arm makes progress,
+/// and searches again from where the arm is where that is not so; after a stop with a larger margin.
 class OnlinePlanner {
  public:
   /// Throws std::invalid_argument that names the setting at fault.
@@ -86,12 +86,12 @@ class OnlinePlanner {
     bool arrives = false;
   };
 
-  /// Whether an obstacle that moves is within 10 cm of the arm, or could be in a second: barriers that leave room at places are
-  /// for what rests. For the loop; allocates nothing.
+  /// Whether an obstacle that moves is within 10 cm of the arm, or could be in a second: barriers that leave room at
+  /// places are for what rests. For the loop; allocates nothing.
   [[nodiscard]] bool disturbed(ConstVectorRef q, const Obstacles& obstacles) noexcept;
 
-  /// One step of the loop, at a time [s] that does not go back; where it is not finite, nothing changes and the status is
-  /// `invalid`. Never blocks; allocates nothing unless synchronous.
+  /// One step of the loop, at a time [s] that does not go back; where it is not finite, nothing changes and the status
+  /// is `invalid`. Never blocks; allocates nothing unless synchronous.
   [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Attractor& attractor) noexcept;
 
   /// For a synchronous planner: ends a search under way once it says so, as if time ran out.

@@ -17,11 +17,13 @@ namespace sidestep {
 struct PlannerSettings {
   double margin = 0.06;     ///< clearance of a wide way, on which barriers hardly act [m]
   double floor = 0.005;     ///< clearance that the first way keeps, and every one [m]
-  double allowance = 0.02;       ///< how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
+  /// how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
+  double allowance = 0.02;
   double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
   double slack = 0.002;     ///< see Margins, at least; else a quarter of the margin [m]
   double fade = 0.3;        ///< see Margins [m]
-  double range = 1.0;       ///< longest edge of the trees, in joints that count by how far they reach, see RrtConnect [rad | m]
+  /// longest edge of the trees, in joints that count by how far they reach, see RrtConnect [rad | m]
+  double range = 1.0;
   int max_nodes = 10000;    ///< of both trees
   int max_iterations = 40000;
   double max_seconds = std::numeric_limits<double>::infinity();
@@ -33,18 +35,20 @@ struct PlannerSettings {
 template <>
 const std::vector<Field<PlannerSettings>>& fields();
 
-/// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner and
-/// LaValle 2000) with dynamic domains (Yershova et al. 2005). Deterministic in (start, goal, obstacles, seed) unless the time
-/// runs out.
+/// A path for a covering body between two configurations: the straight edge if it is free, else RRT-Connect (Kuffner
+/// and LaValle 2000) with dynamic domains (Yershova et al. 2005). Deterministic in (start, goal, obstacles, seed)
+/// unless the time runs out.
 ///
-/// Distances in the trees are √Σ (w_i Δq_i)², w_i the reach of joint i over the mean of all: an edge is as long as what it
-/// moves. Seven of ten samples are uniform within the limits, the others around a node. Both trees grow as far as they can,
-/// the one towards the sample, the other towards where that led. A node that was trapped grows by steps of random length.
+/// Distances in the trees are √Σ (w_i Δq_i)², w_i the reach of joint i over the mean of all: an edge is as long as what
+/// it moves. Seven of ten samples are uniform within the limits, the others around a node. Both trees grow as far as
+/// they can, the one towards the sample, the other towards where that led. A node that was trapped grows by steps of
+/// random length.
 ///
-/// The first path keeps the `floor`: those are many, and the soonest found. It is improved then: one that keeps `margin` is
-/// looked for with a 400th of the budget, else one that keeps the geometric mean of the two with a 40th, and what was found is
-/// shortened and widened. What a path keeps is stated in the plan; near start and goal every link may be as near to things as
-/// it is there, see Margins. A link deeper than `allowance` inside something at an end is refused as in collision.
+/// The first path keeps the `floor`: those are many, and the soonest found. It is improved then: one that keeps
+/// `margin` is looked for with a 400th of the budget, else one that keeps the geometric mean of the two with a 40th,
+/// and what was found is shortened and widened. What a path keeps is stated in the plan; near start and goal every link
+/// may be as near to things as it is there, see Margins. A link deeper than `allowance` inside something at an end is
+/// refused as in collision.
 class RrtConnect {
  public:
   /// The body must outlive the planner, which is mutable: one per thread.
@@ -52,7 +56,8 @@ class RrtConnect {
 
   Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
 
-  /// The two parts of a plan: the first path, then a better one. margin [m]: in place of the settings', at least the floor.
+  /// The two parts of a plan: the first path, then a better one. margin [m]: in place of the settings', at least the
+  /// floor.
   Plan find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
   void improve(Plan& plan, const Obstacles& obstacles, std::uint64_t seed, double margin);
 
@@ -72,7 +77,8 @@ class RrtConnect {
   /// Whether the straight way is free, with this margin [m] but for its ends.
   bool sees(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double margin, const Obstacles& obstacles);
 
-  /// Lets a path (nv × W) begin `here`: straight to its last waypoint, from `first` on, that is seen. False where none is.
+  /// Lets a path (nv × W) begin `here`: straight to its last waypoint, from `first` on, that is seen. False where none
+  /// is.
   bool enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here,
              const Obstacles& obstacles);
 

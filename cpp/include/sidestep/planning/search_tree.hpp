@@ -38,7 +38,8 @@ class SearchTree {
   int size_ = 0, capacity_;
   Eigen::VectorXd weights_;
   Eigen::MatrixXd nodes_;                                              // (nv × capacity)
-  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> coordinates_;    // (capacity × nv), weighted: a run per coordinate, for the scan
+  // (capacity × nv), weighted: a run per coordinate, for the scan
+  Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic> coordinates_;
   Eigen::ArrayXf distances_;
   std::vector<int> parents_;
   std::vector<double> domains_;

@@ -61,7 +61,8 @@ struct Diagnosis {
   /// How far the goal is, for example "0.31 rad" or "12 mm".
   std::string way_left() const;
 
-  /// In one English sentence, given the label of the dominating coordinate and, for their names, the obstacles of the step.
+  /// In one English sentence, given the label of the dominating coordinate and, for their names, the obstacles of the
+  /// step.
   std::string describe(const CoordinateLabel& label, const Obstacles& obstacles = Obstacles::none()) const;
 
  private:

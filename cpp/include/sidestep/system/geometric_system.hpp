@@ -94,7 +94,8 @@ class GeometricSystem {
   };
 
   /// One step at (q, v) [rad, rad/s] towards `goal` [rad]. Never throws, never allocates; the status must be read.
-  /// After a fallback only `workspace.acceleration` is of this step and, unless the state is invalid, what `embed` writes.
+  /// After a fallback only `workspace.acceleration` is of this step and, unless the state is invalid, what `embed`
+  /// writes.
   [[nodiscard]] StepStatus acceleration(ConstVectorRef q, ConstVectorRef v,
                                         ConstVectorRef goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
@@ -104,13 +105,13 @@ class GeometricSystem {
                                         const Goal& goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
 
-  /// The embedding alone, without a goal: coordinates and clearances of `workspace`. False, and nothing is written, where q
-  /// or v is not finite. No allocation.
+  /// The embedding alone, without a goal: coordinates and clearances of `workspace`. False, and nothing is written,
+  /// where q or v is not finite. No allocation.
   [[nodiscard]] bool embed(ConstVectorRef q, ConstVectorRef v,
                            const Obstacles& obstacles, Workspace& workspace) const noexcept;
 
-  /// Whether the body at q, finite, reaches deeper than `depth` [m] into an obstacle, see Embedding: quick, and may miss
-  /// it. No allocation.
+  /// Whether the body at q, finite, reaches deeper than `depth` [m] into an obstacle, see Embedding: quick, and may
+  /// miss it. No allocation.
   bool touches(ConstVectorRef q, const Obstacles& obstacles, double depth,
                Workspace& workspace) const noexcept;
 

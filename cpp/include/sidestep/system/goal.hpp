@@ -17,8 +17,8 @@ namespace sidestep {
 //
 //     h = −G⁻¹ (∂U/∂q − a*) − D (v − v*),
 //
-// and v* is the joint velocity that follows a goal that moves, a* its rate: with them a moving goal is followed without the
-// lag that D v* and a* would cause. Goals are values, made anew or advanced as they move.
+// and v* is the joint velocity that follows a goal that moves, a* its rate: with them a moving goal is followed without
+// the lag that D v* and a* would cause. Goals are values, made anew or advanced as they move.
 
 /// A configuration: U = ½ (q − q*)ᵀ K (q − q*), with the system's own stiffness K; v* = dq*/dt, a* = dv*/dt.
 struct JointGoal {
@@ -47,12 +47,13 @@ struct PoseGoalSettings {
 /// Why no Jacobian of the logarithm is left: dφ/dt = J_r(φ)⁻¹ ω with ω = Rᵀ J_ω v the angular velocity in the frame and
 /// J_r the right Jacobian of SO(3). φ is the axis of its own rotation, so J_r(φ)ᵀ φ = φ, and dU/dt = k_R φ·ω exactly.
 ///
-/// Near |φ| = π, a half turn, U has a ridge: both ways back are equally short. The gradient stays finite there, |R φ| <=
-/// π, and on the ridge one of the two ways is taken; as U falls on both sides, the motion leaves the ridge.
+/// Near |φ| = π, a half turn, U has a ridge: both ways back are equally short. The gradient stays finite there, |R φ|
+/// <= π, and on the ridge one of the two ways is taken; as U falls on both sides, the motion leaves the ridge.
 ///
-/// The posture pull acts where the pose does not: ∂U is joined by N k_0 (q − q_rest) with N = I − Jᵀ (J Jᵀ + λ² I)⁻¹ J, J the
-/// Jacobian of what the goal prescribes. It is no gradient, but moves the resting pose by no more than λ²/σ² of itself,
-/// σ the least singular value of J. The joint velocity that follows a twist V* of the pose is v* = Jᵀ (J Jᵀ + λ² I)⁻¹ V*.
+/// The posture pull acts where the pose does not: ∂U is joined by N k_0 (q − q_rest) with N = I − Jᵀ (J Jᵀ + λ² I)⁻¹ J,
+/// J the Jacobian of what the goal prescribes. It is no gradient, but moves the resting pose by no more than λ²/σ² of
+/// itself, σ the least singular value of J. The joint velocity that follows a twist V* of the pose is v* = Jᵀ (J Jᵀ +
+/// λ² I)⁻¹ V*.
 struct PoseGoal {
   /// Throws std::invalid_argument on a frame that is unknown or that no joint moves (listing the allowed ones), on a
   /// rotation that is none, and on settings out of range. Values that are not finite give a status in the loop instead.
@@ -80,8 +81,8 @@ struct PoseGoal {
 
 using Goal = std::variant<JointGoal, PoseGoal>;
 
-/// Moves a goal for `duration` [s] as its velocity and acceleration say. False where that gives what is not finite: then it
-/// stays where it is. No allocation.
+/// Moves a goal for `duration` [s] as its velocity and acceleration say. False where that gives what is not finite:
+/// then it stays where it is. No allocation.
 bool advance(Goal& goal, double duration) noexcept;
 
 /// Whether a goal has a velocity or an acceleration.

@@ -28,19 +28,19 @@ const std::vector<Field<LocalMinimumSettings>>& fields();
 /// Leads an arm out of local minima without a map: when it is stuck, it follows a random configuration for a while,
 /// then its goal again, as the random walks of Barraquand and Latombe (1991) do for potential fields.
 ///
-/// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so that whether it
-/// arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system, so
-/// nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits, the first ones
-/// near: most dead ends are shallow, and out of the others only a long way leads. An arm within
+/// A spring on a complete metric comes to rest at every local minimum of its potential on the free set, so that whether
+/// it arrives depends on where it starts. A sub-goal gives it another start. Every leg is a motion of the same system,
+/// so nothing about safety changes. Sub-goals are drawn uniformly around the arm, within its position limits, the first
+/// ones near: most dead ends are shallow, and out of the others only a long way leads. An arm within
 /// 0.01 [rad | m] of its goal has arrived and is not stuck. With a goal that from one call to the next is more than
 /// 0.2 [rad | m] elsewhere all begins anew: patience, and the first sub-goal; one that is being followed is given up.
 class LocalMinimumRecovery {
  public:
   explicit LocalMinimumRecovery(const Robot& robot, LocalMinimumSettings settings = {});
 
-  /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. q (nv) [rad | m] is the state. `potential`,
-  /// that of the goal followed in the step before (GoalPull::potential; NaN where there was none), serves for poses;
-  /// of configurations the distance is known. No allocation.
+  /// The goal to follow in a step of `period` [s]: `goal` itself, or a sub-goal. q (nv) [rad | m] is the state.
+  /// `potential`, that of the goal followed in the step before (GoalPull::potential; NaN where there was none), serves
+  /// for poses; of configurations the distance is known. No allocation.
   const Goal& pursue(const Goal& goal, ConstVectorRef q, double potential, double period) noexcept;
 
   /// Whether the last step followed a sub-goal.

@@ -18,18 +18,23 @@ namespace sidestep {
 //    which makes h grow with `speed` and never holds back an arm that leaves faster. Its acceleration along ∇h,
 //        u_k ∇h_k / (|∇h_k|² + ε),        ε > 0: bounded where the joints can hardly change h,
 //    is averaged over the clearances inside when there are several (the ellipsoids of one link push the same way, and
-//    their pushes must not add up). It is bent by the barriers that it would drive the arm into, and by no other: it goes
+//    their pushes must not add up). It is bent by the barriers that it would drive the arm into, and by no other: it
+// goes
 //    through the one-sided metric (one_sided_metric.hpp).
 //
 // 2. No rebound. A geodesic keeps its energy ½ (|v|² + |dψ/dt|²). Leaving a barrier of slope ψ' = 1e5 at 1 cm/s that is
 //    an energy of 5e5, which becomes joint speed as the slope falls. An arm that moves by itself has no such dψ/dt, but
 //    one that is pushed out has, and so has one that an obstacle moves away from. So in the geodesic term a coordinate
-//    whose clearance grows is scaled, ψ → s ψ, with s = rebound / |dψ/dt| where that is below 1, and of its curvature ψ' h''
-//    + ψ'' h'² the second term, which is what gives the speed back, by another s² (s alone would feed energy in at every
+//    whose clearance grows is scaled, ψ → s ψ, with s = rebound / |dψ/dt| where that is below 1, and of its curvature
+// ψ' h''
+//    + ψ'' h'² the second term, which is what gives the speed back, by another s² (s alone would feed energy in at
+// every
 //    step, as s grows while the arm leaves). A motion slower than that among obstacles at rest does not change.
 //
-// 3. Fading. Several barriers that the arm is inside of would each keep their dh/dt: rigid constraints, too many for the
-//    joints. Both in the geodesic term and in what bends the push, J_k of one inside is shortened to (1 − w_k)/w_k at most.
+// 3. Fading. Several barriers that the arm is inside of would each keep their dh/dt: rigid constraints, too many for
+// the
+//    joints. Both in the geodesic term and in what bends the push, J_k of one inside is shortened to (1 − w_k)/w_k at
+// most.
 struct PenetrationRecovery {
   double speed = 0.1;    ///< with which an arm leaves a barrier [m/s | rad/s]
   double rate = 20.0;    ///< with which it takes up that speed [1/s]; 0: no push

@@ -26,9 +26,9 @@ class CollisionDensity final : public Embedding {
   /// Throws std::invalid_argument if a link of the body is unknown or nothing of the body moves.
   CollisionDensity(const Robot& robot, const Body& body, bool average = false);
 
-  /// Multiplications and additions for a Gaussian and a point at rest without radius, comparisons left out: of the motion of
-  /// the link's point 15, of the offset 21 and its rate 15 in the link, of its acceleration 24, of the exponent 21, of the
-  /// exponential with its factor 35, of gradient and wrench 38, and of the second derivative 31.
+  /// Multiplications and additions for a Gaussian and a point at rest without radius, comparisons left out: of the
+  /// motion of the link's point 15, of the offset 21 and its rate 15 in the link, of its acceleration 24, of the
+  /// exponent 21, of the exponential with its factor 35, of gradient and wrench 38, and of the second derivative 31.
   static constexpr int operations_per_pair = 15 + 21 + 15 + 24 + 21 + 35 + 38 + 31;
 
   int num_coordinates() const noexcept override { return 1; }

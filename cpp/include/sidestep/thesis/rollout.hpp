@@ -33,8 +33,8 @@ struct Rollout {
   Eigen::VectorXd step_seconds;        ///< [s] that the acceleration of each row took; empty if not asked for
 };
 
-/// Integrates the system alone from (q, v), obstacles and goal moving at their velocities: nothing holds limits or clearances.
-/// What has to keep them is a Controller, see `integrate`.
+/// Integrates the system alone from (q, v), obstacles and goal moving at their velocities: nothing holds limits or
+/// clearances. What has to keep them is a Controller, see `integrate`.
 /// Throws std::invalid_argument on sizes, a period or number of steps that is not positive, and a record of more than
 /// 8 GiB; Interruption if interrupted.
 Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,

@@ -3,8 +3,8 @@
 #include "../../kinematics/kernels/most_lanes.hpp"
 #include "sidestep/obstacles/balls.hpp"
 
-// The inner loop of ClearanceField, once per instruction set. Plain arrays only: a translation unit compiled for a newer
-// instruction set must not emit code that others share, such as Eigen's inline functions.
+// The inner loop of ClearanceField, once per instruction set. Plain arrays only: a translation unit compiled for a
+// newer instruction set must not emit code that others share, such as Eigen's inline functions.
 namespace sidestep::kernels {
 
 /// Points as structure of arrays, padded to whole leaves of `most_points`. `velocity[0]` is null where all are at rest.
@@ -25,8 +25,9 @@ struct LinkMotion {
   float to_link[9];    // R_LW, by rows
 };
 
-// Of the Boltzmann mean: w, w h', w h'' and w h'²; the same with w (h − reference) in place of w; ∂h and its twists (see
-// Samples) with either. From `approach` on, of the mean of what approaches: w, w h, w h', w h'', and w ∂h and its twists.
+// Of the Boltzmann mean: w, w h', w h'' and w h'²; the same with w (h − reference) in place of w; ∂h and its twists
+// (see Samples) with either. From `approach` on, of the mean of what approaches: w, w h, w h', w h'', and w ∂h and its
+// twists.
 inline constexpr int approach = 20, sums = 30;
 
 inline constexpr int most_points = 16;        // of a leaf
@@ -59,8 +60,8 @@ struct Query {
 
 inline constexpr int most_queries = 16;
 
-// Of every ellipsoid: link frame to principal axes by rows (9), squared semi-axes (3), semi-axes (3), and the smallest radius
-// of curvature of its surface.
+// Of every ellipsoid: link frame to principal axes by rows (9), squared semi-axes (3), semi-axes (3), and the smallest
+// radius of curvature of its surface.
 inline constexpr int squared_at = 9, semi_at = 12, roundness_at = 15, principal_numbers = 16;
 
 inline constexpr int most_leaves = 64;
@@ -83,7 +84,8 @@ struct Leaves {
 
 inline constexpr int most_loose = 256;
 
-/// Points of leaves so wide that all of one says little of a point, in single precision, seen from the origin of a group.
+/// Points of leaves so wide that all of one says little of a point, in single precision, seen from the origin of a
+/// group.
 struct LoosePoints {
   int num = 0;
   int point[most_loose];
@@ -97,9 +99,9 @@ struct QueryGroup {
   double origin[3], centre[3][most_queries];   // world
   alignas(64) float offset[3][most_queries];   // from the origin
   alignas(64) float extent[most_queries];      // longest semi-axis
-  // Clearances from here on do not matter, unless h + τ h' is below that: of the smallest known yet, and a window. Until
-  // one within reach is known, points of leaves that are within reach are kept up to a window beyond, and of other leaves
-  // it is noted what is missed.
+  // Clearances from here on do not matter, unless h + τ h' is below that: of the smallest known yet, and a window.
+  // Until one within reach is known, points of leaves that are within reach are kept up to a window beyond, and of
+  // other leaves it is noted what is missed.
   alignas(64) float near[most_queries], ahead[most_queries];
   alignas(64) float near_leaf[most_queries], ahead_leaf[most_queries];
   alignas(64) float missed[most_queries], missed_ahead[most_queries];
@@ -112,7 +114,8 @@ struct QueryGroup {
   float own_offset[3][most_queries], own_linear[3][most_queries], own_angular[3][most_queries];  // in principal axes
   double inverse_T;
   double reach, reach_ahead;                   // clearances, and h + τ h', from here on are out of reach [m]
-  double window, window_ahead;                 // clearances, and h + τ h', so much above the smallest have no weight [m]
+  // clearances, and h + τ h', so much above the smallest have no weight [m]
+  double window, window_ahead;
   double horizon;                              // τ [s]
   double fastest;                              // speed of any point [m/s], at most
   Leaves leaves;
@@ -137,8 +140,8 @@ struct Limits {
 /// Leaves are looked at in single precision, for every query that their points matter to; what may weigh is summed in
 /// double precision.
 struct ClearanceKernel {
-  /// Nodes [first, first + count) that are below limits, as bits: in the lower half of the word below `beyond`, in the upper
-  /// half below `within`. Writes bounds of clearances, and has room for whole registers.
+  /// Nodes [first, first + count) that are below limits, as bits: in the lower half of the word below `beyond`, in the
+  /// upper half below `within`. Writes bounds of clearances, and has room for whole registers.
   unsigned (*measure)(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
                       const Limits& within, const Limits& beyond, float* bounds) noexcept;
   /// The same of `count` points from `first` on.
@@ -146,8 +149,8 @@ struct ClearanceKernel {
                              const Limits& beyond) noexcept;
   /// To be called once a group is placed.
   void (*begin)(QueryGroup& group) noexcept;
-  /// Adds points of the group's leaves, and its loose points, that may weigh to the candidates, and lowers its limits. Where
-  /// there is no room, the candidates before are summed.
+  /// Adds points of the group's leaves, and its loose points, that may weigh to the candidates, and lowers its limits.
+  /// Where there is no room, the candidates before are summed.
   void (*collect)(QueryGroup& group, const Points& points) noexcept;
   /// Adds the candidates of query k to its sums, and forgets them.
   void (*sum)(QueryGroup& group, int k, const Points& points) noexcept;

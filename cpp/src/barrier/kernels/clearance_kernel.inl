@@ -13,9 +13,9 @@ namespace {
 // Of roots, and so of distances and speeds relative to the larger ones that they come from.
 constexpr float measure_error = 3.0f * rough_error;
 
-/// What is known of balls around places: the distance of a place, and h and h + τ h' of what is within, at least. A way z between
-/// cluster and ball that turns from x by θ is longer than the shortest by |x| (|x| − r) / (2 r) sin²θ, with r for both radii; of the
-/// cluster's speed there it has the part along x by cos θ and the part across x by sin θ.
+/// What is known of balls around places: the distance of a place, and h and h + τ h' of what is within, at least. A way
+/// z between cluster and ball that turns from x by θ is longer than the shortest by |x| (|x| − r) / (2 r) sin²θ, with r
+/// for both radii; of the cluster's speed there it has the part along x by cos θ and the part across x by sin θ.
 struct Measured {
   Singles distance, fastest, room;  // room: of h + τ h'; fastest: −h', at most
 
@@ -38,7 +38,8 @@ struct Measured {
     const Singles more = 4.0f * measure_error * speed + cluster.turning * ball + cluster.fastest;
     fastest = speed + more;
     const Singles apart = (1.0f - measure_error) * distance - radius;
-    const Singles across = larger((1.0f + 2.0f * measure_error) * squared_speed - towards * towards, Singles{});  // squared
+    // squared
+    const Singles across = larger((1.0f + 2.0f * measure_error) * squared_speed - towards * towards, Singles{});
     const Singles growth = distance * apart * (0.5f - measure_error) * rough_inverse(radius) +
                            (1.0f + measure_error) * horizon * smaller(towards, Singles{});
     room = (apart > 0.0f) & (growth > 0.0f)

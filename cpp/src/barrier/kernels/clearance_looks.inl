@@ -79,8 +79,8 @@ struct Ellipsoid {
   }
 };
 
-/// t of places at e from below, nearly: the best of where Newton's iteration comes to from infinity and, along every axis,
-/// of that axis alone. `second` is Σ A e².
+/// t of places at e from below, nearly: the best of where Newton's iteration comes to from infinity and, along every
+/// axis, of that axis alone. `second` is Σ A e².
 inline Singles first_t(const Ellipsoid& of, const Singles* e, Singles second) noexcept {
   Singles fourth = {};  // Σ A² e²
   for (int i = 0; i < 3; ++i) {
@@ -96,8 +96,8 @@ inline Singles first_t(const Ellipsoid& of, const Singles* e, Singles second) no
   return t;
 }
 
-/// Places as an ellipsoid with squared semi-axes A sees them, side by side: at e in its principal axes, with w = e / (A + t).
-/// Outside t > 0 is where S = Σ A w² is 1, which Newton's iteration finds.
+/// Places as an ellipsoid with squared semi-axes A sees them, side by side: at e in its principal axes, with w = e / (A
+/// + t). Outside t > 0 is where S = Σ A w² is 1, which Newton's iteration finds.
 struct Sight {
   Singles t, w[3], squared_norm, S, flatness;  // |w|², Σ A w² / (A + t)
 
@@ -121,8 +121,9 @@ struct Sight {
   }
 };
 
-/// What is true of places whatever t is: the plane that touches the ellipsoid where its normal is w, at p = A w/√S, bounds h
-/// from below; and as e − p is t w and √S − 1 of p, the direction to the foot differs from w by |√S − 1| |p| / h at most.
+/// What is true of places whatever t is: the plane that touches the ellipsoid where its normal is w, at p = A w/√S,
+/// bounds h from below; and as e − p is t w and √S − 1 of p, the direction to the foot differs from w by |√S − 1| |p| /
+/// h at most.
 struct TangentPlane {
   Singles inverse_norm, height;  // 1 / |w|; h from below, nearly, as √S is less than (1 + S) / 2
   Singles above;                 // h − height, at most
@@ -132,8 +133,8 @@ struct TangentPlane {
     const Singles over = at.S - 1.0f;
     inverse_norm = rough_inverse_root(larger(at.squared_norm, all(tiny)));
     height = (at.t * at.squared_norm + 0.5f * over) * inverse_norm;
-    // |√S − 1|, at most, which is |S − 1| / (1 + √S). So much of p lies aside of the normal; and as much, squared, is what
-    // √S is less than (1 + S) / 2 by.
+    // |√S − 1|, at most, which is |S − 1| / (1 + √S). So much of p lies aside of the normal; and as much, squared, is
+    // what √S is less than (1 + S) / 2 by.
     const Singles share = magnitude(over) * (over > -0.2f ? all(0.53f) : all(1.0f)) + 2.0f * rough_error;
     tilt = smaller(of.extent * share * rough_inverse(larger(height, all(least_height))), all(2.0f)) + direction_error;
     above = 0.5f * share * (of.extent * tilt + share * inverse_norm);
@@ -233,8 +234,8 @@ inline Singles chosen(Singles x, unsigned lanes) noexcept {
 }
 
 /// What an ellipsoid sees of leaves: bounds from below of h of all their points, and of h + τ h'; and t near them, as
-/// t0 + gradient · e. In steps, each for several registers: the chain of operations of one is long, and the next one's runs
-/// beside it.
+/// t0 + gradient · e. In steps, each for several registers: the chain of operations of one is long, and the next one's
+/// runs beside it.
 struct LeafBounds {
   alignas(64) float least[most_leaves], after[most_leaves], t0[most_leaves], gradient[3][most_leaves];
   float turn[most_leaves];  // of directions within the leaf
@@ -294,8 +295,8 @@ struct LeafBounds {
     Sight sight;
   };
 
-  /// The plane across the way from centre to centre says enough of many: towards it an ellipsoid reaches √(Σ A e²)/|e|. Of
-  /// points that may be inside it says nothing.
+  /// The plane across the way from centre to centre says enough of many: towards it an ellipsoid reaches √(Σ A e²)/|e|.
+  /// Of points that may be inside it says nothing.
   void separate(const QueryGroup& group, const Ellipsoid& of, int i, Centres& at) noexcept {
     const Leaves& leaves = group.leaves;
     at.first = i;
@@ -331,8 +332,8 @@ struct LeafBounds {
       along += n[j] * v[j];
       box += half[j] * magnitude(n[j]);
     }
-    // h is convex: at d from the centre it is more by n·d at least. n changes by H d for a matrix H between 0 and that of a
-    // sphere as round as the ellipsoid is anywhere, κ; then −dᵀ H v is −κ (|d| |v| + d·v) / 2 at least.
+    // h is convex: at d from the centre it is more by n·d at least. n changes by H d for a matrix H between 0 and that
+    // of a sphere as round as the ellipsoid is anywhere, κ; then −dᵀ H v is −κ (|d| |v| + d·v) / 2 at least.
     const Singles lowest = plane.height - box;
     const Singles bend = rough_inverse(of.roundness + larger(lowest, Singles{}));
     const Singles share = (0.5f * horizon) * bend;
@@ -409,8 +410,8 @@ struct FarSight {
   }
 };
 
-/// What an ellipsoid sees of a register of points: bounds of h and h + τ h'. Found in steps, each for several registers, as
-/// those of leaves are.
+/// What an ellipsoid sees of a register of points: bounds of h and h + τ h'. Found in steps, each for several
+/// registers, as those of leaves are.
 struct Look {
   unsigned asked;  // lanes
   int first;       // point; negative: of loose ones, from −1 − first on

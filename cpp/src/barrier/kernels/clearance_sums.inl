@@ -3,8 +3,8 @@
 // Stands for the centre of an ellipsoid, where the clearance has no gradient [m]; far below any size that matters.
 constexpr double centre_offset = 1e-9;
 
-// S is 1 at the foot of the perpendicular. From within the first a step that leaves the third power ends within the second
-// of nearly round ellipsoids, and from there on the square is below rounding.
+// S is 1 at the foot of the perpendicular. From within the first a step that leaves the third power ends within the
+// second of nearly round ellipsoids, and from there on the square is below rounding.
 constexpr double cubic_within = 5e-3, polished_within = 1e-7;
 constexpr int most_iterations = 16;
 constexpr int together = 4;  // registers
@@ -181,8 +181,8 @@ struct Chosen {
   int point[most_candidates + singles];
   float t[most_candidates + singles];
 
-  /// Those of the candidates of which either bound is below its limit. The errors of the bounds are larger than those of
-  /// rounding the limits.
+  /// Those of the candidates of which either bound is below its limit. The errors of the bounds are larger than those
+  /// of rounding the limits.
   Chosen(const Candidates& candidates, float limit, float limit_ahead) noexcept : size(0) {
     const Singles limits = all(limit), limits_ahead = all(limit_ahead);
     unsigned maybe_inside = 0;
@@ -205,12 +205,13 @@ struct Chosen {
 /// Points in double precision, side by side; infinitely far where no more are chosen.
 struct Samples {
   Lanes h, after, rate, g[3];  // h + τ h', h', and ∂h in principal axes
-  Lanes twist[3];              // its moment about the centre, (A_j − A_l) times which it is along axis i, in cyclic order
+  // its moment about the centre, (A_j − A_l) times which it is along axis i, in cyclic order
+  Lanes twist[3];
   Lanes curvature;             // h'' without what the bias of the link makes, which is linear in ∂h and its moment
 };
 
-/// How samples are found: in steps, each for several registers. The chain of operations of one is long, and the next one's
-/// runs beside it. `moves`: whether points move; `outside`: whether all are.
+/// How samples are found: in steps, each for several registers. The chain of operations of one is long, and the next
+/// one's runs beside it. `moves`: whether points move; `outside`: whether all are.
 template <bool moves, bool outside>
 class Approach {
  public:
@@ -485,8 +486,8 @@ void sum_candidates(QueryGroup& group, int k, const Points& points) noexcept {
   if (!had_sums) {
     begin_sums(group, k);
   }
-  // The limits are those of the smallest clearances and a window, as far as bounds say. Before any is known within reach, what
-  // is left out is noted.
+  // The limits are those of the smallest clearances and a window, as far as bounds say. Before any is known within
+  // reach, what is left out is noted.
   const float nothing = -__builtin_inff();
   const auto note = [&candidates](int which, float& missed) {
     for (int i = 0; i < candidates.size; ++i) {

@@ -6,8 +6,8 @@ namespace sidestep::kernels {
 /// Beyond the last column so many numbers are read, and make no difference.
 inline constexpr int gram_room = 8;
 
-/// Adds Σ_a c_a c_aᵀ to the lower triangle of a matrix, columns `stride` apart, for `num` columns c_a of `rows` numbers, one
-/// after another.
+/// Adds Σ_a c_a c_aᵀ to the lower triangle of a matrix, columns `stride` apart, for `num` columns c_a of `rows`
+/// numbers, one after another.
 using AddGram = void (*)(const double* columns, int num, int rows, double* matrix, int stride) noexcept;
 
 void add_gram_baseline(const double* columns, int num, int rows, double* matrix, int stride) noexcept;

@@ -1,5 +1,5 @@
-// Included by one file per instruction set, after gram_kernel.hpp and <immintrin.h> where there is one. Defines add_gram in an
-// anonymous namespace.
+// Included by one file per instruction set, after gram_kernel.hpp and <immintrin.h> where there is one. Defines
+// add_gram in an anonymous namespace.
 
 namespace sidestep::kernels {
 namespace {

@@ -78,8 +78,8 @@ inline double position(const JointModel& joint, const double* q) noexcept {
 // Of a turned joint's x and y, until its link is written there.
 constexpr int turned_x = 0, turned_y = 4;
 
-/// Writes the x and y of every joint, turned, in the parent's frame. A loop of its own, so that what goes on from link to
-/// link does not wait for it, and reads their numbers from memory, each into all of a register.
+/// Writes the x and y of every joint, turned, in the parent's frame. A loop of its own, so that what goes on from link
+/// to link does not wait for it, and reads their numbers from memory, each into all of a register.
 void turn_joints(const JointModel* joints, int num, const double* q, double* links, int stride) noexcept {
   for (int first = 0; first < num; first += joint_block) {
     Vector positions;

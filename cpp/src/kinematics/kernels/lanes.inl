@@ -370,9 +370,9 @@ inline unsigned below(Singles x, Singles limit) noexcept {
 #endif
 }
 
-/// eˣ for −700 < x < 700, within 2 units in the last place: x = n ln 2 + r, |r| ≤ ln 2 / 2, and Taylor in r. Its terms are
-/// taken in pairs, and these in pairs (Estrin): one after the other they would wait for each other. Where a register holds
-/// 2^0, 2^⅛, … and gives them by number, n counts eighths, and fewer terms do.
+/// eˣ for −700 < x < 700, within 2 units in the last place: x = n ln 2 + r, |r| ≤ ln 2 / 2, and Taylor in r. Its terms
+/// are taken in pairs, and these in pairs (Estrin): one after the other they would wait for each other. Where a
+/// register holds 2^0, 2^⅛, … and gives them by number, n counts eighths, and fewer terms do.
 inline Lanes exponential(Lanes x) noexcept {
   const Lanes magic = all(0x1.8p52);  // adding it leaves the nearest integer in the low bits
 #if defined(__AVX512F__)
@@ -395,7 +395,8 @@ inline Lanes exponential(Lanes x) noexcept {
 #else
   const Lanes shifted = x * 0x1.71547652b82fep+0 + magic;
   const Lanes n = shifted - magic;
-  const Lanes r = (x - n * 0x1.62e42fefap-1) - n * 0x1.cf79abc9e3b39p-40;  // ln 2 in two parts: the first product is exact
+  // ln 2 in two parts: the first product is exact
+  const Lanes r = (x - n * 0x1.62e42fefap-1) - n * 0x1.cf79abc9e3b39p-40;
   const Lanes r2 = r * r, r4 = r2 * r2;
   const Lanes p2 = r * (1.0 / 6.0) + 0.5 + r2 * (r * (1.0 / 120.0) + 1.0 / 24.0);
   const Lanes p6 = r * (1.0 / 5040.0) + 1.0 / 720.0 + r2 * (r * (1.0 / 362880.0) + 1.0 / 40320.0);

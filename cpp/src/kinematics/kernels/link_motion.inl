@@ -61,8 +61,8 @@ struct Rates {
   Motion<Vector> velocity, bias;
 };
 
-/// From a joint's parent to its child; returns the joint's screw. `turned_x`, `turned_y`: the joint's x and y, turned, in the
-/// parent's frame.
+/// From a joint's parent to its child; returns the joint's screw. `turned_x`, `turned_y`: the joint's x and y, turned,
+/// in the parent's frame.
 template <class Vector, class Number>
 inline Motion<Vector> follow(Pose<Vector>& link, const JointModel& joint, const Number* turned_x, const Number* turned_y,
                              Number position) noexcept {

@@ -1,4 +1,5 @@
-// A vector of three in each lane, and what is done with it. To be included after lanes.inl, inside an anonymous namespace.
+// A vector of three in each lane, and what is done with it. To be included after lanes.inl, inside an anonymous
+// namespace.
 
 struct Vectors {
   Lanes x, y, z;

@@ -2,7 +2,8 @@
 
 #include "sidestep/obstacles/balls.hpp"
 
-// The inner loop of BodyClearance and DistanceField, once per instruction set. Plain arrays only, as in the kernels of ClearanceField.
+// The inner loop of BodyClearance and DistanceField, once per instruction set. Plain arrays only, as in the kernels of
+// ClearanceField.
 namespace sidestep::kernels {
 
 /// An ellipsoid in the world.
@@ -17,8 +18,8 @@ inline constexpr int most_balls = 16;  // of one call; the arrays go on for so m
 
 /// Write lower bounds of the signed distances from the ellipsoid to the balls, or boxes, [first, first + count) into
 /// `distances` (most_balls); bit i of the result: that of first + i is below `limit`. Those that are not may be coarse.
-/// In single precision, relative to the centre: right to about a millionth of the distance. Those of balls are distances but
-/// for what two steps of Newton leave; those of boxes are bounds.
+/// In single precision, relative to the centre: right to about a millionth of the distance. Those of balls are
+/// distances but for what two steps of Newton leave; those of boxes are bounds.
 struct Distances {
   unsigned (*of_balls)(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
                        float* distances) noexcept;

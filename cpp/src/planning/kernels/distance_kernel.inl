@@ -1,5 +1,5 @@
-// Included by one file per instruction set, after distance_kernel.hpp. Defines two functions in an anonymous namespace: loops
-// over `most_balls` floats that the compiler puts side by side in the registers it has.
+// Included by one file per instruction set, after distance_kernel.hpp. Defines two functions in an anonymous namespace:
+// loops over `most_balls` floats that the compiler puts side by side in the registers it has.
 
 namespace sidestep::kernels {
 namespace {
@@ -67,8 +67,8 @@ inline unsigned below(F x, float limit) noexcept {
 ///
 ///     d(e) = max over n of (n·e − √(nᵀ S n)) / |n|.
 ///
-/// The best is among n_i = e_i / (a_i² + t), at the root of |a_i n_i| = 1 (the secular equation). t = 0 gives the first-order
-/// distance; Newton's steps on 1/|a_i n_i| − 1, which is concave, come to the root from below.
+/// The best is among n_i = e_i / (a_i² + t), at the root of |a_i n_i| = 1 (the secular equation). t = 0 gives the
+/// first-order distance; Newton's steps on 1/|a_i n_i| − 1, which is concave, come to the root from below.
 unsigned distances_to_balls(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
                       float* distances) noexcept {
   using Floats = Floats<most_balls>;

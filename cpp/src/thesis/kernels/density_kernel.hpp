@@ -32,8 +32,8 @@ struct DensityPoints {
   const double *positions, *radii, *velocities;
 };
 
-/// Weighted sums over the points of the density and its second time derivative, lane by lane; and the wrench of every Gaussian
-/// on its link about the world origin.
+/// Weighted sums over the points of the density and its second time derivative, lane by lane; and the wrench of every
+/// Gaussian on its link about the world origin.
 struct DensitySums {
   alignas(64) double value[most_lanes], curvature[most_lanes];
   double force[3][most_lanes], moment[3][most_lanes];

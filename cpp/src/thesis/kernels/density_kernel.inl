@@ -127,8 +127,8 @@ struct Peak {
   }
 };
 
-/// A point as Gaussians see it. It is found out in steps, each for several points: the chain of operations of one is long,
-/// and the next one's runs beside it.
+/// A point as Gaussians see it. It is found out in steps, each for several points: the chain of operations of one is
+/// long, and the next one's runs beside it.
 struct Seen {
   Vectors x, drag;            // the point, and −R ÿ for q̈ = 0 and ẍ = 0
   Vectors t;                  // P e
