@@ -211,7 +211,8 @@ double QuadraticProgram::most_violated(const QuadraticProgramData& data, int& co
     if (!(distance > worst)) {
       continue;
     }
-    // What cancels in x_i = J_i y is |J_i| |y|, with |y|² = x' H x, at most: a slack of zero is the difference of much more.
+    // What cancels in x_i = J_i y is |J_i| |y|, with |y|² = x' H x, at most: a slack of zero is the difference of much
+    // more.
     if (i < n_ && size < 0.0) {
       size = energy_norm(data);
     }

@@ -13,8 +13,8 @@ namespace {
 constexpr double shortest_gradient = 1e-6;
 // A leaving speed that is missing comes by this many times the rate: see the header.
 constexpr double firmness = 3.0;
-// A stop along the path takes at most this many times as long by the torque as by the acceleration limits: beyond, lines
-// would be so flat that the arm stood still.
+// A stop along the path takes at most this many times as long by the torque as by the acceleration limits: beyond,
+// lines would be so flat that the arm stood still.
 constexpr double longest_stop = 10.0;
 // What closes in no more than this [m/s] faster than by the arm's own motion is held off by the margin.
 constexpr double slow = 0.01;

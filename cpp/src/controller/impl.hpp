@@ -126,7 +126,8 @@ class Controller::Impl {
   // Of the worker; in `step` where synchronous.
   void run();
   void look(const Snapshot& snapshot);
-  /// Calls action(); what it throws costs its result, is kept for `explain`, and ends neither the thread nor the process.
+  /// Calls action(); what it throws costs its result, is kept for `explain`, and ends neither the thread nor the
+  /// process.
   template <class Action>
   void guarded(Action&& action) noexcept;
   void note_fault(const char* what) noexcept;

@@ -515,7 +515,8 @@ BOOST_AUTO_TEST_CASE(past_the_crest_of_a_clearance_an_arm_stops_along_its_path) 
     least = std::min(least, q > 0.0 ? 0.05 - q * q : 1.0);
   }
   BOOST_TEST(hardest < 15.0);  // against the curvature alone it would take 8/|∇h|, 70 and more
-  BOOST_TEST(least > -5e-4);  // of the margin's 5 mm: what is demanded at last is what a stop takes now, without its bend
+  // of the margin's 5 mm: what is demanded at last is what a stop takes now, without its bend
+  BOOST_TEST(least > -5e-4);
   BOOST_TEST(least < 0.005);  // it comes close
   BOOST_TEST(std::abs(v[0]) < 0.01);
 }

@@ -217,7 +217,8 @@ BOOST_AUTO_TEST_CASE(unusable_input_gives_a_damped_stop) {
   check([](Input& in) { in.q[2] = not_a_number; }, TorqueFault::position, -7.0, 12.0);
   check([](Input& in) { in.q.resize(3); }, TorqueFault::position, -7.0, 12.0);
   check([](Input& in) { in.v[2] = infinity; }, TorqueFault::velocity, 3.0, 3.0);  // hold against the bias
-  check([](Input& in) { in.h[2] = not_a_number; }, TorqueFault::bias, -7.0, 12.0);         // the last bias, 3 Nm, is kept
+  // the last bias, 3 Nm, is kept
+  check([](Input& in) { in.h[2] = not_a_number; }, TorqueFault::bias, -7.0, 12.0);
   // Close to a position limit it takes more than -3 /s² to stop before it.
   check([](Input& in) { in.h[2] = not_a_number, in.q[0] = 2.5 - 0.00455, in.v[0] = 0.3; }, TorqueFault::bias,
         3.0 + acceleration_interval(2.5 - 0.00455, 0.3, {-2.5, 2.5, 2.5, 10.0}, 0.001).upper, 12.0);

@@ -237,7 +237,8 @@ BOOST_AUTO_TEST_CASE(points_that_outweigh_the_one_that_touches_hide_nothing) {
   settings.synchronous = true;
   const Arm arm = covered_arm(test::arm_limits(nv));
   Controller controller(arm, settings);
-  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 200);  // beside the first link, which has a semi-axis of 5 cm in y
+  // beside the first link, which has a semi-axis of 5 cm in y
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 200);
   points.row(1).setConstant(0.05 + 1e-3);
   points.row(2).setConstant(0.45);
   points(1, 17) = 0.05 - 1e-4;

@@ -38,8 +38,8 @@ struct QuadraticProgramData {
 /// numerically stable dual method for solving strictly convex quadratic programs", 1983). The factors of the active
 /// set are updated by Givens rotations. The result depends on the data alone: there is no warm start to go stale.
 ///
-/// Slack variables are cheap where they come last: variables that H does not couple to any other start at the bound that
-/// they violate, and of rows only the entries that are not zero are read.
+/// Slack variables are cheap where they come last: variables that H does not couple to any other start at the bound
+/// that they violate, and of rows only the entries that are not zero are read.
 ///
 /// Memory is taken at construction; `solve` allocates nothing. One object per thread.
 class QuadraticProgram {
@@ -94,7 +94,8 @@ class QuadraticProgram {
   Eigen::MatrixXd R_;              // upper triangular, (num_active_, num_active_) in use; N: active normals
   Eigen::VectorXd x_, multipliers_;
   int num_coupled_ = 0;            // H is diagonal from here on
-  Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;  // (m, n) where rows of A in use are not zero
+  // (m, n) where rows of A in use are not zero
+  Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;
   Eigen::VectorXi support_sizes_;  // (m)
   Eigen::VectorXd row_norms_;      // |row| of A
   Eigen::VectorXd u_;              // multipliers of the active constraints, >= 0 for inequalities
@@ -102,7 +103,8 @@ class QuadraticProgram {
 };
 
 /// The largest violation of the optimality conditions at the solver's solution: stationarity, feasibility, sign and
-/// complementarity of the multipliers, each divided by the size of the terms that cancel in it. About 1e-15 when solved.
+/// complementarity of the multipliers, each divided by the size of the terms that cancel in it. About 1e-15 when
+/// solved.
 double optimality_residual(const QuadraticProgramData& data, const QuadraticProgram& solved);
 
 }  // namespace sidestep

@@ -24,9 +24,9 @@ struct ClosingLimits {
 // q̈ = 0 and the acceleration a held for one period T, the closing speed is  w = u − (c + ∇h·a) T  afterwards, up to
 // terms of order T². So a bound w ≤ w_max is one linear inequality,
 //     ∇h·a ≥ (u − w_max)/T − c.
-// h, u and c are those of what approaches most (Clearances::approach), not of what is nearest: a point ahead counts before
-// one beside. But along a sampled surface the points change all the time, so that it does not recede as each of them does:
-// where c is positive, it counts only as far as that of the nearest clearance is.
+// h, u and c are those of what approaches most (Clearances::approach), not of what is nearest: a point ahead counts
+// before one beside. But along a sampled surface the points change all the time, so that it does not recede as each of
+// them does: where c is positive, it counts only as far as that of the nearest clearance is.
 //
 // Which closing speeds leave enough room? Close to the margin γ s, so that the room shrinks at most exponentially; the
 // deceleration along that line is γ u, which a fast approach could not deliver. So from u = A/γ on, the parabola of
@@ -40,41 +40,43 @@ struct ClosingLimits {
 // under semi-implicit Euler, s₊ = s − T w:
 //     p(w) + c T w ≤ s − (1 − c) T u,       c = 1/2 when braking (w < u), 1 when not,
 // whose largest solution is a root of a line or a parabola. If s ≥ p(u) now, then decelerating by at most A meets it:
-// on the parabola w = u − AT under exact integration gives p(u) − p(w) = T(u + w)/2 with equality, on the line less than
-// γ u ≤ A does, and semi-implicit Euler needs less. So for one clearance on its own, with deceleration A available, the
-// margin is kept for ever and no more than A is ever demanded, whatever T is.
+// on the parabola w = u − AT under exact integration gives p(u) − p(w) = T(u + w)/2 with equality, on the line less
+// than γ u ≤ A does, and semi-implicit Euler needs less. So for one clearance on its own, with deceleration A
+// available, the margin is kept for ever and no more than A is ever demanded, whatever T is.
 //
 // Several clearances at once. Each may count on all joints for itself, and they may want opposite things of the same
 // joint. What they all can rely on is that the arm stops along its path: the acceleration −v/τ, by which every closing
-// speed decelerates by u/τ, is within the limits with τ = max_j |v_j| / (acceleration limit)_j, and within the torque if τ
-// is as long as |bias − M v/τ| <= effort takes (up to ten times as long). A line of slope γ demands γ u. So with γ <= 1/τ
-// one and the same acceleration meets all rows on their lines: γ is the smaller of `rate` and 1/τ.
+// speed decelerates by u/τ, is within the limits with τ = max_j |v_j| / (acceleration limit)_j, and within the torque
+// if τ is as long as |bias − M v/τ| <= effort takes (up to ten times as long). A line of slope γ demands γ u. So with γ
+// <= 1/τ one and the same acceleration meets all rows on their lines: γ is the smaller of `rate` and 1/τ.
 //
 // Outside (s < p(u): an obstacle that appeared, a disturbance, another constraint that won) meeting it at once would
 // be a demand of order 1/T. Instead the excess e of closing speed over p⁻¹(s) decays: the demand is at most what
 // the profile itself decelerates with, plus correction·e/T, and never above the hardest deceleration the limits allow.
-// While room is left, neither is it above what a stop takes, γ u or, if that is more, u²/2(s − uT). So among obstacles at
-// rest, as long as u ≤ 2γ (s − uT) and curvatures aside, one and the same acceleration still meets all rows, that of the stop
-// along the path; more could only be had by one row at the expense of another, or of limits. The stop is asked for anew in
-// every period: what disturbs makes the demand grow before s is gone, with the logarithm of s; what is then not to be had
-// goes into the margin.
-// A room that is negative grows back to p⁻¹(s) < 0: closing ends as above, and the leaving speed e that is missing comes by
-// 3γ e, on the line s'' = −3γ s' − 2γ² s: firmly, but without a demand of order 1/T, and never above A. So what closes
-// in is slowed harder than at rest, however deep it is: where clearances want opposite things, the arm comes to rest.
-// What comes nearer by v unseen (an obstacle whose velocity is not given) is held off at s = −1.5 v/γ, an acceleration d that is not known of at −d/2γ².
+// While room is left, neither is it above what a stop takes, γ u or, if that is more, u²/2(s − uT). So among obstacles
+// at rest, as long as u ≤ 2γ (s − uT) and curvatures aside, one and the same acceleration still meets all rows, that of
+// the stop along the path; more could only be had by one row at the expense of another, or of limits. The stop is asked
+// for anew in every period: what disturbs makes the demand grow before s is gone, with the logarithm of s; what is then
+// not to be had goes into the margin.
+// A room that is negative grows back to p⁻¹(s) < 0: closing ends as above, and the leaving speed e that is missing
+// comes by 3γ e, on the line s'' = −3γ s' − 2γ² s: firmly, but without a demand of order 1/T, and never above A. So
+// what closes in is slowed harder than at rest, however deep it is: where clearances want opposite things, the arm
+// comes to rest. What comes nearer by v unseen (an obstacle whose velocity is not given) is held off at s = −1.5 v/γ,
+// an acceleration d that is not known of at −d/2γ².
 //
 // What a row may ask for. The curvature c adds to the demand, other rows want something else, and close to position
-// limits joints cannot give all: no more than b = max ∇h·a within the bounds of now and the torque. With b the room lasts
-// if the arm comes no nearer, or stops in time, u²/2(b + min(c, 0)) <= s.
-// Where nothing but the arm itself closes in (by more than 0.01 m/s, which the margin holds off), its stop along the path
-// settles what is needed: κ times as hard as −v/τ it takes the time τ/κ and the way v τ/2κ, on which the clearance falls by
+// limits joints cannot give all: no more than b = max ∇h·a within the bounds of now and the torque. With b the room
+// lasts if the arm comes no nearer, or stops in time, u²/2(b + min(c, 0)) <= s.
+// Where nothing but the arm itself closes in (by more than 0.01 m/s, which the margin holds off), its stop along the
+// path settles what is needed: κ times as hard as −v/τ it takes the time τ/κ and the way v τ/2κ, on which the clearance
+// falls by
 //     u τ/2κ + max(−c, 0) τ²/8κ²,
 // which is s for a κ in closed form. If κ <= 1 a row asks for no more than its share −∇h·v/τ of that stop, so that −v/τ
-// meets all such rows at once. Otherwise, if it demands more than b, it asks for no more than κ times its share, nor than
-// b if with b the room lasts. Where b + c <= 0, as past the crest of a clearance where ∇h is short, no acceleration along ∇h
-// would do, and the arm is to stop along its path as well, by one more row, −v·q̈ >= κ |v|²/τ, for the row of the largest κ.
-// κ is no larger than twice what meets the demand, nor than takes `correction` of the velocity in this period; bounds of
-// comfort are exceeded κ times by it.
+// meets all such rows at once. Otherwise, if it demands more than b, it asks for no more than κ times its share, nor
+// than b if with b the room lasts. Where b + c <= 0, as past the crest of a clearance where ∇h is short, no
+// acceleration along ∇h would do, and the arm is to stop along its path as well, by one more row, −v·q̈ >= κ |v|²/τ,
+// for the row of the largest κ. κ is no larger than twice what meets the demand, nor than takes `correction` of the
+// velocity in this period; bounds of comfort are exceeded κ times by it.
 // Where something else closes in, or the room is used up, a row asks for no more than b if with b the room lasts. Only
 // where it does not are bounds of comfort given up for it; where the room is used up, only for the end of closing, and
 // not for the way back: what is asked for does not jump where closing turns into leaving.
@@ -110,9 +112,9 @@ struct BrakingTorque {
   const Eigen::VectorXd& bias;
 };
 
-/// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most one
-/// for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked (where rows are
-/// full it takes the place of the least critical).
+/// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most
+/// one for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked (where
+/// rows are full it takes the place of the least critical).
 class SafetyRows {
  public:
   /// Throws std::invalid_argument if the settings are not valid.
@@ -126,9 +128,9 @@ class SafetyRows {
   /// Whether the sizes match and every entry within reach is finite.
   bool usable(const Clearances& clearances) const noexcept;
 
-  /// The most critical clearances of usable ones, at velocity v (nv). The hardest deceleration is Σ_j |∂h/∂q_j| (acceleration limit)_j or,
-  /// given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. `bounds` are those of now.
-  /// No allocation.
+  /// The most critical clearances of usable ones, at velocity v (nv). The hardest deceleration is Σ_j |∂h/∂q_j|
+  /// (acceleration limit)_j or, given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less.
+  /// `bounds` are those of now. No allocation.
   void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
               const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr) noexcept {
     clear();

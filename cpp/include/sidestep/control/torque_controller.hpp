@@ -121,10 +121,10 @@ struct TorqueControllerSettings {
 /// acceleration nearest to what they allow. If that is infeasible, a second one adds slack
 /// to the bounds, within a box of the overruns and of position limits, at the cost p's with a price p far above the
 /// task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
-/// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of those
-/// that are not below zero, then of those that are, w times their depth over the largest. What pulls two ways is shared,
-/// and an arm that cannot get out comes to rest. Where the torque does not reach the box, it is first widened by the least squares that do. So there always
-/// is a solution.
+/// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of
+/// those that are not below zero, then of those that are, w times their depth over the largest. What pulls two ways is
+/// shared, and an arm that cannot get out comes to rest. Where the torque does not reach the box, it is first widened
+/// by the least squares that do. So there always is a solution.
 ///
 /// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
 /// clearances are unusable, the same without them.
@@ -168,8 +168,8 @@ class TorqueController {
 
   const TorqueControllerSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return nv_; }
-  /// The first program of the last solve that had usable input: rows of torque limits, then of clearances, without bounds
-  /// where they are not in use.
+  /// The first program of the last solve that had usable input: rows of torque limits, then of clearances, without
+  /// bounds where they are not in use.
   const QuadraticProgramData& program() const noexcept { return hard_data_; }
   /// Number of solves, since construction, that ended with this status.
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }

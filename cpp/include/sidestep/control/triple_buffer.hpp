@@ -10,9 +10,9 @@ namespace sidestep {
 
 /// Hands the newest value to one reader that never waits, allocates or frees. Values in between are lost.
 ///
-/// Writers either `put` values, from any number of threads, which wait for each other alone; or one of them fills `draft()` in
-/// place and calls `submit()`, and waits for nobody. Of the three slots one is written, one read and one between the two; what
-/// the reader has done with is overwritten by a writer.
+/// Writers either `put` values, from any number of threads, which wait for each other alone; or one of them fills
+/// `draft()` in place and calls `submit()`, and waits for nobody. Of the three slots one is written, one read and one
+/// between the two; what the reader has done with is overwritten by a writer.
 template <class T>
 class TripleBuffer {
  public:

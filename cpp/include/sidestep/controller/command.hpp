@@ -48,7 +48,9 @@ struct Command {
   Eigen::VectorXd position;      ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
   double tracking_error = 0.0;   ///< largest |q_r − q| [rad | m]
 
-  double clearance = std::numeric_limits<double>::infinity();  ///< the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is unknown
+  /// the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
+  /// unknown
+  double clearance = std::numeric_limits<double>::infinity();
   int coordinate = -1;  ///< whose clearance that is, see Controller::labels; -1: none within reach
   int point = -1;       ///< the obstacle point, where it is one
   int bound_by = -1;    ///< the coordinate whose clearance row bends the motion most; -1: none

@@ -19,7 +19,8 @@ namespace sidestep {
 /// The controller: state in, safe command out, once a period.
 ///
 ///   1. Reference: the goal; or a point that runs ahead on the planner's path; or a sub-goal out of a local minimum.
-///   2. Geometric system: a damped spring to the reference on the graph of the barriers, see GeometricSystem. Barriers are
+///   2. Geometric system: a damped spring to the reference on the graph of the barriers, see GeometricSystem. Barriers
+/// are
 ///      lowered where the arm has to come near what rests: at its goal and in narrow places of the path.
 ///   3. Look-ahead: where what moves would come too near on that way, a trajectory out of its way is followed instead.
 ///   4. Quadratic program: the nearest acceleration within every limit and clearance, as torque or acceleration.
@@ -55,11 +56,11 @@ class Controller {
     Controller* controller_;
   };
 
-  /// From the next step on: a configuration (nv) [rad | m] within the limits, of joints without limits at the nearest turn.
-  /// Throws std::invalid_argument that names the joint, its value and what is allowed; the goal before stays.
+  /// From the next step on: a configuration (nv) [rad | m] within the limits, of joints without limits at the nearest
+  /// turn. Throws std::invalid_argument that names the joint, its value and what is allowed; the goal before stays.
   void set_goal(const Eigen::VectorXd& position);
-  /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner. A posture
-  /// for a pose is looked for near its `rest`, or near the arm where it has none.
+  /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner. A
+  /// posture for a pose is looked for near its `rest`, or near the arm where it has none.
   void set_goal(Goal goal);
   /// The arm comes to rest where it is, and goes on evading.
   void clear_goal();
@@ -67,8 +68,8 @@ class Controller {
   /// From the next step on. Points move on by their velocities until they are set again.
   void set_obstacles(Obstacles obstacles);
 
-  /// One period at q [rad | m] and v [/s] (nv). A size that is wrong, or a value that is not finite, gives a damped stop
-  /// with the status `stopping`.
+  /// One period at q [rad | m] and v [/s] (nv). A size that is wrong, or a value that is not finite, gives a damped
+  /// stop with the status `stopping`.
   const Command& step(ConstVectorRef q, ConstVectorRef v) noexcept;
   /// The same with the arm's own mass matrix (nv × nv) and bias (nv) [Nm | N] there; for torque output.
   const Command& step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,

@@ -19,18 +19,19 @@ struct MotionRecord {
   bool arrived = false;           ///< every joint came within the tolerance of the goal, which ended the motion
 };
 
-/// Moves a model that does exactly what it is told, by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every joint is
-/// within `tolerance` [rad | m] of `goal` (nv), which may be empty. Throws std::invalid_argument on sizes, states that are not
-/// finite, less than one step, and a controller that is not synchronous, whose threads keep the machine's time;
-/// Interruption where `interrupted` says so before a step.
+/// Moves a model that does exactly what it is told, by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every
+/// joint is within `tolerance` [rad | m] of `goal` (nv), which may be empty. Throws std::invalid_argument on sizes,
+/// states that are not finite, less than one step, and a controller that is not synchronous, whose threads keep the
+/// machine's time; Interruption where `interrupted` says so before a step.
 MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const Eigen::VectorXd& v, int steps,
                        const Eigen::VectorXd& goal = {}, double tolerance = 0.0,
                        const Interrupted& interrupted = never_interrupted);
 
-/// The motions of several controllers, each as `integrate` gives it, bit for bit, on `threads` threads (0: one per processor).
-/// Row k of q, v (N, nv) and of goals, which may be empty, is of controller k. Throws as `integrate` does, std::invalid_argument
-/// also on a controller that is there twice, records of more than 8 GiB, and a number of threads that is not from 0 to 1024;
-/// std::runtime_error if a controller is in use, see Controller::Use. `interrupted` is asked by the calling thread.
+/// The motions of several controllers, each as `integrate` gives it, bit for bit, on `threads` threads (0: one per
+/// processor). Row k of q, v (N, nv) and of goals, which may be empty, is of controller k. Throws as `integrate` does,
+/// std::invalid_argument also on a controller that is there twice, records of more than 8 GiB, and a number of threads
+/// that is not from 0 to 1024; std::runtime_error if a controller is in use, see Controller::Use. `interrupted` is
+/// asked by the calling thread.
 std::vector<MotionRecord> integrate_batch(const std::vector<Controller*>& controllers, const Eigen::MatrixXd& q,
                                           const Eigen::MatrixXd& v, int steps, const Eigen::MatrixXd& goals = {},
                                           double tolerance = 0.0, int threads = 0,

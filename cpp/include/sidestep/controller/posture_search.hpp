@@ -30,16 +30,17 @@ struct PostureSearchSettings {
   std::uint64_t seed = 0;     ///< of those that are random
   bool another = false;       ///< not from the configuration near by, where the posture found from there leads nowhere
   double room = 0.01;         ///< [m] with so much the first posture is good enough; else that with most is taken
-  double limit_room = 0.0;    ///< [rad | m] kept from position limits where that can be; at most a twentieth of a joint's range
+  /// [rad | m] kept from position limits where that can be; at most a twentieth of a joint's range
+  double limit_room = 0.0;
 };
 
 /// A configuration within the limits with the frame at the pose, by damped least squares from q = near:
 ///
 ///     q ← clip(q + Jᵀ (J Jᵀ + λ² I)⁻¹ e),     e = (p* − p, log(R* Rᵀ)),
 ///
-/// λ shrinking with the error (Nakamura and Hanafusa 1986). Where that does not get there, or to one with little `room`, again
-/// from random configurations ever farther away; the same every time for one seed. A pose that is reached at position limits
-/// alone gets a posture there. Without success the nearest that was found.
+/// λ shrinking with the error (Nakamura and Hanafusa 1986). Where that does not get there, or to one with little
+/// `room`, again from random configurations ever farther away; the same every time for one seed. A pose that is reached
+/// at position limits alone gets a posture there. Without success the nearest that was found.
 Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, const PostureSearchSettings& settings,
                      const std::function<double(const Eigen::VectorXd&)>& room);
 

@@ -32,9 +32,9 @@ struct ArmState {
   Eigen::VectorXd q, v;
 };
 
-/// A Controller at its period by the machine's clock, in a thread of its own: step k is due at (k + 1) periods after the
-/// start, and what is late is not left out. The arm does what it is told: v ← v + a T, q ← q + v T. Meanwhile other threads may
-/// set the controller's goal and obstacles.
+/// A Controller at its period by the machine's clock, in a thread of its own: step k is due at (k + 1) periods after
+/// the start, and what is late is not left out. The arm does what it is told: v ← v + a T, q ← q + v T. Meanwhile other
+/// threads may set the controller's goal and obstacles.
 class RealTimeRun {
  public:
   /// Starts. Throws std::invalid_argument on wrong sizes, values that are not finite and settings at fault, and

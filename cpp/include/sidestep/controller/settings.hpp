@@ -63,7 +63,8 @@ struct ControllerSettings {
   double velocity_margin = 0.02; ///< share of the velocity limits that is left for noise and delay
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop [s]
-  double stop_damping = 0.25;    ///< of a stop without a mass matrix, see TorqueControllerSettings; so are the next four
+  /// of a stop without a mass matrix, see TorqueControllerSettings; so are the next four
+  double stop_damping = 0.25;
   double torque_weight = 1e-6, slack_weight = 1e3;
   double velocity_overrun = 1.2, acceleration_overrun = 10.0;
   double obstacle_timeout = std::numeric_limits<double>::infinity();  ///< age from which obstacles count as stale [s]
@@ -77,7 +78,8 @@ struct ControllerSettings {
   TrackingSettings tracking = {};
   std::optional<OnlinePlannerSettings> planner = OnlinePlannerSettings{};
   std::optional<LookAheadSettings> look_ahead = LookAheadSettings{};
-  std::optional<LocalMinimumSettings> local_minimum = LocalMinimumSettings{};  ///< sub-goals where the arm is stuck without a path
+  /// sub-goals where the arm is stuck without a path
+  std::optional<LocalMinimumSettings> local_minimum = LocalMinimumSettings{};
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;

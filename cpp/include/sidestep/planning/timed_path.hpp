@@ -14,7 +14,8 @@ struct TimedPathSettings {
   double wide = 0.03;         ///< clearance from which it goes at full speed [m]
   double slowest = 0.35;      ///< share of the speed that is left where there is none
   double lead = 0.4;          ///< |q − q*| at which it waits for the arm [rad]
-  double delay = 0.18;        ///< an arm leaves a corner by this times the change of velocity [s]: 1 / (e √K) if critically damped
+  /// an arm leaves a corner by this times the change of velocity [s]: 1 / (e √K) if critically damped
+  double delay = 0.18;
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
@@ -47,8 +48,8 @@ struct TimedPathFollower {
   void enter(const TimedPath& route, ConstVectorRef q, ConstVectorRef v) noexcept;
 
   static constexpr Eigen::Index most_places = 5;
-  /// The narrow samples between the reference and as far behind it as the arm may be, or every second, third, … of them:
-  /// writes them into the columns of (nv × most_places), and says how many they are.
+  /// The narrow samples between the reference and as far behind it as the arm may be, or every second, third, … of
+  /// them: writes them into the columns of (nv × most_places), and says how many they are.
   Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings, Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
 
   /// Moves on for `duration` [s]; writes the reference, its velocity and, along the path, its acceleration (nv).
