@@ -53,7 +53,7 @@ struct ClearanceReport {
 void bind_plan(nb::module_& m) {
   nb::enum_<PlanStatus>(m, "PlanStatus", "What a search says about its result.")
       .value("found", PlanStatus::found, "There is a path.")
-      .value("no_path", PlanStatus::no_path, "None within the budget of nodes.")
+      .value("no_path", PlanStatus::no_path, "None within the budget of nodes, iterations and checks.")
       .value("timeout", PlanStatus::timeout, "None within the budget of time.")
       .value("start_in_collision", PlanStatus::start_in_collision, "See Plan.obstruction.")
       .value("goal_in_collision", PlanStatus::goal_in_collision, "See Plan.obstruction.")
@@ -78,6 +78,7 @@ void bind_plan(nb::module_& m) {
       .def_ro("obstruction", &Plan::obstruction, "What is in the way at a start or goal in collision.")
       .def_ro("nodes", &Plan::nodes, "Of both trees.")
       .def_ro("iterations", &Plan::iterations)
+      .def_ro("checks", &Plan::checks, "The work, see max_checks of PlannerSettings; improvement included.")
       .def_ro("search_seconds", &Plan::search_seconds, "[s] until a path was found, or given up.")
       .def_ro("improvement_seconds", &Plan::improvement_seconds,
               "[s] to look for a wider one, and to make it short.");

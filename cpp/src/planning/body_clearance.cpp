@@ -155,6 +155,7 @@ const BodyClearance::Workspace::Pose& BodyClearance::pose(const Workspace& w, in
 
 BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obstacles, const Asked& asked,
                                          Workspace& w) const noexcept {
+  ++w.checks_;
   if (item.other >= 0) {
     const Asked gap_asked{asked.cap + item.contact, asked.near + item.contact, asked.stop + item.contact};
     const double gap = look_at_pair(item, gap_asked, w);

@@ -52,6 +52,7 @@ const std::vector<Field<PlannerSettings>>& fields() {
       {"range", &S::range, "rad", 0.01, 10.0, "longest edge of the search trees"},
       {"max_nodes", &S::max_nodes, "-", 2.0, 1e6, "of both trees: the budget of a search"},
       {"max_iterations", &S::max_iterations, "-", 1.0, 2e9, "of a search: its budget"},
+      {"max_checks", &S::max_checks, "-", 1.0, 2e9, "of clearances in a plan: its budget of work, some 2 s"},
       {"max_seconds", &S::max_seconds, "s", 1e-9, infinity, "of a search; motions then do not repeat"},
       {"shortcuts", &S::shortcuts, "-", 0.0, 1e6, "attempts to shorten a path: more are shorter and later"},
   };
@@ -161,8 +162,11 @@ Plan RrtConnect::find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
     plan.status = PlanStatus::goal_in_collision;
     return plan;
   }
+  workspace_.reset();
+  nodes_looked_through_ = work_before_ = 0;
   RandomStream random(seed);
   connect(settings_.floor, settings_.max_iterations, start, goal, obstacles, begin + settings_.max_seconds, random, plan);
+  plan.checks = work() - work_before_;
   plan.search_seconds = seconds() - begin;
   return plan;
 }
@@ -172,6 +176,8 @@ void RrtConnect::improve(Plan& plan, const Obstacles& obstacles, std::uint64_t s
     return;
   }
   const double begin = seconds(), deadline = begin + settings_.max_seconds - plan.search_seconds;
+  work_before_ = work() - plan.checks;
+  const Interrupted ended = [this] { return interrupted_() || spent(); };
   RandomStream random(~seed);
   const Eigen::VectorXd start = plan.path.col(0), goal = plan.path.rightCols(1);
   // A wide way is tried for a little, what lies between for longer.
@@ -186,11 +192,12 @@ void RrtConnect::improve(Plan& plan, const Obstacles& obstacles, std::uint64_t s
       }
     }
   }
-  if (plan.path.cols() > 2 && settings_.shortcuts > 0 && !interrupted_()) {
+  if (plan.path.cols() > 2 && settings_.shortcuts > 0 && !ended()) {
     const Margins kept = margins(plan.margin, start, goal, obstacles);
-    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_, interrupted_);
-    plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_, interrupted_);
+    plan.path = shorten(plan.path, *body_, obstacles, kept, settings_.shortcuts, random, workspace_, ended);
+    plan.path = widen(plan.path, *body_, obstacles, kept, settings_.margin, random, workspace_, ended);
   }
+  plan.checks = work() - work_before_;
   plan.improvement_seconds = seconds() - begin;
 }
 
@@ -220,17 +227,17 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
   const Eigen::VectorXd high = limits.upper.cwiseMin((start.cwiseMax(goal).array() + 2.0 * pi).matrix());
   SearchTree *one = &from_start_, *other = &from_goal_;
   const int nodes_before = plan.nodes;
-  for (int i = 0; i < iterations && !one->full() && !other->full(); ++i) {
+  for (int i = 0; i < iterations && !spent() && !one->full() && !other->full(); ++i) {
     ++plan.iterations;
     plan.nodes = nodes_before + one->size() + other->size();
     if (seconds() > deadline || interrupted_()) {
       plan.status = PlanStatus::timeout;
       return;
     }
-    const int nearest = draw_sample(low, high, *one, random);
-    if (extend(*one, nearest, sample_, obstacles, margins, random) != Growth::trapped) {
+    const int at = draw_sample(low, high, *one, random);
+    if (extend(*one, at, sample_, obstacles, margins, random) != Growth::trapped) {
       const Eigen::VectorXd met = one->node(one->size() - 1);
-      if (extend(*other, other->nearest(met), met, obstacles, margins, random) == Growth::reached) {
+      if (extend(*other, nearest(*other, met), met, obstacles, margins, random) == Growth::reached) {
         std::vector<Eigen::VectorXd> way = to_root(from_start_, from_start_.size() - 1);
         std::reverse(way.begin(), way.end());
         const std::vector<Eigen::VectorXd> rest = to_root(from_goal_, from_goal_.size() - 1);
@@ -251,26 +258,31 @@ void RrtConnect::search(const Eigen::VectorXd& start, const Eigen::VectorXd& goa
   }
 }
 
+int RrtConnect::nearest(SearchTree& tree, const Eigen::VectorXd& q) {
+  nodes_looked_through_ += tree.size();
+  return tree.nearest(q);
+}
+
 int RrtConnect::draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& high, SearchTree& tree, RandomStream& random) {
   if (random.unit() < local) {
     const auto node = tree.node(static_cast<int>(random.unit() * tree.size()));
     for (Eigen::Index k = 0; k < sample_.size(); ++k) {
       sample_[k] = random.uniform(std::max(low[k], node[k] - around_node), std::min(high[k], node[k] + around_node));
     }
-    return tree.nearest(sample_);
+    return nearest(tree, sample_);
   }
   // Samples far from nodes that were trapped only find the same walls again.
-  int nearest = 0;
+  int node = 0;
   for (int draw = 0; draw < draws; ++draw) {
     for (Eigen::Index k = 0; k < sample_.size(); ++k) {
       sample_[k] = random.uniform(low[k], high[k]);
     }
-    nearest = tree.nearest(sample_);
-    if (tree.distance(nearest, sample_) <= tree.domain(nearest)) {
+    node = nearest(tree, sample_);
+    if (tree.distance(node, sample_) <= tree.domain(node)) {
       break;
     }
   }
-  return nearest;
+  return node;
 }
 
 RrtConnect::Growth RrtConnect::extend(SearchTree& tree, int from, const Eigen::VectorXd& target, const Obstacles& obstacles,

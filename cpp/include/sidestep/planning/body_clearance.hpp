@@ -85,6 +85,14 @@ class BodyClearance {
    public:
     explicit Workspace(const BodyClearance& body);
 
+    /// How many clearances of single items were asked for: the work done, the same on every machine.
+    std::int64_t checks() const noexcept { return checks_; }
+    /// Begins anew, so that what is asked for next takes the same work whatever was before.
+    void reset() noexcept {
+      checks_ = 0;
+      last_ = 0;
+    }
+
    private:
     friend class BodyClearance;
     struct Pose {
@@ -106,6 +114,7 @@ class BodyClearance {
     std::vector<double> bounds_;  // of the ellipsoids of a link
     Eigen::VectorXd q_, difference_;
     Eigen::VectorXd placed_;  // where the body is
+    std::int64_t checks_ = 0;
     int last_ = 0;  // the item that was in the way last: it is looked at first
   };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 
 #include "sidestep/barrier/embedding.hpp"
@@ -10,7 +11,7 @@ namespace sidestep {
 /// What a search says about its result.
 enum class PlanStatus {
   found,               ///< there is a path
-  no_path,             ///< none within the budget of nodes
+  no_path,             ///< none within the budget of nodes, iterations and checks
   timeout,             ///< none within the budget of time
   start_in_collision,  ///< see Plan::obstruction
   goal_in_collision,   ///< see Plan::obstruction
@@ -40,6 +41,7 @@ struct Plan {
   // The budget spent.
   int nodes = 0;         ///< of both trees
   int iterations = 0;
+  std::int64_t checks = 0;  ///< see PlannerSettings; improvement included
   double search_seconds = 0.0;       ///< until a path was found
   double improvement_seconds = 0.0;  ///< to look for a wider one, and to make it short
 };

@@ -26,6 +26,9 @@ struct PlannerSettings {
   double range = 1.0;
   int max_nodes = 10000;    ///< of both trees
   int max_iterations = 40000;
+  /// The work of a whole plan, some 2 s on any machine: clearances of single items; a thousand nodes looked through count
+  /// as one.
+  int max_checks = 2000000;
   double max_seconds = std::numeric_limits<double>::infinity();
   int shortcuts = 100;      ///< attempts to shorten a path
 
@@ -85,6 +88,10 @@ class RrtConnect {
  private:
   enum class Growth { trapped, advanced, reached };
 
+  /// Whether the budget of checks is used up.
+  bool spent() const noexcept { return work() - work_before_ > settings_.max_checks; }
+  std::int64_t work() const noexcept { return workspace_.checks() + nodes_looked_through_ / 1000; }
+  int nearest(SearchTree& tree, const Eigen::VectorXd& q);
   void connect(double margin, int iterations, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
                const Obstacles& obstacles, double deadline, RandomStream& random, Plan& plan);
   void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
@@ -101,6 +108,7 @@ class RrtConnect {
   const BodyClearance* body_;
   PlannerSettings settings_;
   BodyClearance::Workspace workspace_;
+  std::int64_t nodes_looked_through_ = 0, work_before_ = 0;  // the latter: before the plan under way
   Interrupted interrupted_ = never_interrupted;
   SearchTree from_start_, from_goal_;
   Eigen::VectorXd sample_, next_, near_, clearances_;
