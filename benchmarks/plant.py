@@ -1,8 +1,8 @@
 """An arm in MuJoCo that is not what its model says, and a loop that drives it: what `plants.py` and others share.
 
 The physics step is `PHYSICS_STEP`. The controller sees the measured state once a control period; torques are held
-until the next one. Positions and velocities go to a drive as robots have their own, at the physics rate, in the mass
-matrix and gravity of the model that is told, M and g:
+until the next one. Positions and velocities go to a drive as robots have their own, at the physics rate, with `ROTOR`
+on every joint, the bias of the model that is told, and M = its mass matrix + `ROTOR`:
     position: u = M (3 w^2 e + 3 w e' + w^3 s) + bias,  e = q_d - q,  s the integral of e;  w = `DRIVE_RATE`
     velocity: u = M (2 w e + w^2 s) + bias,             e = v_d - v,  s the integral of e
 q_d runs linearly from one command to the next, over a control period. s stands still where a motor is at its limit.
@@ -25,6 +25,7 @@ from sidestep.simulation.model import SimulationModel, build_model
 PHYSICS_STEP = 5e-4  # [s]
 SAMPLE = 1e-3  # [s] between two true states that are kept
 DRIVE_RATE = 60.0  # [1/s] where all poles of a drive are
+ROTOR = 0.1  # [kg m^2] of a drive's motor, seen from the joint
 PAYLOAD_RADIUS = 0.05  # [m] of the ball of even density that an unknown payload is
 
 
@@ -95,7 +96,7 @@ class SimulatedArm:
         model = self.true.model
         dofs = self.true.joint_velocities
         model.dof_frictionloss[dofs] = plant.friction
-        model.dof_armature[dofs] += plant.armature
+        model.dof_armature[dofs] += plant.armature + (0.0 if output == "torque" else ROTOR)
         model.dof_damping[dofs] += plant.damping
         if plant.payload > 0.0:
             add_payload(self.true, robot, plant.payload)
@@ -193,7 +194,7 @@ class _Motor:
         if self.arm.output == "torque":
             return np.clip(command, -self.most, self.most)
         mass, bias = self.arm.told_dynamics(q, v)
-        w = DRIVE_RATE
+        mass, w = mass + ROTOR * np.eye(len(q)), DRIVE_RATE
         if self.arm.output == "velocity":
             error = command - v
             raw = mass @ (2.0 * w * error + w**2 * self.sum) + bias
