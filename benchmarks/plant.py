@@ -25,6 +25,7 @@ from sidestep.simulation.model import SimulationModel, build_model
 PHYSICS_STEP = 5e-4  # [s]
 SAMPLE = 1e-3  # [s] between two true states that are kept
 DRIVE_RATE = 60.0  # [1/s] where all poles of a drive are
+BAD = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 ROTOR = 0.1  # [kg m^2] of a drive's motor, seen from the joint
 PAYLOAD_RADIUS = 0.05  # [m] of the ball of even density that an unknown payload is
 
@@ -68,6 +69,8 @@ class PlantMotion:
         q, v, applied: (S, nv) true state and torque of the motors [Nm], every `SAMPLE` seconds.
         acceleration, torque: (T, nv) of the command, every `period` [s].
         arrived: see `SimulatedArm.drive`.
+        physics_contacts: samples at which MuJoCo pushed the arm away from a solid. Its convex parts stand out of the
+            meshes (see `build_model`), so that this may be where nothing touched.
     """
 
     q: np.ndarray
@@ -77,6 +80,7 @@ class PlantMotion:
     torque: np.ndarray
     period: float
     arrived: bool
+    physics_contacts: int
 
 
 class SimulatedArm:
@@ -145,13 +149,13 @@ class SimulatedArm:
         motor = _Motor(self, first, offset)
         states: list[tuple[np.ndarray, ...]] = []
         commands: list[tuple[np.ndarray, ...]] = []
-        every = round(SAMPLE / PHYSICS_STEP)
+        pushed, every = 0, round(SAMPLE / PHYSICS_STEP)
         near_since, arrived = None, False
         for k in range(max(1, round(duration * plant.rate))):
             time = k / plant.rate
             mujoco.mj_step1(self.true.model, data)
             q, v = self.true.state(data)
-            if not (np.isfinite(q).all() and np.isfinite(v).all()):
+            if any(data.warning[kind].number for kind in BAD):  # MuJoCo starts anew by itself then
                 raise RuntimeError(f"the physics diverged at {time:.3f} s")
             measured = q + offset, v + plant.velocity_noise * rng.normal(size=count)
             if before is not None:
@@ -166,6 +170,7 @@ class SimulatedArm:
                 data.ctrl[self.true.actuators] = motor.torque(waiting.popleft(), q, v)
                 if substep % every == 0:
                     states.append((q, v, data.ctrl[self.true.actuators].copy()))
+                    pushed += bool(np.any(data.contact.dist <= 0.0))
                 data.xfrc_applied[self.last_body, :3] = _push_at(pushes, time + substep * PHYSICS_STEP)
                 mujoco.mj_step2(self.true.model, data)
             commands.append((command.acceleration, command.torque))
@@ -177,7 +182,7 @@ class SimulatedArm:
                 arrived = True
                 break
         columns = [np.array(c) for rows in (states, commands) for c in zip(*rows, strict=True)]
-        return PlantMotion(*columns, period=1.0 / plant.rate, arrived=arrived)
+        return PlantMotion(*columns, period=1.0 / plant.rate, arrived=arrived, physics_contacts=pushed)
 
 
 class _Motor:

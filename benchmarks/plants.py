@@ -106,6 +106,7 @@ class Bench:
         return {
             **document,
             "holdable": holdable,
+            "physics_contacts": motion.physics_contacts,
             **told(outcome),
             **figures(self.robot.limits, motion, gravity),
         }
@@ -186,6 +187,7 @@ def summary(runs: list[dict[str, Any]]) -> dict[str, Any]:
         "runs": len(runs),
         "diverged": len(runs) - len(ran),
         "contacts": sum(run["contact"] or run["self_contact"] for run in ran),
+        "physics_contacts": sum(run["physics_contacts"] > 0 for run in ran),
         "arrived": sum(run["arrived"] for run in ran),
         "holdable": len(holdable),
         "arrived_of_holdable": sum(run["arrived"] for run in holdable),

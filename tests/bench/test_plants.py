@@ -67,6 +67,13 @@ def test_commands_come_late_and_motors_give_their_share() -> None:
     np.testing.assert_allclose(motion.applied[5:], np.tile(0.6 * robot.limits.effort, (15, 1)))
 
 
+def test_physics_that_diverge_are_told() -> None:
+    robot = ss.Robot.named("fr3")
+    arm = SimulatedArm(robot, (), Plant(push=1e14, push_time=0.05, push_every=1e-3))
+    with pytest.raises(RuntimeError, match=r"the physics diverged at 0\.05"):
+        arm.drive(Constant(robot, np.zeros(7)), robot.neutral, 0.2, seed=0)
+
+
 def test_encoders_are_off_and_the_truth_is_kept() -> None:
     robot = ss.Robot.named("fr3")
     q = np.array([0.0, -0.3, 0.0, -1.8, 0.0, 1.5, 0.0])
