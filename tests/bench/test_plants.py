@@ -67,7 +67,8 @@ def test_commands_come_late_and_motors_give_their_share() -> None:
     np.testing.assert_allclose(motion.applied[5:], np.tile(0.6 * robot.limits.effort, (15, 1)))
 
 
-def test_physics_that_diverge_are_told() -> None:
+def test_physics_that_diverge_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings where it runs
     robot = ss.Robot.named("fr3")
     arm = SimulatedArm(robot, (), Plant(push=1e14, push_time=0.05, push_every=1e-3))
     with pytest.raises(RuntimeError, match=r"the physics diverged at 0\.05"):
