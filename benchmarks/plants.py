@@ -89,7 +89,7 @@ class Bench:
         """What came of one run of a cell."""
         plant, problem = CELLS[cell], self.problem(index)
         settings = ss.ControllerSettings(
-            synchronous=True, seed=index, period=1.0 / plant.rate, output="torque"
+            synchronous=True, seed=index, period=1.0 / plant.rate, output=output
         )
         controller = ss.Controller(self.arm, settings)
         controller.set_obstacles(problem.obstacles)

@@ -45,7 +45,7 @@ void bind_settings_tree(nb::module_& m) {
   bind_settings<ArrivalSettings>(m, "ArrivalSettings", "When a goal counts as reached.");
   bind_settings<TrackingSettings>(
       m, "TrackingSettings",
-      "How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 w (v_r - v), with what the disturbance\n"
+      "How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 z w (v_r - v), with what the disturbance\n"
       "observer found. Not for outputs of position and velocity, which the arm's own drives track.");
   bind_settings<OnlinePlannerSettings>(
       m, "OnlinePlannerSettings", "The planner that runs beside the loop: how it searches, and how its paths are followed.",

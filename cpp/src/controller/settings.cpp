@@ -51,6 +51,7 @@ const std::vector<Field<TrackingSettings>>& fields() {
   using S = TrackingSettings;
   static const std::vector<Field<S>> all{
       {"frequency", &S::frequency, "1/s", 1.0, 300.0, "of the feedback to the reference: larger is stiffer, and shakes with noise and delay"},
+      {"damping", &S::damping, "-", 0.1, 10.0, "of the feedback: 1 is critical; unknown rotor inertias lower it, delay and noise ask for less"},
       {"observer_time", &S::observer_time, "s", 0.005, none,
        "in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay"},
       {"observer_share", &S::observer_share, "-", 0.0, 1.0, "of the effort limits that the observer may make up for"},

@@ -39,7 +39,16 @@ void Controller::Impl::begin_reference() noexcept {
   next_q_ = arm_q_;
   next_v_ = arm_v_;
   a_.setZero();
-  has_last_torque_ = false;
+  if (!torque) {
+    return;
+  }
+  if (has_last_torque_) {
+    reference_torque_ = last_torque_;
+  } else if (dynamics_) {  // what has held the arm until now, nobody knows: what would hold it
+    dynamics_->bias(arm_q_, arm_v_, *dynamics_workspace_, reference_torque_);
+    last_torque_ = reference_torque_;
+    has_last_torque_ = true;
+  }
 }
 
 void Controller::Impl::follow_arm() noexcept {
@@ -63,7 +72,7 @@ void Controller::Impl::follow_arm() noexcept {
 void Controller::Impl::observe() noexcept {
   // v̇ measured, less what was predicted with the disturbance known so far: d changes by M of that, over the time constant.
   const TrackingSettings& tracking = settings.tracking;
-  if (!torque || !known_before_ || !has_last_torque_ || tracking.observer_time == infinity) {
+  if (!torque || !known_before_ || tracking.observer_time == infinity) {
     return;
   }
   surplus_ = (arm_v_ - last_arm_v_) / settings.period - command.acceleration;
@@ -124,7 +133,7 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
     return;
   }
   const double w = settings.tracking.frequency;
-  feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * w * (v_ - arm_v_);
+  feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
   TorqueStatus status;
   if (torque) {
     take_dynamics(arm_workspace_.state(), mass_matrix, bias);
@@ -151,7 +160,7 @@ void Controller::Impl::stop(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix
   }
   tracked_.torque = solution.torque;
   tracked_.acceleration = solution.acceleration;
-  known_before_ = has_last_torque_ = false;
+  known_before_ = false;
 }
 
 void Controller::Impl::advance_reference() noexcept {

@@ -40,10 +40,11 @@ struct OnlinePlannerSettings {
   double retry = 1.0;      ///< until a failed search is repeated in the same scene [s]
 };
 
-/// How the arm is kept on the controller's reference, see Controller: q̈ = a_r + ω² (q_r − q) + 2 ω (v_r − v), with what the
+/// How the arm is kept on the controller's reference, see Controller: q̈ = a_r + ω² (q_r − q) + 2 ζ ω (v_r − v), with what the
 /// disturbance observer found. Not for outputs of position and velocity, which the arm's own drives track.
 struct TrackingSettings {
   double frequency = 30.0;       ///< ω [1/s]
+  double damping = 1.5;          ///< ζ [-]: rotors that the model does not know lower it
   double observer_time = 0.05;   ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
   double observer_share = 0.5;   ///< of the effort limits that it may make up for [-]
   double largest_error = 0.1;    ///< |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m]
