@@ -379,7 +379,7 @@ controller:
         "planner.patience": 2.0,
         "planner.search.margin": 0.08,
         "planner.search.max_nodes": 500,
-        "planner.route.speed": 1.25,
+        "planner.route.speed": 0.75,
         "safety.margin": 0.012345678901234,
         "safety.max_rows": 8,
         "period": 0.002,  # of the simulation

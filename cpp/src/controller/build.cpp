@@ -49,6 +49,7 @@ std::unique_ptr<OnlinePlanner> make_guide(const BodyClearance& body, const Contr
   OnlinePlannerConfig guide;
   guide.planner = settings.planner->search;
   guide.route = settings.planner->route;
+  guide.safety = settings.safety;
   guide.period = settings.planner->period;
   guide.patience = settings.planner->patience;
   guide.retry = settings.planner->retry;

@@ -50,7 +50,7 @@ OnlinePlanner::OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& sett
       velocity_(goal_),
       progress_(settings.patience),
       here_(body_),
-      states_(State{goal_, goal_}),
+      states_(State{goal_, goal_, goal_}),
       answers_(Answer{}),
       newest_(std::make_shared<const Obstacles>(Obstacles::none())),
       planner_(body_, settings.planner),
@@ -130,6 +130,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
   if (!settings_.synchronous || time >= next_look_) {
     State& state = states_.draft();
     state.q = q;
+    state.v = velocity_;
     state.goal = goal_;
     state.time = time;
     state.station = follower_.station;
@@ -161,7 +162,6 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
     }
   } else {
     attractor.position = goal_;
-    follower_.rate = 0.0;
   }
   last_time_ = time;
 

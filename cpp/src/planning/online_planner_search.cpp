@@ -97,12 +97,9 @@ void OnlinePlanner::look(const State& state) {
 }
 
 Eigen::VectorXd OnlinePlanner::on_route(double station) const {
-  const Eigen::VectorXd& at = route_->station;
-  const Eigen::Index last = at.size() - 1;
-  const Eigen::Index next = std::clamp<Eigen::Index>(std::upper_bound(at.begin(), at.end(), station) - at.begin(), 1, last);
-  const double length = at[next] - at[next - 1];
-  const double share = length > 0.0 ? std::clamp((station - at[next - 1]) / length, 0.0, 1.0) : 1.0;
-  return route_->q.col(next - 1) + share * (route_->q.col(next) - route_->q.col(next - 1));
+  RoundedPath::Point point;
+  rounded_->at(station, point);
+  return point.q;
 }
 
 Eigen::Index OnlinePlanner::waypoint_after(double station) const {
@@ -225,8 +222,10 @@ void OnlinePlanner::follow(const State& state, const Eigen::MatrixXd& path, cons
   for (Eigen::Index k = 1; k < path_.cols(); ++k) {
     stations_[k] = stations_[k - 1] + (path_.col(k) - path_.col(k - 1)).norm();
   }
+  rounded_.emplace(path_, body_, obstacles, path_margins_, planner_.workspace());
+  const Eigen::VectorXd v = settings_.synchronous ? state.v : states_.get().v;
   route_ = std::make_shared<const TimedPath>(
-      make_route(path_, body_, obstacles, settings_.route, planner_.workspace(), measured));
+      make_route(*rounded_, v, body_, obstacles, settings_.route, settings_.safety, planner_.workspace(), measured));
   ++route_number_;
   answer(state, PlanStatus::found, false);
 }

@@ -22,6 +22,7 @@ from sidestep.bench.parallel import Progress, Worker, cpu_name, run_tasks
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
+from sidestep.bench.time_ratio import ratio_to_optimum
 from sidestep.distance import Clearance, EllipsoidClearance, SceneObject
 
 Array = npt.NDArray[np.float64]
@@ -38,6 +39,7 @@ class SceneSettings:
         spacing: no point of a surface is farther than this from one that the controller sees [m].
         point_radius: of those points [m].
         only_clearances: measure start and goal and move nothing.
+        time_ratio: of the motions that arrive, see `ratio_to_optimum`; needs the package toppra.
 
     Raises:
         ValueError: jobs below 1, a length that is not positive.
@@ -50,6 +52,7 @@ class SceneSettings:
     spacing: float = SPACING
     point_radius: float = POINT_RADIUS
     only_clearances: bool = False
+    time_ratio: bool = False
 
     def __post_init__(self) -> None:
         if self.jobs < 1:
@@ -94,6 +97,7 @@ class SceneOutcome:
         num_points: that the controller saw at first. unknown_joints: held joints that the robot does not have.
         tolerance: of arriving [rad | m]. arrives: it should arrive; False where the goal stays blocked.
         ended: what the guide said at the end; empty without a guide.
+        time_ratio: see `ratio_to_optimum`; None where it was not asked for or there is none.
     """
 
     set: str
@@ -111,6 +115,7 @@ class SceneOutcome:
     tolerance: float
     arrives: bool = True
     ended: str = ""
+    time_ratio: float | None = None
 
     @property
     def solved(self) -> bool:
@@ -195,6 +200,7 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
             "first_motion_ms": _upper([i.first_motion_s for i, _ in solved], 1e3),
             "path_length_rad": _upper([i.path_length for i, _ in solved]),
             "motion_s": _upper([o.time_s for _, o in solved]),
+            "time_ratio": _upper([i.time_ratio for i, _ in solved if i.time_ratio is not None]),
             "min_clearance_mm": _lower(clearances, 1e3),
         }
     figures["goal_beyond_limits"] = sum(item.goal_beyond_limits > 0.0 for item in items)
@@ -295,6 +301,9 @@ def judged(
     """
     published = problem.goal if goal is None else goal
     motion = None if settings.only_clearances else arm.move(problem, settings.motion)
+    ratio = None
+    if settings.time_ratio and motion is not None and motion.arrived:
+        ratio = ratio_to_optimum(motion.q, settings.motion.period * (len(motion.q) - 1), arm.robot.limits)
     outcome = SceneOutcome(
         set=set,
         index=problem.index,
@@ -311,5 +320,6 @@ def judged(
         tolerance=settings.motion.tolerance,
         arrives=arrives,
         ended="" if motion is None else motion.ended,
+        time_ratio=ratio,
     )
     return outcome, StepTimes() if motion is None else times_of(motion)

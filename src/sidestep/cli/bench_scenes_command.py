@@ -37,6 +37,7 @@ COLUMNS = (  # title, key of the figures, decimals, which quantiles
     ("first motion [ms]", "first_motion_ms", 2, ("median", "p95", "p99")),
     ("path [rad | m]", "path_length_rad", 2, ("median", "p95", "p99")),
     ("motion [s]", "motion_s", 2, ("median", "p95", "p99")),
+    ("over TOPP-RA", "time_ratio", 2, ("median", "p95", "p99")),
     ("clearance [mm]", "min_clearance_mm", 1, ("min", "p5", "median")),
 )
 
@@ -70,6 +71,9 @@ def motion_bench_maker(
     The controller sees points on the surfaces; contacts are judged on exact meshes and solids between samples.
     Solved: arrived, nothing touched, no limit broken. Joints that are not planned, such as fingers, stand where
     the request puts them. Exit code: 0 when nothing was touched and no limit broken, 1 when not, 2 on bad input.
+
+    Over TOPP-RA: time of a motion over that of the time-optimal one along the path it took, from rest to rest,
+    within the same velocity and acceleration limits and without a limit of jerk. Needs the `bench` extra.
     """
     from sidestep.bench import read_motion_bench_maker, run_scenes
 
@@ -81,7 +85,7 @@ def motion_bench_maker(
     chosen = _first_of_sets(found, only or sets, problems)
     motion = {"period": period, "duration": duration, "tolerance": tolerance, "torque": torque}
     points = {"spacing": spacing, "point_radius": point_radius}
-    settings = _settings(robot, method, jobs, motion, **points, only_clearances=clearances)
+    settings = _settings(robot, method, jobs, motion, **points, only_clearances=clearances, time_ratio=True)
     run_and_report(
         settings,
         lambda show: run_scenes(settings, chosen, progress=show),

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <semaphore>
 #include <thread>
 
@@ -35,6 +36,7 @@ const char* name(OnlinePlannerStatus status) noexcept;
 struct OnlinePlannerConfig {
   PlannerSettings planner = {};
   TimedPathSettings route = {};
+  SafetySettings safety = {};  ///< of what follows: margin, rate and braking_fraction bound the speed near obstacles
   double period = 0.02;     ///< between two looks at the scene [s]
   double patience = 1.0;    ///< without progress the arm counts as stuck [s]
   double retry = 1.0;       ///< after which a failed search is repeated in the same scene [s]
@@ -123,7 +125,7 @@ class OnlinePlanner {
  private:
   /// What the loop tells the planner.
   struct State {
-    Eigen::VectorXd q, goal;
+    Eigen::VectorXd q, v, goal;
     double time = 0.0, station = 0.0;
     std::uint64_t goal_number = 0;   // 0: none
     std::uint64_t route_number = 0;  // that it follows
@@ -197,6 +199,7 @@ class OnlinePlanner {
   Eigen::MatrixXd path_;
   Eigen::VectorXd stations_;  // of its waypoints
   Margins path_margins_;
+  std::optional<RoundedPath> rounded_;
   std::shared_ptr<const TimedPath> route_;
   std::thread thread_;
 };

@@ -2,20 +2,17 @@
 
 #include <Eigen/Core>
 
+#include "sidestep/control/safety_rows.hpp"
 #include "sidestep/fields.hpp"
 #include "sidestep/planning/body_clearance.hpp"
+#include "sidestep/planning/path_timing.hpp"
 
 namespace sidestep {
 
 struct TimedPathSettings {
-  double speed = 2.0;         ///< fastest |dq*/dt| of the reference [rad/s]
-  double speed_share = 0.7;   ///< of the joints' velocity limits that it may ask for
-  double acceleration = 4.0;  ///< at which it slows down ahead [rad/s²]
-  double wide = 0.03;         ///< clearance from which it goes at full speed [m]
-  double slowest = 0.35;      ///< share of the speed that is left where there is none
-  double lead = 0.4;          ///< |q − q*| at which it waits for the arm [rad]
-  /// an arm leaves a corner by this times the change of velocity [s]: 1 / (e √K) if critically damped
-  double delay = 0.18;
+  double speed = 1.0;  ///< share of the joints' velocity and acceleration limits
+  double wide = 0.03;  ///< clearance below which a place is narrow [m]
+  double lead = 0.4;   ///< |q − q*| at which it waits for the arm [rad]
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
@@ -23,36 +20,53 @@ struct TimedPathSettings {
 template <>
 const std::vector<Field<TimedPathSettings>>& fields();
 
-/// A path with the speed at which the reference may pass every point of it: slower in narrow places, at corners, and
-/// before the end.
-struct TimedPath {
-  Eigen::MatrixXd q;        ///< (nv × K) [rad]
-  Eigen::VectorXd station;  ///< length of the path up to each [rad]
-  Eigen::VectorXd speed;    ///< (K) [rad/s]
-  Eigen::VectorXd clearance;  ///< (K) not above `wide` [m]; zero where it was not measured
+/// What a path may ask of the joints of a robot: `speed` of their velocity and acceleration limits, less 5 % that are left to
+/// an arm that follows; jerk 100/s times the acceleration limit. Joints without a limit: 2 rad/s, 10 rad/s² (m, alike).
+PathLimits path_limits(const JointLimits& limits, double speed);
 
-  double length() const noexcept { return station.size() > 0 ? station[station.size() - 1] : 0.0; }
+/// A path as a motion: where the reference is at which time, and how narrow the path is.
+struct TimedPath {
+  PathTiming motion;
+  Eigen::MatrixXd places;         ///< (nv × P) 0.05 rad apart
+  Eigen::VectorXd place_station;  ///< (P) length of the path up to each [rad]
+  Eigen::VectorXd clearance;      ///< (P) not above 0.1 m; zero where it was not measured
+  PathLimits limits;
+
+  double length() const noexcept { return motion.station[motion.station.size() - 1]; }
+  double duration() const noexcept { return static_cast<double>(motion.station.size() - 1) * motion.period; }
+  Eigen::Index place_after(double station) const noexcept;
 };
 
-/// Samples a path. One that is not `measured` is slow everywhere, and soon made: clearances are looked at nowhere.
-TimedPath make_route(const Eigen::MatrixXd& path, const BodyClearance& body, const Obstacles& obstacles,
-                 const TimedPathSettings& settings, BodyClearance::Workspace& workspace, bool measured = true);
+/// Times a path, as fast as the limits allow, from a velocity v (nv) of which what leads along the path counts.
+///
+/// Near obstacles the rule of SafetyRows bounds the speed: with h_i the clearance of an item, whose room is s = h_i − margin (at least
+/// 1 mm; where the path itself comes nearer than the margin, that), and A = braking_fraction |dh_i/ds| (d²s/dt²)_max, the speed
+/// along the path is at most p⁻¹(s) / |dh_i/ds| where h_i shrinks. A path that is not `measured` is slow everywhere, and
+/// soon made: clearances are looked at nowhere.
+TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const BodyClearance& body, const Obstacles& obstacles,
+                     const TimedPathSettings& settings, const SafetySettings& safety, BodyClearance::Workspace& workspace,
+                     bool measured = true);
 
-/// Where the reference is on a timed path: it runs ahead of the arm as far as that can follow.
+/// Where the reference is on a timed path: at a time of the motion, which goes more slowly as the reference gets ahead of the arm.
 struct TimedPathFollower {
-  double station = 0.0;
-  double rate = 0.0;    ///< its speed along the path [rad/s]
-  Eigen::Index at = 0;  ///< the sample before it
+  double time = 0.0;     ///< of the motion [s]
+  double pace = 1.0;     ///< r, how fast that goes, in [0, 1]
+  double change = 0.0;   ///< dr/dt [1/s]
+  double station = 0.0;  ///< where it is then [rad]
 
-  /// Onto a new path, at the sample nearest to q among the first ones, as fast as the arm moves along it at v (nv).
+  /// Onto a new path, at the sample nearest to q in the first radian, as fast as the arm moves along it at v (nv).
   void enter(const TimedPath& route, ConstVectorRef q, ConstVectorRef v) noexcept;
 
   static constexpr Eigen::Index most_places = 5;
-  /// The narrow samples between the reference and as far behind it as the arm may be, or every second, third, … of
-  /// them: writes them into the columns of (nv × most_places), and says how many they are.
+  /// The narrow places between the reference and as far behind it as the arm may be, or every second, third, … of them:
+  /// writes them into the columns of (nv × most_places), and says how many they are.
   Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings, Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
 
-  /// Moves on for `duration` [s]; writes the reference, its velocity and, along the path, its acceleration (nv).
+  /// Moves on for `duration` [s]; writes the reference, its velocity and its acceleration (nv). The pace r follows
+  ///
+  ///     r* = min(1, 2 − 2 |q − q*| / lead)₊
+  ///
+  /// as a critically damped spring of 20 rad/s, its change kept where q̈ r² + q̇ dr/dt is within the path's limits.
   void advance(const TimedPath& route, const TimedPathSettings& settings, ConstVectorRef q, double duration,
                Eigen::Ref<Eigen::VectorXd> position, Eigen::Ref<Eigen::VectorXd> velocity,
                Eigen::Ref<Eigen::VectorXd> acceleration) noexcept;

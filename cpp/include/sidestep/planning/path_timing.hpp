@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "sidestep/planning/path_rounding.hpp"
+
+namespace sidestep {
+
+/// What the joints may do along a path (nv each), all positive and finite: [rad/s], [rad/s²], [rad/s³], or of metres.
+struct PathLimits {
+  Eigen::VectorXd velocity, acceleration, jerk;
+};
+
+/// A motion along a path, as fast as limits allow, at samples that are `period` apart.
+struct PathTiming {
+  double period = 0.0;             ///< [s]
+  Eigen::MatrixXd q, v, a;         ///< (nv × K)
+  Eigen::VectorXd station;         ///< (K), ascending
+};
+
+/// The fastest motion along a path from the speed `begin` = ds/dt to rest, within the limits at every sample.
+///
+/// Time-optimal within velocity and acceleration by two passes over `stations` (as TOPP-RA: Pham and Pham 2018): with
+/// x = (ds/dt)² and u = d²s/dt² the limits |q'_j| √x <= v_j and |q'_j u + q''_j x| <= a_j are linear; backward, the largest x
+/// from which the next is reached; forward, the largest u. `fastest` bounds ds/dt at the stations (the limits are met at
+/// stations; between them by interpolation). Its u jumps, so s(t) is averaged over a window 2 max(a_j / jerk_j): the path stays
+/// what it is. Where the average, or the path's own bends, then ask for more acceleration or jerk than allowed, the share of the acceleration
+/// limits is lowered there and the passes repeated; what is left after `most_rounds` of it is met by a slower clock.
+PathTiming time_path(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest,
+                     const PathLimits& limits, double begin);
+
+}  // namespace sidestep
