@@ -364,7 +364,7 @@ controller:
   local_activation: false
   look_ahead: {tries: 30, delay: 0.2}
   local_minimum: null
-  planner: {patience: 2, search: {margin: 0.08, max_nodes: 500}, route: {speed: 1.25}}
+  planner: {patience: 2, search: {margin: 0.08, max_nodes: 500}, route: {speed: 0.75}}
   safety: {margin: 0.012345678901234, max_rows: 8}
 """
     )

@@ -58,6 +58,8 @@ def tuned(name: str) -> dict[str, Any]:
             return next(option for option in p.options if option != p.default)
         assert isinstance(p.default, int | float)
         value = 1.0712345678901 * p.default or 0.0712345678901 * p.upper
+        if not p.allows(value):  # the default is the largest
+            value = 0.0712345678901 * p.upper
         return round(value) if p.whole else value
 
     return {p.name: other(p) for p in METHODS[name].parameters}
