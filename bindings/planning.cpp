@@ -126,7 +126,7 @@ void bind_guide(nb::module_& m) {
   nb::class_<OnlinePlanner>(
       m, "OnlinePlanner",
       "Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.\n"
-      "Until there is a path, and where the straight way to the goal is free, the reference is the goal itself.\n"
+      "Until there is a path the reference is the goal itself; where the straight way to the goal is free, it is the path.\n"
       "robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: TimedPathSettings, None for the defaults.\n"
       "period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is\n"
       "searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed\n"

@@ -64,7 +64,8 @@ def test_a_goal_may_be_replaced_meanwhile_and_a_run_be_left(arm, synchronous):
     begin = time.monotonic()
     del run  # stops, in far less than the 200 s that it has left
     assert time.monotonic() - begin < 10.0
-    assert controller.step(START, AT_REST).status == ss.SafetyStatus.ok
+    # Usable; back at its start, it is far behind a reference that has gone on.
+    assert controller.step(START, AT_REST).status in (ss.SafetyStatus.ok, ss.SafetyStatus.limited)
 
 
 @pytest.mark.parametrize(

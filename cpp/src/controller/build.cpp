@@ -16,6 +16,7 @@
 namespace sidestep {
 namespace {
 
+constexpr double most_per_period = 0.2;       // of the feedback's frequency: a slow rate holds its torques for long
 constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
 
 std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const BarrierSettings& b) {
@@ -132,10 +133,12 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       reference_torque_(q_),
       last_torque_(q_),
       last_acceleration_(q_),
-      disturbance_(q_),
-      surplus_(q_),
+      coupling_(q_),
       feedback_(q_),
       gravity_(q_),
+      model_mass_(Eigen::MatrixXd::Zero(q_.size(), q_.size())),
+      model_bias_(q_),
+      frequency_(std::min(settings.tracking.frequency, most_per_period / settings.period)),
       arm_workspace_(*system),
       tracked_(arm.num_coordinates(), settings.safety.max_rows),
       mass_(Eigen::MatrixXd::Constant(q_.size(), q_.size(), std::numeric_limits<double>::quiet_NaN())),
@@ -169,6 +172,9 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     tracking_program_.emplace(arm.robot(), program);
     program.velocity_share = velocity_share;
     torque_program_.emplace(arm.robot(), program);
+    if (settings.tracking.observer_time < infinity) {
+      observer_.emplace(arm.robot().limits(), settings.period, settings.tracking.observer_time, settings.tracking.observer_share);
+    }
     if (arm.has_dynamics()) {
       dynamics_.emplace(arm.dynamics());
       dynamics_workspace_.emplace(*dynamics_);

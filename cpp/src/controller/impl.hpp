@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
+#include "sidestep/control/disturbance_observer.hpp"
 #include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/posture_search.hpp"
@@ -167,7 +168,11 @@ class Controller::Impl {
   bool apart_ = false;                          // the arm is not exactly where the reference is
   bool drives_track_ = false;                   // the output is position or velocity
   bool has_last_torque_ = false;
-  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, disturbance_, surplus_, feedback_, gravity_;
+  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, coupling_, feedback_, gravity_;
+  Eigen::MatrixXd model_mass_;
+  Eigen::VectorXd model_bias_;
+  std::optional<DisturbanceObserver> observer_;
+  double frequency_ = 0.0;                      // of the feedback [1/s]
   GeometricSystem::Workspace arm_workspace_;
   TorqueSolution tracked_;
   Eigen::MatrixXd mass_;

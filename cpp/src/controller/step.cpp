@@ -41,6 +41,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   if (is_stale()) {
     wanted_ = -v_ / settings.stop_time;
   }
+  wanted_ += coupling_;
   solve_reference(mass_matrix, bias);
   advance_reference();
   track(mass_matrix, bias);

@@ -10,6 +10,7 @@
 namespace sidestep {
 namespace {
 
+constexpr double free_share = 0.2;     // of the largest error, from which the arm draws the reference to itself [-]
 constexpr double sliding_share = 0.2;  // of the largest error, of joints that slide [m/rad]
 
 }  // namespace
@@ -66,22 +67,20 @@ void Controller::Impl::follow_arm() noexcept {
   }
   q_ = next_q_;
   v_ = next_v_;
+  coupling_.setZero();
+  if (!drives_track_) {
+    // What the arm cannot follow is not run away from.
+    for (Eigen::Index j = 0; j < q_.size(); ++j) {
+      const double error = arm_q_[j] - q_[j], free = free_share * most * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_share : 1.0);
+      coupling_[j] = frequency_ * frequency_ * (error - std::clamp(error, -free, free));
+    }
+  }
   apart_ = q_ != arm_q_ || v_ != arm_v_;
 }
 
 void Controller::Impl::observe() noexcept {
-  // v̇ measured, less what was predicted with the disturbance known so far: d changes by M of that, over the time constant.
-  const TrackingSettings& tracking = settings.tracking;
-  if (!torque || !known_before_ || tracking.observer_time == infinity) {
-    return;
-  }
-  surplus_ = (arm_v_ - last_arm_v_) / settings.period - command.acceleration;
-  const double share = std::min(1.0, settings.period / tracking.observer_time);
-  for (Eigen::Index i = 0; i < q_.size(); ++i) {
-    const double most = tracking.observer_share * arm.robot().limits().effort[i], found = mass_.row(i).dot(surplus_);
-    if (std::isfinite(found)) {  // the mass matrix may be missing
-      disturbance_[i] = std::clamp(disturbance_[i] + share * found, -most, most);
-    }
+  if (observer_ && known_before_) {
+    observer_->update(last_arm_v_, arm_v_, last_torque_, last_acceleration_, model_mass_, model_bias_);
   }
 }
 
@@ -102,7 +101,12 @@ void Controller::Impl::take_dynamics(const KinematicState& state, const Eigen::R
   } else {
     mass_.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
-  bias_ -= disturbance_;
+  model_mass_ = mass_;
+  model_bias_ = bias_;
+  if (observer_) {
+    mass_.diagonal() += observer_->rotors();
+    bias_ -= observer_->disturbance();
+  }
 }
 
 void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
@@ -132,7 +136,7 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
     tracked_.acceleration = solution.acceleration;
     return;
   }
-  const double w = settings.tracking.frequency;
+  const double w = frequency_;
   feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
   TorqueStatus status;
   if (torque) {

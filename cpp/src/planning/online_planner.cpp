@@ -148,7 +148,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
 
   const Answer& answer = answers_.get();
   const bool ours = answer.goal_number == goal_number_;
-  if (ours && answer.status == PlanStatus::found && !answer.direct) {
+  if (ours && answer.status == PlanStatus::found) {
     if (answer.route_number != followed_) {
       followed_ = answer.route_number;
       follower_.enter(*answer.route, q, velocity_);
@@ -169,7 +169,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
     progress_.reset();
     return OnlinePlannerStatus::arrived;
   }
-  const double left = ours && !answer.direct && answer.route ? answer.route->length() - follower_.station : 0.0;
+  const double left = ours && answer.status == PlanStatus::found ? answer.route->length() - follower_.station : 0.0;
   const double away = (attractor.position - q).norm() + left;
   if (ours && answer.path_number != measured_) {  // another way may be longer
     measured_ = answer.path_number;
@@ -185,11 +185,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
       case PlanStatus::goal_in_collision: return OnlinePlannerStatus::goal_in_collision;
       case PlanStatus::invalid: return OnlinePlannerStatus::invalid;
       case PlanStatus::no_path:
-      case PlanStatus::timeout:
-        if (!answer.direct) {
-          return OnlinePlannerStatus::no_path;
-        }
-        break;
+      case PlanStatus::timeout: return OnlinePlannerStatus::no_path;
       case PlanStatus::found: break;
     }
   }
@@ -198,8 +194,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
 
 OnlinePlanner::Following OnlinePlanner::following() noexcept {
   const Answer& answer = answers_.current();
-  const bool follows = answer.goal_number == goal_number_ && answer.status == PlanStatus::found && !answer.direct &&
-                       answer.route_number == followed_;
+  const bool follows = answer.goal_number == goal_number_ && answer.status == PlanStatus::found && answer.route_number == followed_;
   return {follows ? followed_ : 0, follower_};
 }
 

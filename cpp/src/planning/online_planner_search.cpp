@@ -10,6 +10,7 @@ namespace {
 
 constexpr double widening = 1.5;  // the margin grows by this factor each time the arm was stuck
 constexpr int widenings = 4;      // and begins anew after so many
+constexpr double shorter = 0.9;   // a straight way is shorter than the rest of a path by this factor to let go of it
 constexpr double back = 0.05;     // between places behind the attractor where an arm may find back to its path [rad]
 
 }  // namespace
@@ -61,25 +62,33 @@ void OnlinePlanner::look(const State& state) {
     margin_ = settings_.planner.margin * std::pow(widening, static_cast<double>(state.stops % widenings));
   }
   // Straight to the goal where that is free with the margin; not where the arm was stuck, which needs another way.
-  // To let go of a path it must be wide, as barriers may stop what goes straight through a narrow place.
+  // To let go of a path it must be wide, as barriers may stop what goes straight through a narrow place, and shorter, among
+  // obstacles that the path was not made for.
+  const bool taken_up = state.route_number == route_number_;
+  const bool lets_go = !have_path_ || (changed_ && taken_up &&
+                                       (state.goal - state.q).norm() < shorter * (rounded_->length() - state.station));
   const PlannerSettings& asked = settings_.planner;
   const double wide = have_path_ ? asked.margin : std::sqrt(asked.margin * asked.floor);
-  const bool straight = state.stops == 0 && !stuck &&
+  const bool straight = lets_go && state.stops == 0 && !stuck &&
                         planner_.sees(state.q, state.goal, wide, obstacles);
   if (straight) {
     Obstruction found;
     if (!planner_.obstructed(state.goal, obstacles, found) && !planner_.obstructed(state.q, obstacles, found)) {
-      if (!direct_ || new_goal || status_ != PlanStatus::found) {
+      const bool strayed = direct_ && taken_up && !planner_.sees(state.q, on_route(state.station), asked.floor, obstacles);
+      if (!direct_ || strayed || status_ != PlanStatus::found) {
         direct_ = true;
         have_path_ = failed_ = false;
         ++path_number_;
-        answer(state, PlanStatus::found, true);
+        Eigen::MatrixXd edge(state.q.size(), 2);
+        edge << within_limits(state.q), state.goal;
+        path_margins_ = planner_.margins(wide, edge.col(0), state.goal, obstacles);
+        follow(state, edge, obstacles, true);
       }
       return;
     }
   }
   if (have_path_ && !stuck && !direct_) {
-    if (state.route_number != route_number_) {  // the loop has yet to take it up
+    if (!taken_up) {  // the loop has yet to take it up
       return;
     }
     if ((!changed_ || ahead_is_free(state.station, obstacles, planner_.workspace())) && holds_on(state, obstacles)) {
@@ -212,7 +221,7 @@ void OnlinePlanner::search(const State& state, const Obstacles& obstacles) {
     counts_.found += found;
   }
   if (!found) {
-    answer(state, status, false);
+    answer(state, status);
   }
 }
 
@@ -227,18 +236,17 @@ void OnlinePlanner::follow(const State& state, const Eigen::MatrixXd& path, cons
   route_ = std::make_shared<const TimedPath>(
       make_route(*rounded_, v, body_, obstacles, settings_.route, settings_.safety, planner_.workspace(), measured));
   ++route_number_;
-  answer(state, PlanStatus::found, false);
+  answer(state, PlanStatus::found);
 }
 
-void OnlinePlanner::answer(const State& state, PlanStatus status, bool direct) {
+void OnlinePlanner::answer(const State& state, PlanStatus status) {
   status_ = status;
   Answer& answer = answers_.draft();
   answer.goal_number = state.goal_number;
   answer.status = status;
-  answer.direct = direct;
   answer.route_number = route_number_;
   answer.path_number = path_number_;
-  if (status == PlanStatus::found && !direct) {
+  if (status == PlanStatus::found) {
     answer.route = route_;
     const std::lock_guard lock(mutex_);
     shown_route_ = route_;

@@ -15,6 +15,7 @@ constexpr double least_room = 0.001;     // [m]
 constexpr double left_to_the_arm = 0.95;  // of the limits
 constexpr double unmeasured = 0.35;      // of the limits
 constexpr double jerk_rate = 100.0;      // [1/s] of the acceleration limit
+constexpr double at_samples = 0.88;      // of the jerk: between samples it is up to an eighth more
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
 
 /// p⁻¹ of SafetyRows: the speed [m/s] at which a clearance with this room may close.
@@ -44,7 +45,7 @@ PathLimits path_limits(const JointLimits& limits, double speed) {
     return Eigen::VectorXd(left_to_the_arm * speed * given.unaryExpr([&](double x) { return std::isfinite(x) ? x : otherwise; }));
   };
   PathLimits all{finite(limits.velocity, free_velocity), finite(limits.acceleration, free_acceleration), {}};
-  all.jerk = jerk_rate / (left_to_the_arm * speed) * all.acceleration;
+  all.jerk = at_samples * jerk_rate / (left_to_the_arm * speed) * all.acceleration;
   return all;
 }
 

@@ -171,7 +171,9 @@ BOOST_AUTO_TEST_CASE(a_joint_without_limits_takes_the_short_way_also_where_its_e
           BOOST_REQUIRE(q[0] < 3.5);
         }
         BOOST_TEST(std::abs(q[0] - (2.0 * pi - 3.0)) < 0.02);
-        BOOST_TEST(fastest < 0.5);
+        // By the spring, or along the planner's path: half of the way as quickly as the joint can, and no turn.
+        const double way = 2.0 * pi - 6.0;
+        BOOST_TEST(fastest < (planner && !follows ? std::sqrt(way * arm.robot().limits().acceleration[0]) : 0.5));
         if (!follows) {
           const double turn = wraps ? 0.0 : 2.0 * pi;  // the target is seen in the coordinates of the state
           BOOST_TEST(std::abs(controller.target()[0] - (turn - 3.0)) < 1e-9);

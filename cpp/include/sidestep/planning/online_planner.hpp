@@ -52,10 +52,10 @@ struct OnlinePlannerConfig {
 
 /// Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.
 ///
-/// One loop calls `step()` with the state and moves by a GeometricSystem towards the reference. Until there is a path,
-/// and where the straight way to the goal is free, the reference is the goal itself. In its own thread the planner
-/// looks, every `period`, whether the way ahead is still free among the newest obstacles and the arm makes progress,
-/// and searches again from where the arm is where that is not so; after a stop with a larger margin.
+/// One loop calls `step()` with the state and moves by a GeometricSystem towards the reference. Until there is a path the
+/// reference is the goal itself; where the straight way to the goal is free, it is the path. In its own thread the
+/// planner looks, every `period`, whether the way ahead is still free among the newest obstacles and the arm makes
+/// progress, and searches again from where the arm is where that is not so; after a stop with a larger margin.
 class OnlinePlanner {
  public:
   /// Throws std::invalid_argument that names the setting at fault.
@@ -135,7 +135,6 @@ class OnlinePlanner {
   struct Answer {
     std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
     PlanStatus status = PlanStatus::no_path;
-    bool direct = true;  // straight to the goal
     std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
   };
 
@@ -156,7 +155,7 @@ class OnlinePlanner {
   Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const {
     return q.cwiseMax(body_.robot().limits().lower).cwiseMin(body_.robot().limits().upper);
   }
-  void answer(const State& state, PlanStatus status, bool direct);
+  void answer(const State& state, PlanStatus status);
 
   BodyClearance body_;
   OnlinePlannerConfig settings_;
