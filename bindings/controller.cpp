@@ -137,6 +137,10 @@ void bind_command(nb::module_& m) {
                    "(nv,) of the reference after this period [rad/s | m/s].")
       .def_prop_ro("position", [](const Command& c) { return to_numpy(c.position); },
                    "(nv,) of the reference after this period [rad | m]; nan until a state was known.")
+      .def_prop_ro("disturbance", [](const Command& c) { return to_numpy(c.disturbance); },
+                   "(nv,) force that the observer makes up for, of torque outputs [Nm | N].")
+      .def_prop_ro("rotors", [](const Command& c) { return to_numpy(c.rotors); },
+                   "(nv,) inertia that it found and the model lacks [kg m^2 | kg].")
       .def_ro("tracking_error", &Command::tracking_error, "Largest difference of the arm from the reference [rad | m].")
       .def_ro("clearance", &Command::clearance, "The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.")
       .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")

@@ -1480,7 +1480,7 @@ class PlanStatus(enum.Enum):
     """There is a path."""
 
     no_path = 1
-    """None within the budget of nodes."""
+    """None within the budget of nodes, iterations and checks."""
 
     timeout = 2
     """None within the budget of time."""
@@ -1549,6 +1549,10 @@ class Plan:
     def iterations(self) -> int: ...
 
     @property
+    def checks(self) -> int:
+        """The work, see max_checks of PlannerSettings; improvement included."""
+
+    @property
     def search_seconds(self) -> float:
         """[s] until a path was found, or given up."""
 
@@ -1569,13 +1573,14 @@ class PlannerSettings:
         range [rad], default 1.0, allowed 0.01 to 10: longest edge of the search trees
         max_nodes, default 10000, allowed 2 to 1e+06: of both trees: the budget of a search
         max_iterations, default 40000, allowed 1 to 2e+09: of a search: its budget
+        max_checks, default 2000000, allowed 1 to 2e+09: of clearances in a plan: its budget of work, some 2 s
         max_seconds [s], default inf, allowed 1e-09 to inf: of a search; motions then do not repeat
         shortcuts, default 100, allowed 0 to 1e+06: attempts to shorten a path: more are shorter and later
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.0, max_nodes: int = 10000, max_iterations: int = 40000, max_seconds: float = ..., shortcuts: int = 100) -> None: ...
+    def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.0, max_nodes: int = 10000, max_iterations: int = 40000, max_checks: int = 2000000, max_seconds: float = ..., shortcuts: int = 100) -> None: ...
 
     @property
     def margin(self) -> float: ...
@@ -1632,6 +1637,12 @@ class PlannerSettings:
     def max_iterations(self, value: int, /) -> None: ...
 
     @property
+    def max_checks(self) -> int: ...
+
+    @max_checks.setter
+    def max_checks(self, value: int, /) -> None: ...
+
+    @property
     def max_seconds(self) -> float: ...
 
     @max_seconds.setter
@@ -1647,36 +1658,13 @@ class TimedPathSettings:
     """
     How fast the reference of an OnlinePlanner passes a path.
 
-        speed [rad/s], default 2.0, allowed 0.01 to 20: largest speed of the reference along the path
-        speed_share, default 0.7, allowed 0.01 to 1: of the joints' velocity limits that the reference may ask for
-        acceleration [rad/s^2], default 4.0, allowed 0.01 to 100: at which the reference slows down ahead
-        wide [m], default 0.03, allowed 0.001 to 1: clearance from which the reference goes at full speed
-        slowest, default 0.35, allowed 0.01 to 1: share of the speed that is left where there is no clearance
+        wide [m], default 0.03, allowed 0.001 to 0.1: clearance below which a place is narrow: barriers leave room there
         lead [rad], default 0.4, allowed 0.01 to 3: distance at which the reference waits for the arm: larger is faster and cuts corners
-        delay [s], default 0.18, allowed 0.001 to 3: by which the arm follows a corner; 1 / (e sqrt(stiffness)) of a critical spring
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, speed: float = 2.0, speed_share: float = 0.7, acceleration: float = 4.0, wide: float = 0.03, slowest: float = 0.35, lead: float = 0.4, delay: float = 0.18) -> None: ...
-
-    @property
-    def speed(self) -> float: ...
-
-    @speed.setter
-    def speed(self, value: float, /) -> None: ...
-
-    @property
-    def speed_share(self) -> float: ...
-
-    @speed_share.setter
-    def speed_share(self, value: float, /) -> None: ...
-
-    @property
-    def acceleration(self) -> float: ...
-
-    @acceleration.setter
-    def acceleration(self, value: float, /) -> None: ...
+    def __init__(self, *, wide: float = 0.03, lead: float = 0.4) -> None: ...
 
     @property
     def wide(self) -> float: ...
@@ -1685,22 +1673,10 @@ class TimedPathSettings:
     def wide(self, value: float, /) -> None: ...
 
     @property
-    def slowest(self) -> float: ...
-
-    @slowest.setter
-    def slowest(self, value: float, /) -> None: ...
-
-    @property
     def lead(self) -> float: ...
 
     @lead.setter
     def lead(self, value: float, /) -> None: ...
-
-    @property
-    def delay(self) -> float: ...
-
-    @delay.setter
-    def delay(self, value: float, /) -> None: ...
 
 class OnlinePlannerStatus(enum.Enum):
     """What a motion led by an OnlinePlanner is about."""
@@ -1758,7 +1734,7 @@ class PlannerReference:
 class OnlinePlanner:
     """
     Leads an arm to a goal by a path that is searched in the background: a reference that runs ahead on the path.
-    Until there is a path, and where the straight way to the goal is free, the reference is the goal itself.
+    Until there is a path the reference is the goal itself; where the straight way to the goal is free, it is the path.
     robot, body, pairs, tables: as for PathPlanner; planner: PlannerSettings, route: TimedPathSettings, None for the defaults.
     period [s]: between two looks at the scene; patience [s]: without progress the arm is stuck and another way is
     searched; retry [s]: after which a failed search is repeated; tolerance [rad]: of arrival; duration [s]: allowed
@@ -2167,26 +2143,33 @@ class ArrivalSettings:
 
 class TrackingSettings:
     """
-    How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 w (v_r - v), with what the disturbance
+    How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 z w (v_r - v), with what the disturbance
     observer found. Not for outputs of position and velocity, which the arm's own drives track.
 
-        frequency [1/s], default 30.0, allowed 1 to 300: of the feedback to the reference: larger is stiffer, and shakes with noise and delay
-        observer_time [s], default 0.05, allowed 0.005 to inf: in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay
-        observer_share, default 0.5, allowed 0 to 1: of the effort limits that the observer may make up for
-        largest_error [rad], default 0.1, allowed 0.001 to 10: between arm and reference, from which the reference begins anew
+        frequency [1/s], default 60.0, allowed 1 to 300: of the feedback to the reference: larger is stiffer, and shakes with noise and delay
+        damping, default 1.0, allowed 0.1 to 10: of the feedback: 1 is critical; unknown rotor inertias lower it, delay and noise ask for less
+        observer_time [s], default 0.03, allowed 0.005 to inf: in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay
+        observer_share, default 0.8, allowed 0 to 1: of the effort limits that the observer may make up for
+        largest_error [rad], default 0.2, allowed 0.001 to 10: between arm and reference, from which the reference begins anew
         servo_lag [rad], default 1.0, allowed 0.001 to 10: the same where the arm's own drives track position or velocity
         drift_gain [1/s], default 2.0, allowed 0 to 50: by which an output of velocity returns to the reference
 
     A Controller refuses what is not allowed.
     """
 
-    def __init__(self, *, frequency: float = 30.0, observer_time: float = 0.05, observer_share: float = 0.5, largest_error: float = 0.1, servo_lag: float = 1.0, drift_gain: float = 2.0) -> None: ...
+    def __init__(self, *, frequency: float = 60.0, damping: float = 1.0, observer_time: float = 0.03, observer_share: float = 0.8, largest_error: float = 0.2, servo_lag: float = 1.0, drift_gain: float = 2.0) -> None: ...
 
     @property
     def frequency(self) -> float: ...
 
     @frequency.setter
     def frequency(self, value: float, /) -> None: ...
+
+    @property
+    def damping(self) -> float: ...
+
+    @damping.setter
+    def damping(self, value: float, /) -> None: ...
 
     @property
     def observer_time(self) -> float: ...
@@ -2613,6 +2596,16 @@ class Command:
         """
         (nv,) of the reference after this period [rad | m]; nan until a state was known.
         """
+
+    @property
+    def disturbance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (nv,) force that the observer makes up for, of torque outputs [Nm | N].
+        """
+
+    @property
+    def rotors(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) inertia that it found and the model lacks [kg m^2 | kg]."""
 
     @property
     def tracking_error(self) -> float:

@@ -364,7 +364,7 @@ controller:
   local_activation: false
   look_ahead: {tries: 30, delay: 0.2}
   local_minimum: null
-  planner: {patience: 2, search: {margin: 0.08, max_nodes: 500}, route: {speed: 0.75}}
+  planner: {patience: 2, search: {margin: 0.08, max_nodes: 500}, route: {lead: 0.3}}
   safety: {margin: 0.012345678901234, max_rows: 8}
 """
     )
@@ -379,7 +379,7 @@ controller:
         "planner.patience": 2.0,
         "planner.search.margin": 0.08,
         "planner.search.max_nodes": 500,
-        "planner.route.speed": 0.75,
+        "planner.route.lead": 0.3,
         "safety.margin": 0.012345678901234,
         "safety.max_rows": 8,
         "period": 0.002,  # of the simulation

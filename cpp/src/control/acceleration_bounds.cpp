@@ -78,6 +78,37 @@ AccelerationInterval acceleration_interval(double q, double v, const ScalarLimit
   return interval;
 }
 
+namespace {
+
+/// Lets the acceleration limit give way up to a factor; position and velocity limits stay.
+void widen(AccelerationInterval& interval, double q, double v, const ScalarLimits& limits, double factor, double period) noexcept {
+  ScalarLimits wide = limits;
+  wide.acceleration *= factor;
+  const double A = limits.acceleration;
+  const auto by_limit = [&](double room, double speed) {
+    return (std::min(largest_next_velocity(room, speed, A, period), limits.velocity) - speed) / period;
+  };
+  if (interval.upper_limit == Limit::acceleration_upper && interval.upper >= A) {
+    interval.upper = std::max(interval.upper, std::min(wide.acceleration, by_limit(limits.upper - q, v)));
+  }
+  if (interval.lower_limit == Limit::acceleration_lower && interval.lower <= -A) {
+    interval.lower = std::min(interval.lower, -std::min(wide.acceleration, by_limit(q - limits.lower, -v)));
+  }
+  // Where a limit asks for more than A, it may have it.
+  if (interval.upper <= -A && interval.position_upper < interval.upper) {
+    interval.upper = std::max(interval.position_upper, -wide.acceleration);
+    interval.lower = std::min(interval.lower, interval.upper);
+  }
+  if (interval.lower >= A && interval.position_lower > interval.lower) {
+    interval.lower = std::min(interval.position_lower, wide.acceleration);
+    interval.upper = std::max(interval.lower, interval.upper);
+  }
+  interval.position_lower = std::min(interval.position_lower, interval.lower);
+  interval.position_upper = std::max(interval.position_upper, interval.upper);
+}
+
+}  // namespace
+
 double jerk_braking_distance(double v, double a, double A, double J) noexcept {
   // From rest of the acceleration: a ramp, a hold and a ramp, symmetric, so that the mean speed is half of the first.
   const auto from_rest = [A, J](double speed) {
@@ -181,7 +212,10 @@ void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, Con
   for (Eigen::Index i = 0; i < lower.size(); ++i) {
     const ScalarLimits joint{limits.lower[i] + margins.position, limits.upper[i] - margins.position,
                              margins.velocity_share * limits.velocity[i], limits.acceleration[i]};
-    const AccelerationInterval interval = acceleration_interval(q[i], v[i], joint, period);
+    AccelerationInterval interval = acceleration_interval(q[i], v[i], joint, period);
+    if (margins.acceleration_factor > 1.0) {
+      widen(interval, q[i], v[i], joint, margins.acceleration_factor, period);
+    }
     const auto at = static_cast<std::size_t>(i);
     lower[i] = interval.lower;
     upper[i] = interval.upper;

@@ -185,7 +185,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (q_known && v_known) {
     bounds_.update(limits_, q, v, settings_.period,
-                   {settings_.position_margin, settings_.velocity_share, mass_known && last.torque != nullptr ? jerk_share() : 1.0},
+                   {settings_.position_margin, settings_.velocity_share, mass_known && last.torque != nullptr ? jerk_share() : 1.0,
+                    settings_.acceleration_factor},
                    last.acceleration);
     solution.lower = bounds_.lower;
     solution.upper = bounds_.upper;

@@ -16,6 +16,7 @@
 namespace sidestep {
 namespace {
 
+constexpr double feedback_room = 20.0;        // of accelerations: dry friction on a light wrist takes so much
 constexpr double most_per_period = 0.2;       // of the feedback's frequency: a slow rate holds its torques for long
 constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
 
@@ -50,6 +51,7 @@ std::unique_ptr<OnlinePlanner> make_guide(const BodyClearance& body, const Contr
   OnlinePlannerConfig guide;
   guide.planner = settings.planner->search;
   guide.route = settings.planner->route;
+  guide.route.speed = settings.speed;
   guide.safety = settings.safety;
   guide.period = settings.planner->period;
   guide.patience = settings.planner->patience;
@@ -169,7 +171,9 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     program.slack_weight = settings.slack_weight;
     program.velocity_overrun = settings.velocity_overrun;
     program.acceleration_overrun = settings.acceleration_overrun;
+    program.acceleration_factor = feedback_room;
     tracking_program_.emplace(arm.robot(), program);
+    program.acceleration_factor = 1.0;
     program.velocity_share = velocity_share;
     torque_program_.emplace(arm.robot(), program);
     if (settings.tracking.observer_time < infinity) {

@@ -33,6 +33,8 @@ Command::Command(int num_coordinates)
       acceleration(torque),
       velocity(torque),
       position(torque),
+      disturbance(torque),
+      rotors(torque),
       limits(static_cast<std::size_t>(num_coordinates), Limit::none) {}
 
 }  // namespace sidestep

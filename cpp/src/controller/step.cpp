@@ -91,6 +91,10 @@ void Controller::Impl::report(bool known) noexcept {
     command.torque = tracked_.torque;
   }
   write_gravity(known);
+  if (observer_) {
+    command.disturbance = observer_->disturbance();
+    command.rotors = observer_->rotors();
+  }
   command.wanted = wanted_;
   command.acceleration = tracked_.acceleration;
   if (!command.acceleration.allFinite()) {

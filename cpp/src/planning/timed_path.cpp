@@ -14,7 +14,7 @@ constexpr double seen = 0.1;             // clearance from which it bounds no sp
 constexpr double least_room = 0.001;     // [m]
 constexpr double left_to_the_arm = 0.95;  // of the limits
 constexpr double unmeasured = 0.35;      // of the limits
-constexpr double jerk_rate = 100.0;      // [1/s] of the acceleration limit
+constexpr double of_closing = 0.8;       // of the speed at which a clearance may close: rows that bind are not smooth
 constexpr double at_samples = 0.88;      // of the jerk: between samples it is up to an eighth more
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
 
@@ -29,7 +29,6 @@ template <>
 const std::vector<Field<TimedPathSettings>>& fields() {
   using S = TimedPathSettings;
   static const std::vector<Field<S>> all{
-      {"speed", &S::speed, "-", 0.01, 1.0, "share of the joints' velocity and acceleration limits that a motion uses"},
       {"wide", &S::wide, "m", 0.001, 0.1, "clearance below which a place is narrow: barriers leave room there"},
       {"lead", &S::lead, "rad", 0.01, 3.0, "distance at which the reference waits for the arm: larger is faster and cuts corners"},
   };
@@ -45,7 +44,8 @@ PathLimits path_limits(const JointLimits& limits, double speed) {
     return Eigen::VectorXd(left_to_the_arm * speed * given.unaryExpr([&](double x) { return std::isfinite(x) ? x : otherwise; }));
   };
   PathLimits all{finite(limits.velocity, free_velocity), finite(limits.acceleration, free_acceleration), {}};
-  all.jerk = at_samples * jerk_rate / (left_to_the_arm * speed) * all.acceleration;
+  all.jerk = at_samples * limits.jerk.unaryExpr(
+                              [](double x) { return std::isfinite(x) ? x : JointLimits::default_jerk * free_acceleration; });
   return all;
 }
 
@@ -87,7 +87,7 @@ TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const Bo
         if (slope > 1e-6) {
           const double room = std::max(least_room, clearances(i, k + 1) - margin);
           const double A = safety.braking_fraction * slope * std::min(hardest[k], hardest[k + 1]);
-          between[k] = std::min(between[k], closing_speed(room, A, safety.rate) / slope);
+          between[k] = std::min(between[k], of_closing * closing_speed(room, A, safety.rate) / slope);
         }
       }
     }

@@ -97,6 +97,8 @@ struct TorqueControllerSettings {
   double position_margin = 0.0;
   /// Share of the velocity limits that is used, in (0, 1]: noise and delay use up the rest [-].
   double velocity_share = 1.0;
+  /// Factor by which the acceleration may exceed its limits, in [1, inf): of feedback against what the model lacks [-].
+  double acceleration_factor = 1.0;
   /// Time constant of the damped stop q̈ = -v/stop_time [s].
   double stop_time = 0.1;
   /// Damping of the stop when the mass matrix is unusable, as a fraction of effort limit / velocity limit [-].

@@ -46,6 +46,8 @@ struct Command {
   Eigen::VectorXd acceleration;  ///< (nv) of the arm: the reference's with feedback [rad/s² | m/s²]
   Eigen::VectorXd velocity;      ///< (nv) of the reference after this period [rad/s | m/s]
   Eigen::VectorXd position;      ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
+  Eigen::VectorXd disturbance;   ///< (nv) force that the observer makes up for, of torque outputs [Nm | N]
+  Eigen::VectorXd rotors;        ///< (nv) inertia that it found and the model lacks [kg m² | kg]
   double tracking_error = 0.0;   ///< largest |q_r − q| [rad | m]
 
   /// the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is

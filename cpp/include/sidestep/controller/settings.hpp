@@ -43,10 +43,10 @@ struct OnlinePlannerSettings {
 /// How the arm is kept on the controller's reference, see Controller: q̈ = a_r + ω² (q_r − q) + 2 ζ ω (v_r − v), with what the
 /// disturbance observer found. Not for outputs of position and velocity, which the arm's own drives track.
 struct TrackingSettings {
-  double frequency = 30.0;       ///< ω [1/s]
-  double damping = 1.5;          ///< ζ [-]: rotors that the model does not know lower it
+  double frequency = 60.0;       ///< ω [1/s]
+  double damping = 1.0;          ///< ζ [-]: rotors that the model does not know lower it
   double observer_time = 0.03;   ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
-  double observer_share = 0.5;   ///< of the effort limits that it may make up for [-]
+  double observer_share = 0.8;   ///< of the effort limits that it may make up for [-]
   double largest_error = 0.2;    ///< |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m]
   double servo_lag = 1.0;        ///< the same where the arm's own drives track the reference [rad]
   double drift_gain = 2.0;       ///< of the output of velocity: v = v_r + gain (q_r − q) [1/s]

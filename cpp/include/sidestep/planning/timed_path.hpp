@@ -10,7 +10,7 @@
 namespace sidestep {
 
 struct TimedPathSettings {
-  double speed = 1.0;  ///< share of the joints' velocity and acceleration limits
+  double speed = 1.0;  ///< share of the velocity and acceleration limits; a Controller sets it to its own
   double wide = 0.03;  ///< clearance below which a place is narrow [m]
   double lead = 0.4;   ///< |q − q*| at which it waits for the arm [rad]
 
