@@ -35,7 +35,7 @@ BOOST_AUTO_TEST_CASE(joints_use_their_share_of_the_limits) {
   JointLimits given = JointLimits::unlimited(2);
   given.velocity[0] = 3.0;
   given.acceleration[0] = 7.0;
-  limits.jerk.setConstant(700.0);
+  given.jerk = Eigen::Vector2d(700.0, std::numeric_limits<double>::infinity());
   const PathLimits limits = path_limits(given, 0.5);
   BOOST_TEST(limits.velocity[0] == 0.95 * 1.5, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(limits.acceleration[0] == 0.95 * 3.5, boost::test_tools::tolerance(1e-12));
