@@ -20,6 +20,8 @@ constexpr double longest_stop = 10.0;
 constexpr double slow = 0.01;
 // Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
 constexpr double smallest_deceleration = 1e-6;
+// Of the jerk limits that one row may take, and of the hardest deceleration that a smooth stop counts on.
+constexpr double of_jerk = 0.5, of_hardest = 0.75;
 
 /// The speed w with p(w) + delay w = room; with delay = 0 the inverse of p. Odd in the room.
 double profile_speed(double room, double delay, double A, double rate) noexcept {
@@ -190,7 +192,8 @@ double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits
 }
 
 void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
-                     const AccelerationBounds& bounds, double period, const BrakingTorque* torque) noexcept {
+                     const AccelerationBounds& bounds, double period, const BrakingTorque* torque,
+                     const LastMotion* last) noexcept {
   const double tau = stop_time(v, limits, torque);
   const double rate = tau * settings_.rate > 1.0 ? 1.0 / tau : settings_.rate;
   const ClearanceState& approach = clearances.approach;
@@ -264,6 +267,20 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     } else if (room <= 0.0 && required > now && net > 0.0) {
       // Of what closes in, not of the way back.
       required = std::min(required, std::max(now, settings_.correction * u / period - c));
+    }
+    bool smooth = false;
+    if (last != nullptr) {
+      const double jerk = of_jerk * last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
+      const double rising = gradient.dot(last->acceleration) + jerk * period;
+      if (required > rising && jerk < infinity) {
+        const double next = u - (rising + c) * period, A = of_hardest * hardest;
+        smooth = room - std::max(u, next) * period >= jerk_braking_distance(next, std::max(-(rising + c), -A), A, jerk);
+        required = smooth ? rising : required;
+      }
+    }
+    if (hardest_row == row && smooth) {
+      hardest_row = -1;
+      hardest_stop = 0.0;
     }
     const double length = gradient.norm();
     normals.row(row) = gradient.transpose() / length;

@@ -209,9 +209,12 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
-      rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr);
+      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_,
+                              last.torque != nullptr ? jerk_share() : 1.0};
+      const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
+      rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       if (two) {
-        rows_.add(*second.clearances, *second.velocity, limits_, bounds_, settings_.period, limited ? &braking : nullptr);
+        rows_.add(*second.clearances, *second.velocity, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       }
     }
     if (wanted_known && clear) {

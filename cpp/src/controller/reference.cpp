@@ -14,6 +14,7 @@ constexpr double near_moving = 0.1;       // [m] of the arm: near what moves bar
 constexpr double moving_foresight = 1.0;  // [s] in which it could be as near
 constexpr std::uint64_t most_posture_attempts = 12;  // one after the other
 constexpr double posture_pause = 2.0;                // [s] until as many more
+constexpr double path_frequency = 10.0;    // [1/s] of the critical spring that follows a path
 constexpr int periods_late = 1000;                   // a trajectory is moved on by at most so many at once
 
 }  // namespace
@@ -104,6 +105,12 @@ void Controller::Impl::choose_reference() noexcept {
     reference.position = attractor_.position;
     reference.velocity = attractor_.velocity;
     reference.acceleration = attractor_.acceleration;
+    if (guide->following().route_number != 0) {
+      // A path is followed more stiffly than a goal is approached.
+      const double w = path_frequency, K = settings.barriers.stiffness, D = settings.barriers.damping;
+      reference.acceleration += std::max(0.0, w * w - K) * (reference.position - q_) +
+                                std::max(0.0, 2.0 * w - D) * (reference.velocity - v_);
+    }
   } else {
     rest_at(target_);
   }

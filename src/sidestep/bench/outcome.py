@@ -156,7 +156,7 @@ class Judge:
             contacts=motion.contacts,
             min_self_clearance_m=own.distance if own.pair else None,
             self_pair=" - ".join(own.pair),
-            limits=self._limits(motion, end),
+            limits=self._limits(motion, end, settings.period),
             diverged=end < len(motion.q),
             way_out=way_out,
             pose_error=motion.pose_error,
@@ -178,7 +178,7 @@ class Judge:
             self_collision=self._self,
         )
 
-    def _limits(self, motion: Motion, end: int) -> dict[str, float]:
+    def _limits(self, motion: Motion, end: int, period: float) -> dict[str, float]:
         limits = self.robot.limits
         q = motion.q[:end]
         beyond = {
@@ -188,6 +188,11 @@ class Judge:
         }
         if motion.torque is not None:
             beyond["torque"] = excess_over(np.abs(motion.torque[:end]), limits.effort)
+            rates = np.abs(np.diff(motion.torque[:end], axis=0)) / period
+            beyond["torque rate"] = excess_over(rates, limits.effort_rate)
+        elif motion.safe:  # of physics they are the plant's, not the command's
+            jerks = np.abs(np.diff(motion.a[: end - 1], axis=0)) / period
+            beyond["jerk"] = excess_over(jerks, limits.jerk)
         return {name: worst for name, (count, worst) in beyond.items() if count > 0}
 
 

@@ -81,6 +81,13 @@ struct ClosingLimits {
 // where it does not are bounds of comfort given up for it; where the room is used up, only for the end of closing, and
 // not for the way back: what is asked for does not jump where closing turns into leaving.
 
+// With a jerk limit. Where a row first binds, the arm may still accelerate towards the obstacle, and would have to brake at
+// once. It need not: half of the deceleration that there is is not planned with. With b the ∇h·a of the last period and J the
+// jerk Σ |∂h/∂q_j| J_j of the clearance, half of which a row may take so that two can rise together, a row asks for no more
+// than b + J T/2, as long as the smooth stop that begins with it,
+//     S(u, −(b + J T/2 + c)) at J/2 and at three quarters of the hardest deceleration,
+// fits into the room: S of acceleration_bounds.hpp. Where it does not, jerk gives way.
+
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.
 double demanded_deceleration(double room, double closing_speed, const ClosingLimits& limits, double period) noexcept;
@@ -112,6 +119,12 @@ struct BrakingTorque {
   const Eigen::VectorXd& bias;
 };
 
+/// The acceleration of the last period (nv) [/s²], and the share of the jerk limits that there is.
+struct LastMotion {
+  const Eigen::VectorXd& acceleration;
+  double jerk_share;
+};
+
 /// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most
 /// one for a stop along the path, with the normal −v/|v|, and the clearance and length for which it is asked (where
 /// rows are full it takes the place of the least critical).
@@ -132,14 +145,15 @@ class SafetyRows {
   /// (acceleration limit)_j or, given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less.
   /// `bounds` are those of now. No allocation.
   void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
-              const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr) noexcept {
+              const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr,
+              const LastMotion* last = nullptr) noexcept {
     clear();
-    add(clearances, v, limits, bounds, period, torque);
+    add(clearances, v, limits, bounds, period, torque, last);
   }
 
   /// Adds those at another state: where both are too many, either keeps at least half of the rows.
   void add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, const AccelerationBounds& bounds,
-           double period, const BrakingTorque* torque = nullptr) noexcept;
+           double period, const BrakingTorque* torque = nullptr, const LastMotion* last = nullptr) noexcept;
 
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
   bool satisfied_within(int k, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) const noexcept;
