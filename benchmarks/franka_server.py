@@ -34,16 +34,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import mujoco
 import numpy as np
-from plant import dynamics
 
 import sidestep as ss
 from sidestep.bench.problems import balls
 from sidestep.body.cache import cache_directory
 from sidestep.distance import ExactClearance, SelfCollision
 from sidestep.robot import Robot, tip_of
-from sidestep.simulation.model import build_model
 
 HOST, PORT = "127.0.0.1", 1337  # the port of the protocol
 SERVER = ("franka-sim==1.1.7", "numpy==1.26.4", "mujoco<3.3")
@@ -145,15 +142,6 @@ class Driver:
         self.franka = pylibfranka
         self.robot, self.arm = Robot.named("fr3"), ss.Arm.load("fr3")
         self.own, self.clearance = SelfCollision(self.robot), ExactClearance(self.robot, ())
-        self._told = build_model(self.robot, visuals=False)
-        self._data = mujoco.MjData(self._told.model)
-
-    def without_gravity(self, command: Any, q: np.ndarray) -> np.ndarray:
-        """Torque (nv,) of a command without the gravity of the model."""
-        if hasattr(command, "torque_without_gravity"):
-            return np.array(command.torque_without_gravity)
-        _, gravity = dynamics(self._told, self._data, q, np.zeros_like(q))
-        return np.array(command.torque) - gravity
 
     def problem(self, start: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """A goal (7,) and the centre (3,) of a ball that is in the way of the straight line there."""
@@ -178,7 +166,7 @@ class Driver:
         robot = franka.Robot(HOST, franka.RealtimeConfig.kIgnore)
         start = np.array(robot.read_once().q)
         goal, center = self.problem(start, seed)
-        settings = ss.ControllerSettings(seed=seed, period=PERIOD, output="torque")
+        settings = ss.ControllerSettings(seed=seed, period=PERIOD, output=mode)
         controller = ss.Controller(self.arm, settings)
         controller.set_obstacles(ss.Obstacles(center[None], np.array([RADIUS])))
         controller.set_goal(goal)
@@ -196,9 +184,13 @@ class Driver:
                 state, span = active.readOnce()
                 q, v = np.array(state.q), np.array(state.dq)
                 rows.append(q)
-                command = controller.step(q, v)
-                if mode == "torque":
-                    out = franka.Torques(self.without_gravity(command, q).tolist())
+                if mode == "position" and len(rows) <= 2:
+                    q = np.array(state.q_d)  # a stream of positions begins with that of the robot, and goes on from it
+                command = controller.step(q, v) if mode == "torque" or len(rows) > 1 else None
+                if command is None:
+                    out = franka.JointPositions(q.tolist())
+                elif mode == "torque":
+                    out = franka.Torques(command.torque_without_gravity.tolist())
                 else:
                     out = franka.JointPositions(command.position.tolist())
                 if np.abs(q - goal).max() < TOLERANCE and np.abs(q - there).max() < REST:

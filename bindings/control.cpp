@@ -162,7 +162,7 @@ void bind_acceleration_bounds(nb::module_& m) {
           throw nb::value_error("limits must have the same number of entries each");
         }
         AccelerationBounds bounds(nv);
-        bounds.update(limits, position, velocity, period, {position_margin, 1.0, 1.0});
+        bounds.update(limits, position, velocity, period, {position_margin});
         return nb::make_tuple(to_numpy(bounds.lower), to_numpy(bounds.upper));
       },
       nb::arg("limits"), nb::arg("q"), nb::arg("v"), nb::arg("period"), nb::kw_only(), nb::arg("position_margin") = 0.0,
@@ -392,7 +392,7 @@ void bind_acceleration_filter(nb::module_& m) {
           [](AccelerationFilter* self, const Robot& robot, double period, double position_margin, double stop_time,
              const SafetySettings* safety) {
             new (self) AccelerationFilter(
-                robot, {period, position_margin, 1.0, stop_time, safety == nullptr ? SafetySettings() : *safety});
+                robot, {period, position_margin, stop_time, safety == nullptr ? SafetySettings() : *safety});
           },
           nb::arg("robot"), nb::kw_only(), nb::arg("period") = defaults.period,
           nb::arg("position_margin") = defaults.position_margin, nb::arg("stop_time") = defaults.stop_time,

@@ -277,7 +277,8 @@ BARE = {
     "look_ahead": None,
     "local_minimum": None,
     "local_activation": False,
-    "velocity_margin": 0.0,
+    "limit_margin": 0.0,
+    "effort_margin": 0.0,
 }
 
 

@@ -131,7 +131,7 @@ def test_every_value_of_a_file_arrives() -> None:
         (
             "body:",
             "controller: {period: 0.01}\nbody:",
-            "unknown key 'period' (value 0.01); allowed: speed, velocity_m",
+            "unknown key 'period' (value 0.01); allowed: speed, limit_m",
         ),
         ("body:", "controller: {local_activation: 1}\nbody:", "is 1; it must be of type boolean"),
         ("body: {", "body: {ellipsoids: 0, ", "body.ellipsoids is 0; it must be at least 1"),

@@ -211,7 +211,7 @@ void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, Con
                                 const Eigen::VectorXd* before) noexcept {
   for (Eigen::Index i = 0; i < lower.size(); ++i) {
     const ScalarLimits joint{limits.lower[i] + margins.position, limits.upper[i] - margins.position,
-                             margins.velocity_share * limits.velocity[i], limits.acceleration[i]};
+                             limits.velocity[i], limits.acceleration[i]};
     AccelerationInterval interval = acceleration_interval(q[i], v[i], joint, period);
     if (margins.acceleration_factor > 1.0) {
       widen(interval, q[i], v[i], joint, margins.acceleration_factor, period);

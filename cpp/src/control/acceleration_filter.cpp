@@ -17,7 +17,6 @@ TorqueControllerSettings controller_settings(const AccelerationFilterSettings& s
   TorqueControllerSettings result;
   result.period = settings.period;
   result.position_margin = settings.position_margin;
-  result.velocity_share = settings.velocity_share;
   result.stop_time = settings.stop_time;
   result.safety = settings.safety;
   result.torque_weight.setZero();

@@ -185,9 +185,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (q_known && v_known) {
     bounds_.update(limits_, q, v, settings_.period,
-                   {settings_.position_margin, settings_.velocity_share, mass_known && last.torque != nullptr ? jerk_share() : 1.0,
+                   {settings_.position_margin, mass_known && last.torque != nullptr ? jerk_share() : 1.0,
                     settings_.acceleration_factor},
-                   last.acceleration);
+                   last.binds ? last.acceleration : nullptr);
     solution.lower = bounds_.lower;
     solution.upper = bounds_.upper;
   } else {
@@ -225,14 +225,27 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
     const bool smooth = last.acceleration != nullptr || last.torque != nullptr;
     write_cost();
     write_torque_rows(&last);
-    bool solved = solve_within_bounds(true, solution), kept = true;
+    bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true;
     if (!solved && smooth) {
-      // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond.
+      // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. First jerk gives way, or
+      // the bounds of a state that noise and disturbances change faster than torque may; then the torque's rate.
       wanted_ = wanted_.cwiseMax(bounds_.smooth_lower).cwiseMin(bounds_.smooth_upper);
       write_cost();
-      write_torque_rows(nullptr);
-      solved = solve_within_bounds(false, solution);
       kept = false;
+      if (last.torque != nullptr) {
+        if (last.acceleration == nullptr || !last.binds) {
+          wide_upper_ = std::max(settings_.acceleration_factor, settings_.acceleration_overrun) * limits_.acceleration;
+          wide_lower_ = -wide_upper_;
+        } else {
+          wide_lower_ = bounds_.lower;
+          wide_upper_ = bounds_.upper;
+        }
+        solved = solve_within_bounds(wide_lower_, wide_upper_, false, solution);
+      }
+      if (!solved) {
+        write_torque_rows(nullptr);
+        solved = solve_within_bounds(bounds_.lower, bounds_.upper, false, solution);
+      }
     }
     if (solved && !presses_for_lost()) {
       const bool free = std::all_of(solution.active.begin(), solution.active.end(),
@@ -248,7 +261,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
         status = TorqueStatus::relaxed;
       }
     }
-    if (last.acceleration != nullptr) {
+    if (last.acceleration != nullptr && last.binds) {
       report_jerk(solution);
     }
     report_safety(solution);
@@ -304,6 +317,15 @@ void TorqueController::write_torque_rows(const LastCommand* last) noexcept {
   hard_data_.A.topRows(nv_) = mass_;
   rate_lower_ = -limits_.effort - bias_;
   rate_upper_ = limits_.effort - bias_;
+  if (last != nullptr && last->gravity != nullptr) {
+    for (int i = 0; i < nv_; ++i) {
+      const double g = (*last->gravity)[i], lower = rate_lower_[i] + g, upper = rate_upper_[i] + g;
+      if (std::abs(g) < limits_.effort[i]) {
+        rate_lower_[i] = std::max(rate_lower_[i], lower);
+        rate_upper_[i] = std::min(rate_upper_[i], upper);
+      }
+    }
+  }
   if (last != nullptr && last->torque != nullptr) {
     for (int i = 0; i < nv_; ++i) {
       const double step = limits_.effort_rate[i] * settings_.period, before = (*last->torque)[i] - bias_[i];
@@ -359,9 +381,8 @@ void TorqueController::write_cost() noexcept {
   });
 }
 
-bool TorqueController::solve_within_bounds(bool smooth, TorqueSolution& solution) noexcept {
-  const Eigen::VectorXd& lower = smooth ? bounds_.smooth_lower : bounds_.lower;
-  const Eigen::VectorXd& upper = smooth ? bounds_.smooth_upper : bounds_.upper;
+bool TorqueController::solve_within_bounds(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth,
+                                           TorqueSolution& solution) noexcept {
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   row_multipliers_.setZero();
   hard_data_.lower = lower;

@@ -70,6 +70,18 @@ bool use_torque(const Arm& arm, ControllerSettings::Output output) {
   return output == ControllerSettings::Output::torque || (output == ControllerSettings::Output::automatic && possible);
 }
 
+/// Less than the limits by what is left for noise, delay, rounding and what the model lacks; velocities of `speed` times theirs.
+Robot within_margins(const Robot& robot, const ControllerSettings& settings, double speed) {
+  JointLimits limits = robot.limits();
+  const double left = 1.0 - settings.limit_margin;
+  limits.velocity *= left * speed;
+  limits.acceleration *= left;
+  limits.jerk *= left;
+  limits.effort_rate *= left;
+  limits.effort *= 1.0 - settings.effort_margin;
+  return Robot(robot.name(), robot.joints(), robot.frames(), robot.coordinate_names(), std::move(limits));
+}
+
 LocalMinimumSettings seeded(LocalMinimumSettings settings, std::uint64_t seed) {
   settings.seed = seed;
   return settings;
@@ -135,9 +147,12 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       reference_torque_(q_),
       last_torque_(q_),
       last_acceleration_(q_),
+      expected_v_(q_),
+      last_measured_v_(q_),
       coupling_(q_),
       feedback_(q_),
       gravity_(q_),
+      gravity_change_(q_),
       model_mass_(Eigen::MatrixXd::Zero(q_.size(), q_.size())),
       model_bias_(q_),
       frequency_(std::min(settings.tracking.frequency, most_per_period / settings.period)),
@@ -159,7 +174,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       worker_workspace_(*system),
       look_period_(settings.planner ? settings.planner->period : default_look_period) {
   guide = make_guide(body_, settings);
-  const double velocity_share = settings.speed * (1.0 - settings.velocity_margin);
+  const Robot of_reference = within_margins(arm.robot(), settings, settings.speed);
+  const Robot of_arm = within_margins(arm.robot(), settings, 1.0);
   if (torque) {
     TorqueControllerSettings program;
     program.period = settings.period;
@@ -172,10 +188,9 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     program.velocity_overrun = settings.velocity_overrun;
     program.acceleration_overrun = settings.acceleration_overrun;
     program.acceleration_factor = feedback_room;
-    tracking_program_.emplace(arm.robot(), program);
+    tracking_program_.emplace(of_arm, program);
     program.acceleration_factor = 1.0;
-    program.velocity_share = velocity_share;
-    torque_program_.emplace(arm.robot(), program);
+    torque_program_.emplace(of_reference, program);
     if (settings.tracking.observer_time < infinity) {
       observer_.emplace(arm.robot().limits(), settings.period, settings.tracking.observer_time, settings.tracking.observer_share);
     }
@@ -184,10 +199,9 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       dynamics_workspace_.emplace(*dynamics_);
     }
   } else {
-    AccelerationFilterSettings program{settings.period, settings.position_margin, 1.0, settings.stop_time, settings.safety};
-    tracking_filter_.emplace(arm.robot(), program);
-    program.velocity_share = velocity_share;
-    filter_.emplace(arm.robot(), program);
+    const AccelerationFilterSettings program{settings.period, settings.position_margin, settings.stop_time, settings.safety};
+    tracking_filter_.emplace(of_arm, program);
+    filter_.emplace(of_reference, program);
   }
   if (settings.local_minimum) {
     escape_.emplace(arm.robot(), seeded(*settings.local_minimum, settings.seed));

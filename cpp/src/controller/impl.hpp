@@ -112,6 +112,7 @@ class Controller::Impl {
   void track(MassMatrix mass_matrix, Bias bias) noexcept;
   void stop(MassMatrix mass_matrix, Bias bias, ConstVectorRef q, ConstVectorRef v) noexcept;
   void advance_reference() noexcept;
+  LastCommand last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque, bool binds) const noexcept;
   void write_gravity(bool known) noexcept;
   void report(bool known) noexcept;
   Activity judge_activity() noexcept;
@@ -168,7 +169,7 @@ class Controller::Impl {
   bool apart_ = false;                          // the arm is not exactly where the reference is
   bool drives_track_ = false;                   // the output is position or velocity
   bool has_last_torque_ = false;
-  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, coupling_, feedback_, gravity_;
+  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, expected_v_, last_measured_v_, coupling_, feedback_, gravity_, gravity_change_;
   Eigen::MatrixXd model_mass_;
   Eigen::VectorXd model_bias_;
   std::optional<DisturbanceObserver> observer_;

@@ -52,6 +52,7 @@ const std::vector<Field<TrackingSettings>>& fields() {
   static const std::vector<Field<S>> all{
       {"frequency", &S::frequency, "1/s", 1.0, 300.0, "of the feedback to the reference: larger is stiffer, and shakes with noise and delay"},
       {"damping", &S::damping, "-", 0.1, 10.0, "of the feedback: 1 is critical; unknown rotor inertias lower it, delay and noise ask for less"},
+      {"velocity_filter", &S::velocity_filter, "s", 1e-5, 1.0, "of measured velocities, against what was predicted: longer is calmer and later"},
       {"observer_time", &S::observer_time, "s", 0.005, none,
        "in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay"},
       {"observer_share", &S::observer_share, "-", 0.0, 1.0, "of the effort limits that the observer may make up for"},
@@ -79,7 +80,9 @@ const std::vector<Field<ControllerSettings>>& fields() {
   static const std::vector<Field<S>> all{
       {"period", &S::period, "s", 1e-4, 0.1, "between two calls of step; limits and clearances hold at samples so far apart"},
       {"speed", &S::speed, "-", 0.01, 1.0, "share of the velocity and acceleration limits that motions use: less is slower and calmer"},
-      {"velocity_margin", &S::velocity_margin, "-", 0.0, 0.5, "share of the velocity limits that is left for noise and delay"},
+      {"limit_margin", &S::limit_margin, "-", 0.0, 0.5,
+       "share of the limits of velocity, acceleration, jerk and torque rate that is left for noise, delay and rounding"},
+      {"effort_margin", &S::effort_margin, "-", 0.0, 0.5, "share of the effort limits that is left for what the model lacks"},
       {"position_margin", &S::position_margin, "rad", 0.0, 1.0, "by which position limits are moved inwards"},
       {"stop_time", &S::stop_time, "s", 0.005, 10.0, "time constant of the damped stop"},
       {"stop_damping", &S::stop_damping, "-", 1e-3, 10.0,

@@ -157,7 +157,6 @@ void Controller::Impl::report(bool known) noexcept {
 
 void Controller::Impl::write_gravity(bool known) noexcept {
   if (torque && known && dynamics_) {
-    dynamics_->gravity(apart_ ? arm_workspace_.state() : workspace.state(), *dynamics_workspace_, gravity_);
     command.torque_without_gravity = command.torque - gravity_;
   } else {
     command.torque_without_gravity.setConstant(torque ? std::numeric_limits<double>::quiet_NaN() : 0.0);

@@ -10,6 +10,7 @@
 namespace sidestep {
 namespace {
 
+constexpr double jitter = 0.1;         // of measured velocities, at rest [rad/s | m/s]
 constexpr double free_share = 0.2;     // of the largest error, from which the arm draws the reference to itself [-]
 constexpr double sliding_share = 0.2;  // of the largest error, of joints that slide [m/rad]
 
@@ -37,8 +38,9 @@ bool Controller::Impl::take_state(ConstVectorRef q, ConstVectorRef v) noexcept {
 }
 
 void Controller::Impl::begin_reference() noexcept {
+  // An arm whose velocities only jitter is at rest.
   next_q_ = arm_q_;
-  next_v_ = arm_v_;
+  next_v_ = arm_v_.unaryExpr([](double v) { return std::abs(v) < jitter ? 0.0 : v; });
   a_.setZero();
   if (!torque) {
     return;
@@ -76,11 +78,20 @@ void Controller::Impl::follow_arm() noexcept {
     }
   }
   apart_ = q_ != arm_q_ || v_ != arm_v_;
+  if (apart_ && known_before_ && !lost) {
+    // Noise is filtered: the velocity that was predicted, drawn to the measured one.
+    const double share = std::min(1.0, settings.period / settings.tracking.velocity_filter);
+    expected_v_ = last_arm_v_ + settings.period * last_acceleration_;
+    arm_v_ = expected_v_ + share * (arm_v_ - expected_v_);
+  }
 }
 
 void Controller::Impl::observe() noexcept {
-  if (observer_ && known_before_) {
-    observer_->update(last_arm_v_, arm_v_, last_torque_, last_acceleration_, model_mass_, model_bias_);
+  if (!known_before_) {
+    last_measured_v_ = arm_v_;
+  } else if (observer_) {
+    observer_->update(last_measured_v_, arm_v_, last_torque_, last_acceleration_, model_mass_, model_bias_);
+    last_measured_v_ = arm_v_;
   }
 }
 
@@ -109,6 +120,12 @@ void Controller::Impl::take_dynamics(const KinematicState& state, const Eigen::R
   }
 }
 
+LastCommand Controller::Impl::last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque,
+                                           bool binds) const noexcept {
+  return {acceleration, has_last_torque_ ? of_torque : nullptr, dynamics_ ? &gravity_ : nullptr,
+          dynamics_ ? &gravity_change_ : nullptr, binds};
+}
+
 void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
                                        const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
   SecondState second;
@@ -118,7 +135,18 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
       second = {&arm_workspace_.clearances, &arm_v_};
     }
   }
-  const LastCommand last{&a_, torque && has_last_torque_ ? &reference_torque_ : nullptr, nullptr};
+  if (torque && dynamics_) {
+    dynamics_->gravity(apart_ ? arm_workspace_.state() : workspace.state(), *dynamics_workspace_, gravity_change_);
+    gravity_change_.swap(gravity_);
+    gravity_change_ = gravity_ - gravity_change_;
+    if (!known_before_) {
+      gravity_change_.setZero();
+    }
+  }
+  LastCommand last{&a_};
+  if (torque) {
+    last = last_command(&a_, &reference_torque_, true);
+  }
   if (torque) {
     // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
     const bool told = mass_matrix != nullptr && (!apart_ || !dynamics_);
@@ -141,10 +169,10 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
   TorqueStatus status;
   if (torque) {
     take_dynamics(arm_workspace_.state(), mass_matrix, bias);
-    const LastCommand last{nullptr, has_last_torque_ ? &last_torque_ : nullptr, nullptr};
+    const LastCommand last = last_command(&last_acceleration_, &last_torque_, false);
     status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, &arm_workspace_.clearances, {}, last, tracked_);
   } else {
-    const LastCommand last{&last_acceleration_, nullptr, nullptr};
+    const LastCommand last{&last_acceleration_};
     status = tracking_filter_->apply(arm_q_, arm_v_, feedback_, &arm_workspace_.clearances, {}, last, tracked_);
   }
   if (status > TorqueStatus::limited) {

@@ -234,7 +234,7 @@ BOOST_AUTO_TEST_CASE(update_applies_the_margin_and_allocates_nothing) {
   limits.acceleration.setConstant(10.0);
   AccelerationBounds bounds(2);
   const Eigen::VectorXd q = Eigen::Vector2d(0.95, 0.0), v = Eigen::Vector2d::Zero();
-  BOOST_TEST(test::allocations_of([&] { bounds.update(limits, q, v, 0.001, {0.1, 1.0, 1.0}); }) == 0u);
+  BOOST_TEST(test::allocations_of([&] { bounds.update(limits, q, v, 0.001, {0.1}); }) == 0u);
   BOOST_TEST(bounds.upper[0] == -10.0);  // outside by the margin: steer back
   BOOST_TEST(bounds.upper[1] == 10.0);
   bounds.update(limits, q, v, 0.001);

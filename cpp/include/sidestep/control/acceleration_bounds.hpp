@@ -110,7 +110,6 @@ SmoothInterval smooth_interval(double q, double v, double before, const Accelera
 /// How the bounds of all joints are drawn in.
 struct LimitMargins {
   double position = 0.0;        ///< position limits are moved inwards by this much [rad | m]
-  double velocity_share = 1.0;  ///< of the velocity limits that may be used
   double jerk_share = 1.0;      ///< of the jerk limits
   double acceleration_factor = 1.0;  ///< acceleration limits are exceeded up to this, but not counted on for braking
 };

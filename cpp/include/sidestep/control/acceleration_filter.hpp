@@ -7,7 +7,6 @@ namespace sidestep {
 struct AccelerationFilterSettings {
   double period = 0.001;         ///< time for which the acceleration is held [s]
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
-  double velocity_share = 1.0;   ///< of the velocity limits that is used [-]
   double stop_time = 0.1;        ///< time constant of the damped stop q̈ = -v/stop_time [s]
   SafetySettings safety = {};
 };

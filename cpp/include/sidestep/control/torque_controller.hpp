@@ -63,7 +63,11 @@ struct TorqueSolution {
 struct LastCommand {
   const Eigen::VectorXd* acceleration = nullptr;  ///< (nv) [/s^2]
   const Eigen::VectorXd* torque = nullptr;        ///< (nv) [Nm | N]
-  const Eigen::VectorXd* gravity_change = nullptr;  ///< (nv) of the bias's gravity since then [Nm | N]: the rate is kept with and without it
+  /// (nv) The bias's gravity now, and its change since then [Nm | N]: effort and its rate keep their limits with and without
+  /// it, as drives that hold the arm themselves are told less.
+  const Eigen::VectorXd* gravity = nullptr;
+  const Eigen::VectorXd* gravity_change = nullptr;
+  bool binds = true;  ///< the jerk limit; else clearances alone rise no faster than it allows
 };
 
 /// Clearances at another state, which bound the same acceleration: those of the arm itself where its reference is what is
@@ -95,8 +99,6 @@ struct TorqueControllerSettings {
   bool hard_bounds = false;
   /// Position limits are moved inwards by this much [rad | m].
   double position_margin = 0.0;
-  /// Share of the velocity limits that is used, in (0, 1]: noise and delay use up the rest [-].
-  double velocity_share = 1.0;
   /// Factor by which the acceleration may exceed its limits, in [1, inf): of feedback against what the model lacks [-].
   double acceleration_factor = 1.0;
   /// Time constant of the damped stop q̈ = -v/stop_time [s].
@@ -194,7 +196,8 @@ class TorqueController {
   void write_torque_rows(const LastCommand* last) noexcept;
   void write_cost() noexcept;
   /// The first program; smooth: within the limits of jerk and torque rate.
-  bool solve_within_bounds(bool smooth, TorqueSolution& solution) noexcept;
+  bool solve_within_bounds(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth,
+                           TorqueSolution& solution) noexcept;
   TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
   void widen_bounds() noexcept;
   void collect_rows() noexcept;

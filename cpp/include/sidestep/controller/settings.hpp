@@ -45,6 +45,7 @@ struct OnlinePlannerSettings {
 struct TrackingSettings {
   double frequency = 60.0;       ///< ω [1/s]
   double damping = 1.0;          ///< ζ [-]: rotors that the model does not know lower it
+  double velocity_filter = 0.008; ///< time constant by which measured velocities are drawn to [s]: prediction takes its place within
   double observer_time = 0.03;   ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
   double observer_share = 0.8;   ///< of the effort limits that it may make up for [-]
   double largest_error = 0.2;    ///< |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m]
@@ -61,7 +62,8 @@ struct ControllerSettings {
   double period = 0.001;         ///< between two calls of `step` [s]
   Output output = Output::automatic;
   double speed = 1.0;            ///< share of the velocity and acceleration limits that motions use
-  double velocity_margin = 0.02; ///< share of the velocity limits that is left for noise and delay
+  double limit_margin = 0.02;    ///< share of the limits of velocity, acceleration, jerk and torque rate that is left for noise, delay and rounding
+  double effort_margin = 0.05;   ///< share of the effort limits that is left for what the model lacks
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop [s]
   /// of a stop without a mass matrix, see TorqueControllerSettings; so are the next four
