@@ -45,8 +45,8 @@ struct OnlinePlannerSettings {
 struct TrackingSettings {
   double frequency = 60.0;       ///< ω [1/s]
   double damping = 1.0;          ///< ζ [-]: rotors that the model does not know lower it
-  double velocity_filter = 0.008; ///< time constant by which measured velocities are drawn to [s]: prediction takes its place within
-  double observer_time = 0.03;   ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
+  double velocity_filter = 0.004; ///< time constant by which measured velocities are drawn to [s]: prediction takes its place within
+  double observer_time = 0.05;   ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
   double observer_share = 0.8;   ///< of the effort limits that it may make up for [-]
   double largest_error = 0.2;    ///< |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m]
   double servo_lag = 1.0;        ///< the same where the arm's own drives track the reference [rad]
