@@ -106,9 +106,9 @@ def test_a_motion_that_does_not_arrive_has_a_row_for_every_step(
     generator: ProblemGenerator, mover: ControllerMover
 ) -> None:
     problem = planted((3.0, 0.0, 0.0), 0.05, generator)
-    motion = mover.move(problem, MotionSettings(duration=1.2))
+    motion = mover.move(problem, MotionSettings(duration=0.6))
     assert not motion.arrived
-    assert len(motion.q) == 1200
+    assert len(motion.q) == 600
 
 
 def test_a_safe_motion_keeps_every_limit(

@@ -64,8 +64,11 @@ def test_a_goal_may_be_replaced_meanwhile_and_a_run_be_left(arm, synchronous):
     begin = time.monotonic()
     del run  # stops, in far less than the 200 s that it has left
     assert time.monotonic() - begin < 10.0
-    # Usable; back at its start, it is far behind a reference that has gone on.
-    assert controller.step(START, AT_REST).status in (ss.SafetyStatus.ok, ss.SafetyStatus.limited)
+    left = controller.command  # usable, from where it has been left
+    assert controller.step(left.position, left.velocity).status in (
+        ss.SafetyStatus.ok,
+        ss.SafetyStatus.limited,
+    )
 
 
 @pytest.mark.parametrize(
@@ -92,7 +95,7 @@ def test_steps_have_bounds(arm, steps):
 
 
 def test_a_second_run_and_what_is_for_the_loop_are_refused_beside_one(arm):
-    controller, other = controller_of(arm), controller_of(arm)
+    controller, other = controller_of(arm, START), controller_of(arm)
     controller.step(START, AT_REST)
     run = run_of(controller, 100_000)
     for refused in (

@@ -36,9 +36,9 @@ PERIOD, STEPS, SEED = 0.002, 500, 3  # none is a default
 DURATION = STEPS * PERIOD
 START = np.array([-0.8, 0.2, 0.0, -2.0, 0.0, 2.2, 0.8])
 GOAL = np.array([0.8, 0.3, 0.0, -1.9, 0.0, 2.2, 0.8])
-CENTRES = np.array([[0.5, 0.02, 0.5], [0.27, -0.05, 0.46]])  # in the way, and coming at the forearm
+CENTRES = np.array([[0.5, 0.02, 0.5], [0.56, 0.56, 1.14]])  # in the way, and coming at the forearm
 RADII = np.array([0.08, 0.04])
-VELOCITIES = np.array([[0.0, 0.0, 0.0], [-0.11, -0.33, 0.26]])
+VELOCITIES = np.array([[0.0, 0.0, 0.0], [-0.4, -0.4, -0.48]])
 FILE = f"""\
 format: 1
 name: same
