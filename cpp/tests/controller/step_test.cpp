@@ -19,6 +19,7 @@ using namespace sidestep;
 using test::covered_arm;
 using test::nv;
 using test::pose_of;
+using test::state_at;
 using test::Random;
 
 namespace {
@@ -94,22 +95,26 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
     ControllerSettings settings;
     settings.output = output;
     settings.planner->search.shortcuts = 20;
+    settings.look_ahead->tries = 30;
     const Arm arm = covered_arm(test::arm_limits(nv));
     Controller controller(arm, settings);
     std::atomic<bool> done{false};
     std::thread other([&] {
       Random random(7);
+      const Eigen::VectorXd left = Eigen::VectorXd::Constant(nv, -0.3), right = -left;
       for (int k = 0; !done.load(); ++k) {
         const Eigen::VectorXd q = random_configuration(random);
         switch (k % 5) {
-          case 0: controller.set_goal(Eigen::VectorXd::Constant(nv, k % 2 == 0 ? -0.3 : 0.3)); break;
+          case 0: controller.set_goal(k % 2 == 0 ? left : right); break;
           case 1: controller.set_goal(pose_of(arm.robot(), q)); break;
           case 2: controller.set_goal(Goal(JointGoal(q, 0.1 * random.vector(nv)))); break;
           case 3: controller.clear_goal(); break;
           default: controller.set_goal(q); break;
         }
-        if (k % 5 == 0) {  // comes from afar, through the arm
-          controller.set_obstacles(test::ball({0.0, 1.5, 1.2}, 0.08, {0.0, -1.5, 0.0}));
+        if (k % 5 == 0) {  // comes from afar at the middle of the arm where it will be, too fast for it to back off
+          const KinematicState there = state_at(arm.robot(), k % 2 == 0 ? left : right);
+          const Eigen::Vector3d at = frame_pose(arm.robot(), there, arm.robot().frame_index("link4")).translation();
+          controller.set_obstacles(test::ball(at + Eigen::Vector3d(0.0, 3.0, 0.0), 0.08, {0.0, -3.0, 0.0}));
         } else {
           controller.set_obstacles(random_balls(random, 1 + k % 4, 0.0));
         }
