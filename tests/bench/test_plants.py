@@ -15,14 +15,15 @@ import sidestep as ss
 from sidestep.robot import tip_of
 from sidestep.simulation.model import build_model
 
-BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
-sys.path.insert(0, BENCHMARKS)
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from franka_server import arm_alone
 from plant import Plant, SimulatedArm, add_payload, combined, dynamics
 from plants import figures
 from policy import Policy
 
-sys.path.remove(BENCHMARKS)  # its studio.py would hide the folder of tests of that name
+sys.path.remove(
+    str(Path(__file__).parents[2] / "benchmarks")
+)  # its studio.py would hide the folder of tests of that name
 
 GRAVITY = 9.81  # [m/s^2] of MuJoCo
 

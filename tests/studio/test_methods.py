@@ -93,7 +93,8 @@ def test_every_parameter_has_a_range_around_its_default_and_a_sentence(name: str
         assert parameter.sentence.endswith(".")
         if not parameter.options:
             lower, upper = parameter.slider
-            assert parameter.lower <= lower <= parameter.default < upper <= parameter.upper  # type: ignore[operator]
+            assert parameter.lower <= lower < upper <= parameter.upper
+            assert lower <= parameter.default <= upper  # type: ignore[operator]
 
 
 def test_an_unknown_parameter_is_refused() -> None:

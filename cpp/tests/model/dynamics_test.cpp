@@ -83,6 +83,17 @@ BOOST_AUTO_TEST_CASE(mass_matrix_and_bias_are_sums_over_bodies) {
     dynamics.bias(state, workspace, force_of_state);
     BOOST_TEST((mass_of_state == mass));
     BOOST_TEST((force_of_state == force));
+
+    // Gravity alone is the bias at rest, whatever velocity the state has.
+    Eigen::VectorXd of_gravity(nv), at_rest(nv);
+    dynamics.gravity(state, workspace, of_gravity);
+    dynamics.bias(q, Eigen::VectorXd::Zero(nv), workspace, at_rest);
+    BOOST_TEST((of_gravity - at_rest).cwiseAbs().maxCoeff() < tolerance);
+    Eigen::VectorXd weight = Eigen::VectorXd::Zero(nv);
+    for (int i = 0; i < robot.num_joints(); ++i) {
+      weight -= frame_jacobian(robot, state, i).topRows(3).transpose() * inertials[static_cast<std::size_t>(i)].mass * gravity;
+    }
+    BOOST_TEST((of_gravity - weight).cwiseAbs().maxCoeff() < tolerance);
   }
 }
 
@@ -149,9 +160,12 @@ BOOST_AUTO_TEST_CASE(dynamics_allocate_nothing) {
   const Eigen::VectorXd q = random.vector(nv), v = random.vector(nv);
   Eigen::MatrixXd mass(nv, nv);
   Eigen::VectorXd force(nv);
+  KinematicState state(robot);
+  state.update(robot, q, v);
   BOOST_TEST(test::allocations_of([&] {
     dynamics.mass_matrix(q, workspace, mass);
     dynamics.bias(q, v, workspace, force);
+    dynamics.gravity(state, workspace, force);
   }) == 0U);
 }
 

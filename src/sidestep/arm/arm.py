@@ -78,8 +78,8 @@ class Arm(_core.Arm):
         Args:
             source: a name of `sidestep.robots()`, the path of an `.arm` file, or a URDF or xacro file (or URDF text).
             package_dirs, base_pose, tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits,
-                effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments: of a description, as in `Robot.from_urdf`; of a name
-                `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
+                effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments: of a description, as in
+                `Robot.from_urdf`; of a name `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
             allowed: pairs of links that may touch: they get no clearance.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
                 "tables" or "pairs", the item a link or a pair of links.

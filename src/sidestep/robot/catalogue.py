@@ -111,7 +111,7 @@ RECIPES: tuple[Recipe, ...] = (
         acceleration_limits=(15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
         jerk_limits=(7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),
         effort_rate_limits=(1000.0,) * 7,
-        overrides_reason="no place in URDF: acceleration, jerk, torque rate of the Franka Control Interface, limits of Panda",
+        overrides_reason="no place in URDF: acceleration, jerk, torque rate as Franka states them, limits of Panda",
     ),
     Recipe("ur5", "Universal Robots UR5", "example-robot-data", 6, file="ur_description/urdf/ur5_robot.urdf"),
     Recipe(

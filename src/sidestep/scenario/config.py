@@ -27,7 +27,15 @@ ABLATIONS = {  # methods that are the controller without these parts
     "barrier": ("planner",),
     "reactive": OPTIONAL,
 }
-_OF_CONTROLLER_ALONE = (*ELSEWHERE, "speed", "limit_margin", "effort_margin", "obstacle_timeout", "local_activation", "seed")
+_OF_CONTROLLER_ALONE = (
+    *ELSEWHERE,
+    "speed",
+    "limit_margin",
+    "effort_margin",
+    "obstacle_timeout",
+    "local_activation",
+    "seed",
+)
 PROGRAM = tuple(name for name in FIELDS if "." not in name and name not in _OF_CONTROLLER_ALONE)
 
 

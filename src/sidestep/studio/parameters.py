@@ -31,6 +31,7 @@ FOLDERS = {  # on the page, by places in a scenario file
     "controller.planner.search": "Search of paths",
     "controller.planner.route": "Following a path",
     "controller.arrival": "Arrival",
+    "controller.tracking": "Tracking",
     "controller": "Limits and weights",
     "controller.safety": "Clearances of every command",
     "body": "Body",
@@ -218,5 +219,6 @@ PLANNER = (
 LOOK_AHEAD = _part("look_ahead", "look_ahead_")
 LOCAL_MINIMUM = _part("local_minimum", "local_minimum_")
 ARRIVAL = _part("arrival", "arrival_")
+TRACKING = _part("tracking", "tracking_")
 SAFETY = _part("safety", "safety_")
 TORQUE = _stated(PROGRAM, "torque_")
