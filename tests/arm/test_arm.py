@@ -86,3 +86,17 @@ def test_the_command_writes_what_the_library_would(arm: ss.Arm, tmp_path: Path) 
         refused = CliRunner().invoke(app, ["prepare", "planar2", "-o", str(tmp_path / wrong)])
         assert isinstance(refused.exception, ValueError)
         assert word in str(refused.exception)
+
+
+def test_a_file_of_the_first_format_has_the_default_limits_of_jerk_and_torque_rate(tmp_path: Path) -> None:
+    """planar2 as Sidestep wrote it before these limits were in the file."""
+    path = Path(__file__).parent / "planar2_format1.arm"
+    assert path.read_bytes()[8:12] == (1).to_bytes(4, "little")
+    old, now = ss.Arm.load(path), ss.Arm.load("planar2")
+    np.testing.assert_array_equal(old.limits.jerk, 100.0 * old.limits.acceleration)
+    assert np.isinf(old.limits.effort_rate).all()
+    np.testing.assert_array_equal(old.limits.effort, now.limits.effort)
+    np.testing.assert_array_equal(old.body.means, now.body.means)
+    old.save(tmp_path / "again.arm")
+    assert (tmp_path / "again.arm").read_bytes()[8:12] == (2).to_bytes(4, "little")
+    assert ss.Arm.load(tmp_path / "again.arm").content_hash == old.content_hash

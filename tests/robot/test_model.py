@@ -196,3 +196,19 @@ def test_planar_arm() -> None:
     for count, length in ((0, 0.5), (2, 0.0), (2, np.nan)):
         with pytest.raises(ValueError, match="must be"):
             planar_arm(count, link_length=length)
+
+
+def test_limits_of_jerk_and_torque_rate_are_given_beside_the_description() -> None:
+    robot = Robot.from_urdf(planar_arm(2), acceleration_limits=[3.0, 4.0])
+    np.testing.assert_array_equal(robot.limits.jerk, [300.0, 400.0])
+    assert np.isinf(robot.limits.effort_rate).all()
+    given = Robot.from_urdf(
+        planar_arm(2), acceleration_limits=[3.0, 4.0], jerk_limits=[50.0, 60.0], effort_rate_limits=700.0
+    )
+    np.testing.assert_array_equal(given.limits.jerk, [50.0, 60.0])
+    np.testing.assert_array_equal(given.limits.effort_rate, [700.0, 700.0])
+    with pytest.raises(ValueError, match="jerk_limits"):
+        Robot.from_urdf(planar_arm(2), jerk_limits=[1.0, 2.0, 3.0])
+    for name in ("jerk_limits", "effort_rate_limits"):
+        with pytest.raises(ValueError, match=r"-1\.0"):
+            Robot.from_urdf(planar_arm(2), **{name: -1.0})

@@ -565,3 +565,39 @@ BOOST_AUTO_TEST_CASE(changing_points_never_make_a_surface_recede) {
   BOOST_TEST(lower(-3.0, 11.0) == 0.0, close);    // along a hollow one
   BOOST_TEST(lower(9.0, 9.0) == -9.0, close);     // past one point
 }
+
+BOOST_AUTO_TEST_CASE(rows_of_a_second_state_are_added_to_those_of_the_first) {
+  Random random(5);
+  const JointLimits limits = test::arm_limits(4);
+  AccelerationBounds bounds(4);
+  bounds.lower.setConstant(-10.0);
+  bounds.upper.setConstant(10.0);
+  int most = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Clearances first = linear_clearances(random, 4, 5), second = linear_clearances(random, 4, 5);
+    const Eigen::VectorXd v = random.vector(4), other = random.vector(4);
+    SafetyRows both(4, {}), one(4, {}), two(4, {});
+    one.update(first, v, limits, bounds, 0.001);
+    two.update(second, other, limits, bounds, 0.001);
+    both.update(first, v, limits, bounds, 0.001);
+    both.add(second, other, limits, bounds, 0.001);
+    BOOST_REQUIRE(both.size() == one.size() + two.size());
+    const auto has = [&](const SafetyRows& part, int row) {
+      for (int k = 0; k < both.size(); ++k) {
+        if ((both.normals.row(k) == part.normals.row(row)) && both.lower[k] == part.lower[row] &&
+            both.coordinates[static_cast<std::size_t>(k)] == part.coordinates[static_cast<std::size_t>(row)]) {
+          return true;
+        }
+      }
+      return false;
+    };
+    for (int k = 0; k < one.size(); ++k) {
+      BOOST_REQUIRE(has(one, k));
+    }
+    for (int k = 0; k < two.size(); ++k) {
+      BOOST_REQUIRE(has(two, k));
+    }
+    most = std::max(most, both.size());
+  }
+  BOOST_TEST(most > 5);
+}
