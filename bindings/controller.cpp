@@ -47,6 +47,10 @@ void bind_settings_tree(nb::module_& m) {
       m, "TrackingSettings",
       "How the arm is kept on the controller's reference: a = a_r + w^2 (q_r - q) + 2 z w (v_r - v), with what the disturbance\n"
       "observer found. Not for outputs of position and velocity, which the arm's own drives track.");
+  bind_settings<SpeedLimitSettings>(
+      m, "SpeedLimitSettings",
+      "Limits of Cartesian speed by the distance d to the nearest obstacle, of every frame of the arm (speed and separation): between\n"
+      "near and far V^2 = near_speed^2 + (far_speed^2 - near_speed^2) (d - near_distance)/(far_distance - near_distance), [m/s].");
   bind_settings<OnlinePlannerSettings>(
       m, "OnlinePlannerSettings", "The planner that runs beside the loop: how it searches, and how its paths are followed.",
       {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "TimedPathSettings", &OnlinePlannerSettings::route)})
@@ -66,10 +70,11 @@ void bind_settings_tree(nb::module_& m) {
 
   auto c = bind_settings<S>(
       m, "ControllerSettings",
-      "All settings of a Controller. Every part is on by default; `planner=None`, `look_ahead=None` and `local_minimum=None`\n"
-      "leave a part out, for comparisons.",
+      "All settings of a Controller. Every part but `speed_limits` is on by default; `planner=None`, `look_ahead=None` and\n"
+      "`local_minimum=None` leave a part out, for comparisons.",
       {part("barriers", "BarrierSettings", &S::barriers), part("safety", "SafetySettings", &S::safety),
        part("arrival", "ArrivalSettings", &S::arrival), part("tracking", "TrackingSettings", &S::tracking),
+       part("speed_limits", "SpeedLimitSettings | None", &S::speed_limits),
        part("planner", "OnlinePlannerSettings | None", &S::planner),
        part("look_ahead", "LookAheadSettings | None", &S::look_ahead),
        part("local_minimum", "LocalMinimumSettings | None", &S::local_minimum),
@@ -81,6 +86,7 @@ void bind_settings_tree(nb::module_& m) {
       .def_rw("output", &S::output)
       .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.")
       .def("__copy__", [](const S& s) { return S(s); });
+  optional_part(c, "speed_limits", &ControllerSettings::speed_limits);
   optional_part(c, "planner", &ControllerSettings::planner);
   optional_part(c, "look_ahead", &ControllerSettings::look_ahead);
   optional_part(c, "local_minimum", &ControllerSettings::local_minimum);
@@ -94,6 +100,7 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<SafetySettings>(rows, "safety.");
         describe_fields<ArrivalSettings>(rows, "arrival.");
         describe_fields<TrackingSettings>(rows, "tracking.");
+        describe_fields<SpeedLimitSettings>(rows, "speed_limits.", true);
         describe_fields<OnlinePlannerSettings>(rows, "planner.", true);
         describe_fields<PlannerSettings>(rows, "planner.search.", true);
         describe_fields<TimedPathSettings>(rows, "planner.route.", true);
@@ -110,7 +117,7 @@ void bind_command(nb::module_& m) {
   nb::enum_<SafetyStatus>(m, "SafetyStatus", nb::is_arithmetic(), "How safe a command is, by severity. Every command may be sent.")
       .value("ok", SafetyStatus::ok, "The motion is what the goal asks for.")
       .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
-      .value("relaxed", SafetyStatus::relaxed, "Jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits.")
+      .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.")
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");
@@ -146,6 +153,10 @@ void bind_command(nb::module_& m) {
       .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")
       .def_ro("point", &Command::point, "The obstacle point, where it is one; else -1.")
       .def_ro("bound_by", &Command::bound_by, "The coordinate whose clearance bends the motion most; -1: none.")
+      .def_ro("distance", &Command::distance,
+              "To the nearest obstacle [m], up to speed_limits.far_distance; inf: farther, or without these settings; nan: unknown.")
+      .def_ro("speed", &Command::speed, "Of the arm's fastest frame [m/s]; nan: unknown.")
+      .def_ro("speed_limit", &Command::speed_limit, "For every frame [m/s]; inf: none; nan: unknown.")
       .def_ro("limits", &Command::limits, "(nv) the limits in the way of each joint.")
       .def_ro("system", &Command::system, "StepStatus of the geometric system.")
       .def_ro("program", &Command::program, "TorqueStatus of the quadratic program.")

@@ -1262,7 +1262,9 @@ class TorqueStatus(enum.Enum):
     """optimal, with a limit in the way"""
 
     relaxed = 2
-    """velocity or acceleration limits gave way"""
+    """
+    limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way
+    """
 
     relaxed_safety = 3
     """not all clearances and position limits can be kept"""
@@ -2201,6 +2203,45 @@ class TrackingSettings:
     @drift_gain.setter
     def drift_gain(self, value: float, /) -> None: ...
 
+class SpeedLimitSettings:
+    """
+    Limits of Cartesian speed by the distance d to the nearest obstacle, of every frame of the arm (speed and separation): between
+    near and far V^2 = near_speed^2 + (far_speed^2 - near_speed^2) (d - near_distance)/(far_distance - near_distance), [m/s].
+
+        near_speed [m/s], default 0.25, allowed 0.02 to 10: that no frame of the arm exceeds at near_distance from an obstacle, and nearer
+        near_distance [m], default 0.1, allowed 0 to 10: to obstacles, up to which near_speed is the limit
+        far_speed [m/s], default 1.5, allowed 0.02 to 10: that no frame of the arm exceeds anywhere
+        far_distance [m], default 1.0, allowed 0.01 to 10: to obstacles, from which far_speed is the limit: the nearer to near_distance, the harder the arm brakes between
+
+    Raises ValueError that names the setting, its value and what is allowed.
+    """
+
+    def __init__(self, *, near_speed: float = 0.25, near_distance: float = 0.1, far_speed: float = 1.5, far_distance: float = 1.0) -> None: ...
+
+    @property
+    def near_speed(self) -> float: ...
+
+    @near_speed.setter
+    def near_speed(self, value: float, /) -> None: ...
+
+    @property
+    def near_distance(self) -> float: ...
+
+    @near_distance.setter
+    def near_distance(self, value: float, /) -> None: ...
+
+    @property
+    def far_speed(self) -> float: ...
+
+    @far_speed.setter
+    def far_speed(self, value: float, /) -> None: ...
+
+    @property
+    def far_distance(self) -> float: ...
+
+    @far_distance.setter
+    def far_distance(self, value: float, /) -> None: ...
+
 class OnlinePlannerSettings:
     """
     The planner that runs beside the loop: how it searches, and how its paths are followed.
@@ -2346,8 +2387,8 @@ class Output(enum.Enum):
 
 class ControllerSettings:
     """
-    All settings of a Controller. Every part is on by default; `planner=None`, `look_ahead=None` and `local_minimum=None`
-    leave a part out, for comparisons.
+    All settings of a Controller. Every part but `speed_limits` is on by default; `planner=None`, `look_ahead=None` and
+    `local_minimum=None` leave a part out, for comparisons.
 
         period [s], default 0.001, allowed 0.0001 to 0.1: between two calls of step; limits and clearances hold at samples so far apart
         speed, default 1.0, allowed 0.01 to 1: share of the velocity and acceleration limits that motions use: less is slower and calmer
@@ -2367,7 +2408,7 @@ class ControllerSettings:
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, period: float = 0.001, speed: float = 1.0, velocity_margin: float = 0.02, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
+    def __init__(self, *, period: float = 0.001, speed: float = 1.0, velocity_margin: float = 0.02, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., speed_limits: SpeedLimitSettings | None = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
 
     @property
     def period(self) -> float: ...
@@ -2491,6 +2532,12 @@ class ControllerSettings:
     def __copy__(self) -> ControllerSettings: ...
 
     @property
+    def speed_limits(self) -> SpeedLimitSettings | None: ...
+
+    @speed_limits.setter
+    def speed_limits(self, value: SpeedLimitSettings | None) -> None: ...
+
+    @property
     def planner(self) -> OnlinePlannerSettings | None: ...
 
     @planner.setter
@@ -2525,7 +2572,7 @@ class SafetyStatus(enum.IntEnum):
 
     relaxed = 2
     """
-    Jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits.
+    Limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.
     """
 
     margin_lost = 3
@@ -2628,6 +2675,20 @@ class Command:
     @property
     def bound_by(self) -> int:
         """The coordinate whose clearance bends the motion most; -1: none."""
+
+    @property
+    def distance(self) -> float:
+        """
+        To the nearest obstacle [m], up to speed_limits.far_distance; inf: farther, or without these settings; nan: unknown.
+        """
+
+    @property
+    def speed(self) -> float:
+        """Of the arm's fastest frame [m/s]; nan: unknown."""
+
+    @property
+    def speed_limit(self) -> float:
+        """For every frame [m/s]; inf: none; nan: unknown."""
 
     @property
     def limits(self) -> list[Limit]:

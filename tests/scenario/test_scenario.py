@@ -13,7 +13,7 @@ import yaml
 
 import sidestep as ss
 from sidestep.control import SafetySettings
-from sidestep.controller import controller_settings_fields
+from sidestep.controller import SpeedLimitSettings, controller_settings_fields
 from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
 from sidestep.scenario import scenario as module
 from sidestep.scenario.config import OPTIONAL, controller_settings_of
@@ -366,6 +366,7 @@ controller:
   local_minimum: null
   planner: {patience: 2, search: {margin: 0.08, max_nodes: 500}, route: {lead: 0.3}}
   safety: {margin: 0.012345678901234, max_rows: 8}
+  speed_limits: {near_speed: 0.125}
 """
     )
     mine = Scenario.from_text(text, folder=tmp_path)
@@ -382,6 +383,7 @@ controller:
         "planner.route.lead": 0.3,
         "safety.margin": 0.012345678901234,
         "safety.max_rows": 8,
+        "speed_limits.near_speed": 0.125,
         "period": 0.002,  # of the simulation
         "synchronous": True,
     }
@@ -408,6 +410,20 @@ def test_methods_are_the_controller_without_parts(method: str, missing: set[str]
     assert {name for name in OPTIONAL if getattr(settings, name) is None} == missing
     if settings.look_ahead is not None:
         assert settings.look_ahead.tries == 30
+
+
+@pytest.mark.parametrize(
+    ("section", "added"), [("{}", False), ("{speed_limits: null}", False), ("{speed_limits: {}}", True)]
+)
+def test_a_part_that_is_off_is_added_by_a_section_however_empty(
+    tmp_path: Path, section: str, added: bool
+) -> None:
+    mine = Scenario.from_text(BASE + f"method: reactive\ncontroller: {section}\n", folder=tmp_path)
+    mine.save(tmp_path / "mine.yaml")
+    assert Scenario.load(tmp_path / "mine.yaml") == mine
+    limits = controller_settings_of(mine).speed_limits
+    assert (limits is not None) == added
+    assert limits is None or limits.far_speed == SpeedLimitSettings().far_speed
 
 
 def test_the_thesis_s_torque_program_has_the_numbers_of_the_section() -> None:

@@ -19,6 +19,7 @@ TorqueControllerSettings controller_settings(const AccelerationFilterSettings& s
   result.position_margin = settings.position_margin;
   result.stop_time = settings.stop_time;
   result.safety = settings.safety;
+  result.max_speed_rows = settings.max_speed_rows;
   result.torque_weight.setZero();
   result.hard_bounds = true;
   return result;

@@ -96,6 +96,7 @@ void TorqueControllerSettings::validate(const Robot& robot) const {
   require_positive(stop_time, "torque controller: stop_time");
   require_positive(stop_damping, "torque controller: stop_damping");
   require(position_margin >= 0.0, "torque controller: position_margin", position_margin, ">= 0");
+  require(max_speed_rows >= 0, "torque controller: max_speed_rows", max_speed_rows, ">= 0");
   for (int i = 0; i < nv; ++i) {
     const double width = robot.limits().upper[i] - robot.limits().lower[i];
     if (!(2.0 * position_margin < width) && position_margin > 0.0) {
@@ -114,15 +115,17 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       torque_cost_(expanded(settings_.torque_weight, nv_).cwiseQuotient(limits_.effort.cwiseAbs2())),
       bounds_(nv_),
       rows_(nv_, settings_.safety),
-      hard_data_(nv_, nv_ + rows_.max_size()),
-      hard_(nv_, nv_ + rows_.max_size()),
+      hard_data_(nv_, nv_ + rows_.max_size() + settings_.max_speed_rows),
+      hard_(nv_, nv_ + rows_.max_size() + settings_.max_speed_rows),
       rows_used_(static_cast<std::size_t>(rows_.max_size())),
-      comfort_data_(2 * nv_, 3 * nv_ + rows_.max_size()),
-      comfort_(2 * nv_, 3 * nv_ + rows_.max_size()),
+      num_slacks_(nv_ + (settings_.max_speed_rows > 0 ? 1 : 0)),
+      comfort_data_(nv_ + num_slacks_, 3 * nv_ + rows_.max_size() + settings_.max_speed_rows),
+      comfort_(nv_ + num_slacks_, 3 * nv_ + rows_.max_size() + settings_.max_speed_rows),
       widening_data_(2 * nv_, 2 * nv_),
       widening_(2 * nv_, 2 * nv_),
       allowed_(Eigen::VectorXd::Zero(rows_.max_size())),
       row_multipliers_(Eigen::VectorXd::Zero(rows_.max_size())),
+      speed_multipliers_(Eigen::VectorXd::Zero(settings_.max_speed_rows)),
       wide_lower_(Eigen::VectorXd::Zero(nv_)),
       wide_upper_(Eigen::VectorXd::Zero(nv_)),
       mass_(Eigen::MatrixXd::Zero(nv_, nv_)),
@@ -138,7 +141,7 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
   comfort_data_.A.block(0, nv_, nv_, nv_).diagonal().setConstant(-1.0);
   comfort_data_.A.block(nv_, 0, nv_, nv_).setIdentity();
   comfort_data_.A.block(nv_, nv_, nv_, nv_).setIdentity();
-  comfort_data_.lower.tail(nv_).setZero();
+  comfort_data_.lower.tail(num_slacks_).setZero();
   // Over x = (q̈, e): q̈ + e within the box, the torque rows.
   widening_data_.A.topLeftCorner(nv_, nv_).setIdentity();
   widening_data_.A.topRightCorner(nv_, nv_).setIdentity();
@@ -156,7 +159,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
                                      ConstVectorRef acceleration,
                                      const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
                                      ConstVectorRef bias, const Clearances* clearances, const SecondState& second,
-                                     const LastCommand& last, TorqueSolution& solution) noexcept {
+                                     const LastCommand& last, TorqueSolution& solution, const SpeedRows* speed) noexcept {
   const auto usable = [this](const auto& x) { return x.size() == nv_ && all_finite(x); };
   const bool q_known = usable(q), v_known = usable(v), wanted_known = usable(acceleration), bias_known = usable(bias);
   const bool two = second.clearances != nullptr;
@@ -198,6 +201,10 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   TorqueStatus status = TorqueStatus::fallback_invalid_input;
   rows_.clear();
   row_multipliers_.setZero();
+  speed_ = speed;
+  speed_multipliers_.setZero();
+  solution.speed_frame = -1;
+  solution.speed_slack = 0.0;
   solution.num_safety_rows = 0;
   solution.dominant = -1;
   solution.least_clearance = infinity;
@@ -250,9 +257,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
     if (solved && !presses_for_lost()) {
       const bool free = std::all_of(solution.active.begin(), solution.active.end(),
                                     [](Limit limit) { return limit == Limit::none; });
-      status = !kept                                  ? TorqueStatus::relaxed
-               : free && row_multipliers_.isZero(0.0) ? TorqueStatus::ok
-                                                      : TorqueStatus::limited;
+      status = !kept ? TorqueStatus::relaxed
+               : free && row_multipliers_.isZero(0.0) && speed_multipliers_.isZero(0.0) ? TorqueStatus::ok
+                                                                                        : TorqueStatus::limited;
     } else {
       write_torque_rows(nullptr);
       kept = kept && !smooth;
@@ -265,6 +272,10 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       report_jerk(solution);
     }
     report_safety(solution);
+    report_speed(solution);
+    if (solution.speed_slack > 0.0 && status < TorqueStatus::relaxed) {
+      status = TorqueStatus::relaxed;
+    }
     if (rows_.helpless >= 0 && status < TorqueStatus::relaxed_safety) {
       status = TorqueStatus::relaxed_safety;
     }
@@ -381,25 +392,48 @@ void TorqueController::write_cost() noexcept {
   });
 }
 
+int TorqueController::num_speed_rows() const noexcept {
+  return speed_ == nullptr ? 0 : std::min(speed_->size(), settings_.max_speed_rows);
+}
+
+void TorqueController::write_speed_rows(QuadraticProgramData& data, int first, int slack, const Eigen::VectorXd& lower,
+                                        const Eigen::VectorXd& upper) const noexcept {
+  data.row_upper.segment(first, settings_.max_speed_rows).setConstant(infinity);
+  for (int k = 0; k < num_speed_rows(); ++k) {
+    if (!speed_->satisfied_within(k, lower, upper)) {
+      data.A.row(first + k).head(nv_) = speed_->normals.row(k);
+      data.row_upper[first + k] = speed_->upper[k];
+      if (slack >= 0) {
+        data.A(first + k, slack) = -1.0 / speed_->lengths[k];
+      }
+    }
+  }
+}
+
 bool TorqueController::solve_within_bounds(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth,
                                            TorqueSolution& solution) noexcept {
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   row_multipliers_.setZero();
+  speed_multipliers_.setZero();
   hard_data_.lower = lower;
   hard_data_.upper = upper;
-  hard_data_.row_lower.tail(rows_.max_size()).setConstant(-infinity);
+  hard_data_.row_lower.segment(nv_, rows_.max_size()).setConstant(-infinity);
   for (int k = 0; k < rows_.size(); ++k) {
     if (!rows_.satisfied_within(k, lower, upper)) {
       hard_data_.A.row(nv_ + k) = rows_.normals.row(k);
       hard_data_.row_lower[nv_ + k] = rows_.lower[k];
     }
   }
+  write_speed_rows(hard_data_, nv_ + rows_.max_size(), -1, lower, upper);
   if (hard_.solve(hard_data_) != QuadraticProgramStatus::solved) {
     return false;
   }
   solution.acceleration = hard_.solution().cwiseMax(lower).cwiseMin(upper);  // rounding
   for (int k = 0; k < rows_.size(); ++k) {
     row_multipliers_[k] = std::max(-hard_.multipliers()[2 * nv_ + k], 0.0);
+  }
+  for (int k = 0; k < num_speed_rows(); ++k) {
+    speed_multipliers_[k] = std::max(hard_.multipliers()[2 * nv_ + rows_.max_size() + k], 0.0);
   }
   for (int i = 0; i < nv_; ++i) {
     const double at_bound = hard_.multipliers()[i];
@@ -436,6 +470,20 @@ void TorqueController::report_safety(TorqueSolution& solution) noexcept {
     if (row_multipliers_[k] > largest) {
       largest = row_multipliers_[k];
       solution.dominant = k;
+    }
+  }
+}
+
+void TorqueController::report_speed(TorqueSolution& solution) const noexcept {
+  double largest = 0.0;
+  for (int k = 0; k < num_speed_rows(); ++k) {
+    const double over = speed_->normals.row(k).dot(solution.acceleration.transpose()) - speed_->upper[k];
+    const bool rounding = over <= slack_tolerance * (1.0 + std::abs(speed_->upper[k]) + wanted_.norm());
+    const double slack = rounding ? 0.0 : speed_->lengths[k] * over;
+    if (slack > solution.speed_slack || (solution.speed_slack == 0.0 && speed_multipliers_[k] > largest)) {
+      solution.speed_slack = slack;
+      solution.speed_frame = speed_->frames[static_cast<std::size_t>(k)];
+      largest = speed_multipliers_[k];
     }
   }
 }

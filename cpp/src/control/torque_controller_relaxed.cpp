@@ -157,9 +157,9 @@ bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noe
     steepest = std::max(steepest, tracking_weight_[i] * (1.0 + beyond));
   }
   data.H.topLeftCorner(nv_, nv_) = hard_data_.H;
-  data.H.diagonal().tail(nv_) = tracking_weight_;
+  data.H.diagonal().segment(nv_, nv_) = tracking_weight_;
   data.g.head(nv_) = hard_data_.g;
-  data.g.tail(nv_).setConstant(settings_.slack_weight * steepest);
+  data.g.tail(num_slacks_).setConstant(settings_.slack_weight * steepest);
   data.lower.head(nv_) = wide_lower_;
   data.upper.head(nv_) = wide_upper_;
   data.row_upper.head(nv_) = bounds_.upper;
@@ -167,24 +167,28 @@ bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noe
   data.A.block(2 * nv_, 0, nv_, nv_) = mass_;
   data.row_lower.segment(2 * nv_, nv_) = hard_data_.row_lower.head(nv_);
   data.row_upper.segment(2 * nv_, nv_) = hard_data_.row_upper.head(nv_);
-  data.row_lower.tail(rows_.max_size()).setConstant(-infinity);
+  data.row_lower.segment(3 * nv_, rows_.max_size()).setConstant(-infinity);
   for (int n = 0; n < num_rows_used_; ++n) {
     const int row = rows_used_[static_cast<std::size_t>(n)], at = 3 * nv_ + n;
     data.A.row(at).head(nv_) = rows_.normals.row(row);
     data.row_lower[at] = lowered(n, rounded);
   }
+  write_speed_rows(data, 3 * nv_ + rows_.max_size(), 2 * nv_, wide_lower_, wide_upper_);
   if (comfort_.solve(data) != QuadraticProgramStatus::solved) {
     return false;
   }
   solution.acceleration = comfort_.solution().head(nv_);
   const Eigen::VectorXd& multipliers = comfort_.multipliers();
-  const int first_row = 2 * nv_;  // multipliers of the bounds come before those of the rows
+  const int first_row = nv_ + num_slacks_;  // multipliers of the bounds come before those of the rows
   for (int i = 0; i < nv_; ++i) {
     add_active(i, std::max(multipliers[i], multipliers[first_row + i]),
                std::min(multipliers[i], multipliers[first_row + nv_ + i]), multipliers[first_row + 2 * nv_ + i], false, solution);
   }
   for (int n = 0; n < num_rows_used_; ++n) {
     row_multipliers_[rows_used_[static_cast<std::size_t>(n)]] = std::max(-multipliers[first_row + 3 * nv_ + n], 0.0);
+  }
+  for (int k = 0; k < num_speed_rows(); ++k) {
+    speed_multipliers_[k] = std::max(multipliers[first_row + 3 * nv_ + rows_.max_size() + k], 0.0);
   }
   return accept(solution);
 }
@@ -195,6 +199,7 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   allowed_.setZero();
   row_multipliers_.setZero();
+  speed_multipliers_.setZero();
   const bool found = (solve_comfort(false, solution) && !presses_for_lost()) ||
                      (find_least_shortfalls(solution) &&
                       (solve_comfort(false, solution) || solve_comfort(true, solution) ||

@@ -155,6 +155,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       gravity_change_(q_),
       model_mass_(Eigen::MatrixXd::Zero(q_.size(), q_.size())),
       model_bias_(q_),
+      speed_rows_(arm.robot()),
+      arm_speed_rows_(speed_rows_),
       frequency_(std::min(settings.tracking.frequency, most_per_period / settings.period)),
       arm_workspace_(*system),
       tracked_(arm.num_coordinates(), settings.safety.max_rows),
@@ -176,10 +178,12 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
   guide = make_guide(body_, settings);
   const Robot of_reference = within_margins(arm.robot(), settings, settings.speed);
   const Robot of_arm = within_margins(arm.robot(), settings, 1.0);
+  const int speed_rows = settings.speed_limits ? speed_rows_.max_size() : 0;
   if (torque) {
     TorqueControllerSettings program;
     program.period = settings.period;
     program.safety = settings.safety;
+    program.max_speed_rows = speed_rows;
     program.position_margin = settings.position_margin;
     program.stop_time = settings.stop_time;
     program.stop_damping = settings.stop_damping;
@@ -199,7 +203,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       dynamics_workspace_.emplace(*dynamics_);
     }
   } else {
-    const AccelerationFilterSettings program{settings.period, settings.position_margin, settings.stop_time, settings.safety};
+    const AccelerationFilterSettings program{settings.period, settings.position_margin, settings.stop_time, settings.safety,
+                                             speed_rows};
     tracking_filter_.emplace(of_arm, program);
     filter_.emplace(of_reference, program);
   }

@@ -58,6 +58,7 @@ std::string Controller::Impl::explain() const {
       text += std::string("background work failed: ") + shown_fault_.data() + "; ";
     }
   }
+  text += explain_speed();
   switch (command.activity) {
     case Activity::no_goal: return text + "no goal: it holds still, and evades what comes";
     case Activity::stale: return text + "stopped: the obstacles are " + std::to_string(obstacle_age_) +

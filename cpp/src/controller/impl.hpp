@@ -110,6 +110,9 @@ class Controller::Impl {
   void take_dynamics(const KinematicState& state, MassMatrix mass_matrix, Bias bias) noexcept;
   void solve_reference(MassMatrix mass_matrix, Bias bias) noexcept;
   void track(MassMatrix mass_matrix, Bias bias) noexcept;
+  const KinematicState& arm_state() const noexcept { return apart_ ? arm_workspace_.state() : workspace.state(); }
+  void limit_speed() noexcept;
+  std::string explain_speed() const;
   void stop(MassMatrix mass_matrix, Bias bias, ConstVectorRef q, ConstVectorRef v) noexcept;
   void advance_reference() noexcept;
   LastCommand last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque, bool binds) const noexcept;
@@ -173,6 +176,8 @@ class Controller::Impl {
   Eigen::MatrixXd model_mass_;
   Eigen::VectorXd model_bias_;
   std::optional<DisturbanceObserver> observer_;
+  SpeedRows speed_rows_, arm_speed_rows_;       // of the reference, of the arm
+  int nearest_point_ = -1;                      // of obstacles
   double frequency_ = 0.0;                      // of the feedback [1/s]
   GeometricSystem::Workspace arm_workspace_;
   TorqueSolution tracked_;

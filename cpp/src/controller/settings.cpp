@@ -111,6 +111,10 @@ void ControllerSettings::validate() const {
     throw std::invalid_argument("controller: barriers.floor is " + std::to_string(barriers.floor) +
                                 " m, allowed: below barriers.activation and barriers.self_activation");
   }
+  if (speed_limits) {
+    check_fields("controller: speed_limits.", *speed_limits);
+    speed_limits->validate();
+  }
   if (planner) {
     check_fields("controller: planner.", *planner);
     check_fields("controller: planner.search.", planner->search);

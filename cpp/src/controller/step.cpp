@@ -107,6 +107,7 @@ void Controller::Impl::report(bool known) noexcept {
   command.clearance = known ? infinity : std::numeric_limits<double>::quiet_NaN();
   command.coordinate = command.point = -1;
   if (!known) {
+    command.distance = command.speed = command.speed_limit = std::numeric_limits<double>::quiet_NaN();
     command.status = SafetyStatus::stopping;
     command.system = StepStatus::invalid_state;
     command.activity = is_stale() ? Activity::stale : has_goal() ? Activity::waiting : Activity::no_goal;

@@ -147,14 +147,16 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
   if (torque) {
     last = last_command(&a_, &reference_torque_, true);
   }
+  limit_speed();
+  const SpeedRows* const speed = settings.speed_limits ? &speed_rows_ : nullptr;
   if (torque) {
     // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
     const bool told = mass_matrix != nullptr && (!apart_ || !dynamics_);
     take_dynamics(workspace.state(), told ? mass_matrix : nullptr, told ? bias : nullptr);
-    command.program = torque_program_->solve(q_, v_, wanted_, mass_, bias_, &workspace.clearances, second, last, solution);
+    command.program = torque_program_->solve(q_, v_, wanted_, mass_, bias_, &workspace.clearances, second, last, solution, speed);
     reference_torque_ = solution.torque;
   } else {
-    command.program = filter_->apply(q_, v_, wanted_, &workspace.clearances, second, last, solution);
+    command.program = filter_->apply(q_, v_, wanted_, &workspace.clearances, second, last, solution, speed);
   }
 }
 
@@ -166,14 +168,15 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
   }
   const double w = frequency_;
   feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
+  const SpeedRows* const speed = settings.speed_limits ? &arm_speed_rows_ : nullptr;
   TorqueStatus status;
   if (torque) {
     take_dynamics(arm_workspace_.state(), mass_matrix, bias);
     const LastCommand last = last_command(&last_acceleration_, &last_torque_, false);
-    status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, &arm_workspace_.clearances, {}, last, tracked_);
+    status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, &arm_workspace_.clearances, {}, last, tracked_, speed);
   } else {
     const LastCommand last{&last_acceleration_};
-    status = tracking_filter_->apply(arm_q_, arm_v_, feedback_, &arm_workspace_.clearances, {}, last, tracked_);
+    status = tracking_filter_->apply(arm_q_, arm_v_, feedback_, &arm_workspace_.clearances, {}, last, tracked_, speed);
   }
   if (status > TorqueStatus::limited) {
     command.program = std::max(command.program, status);

@@ -318,6 +318,20 @@ BodyClearance::Nearest BodyClearance::nearest(int item, ConstVectorRef q, const 
   return {found.clearance, found.clearance < cap ? item : -1, found.point};
 }
 
+BodyClearance::Nearest BodyClearance::nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap,
+                                                       Workspace& w) const noexcept {
+  w.field_.follow(obstacles);
+  place(q, w);
+  Nearest nearest{cap};
+  for (int i = 0; i < num_items() && label(i).kind == CoordinateLabel::Kind::obstacle; ++i) {  // they come first
+    const Found found = look(items_[static_cast<std::size_t>(i)], obstacles, {nearest.clearance, infinity, -infinity}, w);
+    if (found.clearance < nearest.clearance) {
+      nearest = {found.clearance, i, found.point};
+    }
+  }
+  return nearest;
+}
+
 double BodyClearance::nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time,
                                      Workspace& w) const noexcept {
   double nearest = infinity;

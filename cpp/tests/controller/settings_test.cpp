@@ -70,6 +70,9 @@ BOOST_AUTO_TEST_CASE(every_field_has_a_default_in_its_range_and_refuses_what_is_
   check_group<BarrierSettings>("controller: barriers.", [](ControllerSettings& s) -> auto& { return s.barriers; });
   check_group<SafetySettings>("controller: safety.", [](ControllerSettings& s) -> auto& { return s.safety; });
   check_group<ArrivalSettings>("controller: arrival.", [](ControllerSettings& s) -> auto& { return s.arrival; });
+  check_group<SpeedLimitSettings>("controller: speed_limits.", [](ControllerSettings& s) -> auto& {
+    return s.speed_limits ? *s.speed_limits : s.speed_limits.emplace();
+  });
   check_group<OnlinePlannerSettings>("controller: planner.", [](ControllerSettings& s) -> auto& { return *s.planner; });
   check_group<PlannerSettings>("controller: planner.search.", [](ControllerSettings& s) -> auto& { return s.planner->search; });
   check_group<TimedPathSettings>("controller: planner.route.", [](ControllerSettings& s) -> auto& { return s.planner->route; });
@@ -82,6 +85,9 @@ BOOST_AUTO_TEST_CASE(what_a_controller_cannot_do_is_refused_with_name_value_and_
   settings.barriers.floor = 0.02;
   settings.barriers.self_activation = 0.02;
   BOOST_TEST(message_of(settings).find("barriers.floor is 0.02") != std::string::npos);
+  settings = {};
+  settings.speed_limits = SpeedLimitSettings{0.25, 0.5, 1.5, 0.4};
+  BOOST_TEST(message_of(settings).find("near_distance is 0.5") != std::string::npos);
 
   JointLimits limits = test::arm_limits(test::nv);
   limits.effort.setConstant(test::infinity);

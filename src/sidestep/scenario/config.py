@@ -1,7 +1,8 @@
 """The section `controller` of a scenario file: the tree of `ControllerSettings`, as the core states it.
 
-A section is a mapping like that in a file, without what is at its default; None leaves an optional part out. Names have
-dots between their parts, as in `controller_settings_fields`, from where units, ranges, defaults and sentences come.
+A section is a mapping like that in a file, without what is at its default; None leaves an optional part out, and a
+mapping, however empty, adds one that is off by default. Names have dots between their parts, as in
+`controller_settings_fields`, from where units, ranges, defaults and sentences come.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from sidestep._core import ControllerSettings, controller_settings_fields
+from sidestep._core import ControllerSettings, SpeedLimitSettings, controller_settings_fields
 
 if TYPE_CHECKING:
     from sidestep.scenario.scenario import Scenario
@@ -21,7 +22,16 @@ Section: TypeAlias = dict[str, Any]
 MAX_LOOK_STEPS = 10_000  # of one predicted trajectory, of which a look draws hundreds
 ELSEWHERE = ("period", "synchronous")  # said by `simulation`, or by what runs the controller
 FIELDS: dict[str, dict[str, Any]] = {str(field["name"]): field for field in controller_settings_fields()}
-OPTIONAL = tuple(dict.fromkeys(name.partition(".")[0] for name, field in FIELDS.items() if field["optional"]))
+ADDED = {
+    "speed_limits": SpeedLimitSettings()
+}  # optional parts that are off by default, as they are once added
+OPTIONAL = tuple(
+    dict.fromkeys(
+        part
+        for name, field in FIELDS.items()
+        if field["optional"] and (part := name.partition(".")[0]) not in ADDED
+    )
+)
 ABLATIONS = {  # methods that are the controller without these parts
     "controller": (),
     "barrier": ("planner",),
@@ -49,13 +59,21 @@ def section_schema() -> dict[str, Any]:
         *parts, own = name.split(".")
         place, thing = whole, usual
         for part in parts:
-            thing = getattr(thing, part)
+            thing = _usual_part(thing, part)
             place = place["properties"].setdefault(part, _object(str(type(thing).__doc__).split("\n")[0]))
         place["properties"][own] = _number(field)
     for name in OPTIONAL:
         whole["properties"][name]["type"] = ["object", "null"]
         whole["properties"][name]["description"] += " null leaves it out."
+    for name in ADDED:
+        whole["properties"][name] |= {"type": ["object", "null"], "default": None}
     return whole
+
+
+def _usual_part(thing: Any, name: str) -> Any:
+    """A part of settings at their defaults, also one that is off."""
+    part = getattr(thing, name)
+    return ADDED[name] if part is None else part
 
 
 def _object(description: str) -> dict[str, Any]:
@@ -92,8 +110,10 @@ def section_of(values: Mapping[str, Any], within: str = "") -> Section:
     for key, value in values.items():
         if isinstance(value, Mapping):
             value = section_of(value, f"{within}{key}.")
-            if not value:
+            if not value and within + key not in ADDED:
                 continue
+        elif value is None and within + key in ADDED:
+            continue
         elif value is not None:
             usual = FIELDS[within + key]["default"]
             value = type(usual)(value)
@@ -151,7 +171,9 @@ def controller_settings_of(scenario: Scenario, *, synchronous: bool = True) -> C
 def made(usual: Any, values: Mapping[str, Any]) -> Any:
     """Settings of the class of `usual` with these values, mappings for their parts."""
     given = {
-        key: made(getattr(usual, key), value) if isinstance(value, Mapping) and hasattr(usual, key) else value
+        key: made(_usual_part(usual, key), value)
+        if isinstance(value, Mapping) and hasattr(usual, key)
+        else value
         for key, value in values.items()
     }
     try:

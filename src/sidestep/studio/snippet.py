@@ -27,6 +27,7 @@ _ROOMS = {
         "LookAheadSettings",
         "OnlinePlannerSettings",
         "PlannerSettings",
+        "SpeedLimitSettings",
         "TimedPathSettings",
         "TrackingSettings",
     ),

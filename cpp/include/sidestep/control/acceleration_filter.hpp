@@ -9,6 +9,7 @@ struct AccelerationFilterSettings {
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop q̈ = -v/stop_time [s]
   SafetySettings safety = {};
+  int max_speed_rows = 0;        ///< see TorqueControllerSettings
 };
 
 /// The acceleration nearest to a wanted one within the limits of joints and clearances, for motion without torque:
@@ -28,10 +29,11 @@ class AccelerationFilter {
     return apply(q, v, acceleration, clearances, {}, {}, solution);
   }
 
-  /// The same near the last command, and with the clearances at another state.
+  /// The same near the last command, with the clearances at another state and limits of Cartesian speed.
   [[nodiscard]] TorqueStatus apply(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration, const Clearances* clearances,
-                                   const SecondState& second, const LastCommand& last, TorqueSolution& solution) noexcept {
-    return controller_.solve(q, v, acceleration, unit_mass_, no_bias_, clearances, second, last, solution);
+                                   const SecondState& second, const LastCommand& last, TorqueSolution& solution,
+                                   const SpeedRows* speed = nullptr) noexcept {
+    return controller_.solve(q, v, acceleration, unit_mass_, no_bias_, clearances, second, last, solution, speed);
   }
 
   double period() const noexcept { return controller_.settings().period; }

@@ -8,6 +8,7 @@
 #include "sidestep/control/acceleration_bounds.hpp"
 #include "sidestep/control/quadratic_program.hpp"
 #include "sidestep/control/safety_rows.hpp"
+#include "sidestep/control/speed_rows.hpp"
 #include "sidestep/kinematics/robot.hpp"
 
 namespace sidestep {
@@ -16,7 +17,8 @@ namespace sidestep {
 enum class TorqueStatus {
   ok,                      ///< the wanted acceleration is tracked, no limit in the way
   limited,                 ///< optimal within the limits, and at least one of them is in the way
-  relaxed,                 ///< jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits
+  relaxed,                 ///< limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances,
+                           ///< position or torque limits
   relaxed_safety,          ///< not all clearances and position limits can be kept (see safety, slack)
   clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest
   fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
@@ -54,6 +56,8 @@ struct TorqueSolution {
   std::vector<SafetyRow> safety;                   ///< the first num_safety_rows, most critical first
   int num_safety_rows = 0;
   int dominant = -1;                               ///< the entry of `safety` that bends the motion most; -1 if none
+  int speed_frame = -1;                            ///< the frame whose speed limit bends the motion most; -1: none
+  double speed_slack = 0.0;                        ///< how far its row is missed [m/s²]; 0 unless limits of speed gave way
   /// The least of all clearances given [m], exact, also without a row; inf: none.
   double least_clearance = std::numeric_limits<double>::infinity();
   int least_coordinate = -1, least_nearest = -1;   ///< which clearance that is, and its nearest point; -1: none
@@ -95,6 +99,8 @@ struct TorqueControllerSettings {
   double acceleration_overrun = 10.0;
   /// What is kept of the clearances, where they are given.
   SafetySettings safety = {};
+  /// How many limits of Cartesian speed `solve` may be given, see SpeedRows::max_size.
+  int max_speed_rows = 0;
   /// Velocity and acceleration limits do not give way to clearances. For motion without torque, see AccelerationFilter.
   bool hard_bounds = false;
   /// Position limits are moved inwards by this much [rad | m].
@@ -116,14 +122,15 @@ struct TorqueControllerSettings {
 ///   subject to  M q̈ + h = torque                      (h: Coriolis, centrifugal and gravity forces)
 ///               |torque| <= effort limit
 ///               ∇h_k·q̈ >= required_k                   (clearances, see safety_rows.hpp)
+///               n_f·J_f q̈ <= allowed_f                  (Cartesian speed where it is limited, see speed_rows.hpp)
 ///               lower(q, v) <= q̈ <= upper(q, v)        (see acceleration_bounds.hpp)
 ///               |q̈ - last q̈| <= jerk limit T,   |torque - last torque| <= effort rate T,   where these are given
 ///
 /// The torque is eliminated by the first constraint. What is sacrificed, in this order: the task, which is the cost;
-/// jerk and torque rate; velocity and acceleration limits up to the overruns (unless hard_bounds); clearances; the overruns and position
+/// jerk and torque rate; limits of Cartesian speed, and of velocity and acceleration up to the overruns (unless hard_bounds); clearances; the overruns and position
 /// limits; torque limits never. A first program has every constraint hard. If it is infeasible, the same without jerk and torque rate is solved for the
 /// acceleration nearest to what they allow. If that is infeasible, a second one adds slack
-/// to the bounds, within a box of the overruns and of position limits, at the cost p's with a price p far above the
+/// to the bounds, and one slack to all limits of Cartesian speed, within a box of the overruns and of position limits, at the cost p's with a price p far above the
 /// task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
 /// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of
 /// those that are not below zero, then of those that are, w times their depth over the largest. What pulls two ways is
@@ -162,18 +169,20 @@ class TorqueController {
     return solve(q, v, acceleration, mass_matrix, bias, clearances, {}, {}, solution);
   }
 
-  /// The same near the last command, and with the clearances at another state.
+  /// The same near the last command, with the clearances at another state, and limits of Cartesian speed, of which no more
+  /// than max_speed_rows are kept; none if null.
   [[nodiscard]] TorqueStatus solve(ConstVectorRef q,
                                    ConstVectorRef v,
                                    ConstVectorRef acceleration,
                                    const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
                                    ConstVectorRef bias, const Clearances* clearances, const SecondState& second,
-                                   const LastCommand& last, TorqueSolution& solution) noexcept;
+                                   const LastCommand& last, TorqueSolution& solution,
+                                   const SpeedRows* speed = nullptr) noexcept;
 
   const TorqueControllerSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return nv_; }
-  /// The first program of the last solve that had usable input: rows of torque limits, then of clearances, without
-  /// bounds where they are not in use.
+  /// The first program of the last solve that had usable input: rows of torque limits, of clearances, and of
+  /// Cartesian speed, without bounds where they are not in use.
   const QuadraticProgramData& program() const noexcept { return hard_data_; }
   /// Number of solves, since construction, that ended with this status.
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
@@ -195,6 +204,10 @@ class TorqueController {
   /// Writes the torque rows: within the effort limits, and near the last torque unless null.
   void write_torque_rows(const LastCommand* last) noexcept;
   void write_cost() noexcept;
+  /// Writes the speed rows that the box does not satisfy, from row `first` on; their slack is variable `slack`, unless < 0.
+  void write_speed_rows(QuadraticProgramData& data, int first, int slack, const Eigen::VectorXd& lower,
+                        const Eigen::VectorXd& upper) const noexcept;
+  int num_speed_rows() const noexcept;
   /// The first program; smooth: within the limits of jerk and torque rate.
   bool solve_within_bounds(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth,
                            TorqueSolution& solution) noexcept;
@@ -218,6 +231,7 @@ class TorqueController {
   void report_clearance(const Clearances* clearances, TorqueSolution& solution) const noexcept;
   bool accept(TorqueSolution& solution) noexcept;
   void report_safety(TorqueSolution& solution) noexcept;
+  void report_speed(TorqueSolution& solution) const noexcept;
   /// Names the jerk limits that gave way.
   void report_jerk(TorqueSolution& solution) const noexcept;
   void stop(bool mass_known, TorqueSolution& solution) noexcept;
@@ -229,17 +243,20 @@ class TorqueController {
   Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
   AccelerationBounds bounds_;
   SafetyRows rows_;
+  const SpeedRows* speed_ = nullptr;               // of the solve under way
   QuadraticProgramData hard_data_;
   QuadraticProgram hard_;
   std::vector<int> rows_used_;                     // of rows_, in the programs after the first
   int num_rows_used_ = 0;
-  QuadraticProgramData comfort_data_;              // over (q̈, slack of the bounds)
+  int num_slacks_;                                 // of the bounds, and one of speed rows where there may be any
+  QuadraticProgramData comfort_data_;              // over (q̈, slacks)
   QuadraticProgram comfort_;
   QuadraticProgramData widening_data_;             // over (q̈, what it is outside the box)
   QuadraticProgram widening_;
   std::vector<LeastShortfall> least_;              // by number of rows, so that the usual few stay cheap
   Eigen::VectorXd allowed_;                        // shortfalls of the rows used
   Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
+  Eigen::VectorXd speed_multipliers_;              // of *speed_, >= 0
   Eigen::VectorXd wide_lower_, wide_upper_;        // box of the programs after the first
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd weighted_;                       // a column of the mass matrix, by the cost of torques

@@ -14,7 +14,8 @@ namespace sidestep {
 enum class SafetyStatus {
   ok,              ///< the motion is what the goal asks for
   limited,         ///< a limit of the arm or a clearance bends it
-  relaxed,         ///< jerk, torque rate, velocity or acceleration limits gave way to clearances, position or torque limits
+  relaxed,         ///< limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances, position
+                   ///< or torque limits
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
   stopping,        ///< the input is unusable or the program was not solved: a damped stop
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
@@ -56,6 +57,11 @@ struct Command {
   int coordinate = -1;  ///< whose clearance that is, see Controller::labels; -1: none within reach
   int point = -1;       ///< the obstacle point, where it is one
   int bound_by = -1;    ///< the coordinate whose clearance row bends the motion most; -1: none
+  /// to the nearest obstacle [m], exact up to speed_limits.far_distance; inf: farther, or without these settings; NaN: the
+  /// state is unknown
+  double distance = std::numeric_limits<double>::infinity();
+  double speed = 0.0;  ///< of the arm's fastest frame [m/s]; NaN: unknown
+  double speed_limit = std::numeric_limits<double>::infinity();  ///< for every frame [m/s]; inf: none; NaN: unknown
   std::vector<Limit> limits;  ///< (nv) the limits in the way of each joint
 
   StepStatus system = StepStatus::invalid_state;  ///< of the geometric system

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sidestep/control/safety_rows.hpp"
+#include "sidestep/control/speed_rows.hpp"
 #include "sidestep/system/local_minimum_recovery.hpp"
 #include "sidestep/lookahead/look_ahead.hpp"
 #include "sidestep/fields.hpp"
@@ -53,7 +54,7 @@ struct TrackingSettings {
   double drift_gain = 2.0;       ///< of the output of velocity: v = v_r + gain (q_r − q) [1/s]
 };
 
-/// All settings of a Controller. Every part is on by default; an empty optional leaves a part out, for comparisons.
+/// All settings of a Controller. Every part but speed_limits is on by default; an empty optional leaves a part out.
 struct ControllerSettings {
   /// What is sent to the arm. Torque and acceleration are tracked by the controller, from the measured state; position and
   /// velocity by the arm's own drives. Automatic: torque where the arm has inertias and effort limits, else acceleration.
@@ -79,6 +80,8 @@ struct ControllerSettings {
   SafetySettings safety = {};
   ArrivalSettings arrival = {};
   TrackingSettings tracking = {};
+  /// limits of Cartesian speed by the distance to obstacles; without them only joint velocities are limited
+  std::optional<SpeedLimitSettings> speed_limits = std::nullopt;
   std::optional<OnlinePlannerSettings> planner = OnlinePlannerSettings{};
   std::optional<LookAheadSettings> look_ahead = LookAheadSettings{};
   /// sub-goals where the arm is stuck without a path

@@ -130,6 +130,9 @@ class BodyClearance {
   Nearest nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap,
                   Workspace& w) const noexcept;
 
+  /// The same of the obstacles alone, without planes and pairs.
+  Nearest nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
+
   /// The clearance of every item, not above `cap` [m], into out (num_items).
   void clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
