@@ -157,6 +157,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       model_bias_(q_),
       speed_rows_(arm.robot()),
       arm_speed_rows_(speed_rows_),
+      leader_(arm.robot()),
       frequency_(std::min(settings.tracking.frequency, most_per_period / settings.period)),
       arm_workspace_(*system),
       tracked_(arm.num_coordinates(), settings.safety.max_rows),

@@ -112,6 +112,7 @@ class Controller::Impl {
   void track(MassMatrix mass_matrix, Bias bias) noexcept;
   const KinematicState& arm_state() const noexcept { return apart_ ? arm_workspace_.state() : workspace.state(); }
   void limit_speed() noexcept;
+  void limit_pace(double limit) noexcept;
   std::string explain_speed() const;
   void stop(MassMatrix mass_matrix, Bias bias, ConstVectorRef q, ConstVectorRef v) noexcept;
   void advance_reference() noexcept;
@@ -178,6 +179,7 @@ class Controller::Impl {
   std::optional<DisturbanceObserver> observer_;
   SpeedRows speed_rows_, arm_speed_rows_;       // of the reference, of the arm
   int nearest_point_ = -1;                      // of obstacles
+  KinematicState leader_;                       // the reference on the planner's path
   double frequency_ = 0.0;                      // of the feedback [1/s]
   GeometricSystem::Workspace arm_workspace_;
   TorqueSolution tracked_;

@@ -11,6 +11,9 @@ namespace {
 
 // What comes is taken to come no faster [m/s], whatever a new scene seems to say: the speed of walking of ISO 13855.
 constexpr double walking = 1.6;
+// In which the pace along a path is slowed: as rows slow the arm, the reference would run ahead, and corners be cut.
+constexpr double foresight = 0.1;   // [s]
+constexpr double of_limit = 0.95;  // below that of the rows
 
 }  // namespace
 
@@ -26,6 +29,7 @@ void Controller::Impl::limit_speed() noexcept {
   const BodyClearance::Nearest nearest = body_.nearest_obstacle(arm_q_, obstacles(), far, here_);
   const double now = nearest.clearance, closing = std::clamp(before - now, 0.0, (command.speed + walking) * settings.period);
   nearest_point_ = nearest.point;
+  limit_pace(limits.allowed(now - closing / settings.period * foresight));
   command.distance = now < far ? now : infinity;
   command.speed_limit = limits.allowed(now);
   const double next = limits.allowed(now - closing);
@@ -33,6 +37,15 @@ void Controller::Impl::limit_speed() noexcept {
   if (apart_) {
     arm_speed_rows_.update(state, arm.robot().limits(), command.speed_limit, next, settings.period);
   }
+}
+
+void Controller::Impl::limit_pace(double limit) noexcept {
+  if (!guide || followed_ != &reference_) {
+    return;
+  }
+  leader_.update(arm.robot(), attractor_.position, attractor_.velocity);
+  const double speed = speed_rows_.fastest(leader_).speed, pace = guide->following().follower.pace;
+  guide->limit_pace(pace > 0.0 && speed > of_limit * limit * pace ? of_limit * limit * pace / speed : 1.0);
 }
 
 std::string Controller::Impl::explain_speed() const {

@@ -82,12 +82,12 @@ void TimedPathFollower::advance(const TimedPath& route, const TimedPathSettings&
   read();
   // Full pace up to half the lead, none from the whole of it.
   const double lag = (position - q).norm();
-  const double wanted = std::clamp(2.0 - 2.0 * lag / settings.lead, 0.0, 1.0);
+  const double wanted = std::clamp(2.0 - 2.0 * lag / settings.lead, 0.0, std::min(most, 1.0));
   double low = -most_change, high = most_change;
   for (Eigen::Index j = 0; j < position.size(); ++j) {
-    const double rate = velocity[j], most = route.limits.acceleration[j];
+    const double rate = velocity[j], limit = route.limits.acceleration[j];
     if (std::abs(rate) > 1e-6) {
-      const double now = acceleration[j] * pace * pace, a = (-most - now) / rate, b = (most - now) / rate;
+      const double now = acceleration[j] * pace * pace, a = (-limit - now) / rate, b = (limit - now) / rate;
       low = std::max(low, std::min(a, b));
       high = std::min(high, std::max(a, b));
     }

@@ -96,6 +96,9 @@ class OnlinePlanner {
   /// is `invalid`. Never blocks; allocates nothing unless synchronous.
   [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Attractor& attractor) noexcept;
 
+  /// The pace that the reference may go at along the path at most, see TimedPathFollower; from the loop.
+  void limit_pace(double most) noexcept { follower_.most = most; }
+
   /// For a synchronous planner: ends a search under way once it says so, as if time ran out.
   void interrupt_when(Interrupted interrupted) {
     if (settings_.synchronous) {

@@ -54,6 +54,7 @@ struct TimedPathFollower {
   double pace = 1.0;     ///< r, how fast that goes, in [0, 1]
   double change = 0.0;   ///< dr/dt [1/s]
   double station = 0.0;  ///< where it is then [rad]
+  double most = 1.0;     ///< r that is allowed, >= 0
 
   /// Onto a new path, at the sample nearest to q in the first radian, as fast as the arm moves along it at v (nv).
   void enter(const TimedPath& route, ConstVectorRef q, ConstVectorRef v) noexcept;
@@ -65,7 +66,7 @@ struct TimedPathFollower {
 
   /// Moves on for `duration` [s]; writes the reference, its velocity and its acceleration (nv). The pace r follows
   ///
-  ///     r* = min(1, 2 − 2 |q − q*| / lead)₊
+  ///     r* = min(1, most, 2 − 2 |q − q*| / lead)₊
   ///
   /// as a critically damped spring of 20 rad/s, its change kept where q̈ r² + q̇ dr/dt is within the path's limits.
   void advance(const TimedPath& route, const TimedPathSettings& settings, ConstVectorRef q, double duration,
