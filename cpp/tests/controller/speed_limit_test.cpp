@@ -1,9 +1,11 @@
 // Cartesian speed by the distance to obstacles, in motions of the whole controller.
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "sidestep/controller/controller.hpp"
 #include "support/allocations.hpp"
@@ -156,4 +158,33 @@ BOOST_AUTO_TEST_CASE(speed_limits_give_way_to_what_comes_at_the_arm) {
                                       << " words " << motion.words);
     }
   }
+}
+
+BOOST_AUTO_TEST_CASE(the_limit_is_held_on_a_path_of_the_planner_without_allocations) {
+  const Arm arm = covered_arm(test::arm_limits(nv));
+  ControllerSettings settings;
+  settings.speed_limits = SpeedLimitSettings{0.2, 0.1, 0.5, 1.0};
+  Controller controller(arm, settings);
+  const Eigen::Vector3d tip = frames_at(arm.robot(), turned(0.0), Eigen::VectorXd::Zero(nv)).tip;
+  controller.set_obstacles(test::ball(tip + Eigen::Vector3d(0.15, 0.0, 0.0), 0.03));
+  controller.set_goal(turned(1.2));
+  Eigen::VectorXd q = turned(-1.2), v = Eigen::VectorXd::Zero(nv);
+  std::size_t allocations = 0;
+  int on_path = 0, slowed = 0;
+  bool arrived = false;
+  for (int k = 0; k < 40000 && !arrived; ++k) {
+    allocations += test::allocations_of([&] { controller.step(q, v); });
+    const Command& command = controller.command();
+    BOOST_REQUIRE(command.speed <= command.speed_limit);
+    on_path += command.on_path;
+    slowed += controller.solution().speed_frame >= 0;
+    arrived = command.activity == Activity::arrived;
+    v += settings.period * command.acceleration;
+    q += settings.period * v;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));  // for the planner
+  }
+  BOOST_TEST(allocations == 0U);
+  BOOST_TEST(arrived);
+  BOOST_TEST(on_path > 100);
+  BOOST_TEST(slowed > 0);
 }
