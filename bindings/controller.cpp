@@ -51,6 +51,7 @@ void bind_settings_tree(nb::module_& m) {
       m, "SpeedLimitSettings",
       "Limits of Cartesian speed by the distance d to the nearest obstacle, of every frame of the arm (speed and separation): between\n"
       "near and far V^2 = near_speed^2 + (far_speed^2 - near_speed^2) (d - near_distance)/(far_distance - near_distance), [m/s].");
+  bind_settings<InputSettings>(m, "InputSettings", "How velocities, twists and trajectories are followed, see Controller.");
   bind_settings<OnlinePlannerSettings>(
       m, "OnlinePlannerSettings", "The planner that runs beside the loop: how it searches, and how its paths are followed.",
       {part("search", "PlannerSettings", &OnlinePlannerSettings::search), part("route", "TimedPathSettings", &OnlinePlannerSettings::route)})
@@ -75,6 +76,7 @@ void bind_settings_tree(nb::module_& m) {
       {part("barriers", "BarrierSettings", &S::barriers), part("safety", "SafetySettings", &S::safety),
        part("arrival", "ArrivalSettings", &S::arrival), part("tracking", "TrackingSettings", &S::tracking),
        part("speed_limits", "SpeedLimitSettings | None", &S::speed_limits),
+       part("inputs", "InputSettings", &S::inputs),
        part("planner", "OnlinePlannerSettings | None", &S::planner),
        part("look_ahead", "LookAheadSettings | None", &S::look_ahead),
        part("local_minimum", "LocalMinimumSettings | None", &S::local_minimum),
@@ -83,6 +85,7 @@ void bind_settings_tree(nb::module_& m) {
       .def_rw("safety", &S::safety)
       .def_rw("arrival", &S::arrival)
       .def_rw("tracking", &S::tracking)
+      .def_rw("inputs", &S::inputs)
       .def_rw("output", &S::output)
       .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.")
       .def("__copy__", [](const S& s) { return S(s); });
@@ -101,6 +104,7 @@ void bind_settings_tree(nb::module_& m) {
         describe_fields<ArrivalSettings>(rows, "arrival.");
         describe_fields<TrackingSettings>(rows, "tracking.");
         describe_fields<SpeedLimitSettings>(rows, "speed_limits.", true);
+        describe_fields<InputSettings>(rows, "inputs.");
         describe_fields<OnlinePlannerSettings>(rows, "planner.", true);
         describe_fields<PlannerSettings>(rows, "planner.search.", true);
         describe_fields<TimedPathSettings>(rows, "planner.route.", true);
@@ -114,6 +118,9 @@ void bind_settings_tree(nb::module_& m) {
 }
 
 void bind_command(nb::module_& m) {
+  nb::enum_<TrajectoryBehaviour>(m, "TrajectoryBehaviour", "What a Controller does with a trajectory where something is in the way.")
+      .value("keep_path", TrajectoryBehaviour::keep_path, "Stay on the path: slow down and wait before what blocks it, go on when it is free.")
+      .value("steer", TrajectoryBehaviour::steer, "Go around, and rejoin.");
   nb::enum_<SafetyStatus>(m, "SafetyStatus", nb::is_arithmetic(), "How safe a command is, by severity. Every command may be sent.")
       .value("ok", SafetyStatus::ok, "The motion is what the goal asks for.")
       .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
@@ -122,9 +129,9 @@ void bind_command(nb::module_& m) {
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");
   nb::enum_<Activity>(m, "Activity", "What a controller is about.")
-      .value("no_goal", Activity::no_goal, "None was given: the arm comes to rest, and evades.")
-      .value("moving", Activity::moving, "On the way to its goal.")
-      .value("waiting", Activity::waiting, "Until a posture is found.")
+      .value("no_goal", Activity::no_goal, "None was given, or no velocity for a while: the arm comes to rest, and evades.")
+      .value("moving", Activity::moving, "On the way to its goal, or as it is told.")
+      .value("waiting", Activity::waiting, "Until a posture is found, or a trajectory that it keeps to is free.")
       .value("arrived", Activity::arrived, "The goal is reached.")
       .value("blocked", Activity::blocked, "No way leads to the goal now, see Controller.explain.")
       .value("stale", Activity::stale, "The obstacles are older than obstacle_timeout: the arm stops.");
@@ -149,6 +156,8 @@ void bind_command(nb::module_& m) {
       .def_prop_ro("rotors", [](const Command& c) { return to_numpy(c.rotors); },
                    "(nv,) inertia that it found and the model lacks [kg m^2 | kg].")
       .def_ro("tracking_error", &Command::tracking_error, "Largest difference of the arm from the reference [rad | m].")
+      .def_ro("deviation", &Command::deviation, "Of the reference from a trajectory, in the farthest joint [rad | m].")
+      .def_ro("delay", &Command::delay, "How far the trajectory's clock is behind [s].")
       .def_ro("clearance", &Command::clearance, "The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.")
       .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")
       .def_ro("point", &Command::point, "The obstacle point, where it is one; else -1.")
@@ -195,6 +204,37 @@ void bind_controller(nb::module_& m) {
           nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal) -> None"),
           "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose. Raises\n"
           "ValueError that names the joint, its value and what is allowed; the goal before stays.")
+      .def(
+          "set_velocity",
+          [](Controller& self, nb::handle v) { self.set_velocity(as_vector(v, "v", self.arm().num_coordinates())); },
+          nb::arg("v"), nb::sig("def set_velocity(self, v: numpy.typing.ArrayLike) -> None"),
+          "Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. Obstacles steer the\n"
+          "arm around them and stop it. After `inputs.timeout` without another order the arm stops. Raises ValueError that\n"
+          "names the joint and what is allowed; the order before stays.")
+      .def(
+          "set_twist",
+          [](Controller& self, const std::string& frame, nb::handle twist, bool local) {
+            self.set_twist(frame, Vector6d(as_vector(twist, "twist", 6)), local);
+          },
+          nb::arg("frame"), nb::arg("twist"), nb::arg("local") = false,
+          nb::sig("def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False) -> None"),
+          "The same for the twist (6,) of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of\n"
+          "the world or, `local`, its own; rows as in `Robot.jacobian`. The arm slides along singular configurations and limits.\n"
+          "Raises ValueError that lists the frames that there are.")
+      .def(
+          "set_trajectory",
+          [](Controller& self, nb::handle q, nb::handle times, nb::handle behaviour) {
+            const Eigen::VectorXd at = as_vector(times, "times");
+            const Eigen::MatrixXd rows = as_matrix(q, "q", at.size(), self.arm().num_coordinates());
+            self.set_trajectory(rows.transpose(), at, as_enum<TrajectoryBehaviour>(behaviour, "behaviour"));
+          },
+          nb::arg("q"), nb::arg("times"), nb::arg("behaviour") = "keep_path",
+          nb::sig("def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, "
+                  "behaviour: TrajectoryBehaviour | str = 'keep_path') -> None"),
+          "Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing; cubics between them. A first\n"
+          "time after zero leaves that long to get to the first sample, which need not be where the arm is. `keep_path` slows\n"
+          "down and waits before what blocks the path, `steer` goes around and rejoins; `command.deviation` and `command.delay`\n"
+          "say how far off and behind it is. Raises ValueError that names sample, joint, value and what is allowed.")
       .def("clear_goal", &Controller::clear_goal, "The arm comes to rest where it is, and goes on evading.")
       .def(
           "set_obstacles", [](Controller& self, nb::handle obstacles) { self.set_obstacles(as_obstacles(obstacles)); },

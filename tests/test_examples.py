@@ -73,7 +73,7 @@ def test_06_merged_points_cover_the_cloud() -> None:
 
 
 def test_examples_are_short_and_say_what_they_show() -> None:
-    for path in sorted(EXAMPLES.glob("0*.py")):
+    for path in sorted(EXAMPLES.glob("[0-9]*.py")):
         text = path.read_text(encoding="utf-8")
         assert text.startswith('"""'), path.name
         assert len(text.splitlines()) < 80, path.name
@@ -95,3 +95,26 @@ def test_07_is_as_short_as_it_says() -> None:
         text = (EXAMPLES / name).read_text(encoding="utf-8").split('"""')[-1]
         lines = [line for line in text.splitlines() if line.strip() and not line.strip().startswith(comment)]
         assert len(lines) <= most, name
+
+
+def test_08_the_filter_keeps_off_the_ball() -> None:
+    output = run("08")
+    assert number_after("clearance at least", output) > 0.0
+
+
+def test_09_the_hand_has_its_twist() -> None:
+    numbers = [float(x) for x in re.findall(r"-?\d+\.\d*", run("09"))]
+    assert numbers == pytest.approx([0.0, 0.1, 0.0, 0.0, 0.0, 0.2], abs=0.005)
+
+
+def test_10_the_trajectory_arrives_on_its_path() -> None:
+    output = run("10")
+    assert "arrived" in output
+    assert number_after("at most", output) < 1.0  # [mrad]
+
+
+@pytest.mark.parametrize("number", ["08", "09", "10"])
+def test_hello_worlds_of_inputs_have_at_most_12_lines(number: str) -> None:
+    (path,) = EXAMPLES.glob(f"{number}_*.py")
+    lines = [line for line in path.read_text(encoding="utf-8").split('"""')[-1].splitlines() if line.strip()]
+    assert len(lines) <= 12

@@ -16,6 +16,7 @@
 namespace sidestep {
 namespace {
 
+constexpr double usable_acceleration = 0.9;   // of the limits, for velocities, twists and trajectories: the rest is for feedback
 constexpr double feedback_room = 20.0;        // of accelerations: dry friction on a light wrist takes so much
 constexpr double most_per_period = 0.2;       // of the feedback's frequency: a slow rate holds its torques for long
 constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
@@ -112,6 +113,8 @@ Controller::Impl::Snapshot::Snapshot(const Arm& arm, const AvoidanceTrajectory& 
     : q(Eigen::VectorXd::Zero(arm.num_coordinates())),
       v(q),
       followed(q),
+      begin_q(q),
+      begin_v(q),
       places(Eigen::MatrixXd::Zero(q.size(), TimedPathFollower::most_places + 1)),
       trajectory(flight) {}
 
@@ -169,6 +172,24 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       attractor_(q_.size()),
       reference_(JointGoal(q_)),
       refuge_(JointGoal(q_)),
+      input_goal_(JointGoal(q_)),
+      input_pull_(JointGoal(q_)),
+      wanted_v_(q_),
+      last_wanted_v_(q_),
+      weights_(q_),
+      twist_state_(arm.robot()),
+      jacobian_transposed_(Eigen::MatrixXd::Zero(q_.size(), 6)),
+      most_v_(settings.speed * (1.0 - settings.velocity_margin) * arm.robot().limits().velocity),
+      most_a_(settings.speed * usable_acceleration * arm.robot().limits().acceleration),
+      begin_q_(q_),
+      begin_v_(q_),
+      path_q_(q_),
+      path_v_(q_),
+      path_a_(q_),
+      seen_q_(q_),
+      seen_v_(q_),
+      seen_a_(q_),
+      path_step_(q_),
       trajectory_(at_rest(arm)),
       places_(Eigen::MatrixXd::Zero(q_.size(), TimedPathFollower::most_places + 1)),
       lowered_places_(places_),

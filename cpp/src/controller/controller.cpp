@@ -42,10 +42,14 @@ void Controller::Impl::set_goal(std::optional<Goal> goal) {
       pose.settings.orientation_stiffness = pose_rotation_share * settings.barriers.stiffness;
     }
   }
+  put(goal ? Order(std::move(*goal)) : Order());
+}
+
+void Controller::Impl::put(Order order) {
   const std::lock_guard lock(mutex_);
-  shown_goal_ = goal;
+  shown_order_ = order;
   shown_posture_.reset();
-  goal_orders_.put({++goal_count_, std::move(goal)});
+  goal_orders_.put({++goal_count_, std::move(order)});
 }
 
 void Controller::Impl::set_obstacles(Obstacles obstacles) {
@@ -72,6 +76,11 @@ void Controller::set_goal(const Eigen::VectorXd& position) {
   impl_->set_goal(std::optional<Goal>(std::in_place, JointGoal(position)));
 }
 void Controller::set_goal(Goal goal) { impl_->set_goal(std::move(goal)); }
+void Controller::set_velocity(const Eigen::VectorXd& v) { impl_->set_velocity(v); }
+void Controller::set_twist(const std::string& frame, const Vector6d& twist, bool local) { impl_->set_twist(frame, twist, local); }
+void Controller::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour) {
+  impl_->set_trajectory(q, times, behaviour);
+}
 void Controller::clear_goal() { impl_->set_goal(std::nullopt); }
 void Controller::set_obstacles(Obstacles obstacles) { impl_->set_obstacles(std::move(obstacles)); }
 

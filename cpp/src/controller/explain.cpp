@@ -35,6 +35,16 @@ std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
 
 Eigen::VectorXd Controller::Impl::target() const { return has_target_ ? Eigen::VectorXd(target_ - turns_) : Eigen::VectorXd(); }
 
+std::string Controller::Impl::explain_input() const {
+  std::string words = trajectory_order() ? "follows a trajectory" : "moves at the velocity that it is told";
+  if (command.bound_by >= 0) {
+    const CoordinateLabel& label = system->labels()[static_cast<std::size_t>(command.bound_by)];
+    words += ", bent by the clearance of " +
+             parties(label, command.bound_by == command.coordinate ? obstacles().words_for(command.point) : "an obstacle");
+  }
+  return words;
+}
+
 std::string Controller::Impl::explain() const {
   std::string text;
   if (command.status == SafetyStatus::stopping) {
@@ -59,6 +69,13 @@ std::string Controller::Impl::explain() const {
     }
   }
   text += explain_speed();
+  const std::string trajectory = explain_trajectory();
+  if (!trajectory.empty() && command.activity != Activity::stale) {
+    if (command.activity == Activity::waiting) {
+      return text + "waiting: " + trajectory;
+    }
+    text += trajectory + "; ";
+  }
   switch (command.activity) {
     case Activity::no_goal: return text + "no goal: it holds still, and evades what comes";
     case Activity::stale: return text + "stopped: the obstacles are " + std::to_string(obstacle_age_) +
@@ -108,6 +125,9 @@ std::string Controller::Impl::explain() const {
   }
   if (has_sub_goal()) {
     text += "leaves a local minimum by a sub-goal; ";
+  }
+  if (has_input()) {
+    return text + explain_input();
   }
   if (command.on_path) {
     text += "follows a path; ";

@@ -9,6 +9,7 @@
 #include <optional>
 #include <semaphore>
 #include <thread>
+#include <variant>
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
@@ -31,6 +32,9 @@ class Controller::Impl {
   ~Impl();
 
   void set_goal(std::optional<Goal> goal);
+  void set_velocity(const Eigen::VectorXd& v);
+  void set_twist(const std::string& frame, const Vector6d& twist, bool local);
+  void set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour);
   void set_obstacles(Obstacles obstacles);
   const Obstacles& obstacles() const noexcept { return obstacle_orders_.current().obstacles; }
   const Command& step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
@@ -48,10 +52,24 @@ class Controller::Impl {
   bool torque = false;
 
  private:
-  /// A goal as it was set, with its number: 0 is none.
+  struct VelocityOrder {
+    Eigen::VectorXd velocity;
+  };
+  struct TwistOrder {
+    Frame frame;
+    Vector6d twist;
+    bool local;
+  };
+  struct TrajectoryOrder {
+    JointTrajectory path;
+    TrajectoryBehaviour behaviour;
+  };
+  /// What the arm is to do, as it was set.
+  using Order = std::variant<std::monostate, Goal, VelocityOrder, TwistOrder, TrajectoryOrder>;
+  /// With its number: 0 is none.
   struct GoalOrder {
     std::uint64_t number = 0;
-    std::optional<Goal> goal;
+    Order order;
   };
   struct ObstacleOrder {
     std::uint64_t number = 0;
@@ -67,6 +85,9 @@ class Controller::Impl {
     std::uint64_t obstacle_number = 0;
     double obstacle_age = 0.0;
     JointGoal followed;                  // the reference of the step
+    bool on_trajectory = false;          // of the order, which began there, and whose clock is there
+    Eigen::VectorXd begin_q, begin_v;
+    double clock = 0.0, rate = 0.0;
     bool by_pose = false;                // the pose goal itself is followed, as it moves
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // where it is now
     OnlinePlanner::Following following;
@@ -93,6 +114,8 @@ class Controller::Impl {
     AvoidanceTrajectory trajectory;
   };
 
+  void put(Order order);
+
   // Of the step.
   bool take_state(ConstVectorRef q, ConstVectorRef v) noexcept;
   void take_orders() noexcept;
@@ -101,6 +124,22 @@ class Controller::Impl {
   void take_posture(const Posture& posture) noexcept;
   void choose_reference() noexcept;
   void leave_room(bool looks) noexcept;
+  const TrajectoryOrder* trajectory_order() const noexcept { return std::get_if<TrajectoryOrder>(&goal_orders_.current().order); }
+  bool is_fresh() const noexcept { return order_age_ <= settings.inputs.timeout; }
+  /// Velocity, twist or trajectory, while no goal has taken its place.
+  bool has_input() const noexcept { return goal_ == &input_goal_ && moves_; }
+  void begin_input() noexcept;
+  void follow_input() noexcept;
+  void follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept;
+  void solve_twist(const TwistOrder& order) noexcept;
+  void scale_to_limits(Eigen::VectorXd& velocity) const noexcept;
+  void begin_trajectory(TrajectoryOrder& order) noexcept;
+  void follow_trajectory(const TrajectoryOrder& order) noexcept;
+  void run_clock(const TrajectoryOrder& order) noexcept;
+  void look_along(const JointTrajectory& path, double window) noexcept;
+  bool keeps_path() const noexcept { return pulls_ && trajectory_order() && trajectory_order()->behaviour == TrajectoryBehaviour::keep_path; }
+  std::string explain_trajectory() const;
+  std::string explain_input() const;
   void avoid() noexcept;
   using MassMatrix = const Eigen::Ref<const Eigen::MatrixXd>*;
   using Bias = const Eigen::Ref<const Eigen::VectorXd>*;
@@ -141,6 +180,7 @@ class Controller::Impl {
   Posture search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles,
                          std::uint64_t attempt, std::uint64_t goal_number);
   LookAhead::Leader leader_of(const OnlinePlanner::Following& following) const;
+  static LookAhead::Leader leader_of(JointTrajectory path, double clock, double rate);
   /// Writes activation distances that leave room at places; whether the last of them is inside a barrier.
   bool lower_at(const Eigen::MatrixXd& places, Eigen::Index num, const Obstacles& obstacles,
                 GeometricSystem::Workspace& workspace, Eigen::VectorXd& activations) const noexcept;
@@ -153,7 +193,7 @@ class Controller::Impl {
   TripleBuffer<FoundPosture> postures_;
   TripleBuffer<FoundTrajectory> trajectories_;
   mutable std::mutex mutex_;  // of what follows; the step never takes it unless synchronous
-  std::optional<Goal> shown_goal_;
+  Order shown_order_;
   std::uint64_t goal_count_ = 0, obstacle_count_ = 0;
   std::shared_ptr<const Obstacles> shown_obstacles_;
   std::optional<Posture> shown_posture_;
@@ -199,6 +239,25 @@ class Controller::Impl {
   Goal reference_;                // JointGoal
   const Goal* followed_ = nullptr;
   Goal refuge_;                   // JointGoal: the target of the trajectory
+  // Of velocities, twists and trajectories.
+  Goal input_goal_;               // JointGoal: where and how the arm is to move now
+  Goal input_pull_;               // JointGoal whose pull is the acceleration that is wanted for that
+  bool pulls_ = false, begins_input_ = false, waits_ = false;
+  double order_age_ = 0.0;        // [s]
+  Eigen::VectorXd wanted_v_, last_wanted_v_, weights_;
+  bool has_last_wanted_v_ = false;
+  KinematicState twist_state_;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_;
+  Eigen::VectorXd most_v_, most_a_;  // limits that motions use
+  struct Clock {
+    double time = 0.0, rate = 0.0, change = 0.0;   // s [s], ds/dt, d²s/dt² [1/s]
+    double free = 0.0, seen = -1.0;                // the path is free up to there; it is looked at there
+    double delay = 0.0;                            // behind time, at the end the last [s]
+    double room = 0.0;                             // clearance that is asked for [m]
+    bool blocked = false;
+    BodyClearance::Nearest blocker{};
+  } clock_;
+  Eigen::VectorXd begin_q_, begin_v_, path_q_, path_v_, path_a_, seen_q_, seen_v_, seen_a_, path_step_;
   bool avoiding_ = false, pending_ = false;
   AvoidanceTrajectory trajectory_;
   Eigen::VectorXd own_activations_;

@@ -67,6 +67,13 @@ void Controller::Impl::choose_reference() noexcept {
     reference.velocity.setZero();
     reference.acceleration.setZero();
   };
+  if (begins_input_) {
+    begin_input();
+  }
+  pulls_ = waits_ = false;
+  if (has_input() && !is_stale()) {
+    follow_input();
+  }
   if (begins_goal_) {
     begin_goal();
   }
@@ -194,9 +201,12 @@ void Controller::Impl::avoid() noexcept {
   }
   if (settings.synchronous) {
     guarded([&] {
-      const LookAhead::Leader leader = evasion_->is_due(settings.period) && guide && followed_ == &reference_
-                                         ? leader_of(guide->following())
-                                         : LookAhead::Leader{};
+      LookAhead::Leader leader;
+      if (evasion_->is_due(settings.period) && pulls_ && trajectory_order()) {
+        leader = leader_of(trajectory_order()->path, clock_.time, clock_.rate);
+      } else if (evasion_->is_due(settings.period) && guide && has_target_ && followed_ == &reference_) {
+        leader = leader_of(guide->following());
+      }
       const AvoidanceTrajectory* found = evasion_->pursue(*followed_, q_, v_, obstacles(), settings.period, leader);
       avoiding_ = found != nullptr;
       if (avoiding_) {

@@ -64,6 +64,21 @@ const std::vector<Field<TrackingSettings>>& fields() {
 }
 
 template <>
+const std::vector<Field<InputSettings>>& fields() {
+  using S = InputSettings;
+  static const std::vector<Field<S>> all{
+      {"response", &S::response, "1/s", 1.0, 100.0, "to a velocity that is wanted: larger is quicker, and passes on its noise"},
+      {"timeout", &S::timeout, "s", 0.001, none, "age from which a velocity or a twist counts as zero"},
+      {"singular", &S::singular, "-", 1e-4, 1.0,
+       "singular value of a frame's Jacobian [m and rad] below which a twist is damped: larger is calmer and less exact there"},
+      {"frequency", &S::frequency, "1/s", 1.0, 50.0, "of the return to a trajectory: larger is stiffer"},
+      {"lead", &S::lead, "rad", 0.001, 10.0,
+       "error from which a trajectory slows down, to a halt at twice as much; of sliding joints a fifth [m]"},
+  };
+  return all;
+}
+
+template <>
 const std::vector<Field<OnlinePlannerSettings>>& fields() {
   using S = OnlinePlannerSettings;
   static const std::vector<Field<S>> all{
@@ -107,6 +122,7 @@ void ControllerSettings::validate() const {
   check_fields("controller: safety.", safety);
   check_fields("controller: arrival.", arrival);
   check_fields("controller: tracking.", tracking);
+  check_fields("controller: inputs.", inputs);
   if (!(barriers.floor < barriers.activation && barriers.floor < barriers.self_activation)) {
     throw std::invalid_argument("controller: barriers.floor is " + std::to_string(barriers.floor) +
                                 " m, allowed: below barriers.activation and barriers.self_activation");

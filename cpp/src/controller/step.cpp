@@ -31,12 +31,14 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   choose_reference();
   leave_room(looks);
   avoid();
-  const Goal& goal = avoiding_ ? refuge_ : *followed_;
+  const Goal& goal = avoiding_ ? refuge_ : pulls_ ? input_pull_ : *followed_;
   const StepStatus status = system->acceleration(q_, v_, goal, obstacles(), workspace);
   command.system = status;
   wanted_ = workspace.acceleration;
   if (avoiding_ && !is_fallback(status)) {
     trajectory_.acceleration(q_, v_, settings.period, wanted_);
+  } else if (keeps_path() && !is_fallback(status)) {
+    wanted_ = std::get<JointGoal>(input_pull_).acceleration + workspace.recovery;
   }
   if (is_stale()) {
     wanted_ = -v_ / settings.stop_time;
@@ -70,7 +72,9 @@ void Controller::Impl::take_orders() noexcept {
   }
   if (goal_orders_.update()) {
     GoalOrder& order = goal_orders_.current();
-    goal_ = order.goal ? &*order.goal : nullptr;
+    goal_ = std::get_if<Goal>(&order.order);
+    order_age_ = 0.0;
+    begins_input_ = goal_ == nullptr && order.order.index() != 0;
     goal_number_ = order.number;
     has_target_ = posture_found_ = false;
     target_blocked_ = false;
@@ -80,8 +84,15 @@ void Controller::Impl::take_orders() noexcept {
     num_lowered_ = -1;
     next_posture_ = 0.0;
     begins_goal_ = goal_ != nullptr;  // where the state is known
-  } else if (goal_ != nullptr && moves_) {
-    advance(*goal_, settings.period);
+    if (begins_input_) {
+      goal_ = &input_goal_;
+      moves_ = true;
+    }
+  } else {
+    order_age_ += settings.period;
+    if (goal_ != nullptr && moves_ && !has_input()) {
+      advance(*goal_, settings.period);
+    }
   }
 }
 
@@ -94,6 +105,11 @@ void Controller::Impl::report(bool known) noexcept {
   if (observer_) {
     command.disturbance = observer_->disturbance();
     command.rotors = observer_->rotors();
+  }
+  command.deviation = command.delay = 0.0;
+  if (trajectory_order() && known && !begins_input_) {
+    command.deviation = (path_q_ - q_).cwiseAbs().maxCoeff();
+    command.delay = clock_.delay;
   }
   command.wanted = wanted_;
   command.acceleration = tracked_.acceleration;
@@ -189,8 +205,16 @@ Activity Controller::Impl::judge_activity() noexcept {
   if (!has_goal()) {
     return Activity::no_goal;
   }
-  if (at_goal()) {
+  const bool on_trajectory = trajectory_order() != nullptr;
+  if (has_input() && !on_trajectory) {
+    return is_fresh() ? Activity::moving : Activity::no_goal;
+  }
+  const bool under_way = has_input() && on_trajectory && (begins_input_ || clock_.time < trajectory_order()->path.duration());
+  if (!under_way && at_goal()) {
     return Activity::arrived;
+  }
+  if (waits_) {
+    return Activity::waiting;
   }
   if (command.system == StepStatus::invalid_goal || command.system == StepStatus::goal_outside_limits) {
     return Activity::blocked;
@@ -218,6 +242,13 @@ void Controller::Impl::write_snapshot() noexcept {
   s.obstacle_number = obstacle_orders_.current().number;
   s.obstacle_age = obstacle_age_;
   s.by_pose = followed_ == goal_;
+  s.on_trajectory = pulls_ && trajectory_order();
+  if (s.on_trajectory) {
+    s.begin_q = begin_q_;
+    s.begin_v = begin_v_;
+    s.clock = clock_.time;
+    s.rate = clock_.rate;
+  }
   if (const PoseGoal* pose = pose_goal()) {
     s.pose = pose->pose;
   }

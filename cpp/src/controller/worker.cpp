@@ -48,13 +48,14 @@ Obstacles Controller::Impl::obstacles_at(const Snapshot& snapshot) const {
 }
 
 void Controller::Impl::look(const Snapshot& s) {
-  std::optional<Goal> goal;
+  Order order;
   {
     const std::lock_guard lock(mutex_);
     if (goal_count_ == s.goal_number) {
-      goal = shown_goal_;
+      order = shown_order_;
     }
   }
+  const Goal* goal = std::get_if<Goal>(&order);
   const Obstacles around = obstacles_at(s);
   if (guide && around.tree().moves()) {
     const std::lock_guard lock(mutex_);
@@ -62,7 +63,7 @@ void Controller::Impl::look(const Snapshot& s) {
       guide->set_obstacles(around);
     }
   }
-  const auto* pose = goal ? std::get_if<PoseGoal>(&*goal) : nullptr;
+  const auto* pose = goal ? std::get_if<PoseGoal>(goal) : nullptr;
   if (pose != nullptr && !is_moving(*pose) && (sought_goal_ != s.goal_number || sought_attempt_ != s.posture_attempt)) {
     FoundPosture& found = postures_.draft();
     found = {s.goal_number, s.posture_attempt, search_posture(*pose, s.q, around, s.posture_attempt, s.goal_number)};
@@ -84,9 +85,14 @@ void Controller::Impl::look(const Snapshot& s) {
       followed = *pose;
       std::get<PoseGoal>(followed).pose = s.pose;
     }
+    LookAhead::Leader leader = leader_of(s.following);
+    if (auto* trajectory = std::get_if<TrajectoryOrder>(&order); trajectory != nullptr && s.on_trajectory) {
+      trajectory->path.begin_at(s.begin_q, s.begin_v);
+      leader = leader_of(std::move(trajectory->path), s.clock, s.rate);
+    }
     FoundTrajectory& found = trajectories_.draft();
     const std::optional<AvoidanceTrajectory> followed_now = s.avoiding ? std::optional(s.trajectory) : std::nullopt;
-    const std::optional<AvoidanceTrajectory> best = evasion_->look(followed, s.q, s.v, around, followed_now, leader_of(s.following));
+    const std::optional<AvoidanceTrajectory> best = evasion_->look(followed, s.q, s.v, around, followed_now, leader);
     found.time = s.time;
     found.goal_number = s.goal_number;
     found.avoid = best.has_value();
@@ -116,6 +122,17 @@ Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::Vect
     shown_posture_ = posture;
   }
   return posture;
+}
+
+LookAhead::Leader Controller::Impl::leader_of(JointTrajectory path, double clock, double rate) {
+  return [path = std::make_shared<const JointTrajectory>(std::move(path)), clock, rate](const Eigen::VectorXd&, double duration,
+                                                                                         Goal& goal) mutable {
+    JointGoal& reference = std::get<JointGoal>(goal);
+    clock += rate * duration;
+    path->sample(clock, reference.position, reference.velocity, reference.acceleration);
+    reference.velocity *= rate;
+    reference.acceleration *= rate * rate;
+  };
 }
 
 LookAhead::Leader Controller::Impl::leader_of(const OnlinePlanner::Following& following) const {

@@ -24,22 +24,23 @@ void check_stiffness(double value, const char* name) {
   }
 }
 
-Frame moved_frame(const Robot& robot, const std::string& name) {
-  const Frame& frame = robot.frames()[static_cast<std::size_t>(robot.frame_index(name))];
-  if (frame.joint >= 0) {
-    return frame;
-  }
-  std::string allowed;
-  for (const Frame& other : robot.frames()) {
-    if (other.joint >= 0) {
-      allowed += (allowed.empty() ? "" : ", ") + other.name;
-    }
-  }
-  throw std::invalid_argument("pose goal: no joint of robot '" + robot.name() + "' moves frame '" + name +
-                              "'; those that one moves: " + allowed);
-}
-
 }  // namespace
+
+const Frame& moved_frame(const Robot& robot, const std::string& name, const std::string& what) {
+  std::string allowed;
+  for (const Frame& frame : robot.frames()) {
+    if (frame.joint < 0) {
+      continue;
+    }
+    if (frame.name == name) {
+      return frame;
+    }
+    allowed += (allowed.empty() ? "" : ", ") + frame.name;
+  }
+  const int known = robot.frame_index(name);  // names those that there are
+  throw std::invalid_argument(what + ": no joint of robot '" + robot.name() + "' moves frame '" +
+                              robot.frames()[static_cast<std::size_t>(known)].name + "'; those that one moves: " + allowed);
+}
 
 JointGoal::JointGoal(Eigen::VectorXd q)
     : position(std::move(q)), velocity(Eigen::VectorXd::Zero(position.size())), acceleration(velocity) {}
@@ -61,7 +62,7 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
     : pose(X),
       twist(V),
       settings(std::move(s)),
-      frame_(moved_frame(robot, frame)),
+      frame_(moved_frame(robot, frame, "pose goal")),
       joints_hash_(robot.joints_hash()) {
   check_stiffness(settings.position_stiffness, "position stiffness");
   check_stiffness(settings.orientation_stiffness, "orientation stiffness");

@@ -23,6 +23,7 @@ _ROOMS = {
     "sidestep.controller": (
         "ArrivalSettings",
         "BarrierSettings",
+        "InputSettings",
         "LocalMinimumSettings",
         "LookAheadSettings",
         "OnlinePlannerSettings",

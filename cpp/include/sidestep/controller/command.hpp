@@ -23,9 +23,9 @@ enum class SafetyStatus {
 
 /// What a controller is about.
 enum class Activity {
-  no_goal,  ///< none was given: the arm comes to rest, and evades
-  moving,   ///< on the way to its goal
-  waiting,  ///< it holds on until a path or a posture is found
+  no_goal,  ///< none was given, or no velocity for a while: the arm comes to rest, and evades
+  moving,   ///< on the way to its goal, or as it is told
+  waiting,  ///< it holds on until a posture is found, or a trajectory that it keeps to is free
   arrived,  ///< the goal is reached
   blocked,  ///< no way leads to the goal now, see `explain`
   stale,    ///< the obstacles are older than `obstacle_timeout`: the arm stops
@@ -50,6 +50,8 @@ struct Command {
   Eigen::VectorXd disturbance;   ///< (nv) force that the observer makes up for, of torque outputs [Nm | N]
   Eigen::VectorXd rotors;        ///< (nv) inertia that it found and the model lacks [kg m² | kg]
   double tracking_error = 0.0;   ///< largest |q_r − q| [rad | m]
+  double deviation = 0.0;        ///< of the reference from a trajectory, largest |q_r − q*| [rad | m]
+  double delay = 0.0;            ///< how far the trajectory's clock is behind [s]
 
   /// the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
   /// unknown

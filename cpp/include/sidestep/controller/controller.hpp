@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sidestep/controller/command.hpp"
+#include "sidestep/controller/joint_trajectory.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/system/goal.hpp"
 #include "sidestep/planning/online_planner.hpp"
@@ -62,6 +63,21 @@ class Controller {
   /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner. A
   /// posture for a pose is looked for near its `rest`, or near the arm where it has none.
   void set_goal(Goal goal);
+  // Each of these takes the place of the goal or order before, and needs none. They too throw std::invalid_argument, and the
+  // order before stays.
+
+  /// Wanted joint velocities (nv) [rad/s | m/s], as a whole scaled down to the limits. Obstacles steer the arm around them
+  /// and stop it. After `inputs.timeout` without another order the arm stops.
+  void set_velocity(const Eigen::VectorXd& v);
+  /// The same for the twist of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of the world
+  /// or, `local`, its own; rows as in frame_jacobian. Joint velocities by least squares: exact away from singular
+  /// configurations and limits, along which the arm slides.
+  void set_twist(const std::string& frame, const Vector6d& twist, bool local = false);
+  /// Joint positions q (nv × K) at times (K) [s] from the step that takes them over, see JointTrajectory. A first time after
+  /// zero leaves that long to get to the first sample, which need not be where the arm is.
+  void set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times,
+                      TrajectoryBehaviour behaviour = TrajectoryBehaviour::keep_path);
+
   /// The arm comes to rest where it is, and goes on evading.
   void clear_goal();
 

@@ -54,6 +54,15 @@ struct TrackingSettings {
   double drift_gain = 2.0;       ///< of the output of velocity: v = v_r + gain (q_r − q) [1/s]
 };
 
+/// How velocities, twists and trajectories are followed, see Controller.
+struct InputSettings {
+  double response = 20.0;   ///< k of a velocity that is wanted: acceleration k (v_d − v) [1/s]
+  double timeout = 0.25;    ///< age from which a velocity or a twist counts as zero [s]
+  double singular = 0.05;   ///< singular value of a frame's Jacobian below which its direction is damped [m and rad]
+  double frequency = 10.0;  ///< ω of the return to a trajectory, ω² e + 2 ω de/dt [1/s]
+  double lead = 0.1;        ///< |q_r − q*| from which a trajectory slows down; it waits at twice as much [rad]; of sliding joints a fifth [m]
+};
+
 /// All settings of a Controller. Every part but speed_limits is on by default; an empty optional leaves a part out.
 struct ControllerSettings {
   /// What is sent to the arm. Torque and acceleration are tracked by the controller, from the measured state; position and
@@ -82,6 +91,7 @@ struct ControllerSettings {
   TrackingSettings tracking = {};
   /// limits of Cartesian speed by the distance to obstacles; without them only joint velocities are limited
   std::optional<SpeedLimitSettings> speed_limits = std::nullopt;
+  InputSettings inputs = {};
   std::optional<OnlinePlannerSettings> planner = OnlinePlannerSettings{};
   std::optional<LookAheadSettings> look_ahead = LookAheadSettings{};
   /// sub-goals where the arm is stuck without a path
@@ -94,6 +104,7 @@ struct ControllerSettings {
 template <> const std::vector<Field<BarrierSettings>>& fields();
 template <> const std::vector<Field<ArrivalSettings>>& fields();
 template <> const std::vector<Field<TrackingSettings>>& fields();
+template <> const std::vector<Field<InputSettings>>& fields();
 template <> const std::vector<Field<OnlinePlannerSettings>>& fields();
 template <> const std::vector<Field<ControllerSettings>>& fields();
 

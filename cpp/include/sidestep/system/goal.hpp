@@ -79,6 +79,10 @@ struct PoseGoal {
   Eigen::Vector3d shoulder_ = Eigen::Vector3d::Zero();
 };
 
+/// The frame of a name. Throws std::invalid_argument, beginning with `what`, where it is unknown or no joint moves it, with
+/// the names that are allowed.
+const Frame& moved_frame(const Robot& robot, const std::string& name, const std::string& what);
+
 using Goal = std::variant<JointGoal, PoseGoal>;
 
 /// Moves a goal for `duration` [s] as its velocity and acceleration say. False where that gives what is not finite:

@@ -1,0 +1,163 @@
+// Velocities and twists: how they are set, and what acceleration follows them.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "../settings.hpp"
+#include "impl.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double limit_room = 0.01, limit_fade = 0.1;  // [rad] to a position limit, where a joint takes no part in a twist, and less
+constexpr double sliding_fade = 0.05;                  // at most so much of a sliding joint's range
+constexpr int most_solutions = 4;                      // of a twist, each with more joints near their limits
+
+}  // namespace
+
+void Controller::Impl::set_velocity(const Eigen::VectorXd& v) {
+  if (v.size() != q_.size()) {
+    throw std::invalid_argument("controller: velocity has " + std::to_string(v.size()) + " entries, allowed: " +
+                                std::to_string(q_.size()) + ", one for each joint");
+  }
+  for (Eigen::Index j = 0; j < v.size(); ++j) {
+    if (!std::isfinite(v[j])) {
+      throw std::invalid_argument("controller: velocity of joint '" + arm.robot().coordinate_names()[static_cast<std::size_t>(j)] +
+                                  "' is " + std::to_string(v[j]) + ", allowed: finite numbers");
+    }
+  }
+  put(VelocityOrder{v});
+}
+
+void Controller::Impl::set_twist(const std::string& frame, const Vector6d& twist, bool local) {
+  if (!twist.allFinite()) {
+    std::string numbers;
+    for (const double number : twist) {
+      numbers += (numbers.empty() ? "" : ", ") + std::to_string(number);
+    }
+    throw std::invalid_argument("controller: twist of frame '" + frame + "' is (" + numbers + "), allowed: finite numbers");
+  }
+  put(TwistOrder{moved_frame(arm.robot(), frame, "controller: twist"), twist, local});
+}
+
+void Controller::Impl::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour) {
+  put(TrajectoryOrder{JointTrajectory(arm.robot(), q, times, most_v_, most_a_), behaviour});
+}
+
+void Controller::Impl::begin_input() noexcept {
+  begins_input_ = false;
+  Order& order = goal_orders_.current().order;
+  if (auto* trajectory = std::get_if<TrajectoryOrder>(&order)) {
+    has_last_wanted_v_ = false;
+    begin_trajectory(*trajectory);
+  } else if (const auto* twist = std::get_if<TwistOrder>(&order); twist != nullptr && has_last_wanted_v_) {
+    solve_twist(*twist);  // where the arm was before: what the arm's motion changes in it is followed without a lag
+    scale_to_limits(wanted_v_);
+    last_wanted_v_ = wanted_v_;
+  } else {
+    has_last_wanted_v_ = false;
+  }
+}
+
+void Controller::Impl::follow_input() noexcept {
+  const Order& order = goal_orders_.current().order;
+  if (const auto* trajectory = std::get_if<TrajectoryOrder>(&order)) {
+    follow_trajectory(*trajectory);
+  } else {
+    follow_velocity(std::get_if<VelocityOrder>(&order), std::get_if<TwistOrder>(&order));
+  }
+}
+
+void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept {
+  if (!is_fresh()) {
+    wanted_v_.setZero();
+    has_last_wanted_v_ = false;
+  } else if (velocity != nullptr) {
+    wanted_v_ = velocity->velocity;
+  } else {
+    twist_state_.update(arm.robot(), q_, v_);
+    solve_twist(*twist);
+  }
+  scale_to_limits(wanted_v_);
+  JointGoal& goal = std::get<JointGoal>(input_goal_);
+  JointGoal& pull = std::get<JointGoal>(input_pull_);
+  goal.position = q_.cwiseMax(arm.robot().limits().lower).cwiseMin(arm.robot().limits().upper);
+  goal.velocity = wanted_v_;
+  goal.acceleration.setZero();
+  pull.position = goal.position;
+  pull.velocity = v_;
+  pull.acceleration = settings.inputs.response * (wanted_v_ - v_);
+  if (has_last_wanted_v_) {  // its own change, while the order is the same
+    pull.acceleration += ((wanted_v_ - last_wanted_v_) / settings.period).cwiseMax(-most_a_).cwiseMin(most_a_);
+  }
+  last_wanted_v_ = wanted_v_;
+  has_last_wanted_v_ = twist != nullptr && is_fresh();
+  pulls_ = true;
+}
+
+void Controller::Impl::scale_to_limits(Eigen::VectorXd& velocity) const noexcept {
+  double share = 1.0;
+  for (Eigen::Index j = 0; j < velocity.size(); ++j) {
+    if (std::abs(velocity[j]) > most_v_[j]) {
+      share = std::min(share, most_v_[j] / std::abs(velocity[j]));
+    }
+  }
+  velocity *= share;
+}
+
+// v = W Jᵀ U f(Λ) Uᵀ V with J W Jᵀ = U Λ Uᵀ and f = 1/λ, damped where σ = √λ is below σ₀: 1/(λ + (1 − λ/σ₀²) σ₀²). W, a
+// diagonal, takes joints out that go towards a position limit.
+void Controller::Impl::solve_twist(const TwistOrder& order) noexcept {
+  const KinematicState::Link& link = twist_state_.link(order.frame.joint);
+  const Eigen::Vector3d p = link.p_WL + link.R_WL * order.frame.X_JF.translation();
+  Vector6d twist = order.twist;
+  if (order.local) {
+    const Eigen::Matrix3d R = link.R_WL * order.frame.X_JF.linear();
+    twist << R * order.twist.head<3>(), R * order.twist.tail<3>();
+  }
+  jacobian_transposed_.setZero();
+  for (int j = order.frame.joint; j >= 0; j = twist_state_.link(j).parent) {
+    const KinematicState::Link& mover = twist_state_.link(j);
+    jacobian_transposed_.row(mover.coordinate).head<3>() += (mover.screw.linear + mover.screw.angular.cross(p)).transpose();
+    jacobian_transposed_.row(mover.coordinate).tail<3>() += mover.screw.angular.transpose();
+  }
+  const JointLimits& limits = arm.robot().limits();
+  const double least = settings.inputs.singular * settings.inputs.singular;
+  weights_.setOnes();
+  for (int k = 0; k < most_solutions; ++k) {
+    Eigen::Matrix<double, 6, 6> gram = Eigen::Matrix<double, 6, 6>::Zero();
+    for (Eigen::Index j = 0; j < weights_.size(); ++j) {
+      gram.noalias() += weights_[j] * jacobian_transposed_.row(j).transpose().lazyProduct(jacobian_transposed_.row(j));
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> principal(gram);
+    Vector6d along = principal.eigenvectors().transpose() * twist;
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      const double square = std::max(0.0, principal.eigenvalues()[i]);
+      along[i] /= square < least ? square + (1.0 - square / least) * least : square;
+    }
+    const Vector6d force = principal.eigenvectors() * along;
+    wanted_v_ = jacobian_transposed_.lazyProduct(force).cwiseProduct(weights_);
+    bool changes = false;
+    for (Eigen::Index j = 0; j < weights_.size(); ++j) {
+      const double side = wanted_v_[j] > 0.0 ? 1.0 : -1.0, speed = std::max(0.0, side * twist_state_.v()[j]);
+      const double range = limits.upper[j] - limits.lower[j];
+      const double fade = std::min(limit_fade, is_sliding_[static_cast<std::size_t>(j)] ? sliding_fade * range : limit_fade);
+      const double room = (side > 0.0 ? limits.upper[j] - twist_state_.q()[j] : twist_state_.q()[j] - limits.lower[j]) - settings.position_margin -
+                          0.5 * speed * speed / most_a_[j] - limit_room * fade / limit_fade;
+      const double weight = std::clamp(room / fade, 0.0, 1.0);
+      if (wanted_v_[j] != 0.0 && weight < weights_[j]) {
+        weights_[j] = weight;
+        changes = true;
+      }
+    }
+    if (!changes) {
+      return;
+    }
+  }
+  wanted_v_ = wanted_v_.cwiseProduct(weights_);  // those found last too
+}
+
+}  // namespace sidestep
