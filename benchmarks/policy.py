@@ -100,7 +100,10 @@ class Bench:
             return {"index": index, "skipped": "no path" if task else "nothing to drive into"}
         policy = Policy(problem.start, waypoints, speed)
         controller = ss.Controller(
-            self.arm, ss.ControllerSettings(synchronous=True, seed=index, period=PERIOD, planner=None)
+            self.arm,
+            ss.ControllerSettings(
+                synchronous=True, seed=index, period=PERIOD, planner=None, output="position"
+            ),
         )
         controller.set_obstacles(problem.obstacles)
         q, v = problem.start.copy(), np.zeros_like(problem.start)

@@ -46,7 +46,6 @@ void Controller::Impl::begin_trajectory(TrajectoryOrder& order) noexcept {
 void Controller::Impl::follow_trajectory(const TrajectoryOrder& order) noexcept {
   run_clock(order);
   JointGoal& goal = std::get<JointGoal>(input_goal_);
-  JointGoal& pull = std::get<JointGoal>(input_pull_);
   goal.position = path_q_;
   goal.velocity = clock_.rate * path_v_;
   goal.acceleration = clock_.rate * clock_.rate * path_a_ + clock_.change * path_v_;
@@ -61,17 +60,16 @@ void Controller::Impl::follow_trajectory(const TrajectoryOrder& order) noexcept 
   // ω² e + 2 ω de/dt, with velocities from which it can still brake. v_ is of half a period ago, as positions are the sums
   // of velocities.
   const double w = settings.inputs.frequency;
-  pull.position = q_.cwiseMax(arm.robot().limits().lower).cwiseMin(arm.robot().limits().upper);
-  pull.velocity = v_;
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
     const double error = path_q_[j] - q_[j];
     const double back = std::min(0.5 * w * std::abs(error), std::sqrt(most_a_[j] * std::abs(error)));
     const double ahead = goal.velocity[j] - 0.5 * settings.period * goal.acceleration[j];
     const double velocity = std::clamp(ahead + std::copysign(back, error), -most_v_[j], most_v_[j]);
-    pull.acceleration[j] = goal.acceleration[j] + 2.0 * w * (velocity - v_[j]);
+    wanted_v_[j] = velocity;
+    seen_a_[j] = goal.acceleration[j] + 2.0 * w * (velocity - v_[j]);
   }
+  pull(wanted_v_, seen_a_);
   waits_ = order.behaviour == TrajectoryBehaviour::keep_path && clock_.blocked && clock_.rate < waiting_rate;
-  pulls_ = true;
 }
 
 void Controller::Impl::run_clock(const TrajectoryOrder& order) noexcept {

@@ -131,6 +131,7 @@ class Controller::Impl {
   void begin_input() noexcept;
   void follow_input() noexcept;
   void follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept;
+  void pull(const Eigen::VectorXd& velocity, const Eigen::VectorXd& acceleration) noexcept;
   void solve_twist(const TwistOrder& order) noexcept;
   void scale_to_limits(Eigen::VectorXd& velocity) const noexcept;
   void begin_trajectory(TrajectoryOrder& order) noexcept;
@@ -244,7 +245,8 @@ class Controller::Impl {
   Goal input_pull_;               // JointGoal whose pull is the acceleration that is wanted for that
   bool pulls_ = false, begins_input_ = false, waits_ = false;
   double order_age_ = 0.0;        // [s]
-  Eigen::VectorXd wanted_v_, last_wanted_v_, weights_;
+  Eigen::VectorXd wanted_v_, last_wanted_v_, pulled_;
+  std::vector<bool> is_held_;
   bool has_last_wanted_v_ = false;
   KinematicState twist_state_;
   Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_;

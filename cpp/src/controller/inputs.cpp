@@ -12,9 +12,10 @@
 namespace sidestep {
 namespace {
 
-constexpr double limit_room = 0.01, limit_fade = 0.1;  // [rad] to a position limit, where a joint takes no part in a twist, and less
-constexpr double sliding_fade = 0.05;                  // at most so much of a sliding joint's range
-constexpr int most_solutions = 4;                      // of a twist, each with more joints near their limits
+constexpr double limit_room = 0.03;   // [rad] to a position limit, where a twist does not move a joint on
+constexpr double sliding_room = 0.2;  // the same of joints that slide [m/rad]
+constexpr double limit_rate = 3.0;    // [1/s] at which joints come to there
+constexpr int most_solutions = 4;                      // of a twist, each with more joints held
 
 }  // namespace
 
@@ -83,18 +84,30 @@ void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const Twis
   }
   scale_to_limits(wanted_v_);
   JointGoal& goal = std::get<JointGoal>(input_goal_);
-  JointGoal& pull = std::get<JointGoal>(input_pull_);
   goal.position = q_.cwiseMax(arm.robot().limits().lower).cwiseMin(arm.robot().limits().upper);
   goal.velocity = wanted_v_;
   goal.acceleration.setZero();
-  pull.position = goal.position;
-  pull.velocity = v_;
-  pull.acceleration = settings.inputs.response * (wanted_v_ - v_);
+  path_a_ = settings.inputs.response * (wanted_v_ - v_);
   if (has_last_wanted_v_) {  // its own change, while the order is the same
-    pull.acceleration += ((wanted_v_ - last_wanted_v_) / settings.period).cwiseMax(-most_a_).cwiseMin(most_a_);
+    path_a_ += ((wanted_v_ - last_wanted_v_) / settings.period).cwiseMax(-most_a_).cwiseMin(most_a_);
   }
+  pull(wanted_v_, path_a_);
   last_wanted_v_ = wanted_v_;
   has_last_wanted_v_ = twist != nullptr && is_fresh();
+}
+
+// Barriers hold back what a pull does towards obstacles, also where it brakes a motion away from them: that much is given to the
+// damping, which they leave alone.
+void Controller::Impl::pull(const Eigen::VectorXd& velocity, const Eigen::VectorXd& acceleration) noexcept {
+  JointGoal& pull = std::get<JointGoal>(input_pull_);
+  pull.position = q_.cwiseMax(arm.robot().limits().lower).cwiseMin(arm.robot().limits().upper);
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    const double change = velocity[j] - v_[j];
+    const double braking = change * v_[j] < 0.0 ? std::copysign(std::min(std::abs(change), std::abs(v_[j])), change) : 0.0;
+    pull.velocity[j] = v_[j] + braking;
+    pull.acceleration[j] = acceleration[j] - settings.barriers.damping * braking;
+  }
+  pulled_ = acceleration;
   pulls_ = true;
 }
 
@@ -108,8 +121,8 @@ void Controller::Impl::scale_to_limits(Eigen::VectorXd& velocity) const noexcept
   velocity *= share;
 }
 
-// v = W Jᵀ U f(Λ) Uᵀ V with J W Jᵀ = U Λ Uᵀ and f = 1/λ, damped where σ = √λ is below σ₀: 1/(λ + (1 − λ/σ₀²) σ₀²). W, a
-// diagonal, takes joints out that go towards a position limit.
+// v = Jᵀ U f(Λ) Uᵀ V with J Jᵀ = U Λ Uᵀ and f = 1/λ, damped where σ = √λ is below σ₀: 1/(λ + (1 − λ/σ₀²) σ₀²). Joints that
+// would come to their position limits faster than they get there are set to what they can do, and the others make up for it.
 void Controller::Impl::solve_twist(const TwistOrder& order) noexcept {
   const KinematicState::Link& link = twist_state_.link(order.frame.joint);
   const Eigen::Vector3d p = link.p_WL + link.R_WL * order.frame.X_JF.translation();
@@ -126,38 +139,42 @@ void Controller::Impl::solve_twist(const TwistOrder& order) noexcept {
   }
   const JointLimits& limits = arm.robot().limits();
   const double least = settings.inputs.singular * settings.inputs.singular;
-  weights_.setOnes();
+  is_held_.assign(is_held_.size(), false);
   for (int k = 0; k < most_solutions; ++k) {
     Eigen::Matrix<double, 6, 6> gram = Eigen::Matrix<double, 6, 6>::Zero();
-    for (Eigen::Index j = 0; j < weights_.size(); ++j) {
-      gram.noalias() += weights_[j] * jacobian_transposed_.row(j).transpose().lazyProduct(jacobian_transposed_.row(j));
+    Vector6d left = twist;
+    for (Eigen::Index j = 0; j < wanted_v_.size(); ++j) {
+      if (is_held_[static_cast<std::size_t>(j)]) {
+        left -= wanted_v_[j] * jacobian_transposed_.row(j).transpose();
+      } else {
+        gram += jacobian_transposed_.row(j).transpose().lazyProduct(jacobian_transposed_.row(j));
+      }
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> principal(gram);
-    Vector6d along = principal.eigenvectors().transpose() * twist;
+    Vector6d along = principal.eigenvectors().transpose() * left;
     for (Eigen::Index i = 0; i < 6; ++i) {
       const double square = std::max(0.0, principal.eigenvalues()[i]);
       along[i] /= square < least ? square + (1.0 - square / least) * least : square;
     }
     const Vector6d force = principal.eigenvectors() * along;
-    wanted_v_ = jacobian_transposed_.lazyProduct(force).cwiseProduct(weights_);
     bool changes = false;
-    for (Eigen::Index j = 0; j < weights_.size(); ++j) {
-      const double side = wanted_v_[j] > 0.0 ? 1.0 : -1.0, speed = std::max(0.0, side * twist_state_.v()[j]);
-      const double range = limits.upper[j] - limits.lower[j];
-      const double fade = std::min(limit_fade, is_sliding_[static_cast<std::size_t>(j)] ? sliding_fade * range : limit_fade);
-      const double room = (side > 0.0 ? limits.upper[j] - twist_state_.q()[j] : twist_state_.q()[j] - limits.lower[j]) - settings.position_margin -
-                          0.5 * speed * speed / most_a_[j] - limit_room * fade / limit_fade;
-      const double weight = std::clamp(room / fade, 0.0, 1.0);
-      if (wanted_v_[j] != 0.0 && weight < weights_[j]) {
-        weights_[j] = weight;
-        changes = true;
+    for (Eigen::Index j = 0; j < wanted_v_.size(); ++j) {
+      if (is_held_[static_cast<std::size_t>(j)]) {
+        continue;
+      }
+      const double asked = jacobian_transposed_.row(j).dot(force);
+      const double off = settings.position_margin + limit_room * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_room : 1.0);
+      const double up = limit_rate * std::max(0.0, limits.upper[j] - twist_state_.q()[j] - off);
+      const double down = limit_rate * std::max(0.0, twist_state_.q()[j] - limits.lower[j] - off);
+      wanted_v_[j] = std::clamp(asked, -down, up);
+      if (wanted_v_[j] != asked) {
+        is_held_[static_cast<std::size_t>(j)] = changes = true;
       }
     }
     if (!changes) {
       return;
     }
   }
-  wanted_v_ = wanted_v_.cwiseProduct(weights_);  // those found last too
 }
 
 }  // namespace sidestep

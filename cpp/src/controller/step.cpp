@@ -38,7 +38,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   if (avoiding_ && !is_fallback(status)) {
     trajectory_.acceleration(q_, v_, settings.period, wanted_);
   } else if (keeps_path() && !is_fallback(status)) {
-    wanted_ = std::get<JointGoal>(input_pull_).acceleration + workspace.recovery;
+    wanted_ = pulled_ + workspace.recovery;
   }
   if (is_stale()) {
     wanted_ = -v_ / settings.stop_time;

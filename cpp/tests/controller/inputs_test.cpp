@@ -92,7 +92,7 @@ BOOST_AUTO_TEST_CASE(a_velocity_is_reached_scaled_to_the_limits_and_given_up_whe
     BOOST_TEST((model.step(controller).activity == Activity::moving));
   }
   BOOST_TEST((model.v - wanted).cwiseAbs().maxCoeff() < 1e-3);
-  const double most = controller.settings().speed * (1.0 - controller.settings().velocity_margin) * arm.robot().limits().velocity[0];
+  const double most = controller.settings().speed * (1.0 - controller.settings().limit_margin) * arm.robot().limits().velocity[0];
   wanted *= 100.0 * most;  // the direction stays
   for (int k = 0; k < 450; ++k) {
     controller.set_velocity(-wanted);
