@@ -17,6 +17,7 @@ namespace sidestep {
 namespace {
 
 constexpr double usable_acceleration = 0.9;   // of the limits, for velocities, twists and trajectories: the rest is for feedback
+constexpr Eigen::Index most_held = 6;         // bounds that a twist is held by
 constexpr double feedback_room = 20.0;        // of accelerations: dry friction on a light wrist takes so much
 constexpr double most_per_period = 0.2;       // of the feedback's frequency: a slow rate holds its torques for long
 constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
@@ -177,9 +178,11 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       wanted_v_(q_),
       last_wanted_v_(q_),
       pulled_(q_),
-      is_held_(static_cast<std::size_t>(q_.size()), false),
+      held_v_(q_),
+      held_(Eigen::MatrixXd::Zero(q_.size(), std::min<Eigen::Index>(q_.size(), most_held))),
       twist_state_(arm.robot()),
       jacobian_transposed_(Eigen::MatrixXd::Zero(q_.size(), 6)),
+      projected_(jacobian_transposed_),
       most_v_(settings.speed * (1.0 - settings.limit_margin) * arm.robot().limits().velocity),
       most_a_(settings.speed * usable_acceleration * arm.robot().limits().acceleration),
       begin_q_(q_),

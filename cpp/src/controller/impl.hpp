@@ -132,6 +132,7 @@ class Controller::Impl {
   void follow_input() noexcept;
   void follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept;
   void pull(const Eigen::VectorXd& velocity, const Eigen::VectorXd& acceleration) noexcept;
+  bool hold_worst(Eigen::Index held) noexcept;
   void solve_twist(const TwistOrder& order) noexcept;
   void scale_to_limits(Eigen::VectorXd& velocity) const noexcept;
   void begin_trajectory(TrajectoryOrder& order) noexcept;
@@ -245,11 +246,11 @@ class Controller::Impl {
   Goal input_pull_;               // JointGoal whose pull is the acceleration that is wanted for that
   bool pulls_ = false, begins_input_ = false, waits_ = false;
   double order_age_ = 0.0;        // [s]
-  Eigen::VectorXd wanted_v_, last_wanted_v_, pulled_;
-  std::vector<bool> is_held_;
+  Eigen::VectorXd wanted_v_, last_wanted_v_, pulled_, held_v_;
+  Eigen::MatrixXd held_;         // directions that limits hold, orthonormal (nv × 6)
   bool has_last_wanted_v_ = false;
   KinematicState twist_state_;
-  Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_, projected_;
   Eigen::VectorXd most_v_, most_a_;  // limits that motions use
   struct Clock {
     double time = 0.0, rate = 0.0, change = 0.0;   // s [s], ds/dt, d²s/dt² [1/s]

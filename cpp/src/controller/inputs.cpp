@@ -14,8 +14,9 @@ namespace {
 
 constexpr double limit_room = 0.03;   // [rad] to a position limit, where a twist does not move a joint on
 constexpr double sliding_room = 0.2;  // the same of joints that slide [m/rad]
-constexpr double limit_rate = 3.0;    // [1/s] at which joints come to there
-constexpr int most_solutions = 4;                      // of a twist, each with more joints held
+constexpr double limit_rate = 3.0;    // [1/s] at which joints come to there, and clearances to their margins
+constexpr double bound_rounding = 1e-9;  // [rad/s]
+constexpr double least_free = 0.05;   // share of a bound's direction that those held leave
 
 }  // namespace
 
@@ -121,8 +122,9 @@ void Controller::Impl::scale_to_limits(Eigen::VectorXd& velocity) const noexcept
   velocity *= share;
 }
 
-// v = Jᵀ U f(Λ) Uᵀ V with J Jᵀ = U Λ Uᵀ and f = 1/λ, damped where σ = √λ is below σ₀: 1/(λ + (1 − λ/σ₀²) σ₀²). Joints that
-// would come to their position limits faster than they get there are set to what they can do, and the others make up for it.
+// v = v_h + P Jᵀ U f(Λ) Uᵀ (V − J v_h) with J P Jᵀ = U Λ Uᵀ and f = 1/λ, damped where σ = √λ is below σ₀: 1/(λ + (1 − λ/σ₀²)
+// σ₀²). P projects on what is left free: position limits and clearances g·v ≥ b that v would not keep are held, one after the
+// other, the worst first, at g·v_h = b, and the free motion makes up for it as far as it can.
 void Controller::Impl::solve_twist(const TwistOrder& order) noexcept {
   const KinematicState::Link& link = twist_state_.link(order.frame.joint);
   const Eigen::Vector3d p = link.p_WL + link.R_WL * order.frame.X_JF.translation();
@@ -137,44 +139,77 @@ void Controller::Impl::solve_twist(const TwistOrder& order) noexcept {
     jacobian_transposed_.row(mover.coordinate).head<3>() += (mover.screw.linear + mover.screw.angular.cross(p)).transpose();
     jacobian_transposed_.row(mover.coordinate).tail<3>() += mover.screw.angular.transpose();
   }
-  const JointLimits& limits = arm.robot().limits();
+  projected_ = jacobian_transposed_;
+  held_v_.setZero();
   const double least = settings.inputs.singular * settings.inputs.singular;
-  is_held_.assign(is_held_.size(), false);
-  for (int k = 0; k < most_solutions; ++k) {
-    Eigen::Matrix<double, 6, 6> gram = Eigen::Matrix<double, 6, 6>::Zero();
-    Vector6d left = twist;
-    for (Eigen::Index j = 0; j < wanted_v_.size(); ++j) {
-      if (is_held_[static_cast<std::size_t>(j)]) {
-        left -= wanted_v_[j] * jacobian_transposed_.row(j).transpose();
-      } else {
-        gram += jacobian_transposed_.row(j).transpose().lazyProduct(jacobian_transposed_.row(j));
-      }
-    }
+  for (Eigen::Index held = 0;; ++held) {
+    const Eigen::Matrix<double, 6, 6> gram = projected_.transpose().lazyProduct(projected_);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> principal(gram);
+    const Vector6d left = twist - jacobian_transposed_.transpose().lazyProduct(held_v_);
     Vector6d along = principal.eigenvectors().transpose() * left;
     for (Eigen::Index i = 0; i < 6; ++i) {
       const double square = std::max(0.0, principal.eigenvalues()[i]);
       along[i] /= square < least ? square + (1.0 - square / least) * least : square;
     }
     const Vector6d force = principal.eigenvectors() * along;
-    bool changes = false;
-    for (Eigen::Index j = 0; j < wanted_v_.size(); ++j) {
-      if (is_held_[static_cast<std::size_t>(j)]) {
-        continue;
-      }
-      const double asked = jacobian_transposed_.row(j).dot(force);
-      const double off = settings.position_margin + limit_room * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_room : 1.0);
-      const double up = limit_rate * std::max(0.0, limits.upper[j] - twist_state_.q()[j] - off);
-      const double down = limit_rate * std::max(0.0, twist_state_.q()[j] - limits.lower[j] - off);
-      wanted_v_[j] = std::clamp(asked, -down, up);
-      if (wanted_v_[j] != asked) {
-        is_held_[static_cast<std::size_t>(j)] = changes = true;
-      }
-    }
-    if (!changes) {
+    wanted_v_ = held_v_ + projected_.lazyProduct(force);
+    if (held == held_.cols() || !hold_worst(held)) {
       return;
     }
   }
+}
+
+bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
+  double worst = bound_rounding, bound = 0.0, length = 1.0;
+  auto direction = held_.col(held);
+  const JointLimits& limits = arm.robot().limits();
+  Eigen::Index joint = -1, clearance = -1;
+  for (Eigen::Index j = 0; j < wanted_v_.size(); ++j) {
+    const double side = wanted_v_[j] > 0.0 ? 1.0 : -1.0, at = twist_state_.q()[j];
+    const double off = settings.position_margin + limit_room * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_room : 1.0);
+    const double most = limit_rate * std::max(0.0, (side > 0.0 ? limits.upper[j] - at : at - limits.lower[j]) - off);
+    if (side * wanted_v_[j] - most > worst) {
+      worst = side * wanted_v_[j] - most;
+      bound = side * most;
+      joint = j;
+    }
+  }
+  const Clearances& near = workspace.clearances;
+  for (const Eigen::Index k : metric_coordinates_) {
+    if (near.nearest[k] < 0 || !(near.values[k] < infinity)) {
+      continue;
+    }
+    const double norm = near.gradients.col(k).norm();
+    const double least = -limit_rate * std::max(0.0, near.values[k] - std::min(near.margins[k], settings.safety.margin));
+    const double excess = norm > 0.0 ? (least - near.gradients.col(k).dot(wanted_v_)) / norm : 0.0;
+    if (excess > worst) {
+      worst = excess;
+      bound = least / norm;
+      length = norm;
+      clearance = k;
+    }
+  }
+  if (clearance >= 0) {
+    direction = near.gradients.col(clearance) / length;
+  } else if (joint >= 0) {
+    direction.setZero();
+    direction[joint] = 1.0;
+  } else {
+    return false;
+  }
+  const double missing = bound - direction.dot(held_v_);
+  for (Eigen::Index k = 0; k < held; ++k) {
+    direction -= held_.col(k).dot(direction) * held_.col(k);
+  }
+  const double free = direction.norm();  // of the unit that it was
+  if (free < least_free) {
+    return false;
+  }
+  direction /= free;
+  held_v_ += missing / free * direction;
+  const Vector6d seen = projected_.transpose().lazyProduct(direction);
+  projected_ -= direction.lazyProduct(seen.transpose());
+  return true;
 }
 
 }  // namespace sidestep

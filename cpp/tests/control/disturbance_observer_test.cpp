@@ -12,7 +12,8 @@ using namespace sidestep;
 
 namespace {
 
-constexpr double period = 0.001, observer_time = 0.03, share = 0.8;
+constexpr double observer_period = 0.001;
+constexpr double observer_time = 0.03, share = 0.8;
 
 JointLimits limits_of_two() {
   JointLimits limits = JointLimits::unlimited(2);
@@ -35,7 +36,7 @@ struct Plant {
     real.diagonal() += rotors;
     const Eigen::Vector2d dry = -friction.cwiseProduct((v / 1e-3).array().tanh().matrix());
     const Eigen::VectorXd before = v;
-    v += period * real.ldlt().solve(torque + disturbance + dry - bias);
+    v += observer_period * real.ldlt().solve(torque + disturbance + dry - bias);
     observer.update(before, v, torque, wanted, mass, bias);
   }
 };
@@ -43,7 +44,7 @@ struct Plant {
 /// There and back, at 4 Hz and 7 Hz: swings between velocities of one sign are long enough to count.
 Eigen::Vector2d swing(int k, double mean) {
   using std::numbers::pi;
-  const double t = k * period;
+  const double t = k * observer_period;
   // around a slow motion there and back
   const double slow = mean * 2.0 * pi * 0.3 * std::cos(2.0 * pi * 0.3 * t);
   return {slow + 8.0 * std::cos(2.0 * pi * 4.0 * t), slow + 8.0 * std::cos(2.0 * pi * 7.0 * t)};
@@ -52,13 +53,13 @@ Eigen::Vector2d swing(int k, double mean) {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(a_constant_disturbance_is_found_with_the_time_constant) {
-  DisturbanceObserver observer(limits_of_two(), period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
   Plant plant;
   plant.disturbance << -6.0, 2.0;
   for (int k = 0; k < 30; ++k) {  // T_o
     plant.step(observer, Eigen::Vector2d::Zero());
   }
-  const double left = std::pow(1.0 - period / observer_time, 30);  // 0.362: of held samples, 1/e in the limit
+  const double left = std::pow(1.0 - observer_period / observer_time, 30);  // 0.362: of held samples, 1/e in the limit
   BOOST_TEST((observer.disturbance() - (1.0 - left) * plant.disturbance).cwiseAbs().maxCoeff() < 1e-9);
   for (int k = 0; k < 300; ++k) {
     plant.step(observer, Eigen::Vector2d::Zero());
@@ -72,7 +73,7 @@ BOOST_AUTO_TEST_CASE(a_constant_disturbance_is_found_with_the_time_constant) {
 }
 
 BOOST_AUTO_TEST_CASE(a_disturbance_is_bounded_by_its_share_of_the_effort_limits) {
-  DisturbanceObserver observer(limits_of_two(), period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
   Plant plant;
   plant.disturbance << -500.0, 500.0;
   for (int k = 0; k < 500; ++k) {
@@ -84,7 +85,7 @@ BOOST_AUTO_TEST_CASE(a_disturbance_is_bounded_by_its_share_of_the_effort_limits)
 
 BOOST_AUTO_TEST_CASE(rotors_are_found_where_there_are_some) {
   for (const double rotor : {0.0, 0.1}) {
-    DisturbanceObserver observer(limits_of_two(), period, observer_time, share);
+    DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
     Plant plant;
     plant.rotors << 0.0, rotor;
     plant.disturbance << 1.0, -0.5;
@@ -97,7 +98,7 @@ BOOST_AUTO_TEST_CASE(rotors_are_found_where_there_are_some) {
 }
 
 BOOST_AUTO_TEST_CASE(dry_friction_is_not_taken_for_inertia) {
-  DisturbanceObserver observer(limits_of_two(), period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
   Plant plant;
   plant.friction << 4.0, 2.0;
   for (int k = 0; k < 6000; ++k) {  // turns back twice in every swing
@@ -108,7 +109,7 @@ BOOST_AUTO_TEST_CASE(dry_friction_is_not_taken_for_inertia) {
 }
 
 BOOST_AUTO_TEST_CASE(what_is_not_finite_changes_nothing_and_no_update_allocates) {
-  DisturbanceObserver observer(limits_of_two(), period, observer_time, share);
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
   Plant plant;
   plant.disturbance << 2.0, 1.0;
   for (int k = 0; k < 100; ++k) {

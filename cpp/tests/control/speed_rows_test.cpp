@@ -17,7 +17,8 @@ using test::nv;
 
 namespace {
 
-constexpr double period = 0.001;
+constexpr double speed_period = 0.001;
+
 
 /// The speed of a frame's origin.
 double speed_of(const Robot& robot, int frame, const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
@@ -43,7 +44,7 @@ BOOST_AUTO_TEST_CASE(rows_are_the_change_of_the_speed_of_every_frame_that_moves)
     const Eigen::VectorXd q = random.vector(nv), v = random.vector(nv), a = 5.0 * random.vector(nv);
     state.update(robot, q, v);
     const double limit = 100.0, h = 1e-5;
-    BOOST_TEST(test::allocations_of([&] { rows.update(state, robot.limits(), limit, limit, period); }) == 0U);
+    BOOST_TEST(test::allocations_of([&] { rows.update(state, robot.limits(), limit, limit, speed_period); }) == 0U);
     BOOST_TEST(rows.size() >= nv - 2);  // the first links turn in place
     double fastest = 0.0;
     for (int i = 0; i < rows.size(); ++i) {
@@ -68,7 +69,7 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_no_more_than_a_stop_along_the_path) {
   for (int k = 0; k < 50; ++k) {
     const Eigen::VectorXd q = random.vector(nv), v = random.vector(nv);
     state.update(robot, q, v);
-    rows.update(state, robot.limits(), 0.05, 0.0, period);  // far exceeded, and falling
+    rows.update(state, robot.limits(), 0.05, 0.0, speed_period);  // far exceeded, and falling
     const Eigen::VectorXd stop = -v * (robot.limits().acceleration.cwiseQuotient(v.cwiseAbs()).minCoeff());
     BOOST_TEST(rows.size() > 0);
     for (int i = 0; i < rows.size(); ++i) {
@@ -102,12 +103,12 @@ BOOST_AUTO_TEST_CASE(speed_gives_way_to_clearances_and_says_so) {
   KinematicState state(robot);
   state.update(robot, q, v);
   const SpeedRows::Fastest fastest = rows.fastest(state);
-  rows.update(state, robot.limits(), fastest.speed, fastest.speed, period);
+  rows.update(state, robot.limits(), fastest.speed, fastest.speed, speed_period);
   const Eigen::VectorXd wanted = 5.0 * Eigen::VectorXd::Unit(nv, 0);
   BOOST_TEST((filter.apply(q, v, wanted, nullptr, {}, {}, solution, &rows) == TorqueStatus::limited));
   BOOST_TEST(solution.speed_frame == fastest.frame);
   BOOST_TEST(solution.speed_slack == 0.0);
-  const auto speed_after = [&] { return speed_of(robot, fastest.frame, q + period * v, v + period * solution.acceleration); };
+  const auto speed_after = [&] { return speed_of(robot, fastest.frame, q + speed_period * v, v + speed_period * solution.acceleration); };
   BOOST_TEST(speed_after() <= fastest.speed);
   BOOST_TEST((filter.apply(q, v, wanted, nullptr, {}, {}, solution) == TorqueStatus::ok));
   BOOST_TEST(speed_after() > fastest.speed + 1e-3);
