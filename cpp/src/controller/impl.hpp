@@ -132,6 +132,7 @@ class Controller::Impl {
   void follow_input() noexcept;
   void follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept;
   void pull(const Eigen::VectorXd& velocity, const Eigen::VectorXd& acceleration) noexcept;
+  void keep_bounds(const Eigen::VectorXd& velocity) noexcept;
   bool hold_worst(Eigen::Index held) noexcept;
   void solve_twist(const TwistOrder& order) noexcept;
   void scale_to_limits(Eigen::VectorXd& velocity) const noexcept;

@@ -12,11 +12,12 @@
 namespace sidestep {
 namespace {
 
-constexpr double limit_room = 0.03;   // [rad] to a position limit, where a twist does not move a joint on
-constexpr double sliding_room = 0.2;  // the same of joints that slide [m/rad]
-constexpr double limit_rate = 3.0;    // [1/s] at which joints come to there, and clearances to their margins
+constexpr double limit_room = 0.03;      // [rad] to a position limit, where a twist does not move a joint on
+constexpr double sliding_room = 0.2;     // the same of joints that slide [m/rad]
+constexpr double limit_rate = 3.0;       // [1/s] at which joints come to there
+constexpr double clearance_rate = 6.0;   // [1/s] at which clearances come to their margins
 constexpr double bound_rounding = 1e-9;  // [rad/s]
-constexpr double least_free = 0.05;   // share of a bound's direction that those held leave
+constexpr double least_free = 0.05;      // share of a bound's direction that those held leave
 
 }  // namespace
 
@@ -74,14 +75,17 @@ void Controller::Impl::follow_input() noexcept {
 }
 
 void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept {
-  if (!is_fresh()) {
-    wanted_v_.setZero();
-    has_last_wanted_v_ = false;
-  } else if (velocity != nullptr) {
-    wanted_v_ = velocity->velocity;
-  } else {
-    twist_state_.update(arm.robot(), q_, v_);
+  twist_state_.update(arm.robot(), q_, v_);
+  if (twist != nullptr && is_fresh()) {
     solve_twist(*twist);
+  } else {
+    path_v_.setZero();
+    if (is_fresh()) {
+      path_v_ = velocity->velocity;
+      scale_to_limits(path_v_);
+    }
+    keep_bounds(path_v_);
+    has_last_wanted_v_ = false;
   }
   scale_to_limits(wanted_v_);
   JointGoal& goal = std::get<JointGoal>(input_goal_);
@@ -92,7 +96,12 @@ void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const Twis
   if (has_last_wanted_v_) {  // its own change, while the order is the same
     path_a_ += ((wanted_v_ - last_wanted_v_) / settings.period).cwiseMax(-most_a_).cwiseMin(most_a_);
   }
-  pull(wanted_v_, path_a_);
+  // What bounds hold of the velocity is held: its pull needs no barriers, and is the damping's.
+  JointGoal& pull = std::get<JointGoal>(input_pull_);
+  pull.position = goal.position;
+  pull.velocity = v_ + path_a_ / settings.barriers.damping;
+  pull.acceleration.setZero();
+  pulls_ = true;
   last_wanted_v_ = wanted_v_;
   has_last_wanted_v_ = twist != nullptr && is_fresh();
 }
@@ -159,6 +168,17 @@ void Controller::Impl::solve_twist(const TwistOrder& order) noexcept {
   }
 }
 
+void Controller::Impl::keep_bounds(const Eigen::VectorXd& velocity) noexcept {
+  held_v_.setZero();
+  wanted_v_ = velocity;
+  for (Eigen::Index held = 0; held < held_.cols() && hold_worst(held); ++held) {
+    wanted_v_ = held_v_ + velocity;
+    for (Eigen::Index k = 0; k <= held; ++k) {
+      wanted_v_ -= held_.col(k).dot(velocity) * held_.col(k);
+    }
+  }
+}
+
 bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
   double worst = bound_rounding, bound = 0.0, length = 1.0;
   auto direction = held_.col(held);
@@ -180,7 +200,9 @@ bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
       continue;
     }
     const double norm = near.gradients.col(k).norm();
-    const double least = -limit_rate * std::max(0.0, near.values[k] - std::min(near.margins[k], settings.safety.margin));
+    // Obstacles that come nearer are given way to.
+    const double comes = std::min(0.0, near.rates[k] - near.gradients.col(k).dot(workspace.state().v()));
+    const double least = -comes - clearance_rate * std::max(0.0, near.values[k] - std::min(near.margins[k], settings.safety.margin));
     const double excess = norm > 0.0 ? (least - near.gradients.col(k).dot(wanted_v_)) / norm : 0.0;
     if (excess > worst) {
       worst = excess;
