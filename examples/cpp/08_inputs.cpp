@@ -21,13 +21,13 @@ int main(int argc, char** argv) {
   Eigen::VectorXd q = arm.neutral(), v = Eigen::VectorXd::Zero(arm.num_coordinates());
 
   Controller controller(arm);
-  controller.set_velocity(Eigen::VectorXd::Constant(q.size(), 0.1));  // counts for 0.25 s
-  run(controller, q, v, 1000);
+  controller.set_velocity(Eigen::VectorXd::Constant(q.size(), 0.1));  // counts for 0.25 s: tell it again and again
+  run(controller, q, v, 200);
 
   sidestep::Vector6d twist;
   twist << 0.0, 0.1, 0.0, 0.0, 0.0, 0.2;  // m/s and rad/s, of the world
   controller.set_twist("fr3_hand_tcp", twist);
-  run(controller, q, v, 1000);
+  run(controller, q, v, 200);
 
   Eigen::MatrixXd chunk(q.size(), 2);
   chunk << q, arm.neutral();
