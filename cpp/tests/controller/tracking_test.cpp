@@ -1,0 +1,131 @@
+// The reference that a controller integrates, what it sends, and an arm that is not as its model.
+#include <algorithm>
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+
+#include "sidestep/controller/controller.hpp"
+#include "support/covered_arm.hpp"
+#include "support/random.hpp"
+
+using namespace sidestep;
+using test::covered_arm;
+using test::nv;
+
+namespace {
+
+const Eigen::VectorXd from = (Eigen::VectorXd(nv) << -0.5, 0.9, 0.0, 0.6, 0.0, 0.3, 0.0).finished();
+const Eigen::VectorXd to = (Eigen::VectorXd(nv) << 0.4, 0.5, 0.3, 0.9, -0.2, 0.6, 0.4).finished();
+
+ControllerSettings settings_of(ControllerSettings::Output output) {
+  ControllerSettings settings;
+  settings.synchronous = true;
+  settings.output = output;
+  return settings;
+}
+
+JointLimits limits_with_rates() {
+  JointLimits limits = test::arm_limits(nv);
+  limits.jerk.setConstant(1000.0);
+  limits.effort_rate.setConstant(1000.0);
+  return limits;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(positions_and_velocities_integrate_the_acceleration_whatever_the_drives_do) {
+  for (const double lag : {0.0, 0.02}) {
+    Controller controller(covered_arm(limits_with_rates()), settings_of(ControllerSettings::Output::position));
+    controller.set_goal(to);
+    const double period = controller.settings().period;
+    Eigen::VectorXd q = from, v = Eigen::VectorXd::Zero(nv), position = q, velocity = v;
+    for (int k = 0; k < 4000; ++k) {
+      const Command& command = controller.step(q, v);
+      BOOST_REQUIRE((command.velocity - velocity - period * command.acceleration).cwiseAbs().maxCoeff() < 1e-14);  // rounding
+      BOOST_REQUIRE((command.position - position - period * command.velocity).cwiseAbs().maxCoeff() < 1e-14);
+      position = command.position;
+      velocity = command.velocity;
+      const Eigen::VectorXd before = q;
+      q += period / (period + lag) * (position - q);  // a drive of first order
+      v = (q - before) / period;
+    }
+    BOOST_TEST((q - to).cwiseAbs().maxCoeff() < controller.settings().arrival.joint);
+    BOOST_TEST((controller.command().activity == Activity::arrived));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(velocities_lead_the_arm_back_to_the_reference) {
+  Controller controller(covered_arm(limits_with_rates()), settings_of(ControllerSettings::Output::velocity));
+  Eigen::VectorXd q = from;
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(nv);
+  BOOST_TEST(controller.step(q, rest).velocity.norm() == 0.0);
+  q[2] += 0.05;  // it has drifted
+  const Command& command = controller.step(q, rest);
+  BOOST_TEST((command.position - from).norm() < 1e-12);
+  BOOST_TEST((command.velocity + controller.settings().tracking.drift_gain * 0.05 * Eigen::VectorXd::Unit(nv, 2)).norm() < 1e-12);
+  BOOST_TEST(std::abs(command.tracking_error - 0.05) < 1e-12);
+}
+
+BOOST_AUTO_TEST_CASE(jerk_and_torque_rate_keep_their_limits_at_every_sample) {
+  JointLimits limits = limits_with_rates();
+  limits.jerk.setConstant(200.0);
+  const Arm arm = covered_arm(limits);
+  Controller controller(arm, settings_of(ControllerSettings::Output::torque));
+  const double period = controller.settings().period;
+  Eigen::VectorXd q = from, v = Eigen::VectorXd::Zero(nv), a = v, held(nv);
+  const RigidBodyDynamics dynamics(arm.dynamics());
+  RigidBodyDynamics::Workspace workspace(dynamics);
+  dynamics.bias(q, v, workspace, held);  // what holds it until now
+  Eigen::VectorXd torque = held;
+  double most_jerk = 0.0, most_rate = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    if (k % 700 == 0) {  // turns round on its way
+      controller.set_goal(k % 1400 == 0 ? to : from);
+    }
+    const Command& command = controller.step(q, v);
+    BOOST_REQUIRE(command.status <= SafetyStatus::limited);
+    most_jerk = std::max(most_jerk, (command.acceleration - a).cwiseAbs().cwiseQuotient(period * limits.jerk).maxCoeff());
+    most_rate = std::max(most_rate, (command.torque - torque).cwiseAbs().cwiseQuotient(period * limits.effort_rate).maxCoeff());
+    a = command.acceleration;
+    torque = command.torque;
+    v += period * a;
+    q += period * v;
+  }
+  BOOST_TEST(most_jerk < 1.0 + 1e-6);
+  BOOST_TEST(most_rate < 1.0 + 1e-6);
+  BOOST_TEST(std::max(most_jerk, most_rate) > 0.7);  // they are what holds it back
+}
+
+BOOST_AUTO_TEST_CASE(an_arm_with_a_payload_arrives_and_the_payload_is_found) {
+  const Arm arm = covered_arm(test::arm_limits(nv));
+  Controller controller(arm, settings_of(ControllerSettings::Output::torque));
+  controller.set_goal(to);
+  const double period = controller.settings().period;
+  const RigidBodyDynamics model(arm.dynamics());
+  auto inertials = arm.inertials();
+  inertials.back() = {0.5, {0.0, 0.0, 0.2}, Eigen::Vector3d(6e-3, 6e-3, 1e-3).asDiagonal()};  // 0.3 kg and 0.2 kg in its hand
+  const RigidBodyDynamics real(arm.robot(), inertials);
+  RigidBodyDynamics::Workspace of_model(model), of_real(real);
+  Eigen::MatrixXd mass(nv, nv);
+  Eigen::VectorXd bias(nv), held(nv), q = from, v = Eigen::VectorXd::Zero(nv);
+  double worst = 0.0;
+  for (int k = 0; k < 6000; ++k) {
+    const Command& command = controller.step(q, v);
+    worst = std::max(worst, command.tracking_error);
+    real.mass_matrix(q, of_real, mass);
+    real.bias(q, v, of_real, bias);
+    v += period * mass.ldlt().solve(command.torque - bias);
+    q += period * v;
+  }
+  const Command& command = controller.command();
+  BOOST_TEST((command.activity == Activity::arrived));
+  BOOST_TEST((q - to).cwiseAbs().maxCoeff() < 1e-3);
+  BOOST_TEST(worst < 0.05);  // [rad] on the way, of the first moment without its weight
+  real.bias(q, v, of_real, bias);
+  model.bias(q, v, of_model, held);
+  BOOST_TEST((command.disturbance - (held - bias)).cwiseAbs().maxCoeff() < 0.02);  // [Nm] of some 5
+  KinematicState state(arm.robot());
+  state.update(arm.robot(), q, v);
+  Eigen::VectorXd gravity(nv);
+  model.gravity(state, of_model, gravity);
+  BOOST_TEST((command.torque - command.torque_without_gravity - gravity).cwiseAbs().maxCoeff() < 0.01);
+}
