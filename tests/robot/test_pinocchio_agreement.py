@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 import xacro
 
+import sidestep as ss
 from sidestep.robot import Robot
 from sidestep.robot.catalogue import RECIPES, recipe
 
@@ -159,3 +160,17 @@ def test_frames_and_limits(pair: tuple[Robot, Oracle]) -> None:
         if robot.name != "iiwa":  # whose placeholders the catalogue replaces
             assert robot.limits.velocity[i] == oracle.model.velocityLimit[joint.idx_v]
             assert robot.limits.effort[i] == oracle.model.effortLimit[joint.idx_v]
+
+
+@pytest.mark.parametrize("name", ["fr3_arm", "ur5"])
+def test_torque_without_gravity_lacks_the_gravity_of_pinocchio(name: str) -> None:
+    """At velocities too, where the bias has more than gravity."""
+    arm = ss.Arm.load(name)
+    oracle = named_oracle(name, Robot.named(name))
+    for q, v in states(arm.robot)[:20]:
+        settings = ss.ControllerSettings(synchronous=True, planner=None, look_ahead=None, output="torque")
+        command = ss.Controller(arm, settings).step(q, 0.1 * v)
+        expected = pin.computeGeneralizedGravity(oracle.model, oracle.data, oracle.configuration(q))
+        np.testing.assert_allclose(
+            command.torque - command.torque_without_gravity, oracle.selection.T @ expected, atol=TOLERANCE
+        )
