@@ -10,6 +10,8 @@ constexpr double quick_filter = 0.01, slow_filter = 0.1;  // [s] time constants 
 constexpr double memory = 3.0;              // [s] of the sums
 constexpr double settled = 0.15;            // [s] for which a joint has moved one way
 constexpr double moving = 0.02;             // [rad/s | m/s]
+constexpr double explained = 0.3;            // of the missing force's variation that the acceleration has to explain [-]
+constexpr double adoption = 0.05;            // [s] in which a new estimate is taken over
 constexpr double least_square = 2.0;        // [(rad/s²)² s] of excitation that counts as much as the guess of no rotor
 
 }  // namespace
@@ -28,6 +30,7 @@ DisturbanceObserver::DisturbanceObserver(const JointLimits& limits, double perio
       slow_y_(disturbance_),
       squares_(disturbance_),
       products_(disturbance_),
+      missing_squares_(disturbance_),
       one_way_(disturbance_),
       last_v_(disturbance_) {}
 
@@ -46,7 +49,12 @@ void DisturbanceObserver::identify(Eigen::Index j, double v, double a, double y)
   const double keep = std::exp(-period_ / memory * std::min(1.0, x * x));  // what is not excited is not forgotten
   squares_[j] = keep * squares_[j] + period_ * x * x;
   products_[j] = keep * products_[j] + period_ * x * of_x;
-  rotors_[j] = std::clamp(products_[j] / (squares_[j] + least_square), 0.0, std::isfinite(most_rotor_[j]) ? most_rotor_[j] : 0.0);
+  missing_squares_[j] = keep * missing_squares_[j] + period_ * of_x * of_x;
+  // Only what is proportional to the acceleration is inertia: payloads move several joints, torques that lag behind none.
+  const bool proportional = products_[j] > 0.0 && products_[j] * products_[j] > explained * squares_[j] * missing_squares_[j];
+  const double found = proportional ? products_[j] / (squares_[j] + least_square) : 0.0;
+  const double most = std::isfinite(most_rotor_[j]) ? most_rotor_[j] : 0.0;
+  rotors_[j] += std::min(1.0, period_ / adoption) * (std::min(found, most) - rotors_[j]);
 }
 
 void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::VectorXd& torque,

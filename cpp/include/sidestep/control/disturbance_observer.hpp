@@ -36,7 +36,7 @@ class DisturbanceObserver {
   Eigen::VectorXd most_disturbance_, most_rotor_;
   Eigen::VectorXd disturbance_, rotors_, acceleration_;
   // Two low-pass filters each, whose difference is the band; sums of squares and products; how long a joint moves one way.
-  Eigen::VectorXd quick_a_, slow_a_, quick_y_, slow_y_, squares_, products_, one_way_, last_v_;
+  Eigen::VectorXd quick_a_, slow_a_, quick_y_, slow_y_, squares_, products_, missing_squares_, one_way_, last_v_;
 };
 
 }  // namespace sidestep
