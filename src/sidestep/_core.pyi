@@ -2150,7 +2150,8 @@ class TrackingSettings:
 
         frequency [1/s], default 60.0, allowed 1 to 300: of the feedback to the reference: larger is stiffer, and shakes with noise and delay
         damping, default 1.0, allowed 0.1 to 10: of the feedback: 1 is critical; unknown rotor inertias lower it, delay and noise ask for less
-        observer_time [s], default 0.03, allowed 0.005 to inf: in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay
+        velocity_filter [s], default 0.004, allowed 1e-05 to 1: of measured velocities, against what was predicted: longer is calmer and later
+        observer_time [s], default 0.05, allowed 0.005 to inf: in which friction, payload and wrong gravity are taken up: shorter is stiffer, and shakes with noise and delay
         observer_share, default 0.8, allowed 0 to 1: of the effort limits that the observer may make up for
         largest_error [rad], default 0.2, allowed 0.001 to 10: between arm and reference, from which the reference begins anew
         servo_lag [rad], default 1.0, allowed 0.001 to 10: the same where the arm's own drives track position or velocity
@@ -2159,7 +2160,7 @@ class TrackingSettings:
     A Controller refuses what is not allowed.
     """
 
-    def __init__(self, *, frequency: float = 60.0, damping: float = 1.0, observer_time: float = 0.03, observer_share: float = 0.8, largest_error: float = 0.2, servo_lag: float = 1.0, drift_gain: float = 2.0) -> None: ...
+    def __init__(self, *, frequency: float = 60.0, damping: float = 1.0, velocity_filter: float = 0.004, observer_time: float = 0.05, observer_share: float = 0.8, largest_error: float = 0.2, servo_lag: float = 1.0, drift_gain: float = 2.0) -> None: ...
 
     @property
     def frequency(self) -> float: ...
@@ -2172,6 +2173,12 @@ class TrackingSettings:
 
     @damping.setter
     def damping(self, value: float, /) -> None: ...
+
+    @property
+    def velocity_filter(self) -> float: ...
+
+    @velocity_filter.setter
+    def velocity_filter(self, value: float, /) -> None: ...
 
     @property
     def observer_time(self) -> float: ...
@@ -2241,6 +2248,51 @@ class SpeedLimitSettings:
 
     @far_distance.setter
     def far_distance(self, value: float, /) -> None: ...
+
+class InputSettings:
+    """
+    How velocities, twists and trajectories are followed, see Controller.
+
+        response [1/s], default 20.0, allowed 1 to 100: to a velocity that is wanted: larger is quicker, and passes on its noise
+        timeout [s], default 0.25, allowed 0.001 to inf: age from which a velocity or a twist counts as zero
+        singular, default 0.05, allowed 0.0001 to 1: singular value of a frame's Jacobian [m and rad] below which a twist is damped: larger is calmer and less exact there
+        frequency [1/s], default 10.0, allowed 1 to 50: of the return to a trajectory: larger is stiffer
+        lead [rad], default 0.1, allowed 0.001 to 10: error from which a trajectory slows down, to a halt at twice as much; of sliding joints a fifth [m]
+
+    A Controller refuses what is not allowed.
+    """
+
+    def __init__(self, *, response: float = 20.0, timeout: float = 0.25, singular: float = 0.05, frequency: float = 10.0, lead: float = 0.1) -> None: ...
+
+    @property
+    def response(self) -> float: ...
+
+    @response.setter
+    def response(self, value: float, /) -> None: ...
+
+    @property
+    def timeout(self) -> float: ...
+
+    @timeout.setter
+    def timeout(self, value: float, /) -> None: ...
+
+    @property
+    def singular(self) -> float: ...
+
+    @singular.setter
+    def singular(self, value: float, /) -> None: ...
+
+    @property
+    def frequency(self) -> float: ...
+
+    @frequency.setter
+    def frequency(self, value: float, /) -> None: ...
+
+    @property
+    def lead(self) -> float: ...
+
+    @lead.setter
+    def lead(self, value: float, /) -> None: ...
 
 class OnlinePlannerSettings:
     """
@@ -2392,7 +2444,8 @@ class ControllerSettings:
 
         period [s], default 0.001, allowed 0.0001 to 0.1: between two calls of step; limits and clearances hold at samples so far apart
         speed, default 1.0, allowed 0.01 to 1: share of the velocity and acceleration limits that motions use: less is slower and calmer
-        velocity_margin, default 0.02, allowed 0 to 0.5: share of the velocity limits that is left for noise and delay
+        limit_margin, default 0.02, allowed 0 to 0.5: share of the limits of velocity, acceleration, jerk and torque rate that is left for noise, delay and rounding
+        effort_margin, default 0.05, allowed 0 to 0.5: share of the effort limits that is left for what the model lacks
         position_margin [rad], default 0.0, allowed 0 to 1: by which position limits are moved inwards
         stop_time [s], default 0.1, allowed 0.005 to 10: time constant of the damped stop
         stop_damping, default 0.25, allowed 0.001 to 10: of a stop where the mass matrix is unusable, as a share of effort limit / velocity limit
@@ -2408,7 +2461,7 @@ class ControllerSettings:
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, period: float = 0.001, speed: float = 1.0, velocity_margin: float = 0.02, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., speed_limits: SpeedLimitSettings | None = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
+    def __init__(self, *, period: float = 0.001, speed: float = 1.0, limit_margin: float = 0.02, effort_margin: float = 0.05, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., speed_limits: SpeedLimitSettings | None = ..., inputs: InputSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
 
     @property
     def period(self) -> float: ...
@@ -2423,10 +2476,16 @@ class ControllerSettings:
     def speed(self, value: float, /) -> None: ...
 
     @property
-    def velocity_margin(self) -> float: ...
+    def limit_margin(self) -> float: ...
 
-    @velocity_margin.setter
-    def velocity_margin(self, value: float, /) -> None: ...
+    @limit_margin.setter
+    def limit_margin(self, value: float, /) -> None: ...
+
+    @property
+    def effort_margin(self) -> float: ...
+
+    @effort_margin.setter
+    def effort_margin(self, value: float, /) -> None: ...
 
     @property
     def position_margin(self) -> float: ...
@@ -2519,6 +2578,12 @@ class ControllerSettings:
     def tracking(self, arg: TrackingSettings, /) -> None: ...
 
     @property
+    def inputs(self) -> InputSettings: ...
+
+    @inputs.setter
+    def inputs(self, arg: InputSettings, /) -> None: ...
+
+    @property
     def output(self) -> Output: ...
 
     @output.setter
@@ -2561,6 +2626,19 @@ def controller_settings_fields() -> list[dict[str, float | str]]:
     that its name begins with is optional, so that None leaves it out.
     """
 
+class TrajectoryBehaviour(enum.Enum):
+    """
+    What a Controller does with a trajectory where something is in the way.
+    """
+
+    keep_path = 0
+    """
+    Stay on the path: slow down and wait before what blocks it, go on when it is free.
+    """
+
+    steer = 1
+    """Go around, and rejoin."""
+
 class SafetyStatus(enum.IntEnum):
     """How safe a command is, by severity. Every command may be sent."""
 
@@ -2588,13 +2666,15 @@ class Activity(enum.Enum):
     """What a controller is about."""
 
     no_goal = 0
-    """None was given: the arm comes to rest, and evades."""
+    """
+    None was given, or no velocity for a while: the arm comes to rest, and evades.
+    """
 
     moving = 1
-    """On the way to its goal."""
+    """On the way to its goal, or as it is told."""
 
     waiting = 2
-    """Until a posture is found."""
+    """Until a posture is found, or a trajectory that it keeps to is free."""
 
     arrived = 3
     """The goal is reached."""
@@ -2657,6 +2737,14 @@ class Command:
     @property
     def tracking_error(self) -> float:
         """Largest difference of the arm from the reference [rad | m]."""
+
+    @property
+    def deviation(self) -> float:
+        """Of the reference from a trajectory, in the farthest joint [rad | m]."""
+
+    @property
+    def delay(self) -> float:
+        """How far the trajectory's clock is behind [s]."""
 
     @property
     def clearance(self) -> float:
@@ -2722,6 +2810,28 @@ class Controller:
         """
         From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose. Raises
         ValueError that names the joint, its value and what is allowed; the goal before stays.
+        """
+
+    def set_velocity(self, v: numpy.typing.ArrayLike) -> None:
+        """
+        Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. Obstacles steer the
+        arm around them and stop it. After `inputs.timeout` without another order the arm stops. Raises ValueError that
+        names the joint and what is allowed; the order before stays.
+        """
+
+    def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False) -> None:
+        """
+        The same for the twist (6,) of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of
+        the world or, `local`, its own; rows as in `Robot.jacobian`. The arm slides along singular configurations and limits.
+        Raises ValueError that lists the frames that there are.
+        """
+
+    def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, behaviour: TrajectoryBehaviour | str = 'keep_path') -> None:
+        """
+        Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing; cubics between them. A first
+        time after zero leaves that long to get to the first sample, which need not be where the arm is. `keep_path` slows
+        down and waits before what blocks the path, `steer` goes around and rejoins; `command.deviation` and `command.delay`
+        say how far off and behind it is. Raises ValueError that names sample, joint, value and what is allowed.
         """
 
     def clear_goal(self) -> None:

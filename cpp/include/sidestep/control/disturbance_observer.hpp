@@ -13,7 +13,8 @@ namespace sidestep {
 ///     far, d changes by (M + J) (v̇ − a) T/T_o in every period T: it follows with the time constant T_o;
 ///   - the inertias J of rotors (diagonal), which gears make larger than those of light links: the slope of what is missing,
 ///     τ − h − M v̇, over v̇, both between 1.6 and 16 Hz, by least squares over the last seconds. Where a joint turns back,
-///     dry friction would count as inertia: those samples are left out.
+///     dry friction would count as inertia: those samples are left out; so is what goes with the forces of other joints'
+///     accelerations, as a payload's does.
 /// Both are bounded: |d| by a share of the effort limits, J by what the effort limit can accelerate at the acceleration limit.
 /// No member allocates.
 class DisturbanceObserver {
@@ -30,13 +31,18 @@ class DisturbanceObserver {
   const Eigen::VectorXd& rotors() const noexcept { return rotors_; }            ///< J (nv) [kg m² | kg]
 
  private:
-  void identify(Eigen::Index joint, double v, double acceleration, double missing) noexcept;
+  struct Filters {
+    Eigen::VectorXd quick, slow;  // two low-pass filters, whose difference is the band
+  };
+  void identify(Eigen::Index joint, double v, double acceleration, double coupled, double missing) noexcept;
 
   double period_, share_of_period_;
   Eigen::VectorXd most_disturbance_, most_rotor_;
   Eigen::VectorXd disturbance_, rotors_, acceleration_;
-  // Two low-pass filters each, whose difference is the band; sums of squares and products; how long a joint moves one way.
-  Eigen::VectorXd quick_a_, slow_a_, quick_y_, slow_y_, squares_, products_, missing_squares_, one_way_, last_v_;
+  // Of every joint: its acceleration x, the model's force z of the other joints' accelerations, the missing force y; sums of
+  // their products; how long it moves one way.
+  Filters acceleration_band_, coupled_band_, missing_band_;
+  Eigen::VectorXd xx_, xz_, zz_, xy_, zy_, yy_, one_way_, last_v_;
 };
 
 }  // namespace sidestep
