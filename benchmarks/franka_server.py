@@ -185,7 +185,9 @@ class Driver:
                 q, v = np.array(state.q), np.array(state.dq)
                 rows.append(q)
                 if mode == "position" and len(rows) <= 2:
-                    q = np.array(state.q_d)  # a stream of positions begins with that of the robot, and goes on from it
+                    q = np.array(
+                        state.q_d
+                    )  # a stream of positions begins with that of the robot, and goes on from it
                 command = controller.step(q, v) if mode == "torque" or len(rows) > 1 else None
                 if command is None:
                     out = franka.JointPositions(q.tolist())

@@ -88,9 +88,7 @@ class Bench:
     def run(self, cell: str, index: int, output: str, duration: float) -> dict[str, Any]:
         """What came of one run of a cell."""
         plant, problem = CELLS[cell], self.problem(index)
-        settings = ss.ControllerSettings(
-            synchronous=True, seed=index, period=1.0 / plant.rate, output=output
-        )
+        settings = ss.ControllerSettings(synchronous=True, seed=index, period=1.0 / plant.rate, output=output)
         controller = ss.Controller(self.arm, settings)
         controller.set_obstacles(problem.obstacles)
         controller.set_goal(problem.goal)

@@ -32,4 +32,4 @@ print(
 )
 print(f"largest torque over its limit: {found.max_torque_ratio:.2f}")
 print(f"limits kept: {not found.limits.any}")
-print(f"largest tracking error: {found.max_tracking_error:.2e} rad/s^2")
+print(f"largest error of the model: {found.max_model_error:.2e} rad/s^2")

@@ -115,7 +115,8 @@ def test_a_handler_that_does_not_raise_does_not_end_the_work():
 def test_two_threads_are_not_let_into_one_planner():
     robot, body = ss.Robot.named("planar3"), ss.Body(**planar_problems.BODY)
     wall = ss.Obstacles([[r * np.cos(0.75), r * np.sin(0.75), 0.0] for r in np.linspace(0.45, 1.6, 40)], 0.05)
-    settings = PlannerSettings(max_nodes=1_000_000, max_iterations=2_000_000_000, max_seconds=3.0)
+    many = 2_000_000_000
+    settings = PlannerSettings(max_nodes=1_000_000, max_iterations=many, max_checks=many, max_seconds=3.0)
     planner, plans = PathPlanner(robot, body, settings=settings), []
     thread = threading.Thread(target=lambda: plans.append(planner.plan([0, 0, 0], [1.5, 0, 0], wall)))
     thread.start()

@@ -289,7 +289,8 @@ def near_the_tip(arm: ss.Arm, aside: float = 0.0) -> ss.Obstacles:
 def states(arm: ss.Arm, num: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(4)
     q = arm.neutral + rng.normal(scale=0.1, size=(num, arm.num_coordinates))
-    return q, rng.normal(scale=0.3, size=q.shape)
+    v = rng.normal(scale=0.3, size=q.shape)
+    return q, v + np.copysign(0.1, v)  # slower joints count as at rest
 
 
 def bare(arm: ss.Arm, goal: np.ndarray, seen: ss.Obstacles) -> ss.Controller:

@@ -72,7 +72,7 @@ def test_the_fr3_is_slow_near_a_person_and_arrives(fr3: ss.Arm) -> None:
     assert limited.excess <= 0.0
     assert limited.fastest < 1.2
     assert (free.relaxed, limited.relaxed) == (0, 0)
-    assert free.seconds < limited.seconds < 2.0 * free.seconds
+    assert free.seconds < limited.seconds < 4.5
     assert limited.clearance > 0.5 * free.clearance  # the reference on the path waits: no corner is cut
     assert any("may move at 0.25 m/s, 0.0" in words and "m from 'person'" in words for words in limited.words)
     assert not any("speed limit" in words for words in free.words)

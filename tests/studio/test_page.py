@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -194,7 +195,7 @@ def test_a_second_browser_sees_the_same(studio: Studio, looker: Looker, chromium
         assert differ(before, second.scene()).sum() > 1000  # [px] of the arm that moves
         words = second.page.locator("#words").inner_text()
         assert "0.5 s" in words
-        assert "status: ok, moving" in words
+        assert re.search("status: (ok|limited), moving", words)  # it begins with all the jerk there is
         assert looker.page.locator("#words").inner_text() == words
         assert second.errors == []
     finally:

@@ -123,7 +123,7 @@ void Controller::Impl::choose_reference() noexcept {
   }
   const bool led = guide && guide_status_ != OnlinePlannerStatus::no_path;
   if (escape_ && !led && !target_blocked_ && !avoiding_) {
-    followed_ = &escape_->pursue(reference_, q_, std::numeric_limits<double>::quiet_NaN(), settings.period);
+    followed_ = &escape_->pursue(reference_, arm_q_, std::numeric_limits<double>::quiet_NaN(), settings.period);
   }
 }
 

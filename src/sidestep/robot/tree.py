@@ -274,7 +274,9 @@ def _limits(
             names,
         ),
         jerk=None if jerk is None else _per_coordinate(jerk, "jerk_limits", names),
-        effort_rate=None if effort_rate is None else _per_coordinate(effort_rate, "effort_rate_limits", names),
+        effort_rate=None
+        if effort_rate is None
+        else _per_coordinate(effort_rate, "effort_rate_limits", names),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from sidestep.studio.parameters import (
     ARRIVAL,
     BARRIERS,
+    INPUTS,
     LOCAL_MINIMUM,
     LOOK_AHEAD,
     PLANNER,
@@ -27,14 +28,24 @@ METHODS: dict[str, Method] = {
             "controller (recommended)",
             "Everything: a path that is searched beside the loop, barriers for each part of the body, each joint limit "
             "and each pair of links, a look ahead at what moves, and a program that keeps clearances and limits.",
-            (*BARRIERS, *PLANNER, *LOOK_AHEAD, *LOCAL_MINIMUM, *ARRIVAL, *TRACKING, *SAFETY, *TORQUE),
+            (
+                *BARRIERS,
+                *PLANNER,
+                *LOOK_AHEAD,
+                *LOCAL_MINIMUM,
+                *ARRIVAL,
+                *TRACKING,
+                *INPUTS,
+                *SAFETY,
+                *TORQUE,
+            ),
             controlled=True,
         ),
         Method(
             "barrier",
             "controller without planner",
             "The same without paths: where it is stuck it follows random sub-goals for a while.",
-            (*BARRIERS, *LOOK_AHEAD, *LOCAL_MINIMUM, *ARRIVAL, *TRACKING, *SAFETY, *TORQUE),
+            (*BARRIERS, *LOOK_AHEAD, *LOCAL_MINIMUM, *ARRIVAL, *TRACKING, *INPUTS, *SAFETY, *TORQUE),
             controlled=True,
         ),
         Method(
@@ -42,7 +53,7 @@ METHODS: dict[str, Method] = {
             "controller, reactive alone",
             "The same without sub-goals and look ahead: where it is stuck it stays, and it yields straight away from "
             "what comes.",
-            (*BARRIERS, *ARRIVAL, *TRACKING, *SAFETY, *TORQUE),
+            (*BARRIERS, *ARRIVAL, *TRACKING, *INPUTS, *SAFETY, *TORQUE),
             controlled=True,
         ),
         *METHODS_OF_THESIS,

@@ -32,6 +32,7 @@ FOLDERS = {  # on the page, by places in a scenario file
     "controller.planner.route": "Following a path",
     "controller.arrival": "Arrival",
     "controller.tracking": "Tracking",
+    "controller.inputs": "Inputs",
     "controller": "Limits and weights",
     "controller.safety": "Clearances of every command",
     "body": "Body",
@@ -220,5 +221,6 @@ LOOK_AHEAD = _part("look_ahead", "look_ahead_")
 LOCAL_MINIMUM = _part("local_minimum", "local_minimum_")
 ARRIVAL = _part("arrival", "arrival_")
 TRACKING = _part("tracking", "tracking_")
+INPUTS = _part("inputs", "inputs_")
 SAFETY = _part("safety", "safety_")
 TORQUE = _stated(PROGRAM, "torque_")
