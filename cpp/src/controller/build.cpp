@@ -140,6 +140,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       v_(q_),
       a_(q_),
       wanted_(q_),
+      smooth_a_(q_),
       next_q_(q_),
       next_v_(q_),
       arm_q_(q_),

@@ -211,6 +211,7 @@ class Controller::Impl {
   BodyClearance body_;
   BodyClearance::Workspace here_;
   Eigen::VectorXd q_, v_, a_, wanted_;          // the reference: now, and its acceleration in the last period or this one
+  Eigen::VectorXd smooth_a_;                    // from which jerk goes on
   Eigen::VectorXd next_q_, next_v_;             // after this period
   Eigen::VectorXd arm_q_, arm_v_, last_arm_q_, last_arm_v_, turns_;  // measured
   bool apart_ = false;                          // the arm is not exactly where the reference is

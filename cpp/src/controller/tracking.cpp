@@ -42,6 +42,7 @@ void Controller::Impl::begin_reference() noexcept {
   next_q_ = arm_q_;
   next_v_ = arm_v_.unaryExpr([](double v) { return std::abs(v) < jitter ? 0.0 : v; });
   a_.setZero();
+  smooth_a_.setZero();
   if (!torque) {
     return;
   }
@@ -143,9 +144,9 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
       gravity_change_.setZero();
     }
   }
-  LastCommand last{&a_};
+  LastCommand last{&smooth_a_};
   if (torque) {
-    last = last_command(&a_, &reference_torque_, true);
+    last = last_command(&smooth_a_, &reference_torque_, true);
   }
   limit_speed();
   const SpeedRows* const speed = settings.speed_limits ? &speed_rows_ : nullptr;
@@ -200,6 +201,16 @@ void Controller::Impl::stop(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix
 
 void Controller::Impl::advance_reference() noexcept {
   a_ = solution.acceleration.allFinite() ? solution.acceleration : a_;
+  if (command.program == TorqueStatus::relaxed_safety || command.program == TorqueStatus::clearance_lost) {
+    // Jerk goes on from what it would have allowed: a push out of what is lost ends as suddenly as it began.
+    const Eigen::VectorXd& jerk = arm.robot().limits().jerk;
+    for (Eigen::Index j = 0; j < a_.size(); ++j) {
+      const double step = jerk[j] * settings.period;
+      smooth_a_[j] += std::clamp(a_[j] - smooth_a_[j], -step, step);
+    }
+  } else {
+    smooth_a_ = a_;
+  }
   next_v_ = v_ + settings.period * a_;
   next_q_ = q_ + settings.period * next_v_;
 }
