@@ -271,7 +271,9 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     bool smooth = false;
     if (last != nullptr) {
       const double jerk = of_jerk * last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
-      const double rising = gradient.dot(last->acceleration) + jerk * period;
+      // Joints that are at a limit give no more.
+      const double before = gradient.dot(last->acceleration), most = largest_product(gradient, bounds.smooth_lower, bounds.smooth_upper);
+      const double rising = std::min(before + of_jerk * std::max(most - before, 0.0), most);
       if (required > rising && jerk < infinity) {
         const double next = u - (rising + c) * period, A = of_hardest * hardest;
         smooth = room - std::max(u, next) * period >= jerk_braking_distance(next, std::max(-(rising + c), -A), A, jerk);

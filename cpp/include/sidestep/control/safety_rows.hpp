@@ -84,8 +84,8 @@ struct ClosingLimits {
 // With a jerk limit. Where a row first binds, the arm may still accelerate towards the obstacle, and would have to brake at
 // once. It need not: half of the deceleration that there is is not planned with. With b the ∇h·a of the last period and J the
 // jerk Σ |∂h/∂q_j| J_j of the clearance, half of which a row may take so that two can rise together, a row asks for no more
-// than b + J T/2, as long as the smooth stop that begins with it,
-//     S(u, −(b + J T/2 + c)) at J/2 and at three quarters of the hardest deceleration,
+// than b and half of what the smooth bounds of now leave beyond it (J T/2, of joints at no limit), as long as the smooth stop that begins with it,
+//     S(u, −(∇h·a + c)) at J/2 and at three quarters of the hardest deceleration,
 // fits into the room: S of acceleration_bounds.hpp. Where it does not, jerk gives way.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
