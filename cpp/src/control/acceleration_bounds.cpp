@@ -232,4 +232,14 @@ void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, Con
   }
 }
 
+void AccelerationBounds::draw_in(const Eigen::VectorXd& limit, ConstVectorRef wanted) noexcept {
+  for (Eigen::Index i = 0; i < lower.size(); ++i) {
+    const double high = std::max(limit[i], wanted[i]), low = std::min(-limit[i], wanted[i]);
+    upper[i] = std::max(std::min(upper[i], high), lower[i]);
+    lower[i] = std::min(std::max(lower[i], low), upper[i]);
+    smooth_upper[i] = std::clamp(smooth_upper[i], lower[i], upper[i]);
+    smooth_lower[i] = std::clamp(smooth_lower[i], lower[i], upper[i]);
+  }
+}
+
 }  // namespace sidestep

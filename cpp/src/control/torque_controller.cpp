@@ -189,8 +189,11 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   if (q_known && v_known) {
     bounds_.update(limits_, q, v, settings_.period,
                    {settings_.position_margin, mass_known && last.torque != nullptr ? jerk_share() : 1.0,
-                    settings_.acceleration_factor},
+                    last.acceleration_factor},
                    last.binds ? last.acceleration : nullptr);
+    if (last.acceleration_factor > 1.0 && wanted_known) {
+      bounds_.draw_in(limits_.acceleration, acceleration);
+    }
     solution.lower = bounds_.lower;
     solution.upper = bounds_.upper;
   } else {
@@ -240,8 +243,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       write_cost();
       kept = false;
       if (last.torque != nullptr) {
-        if (last.acceleration == nullptr || !last.binds) {
-          wide_upper_ = std::max(settings_.acceleration_factor, settings_.acceleration_overrun) * limits_.acceleration;
+        if (last.acceleration_factor > 1.0) {
+          wide_upper_ = last.acceleration_factor * limits_.acceleration;
           wide_lower_ = -wide_upper_;
         } else {
           wide_lower_ = bounds_.lower;

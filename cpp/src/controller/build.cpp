@@ -18,7 +18,6 @@ namespace {
 
 constexpr double usable_acceleration = 0.9;   // of the limits, for velocities, twists and trajectories: the rest is for feedback
 constexpr Eigen::Index most_held = 6;         // bounds that a twist is held by
-constexpr double feedback_room = 20.0;        // of accelerations: dry friction on a light wrist takes so much
 constexpr double most_per_period = 0.2;       // of the feedback's frequency: a slow rate holds its torques for long
 constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
 
@@ -218,9 +217,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
     program.slack_weight = settings.slack_weight;
     program.velocity_overrun = settings.velocity_overrun;
     program.acceleration_overrun = settings.acceleration_overrun;
-    program.acceleration_factor = feedback_room;
     tracking_program_.emplace(of_arm, program);
-    program.acceleration_factor = 1.0;
     torque_program_.emplace(of_reference, program);
     if (settings.tracking.observer_time < infinity) {
       observer_.emplace(arm.robot().limits(), settings.period, settings.tracking.observer_time, settings.tracking.observer_share);

@@ -158,7 +158,8 @@ class Controller::Impl {
   std::string explain_speed() const;
   void stop(MassMatrix mass_matrix, Bias bias, ConstVectorRef q, ConstVectorRef v) noexcept;
   void advance_reference() noexcept;
-  LastCommand last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque, bool binds) const noexcept;
+  LastCommand last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque, double factor,
+                           bool binds) const noexcept;
   void write_gravity(bool known) noexcept;
   void report(bool known) noexcept;
   Activity judge_activity() noexcept;

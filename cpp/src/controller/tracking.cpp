@@ -10,6 +10,9 @@
 namespace sidestep {
 namespace {
 
+constexpr double close = 0.003;        // to the reference [rad | m]: feedback keeps the acceleration limits
+constexpr double feedback_room = 20.0;  // of accelerations elsewhere: dry friction on a light wrist takes so much
+constexpr double like_reference = 0.1;  // of the acceleration limits, by which feedback may differ [-]
 constexpr double jitter = 0.1;         // of measured velocities, at rest [rad/s | m/s]
 constexpr double free_share = 0.2;     // of the largest error, from which the arm draws the reference to itself [-]
 constexpr double sliding_share = 0.2;  // of the largest error, of joints that slide [m/rad]
@@ -122,9 +125,9 @@ void Controller::Impl::take_dynamics(const KinematicState& state, const Eigen::R
 }
 
 LastCommand Controller::Impl::last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque,
-                                           bool binds) const noexcept {
+                                           double factor, bool binds) const noexcept {
   return {acceleration, has_last_torque_ ? of_torque : nullptr, dynamics_ ? &gravity_ : nullptr,
-          dynamics_ ? &gravity_change_ : nullptr, binds};
+          dynamics_ ? &gravity_change_ : nullptr, factor, binds};
 }
 
 void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
@@ -146,7 +149,7 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
   }
   LastCommand last{&smooth_a_};
   if (torque) {
-    last = last_command(&smooth_a_, &reference_torque_, true);
+    last = last_command(&smooth_a_, &reference_torque_, 1.0, true);
   }
   limit_speed();
   const SpeedRows* const speed = settings.speed_limits ? &speed_rows_ : nullptr;
@@ -170,14 +173,18 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
   const double w = frequency_;
   feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
   const SpeedRows* const speed = settings.speed_limits ? &arm_speed_rows_ : nullptr;
+  // The reference's acceleration meets the clearances of the arm as well: they are asked again where the arm is to do something
+  // else.
+  const bool as_reference = ((feedback_ - a_).cwiseAbs().array() < like_reference * arm.robot().limits().acceleration.array()).all();
+  const Clearances* const clearances = as_reference ? nullptr : &arm_workspace_.clearances;
   TorqueStatus status;
   if (torque) {
     take_dynamics(arm_workspace_.state(), mass_matrix, bias);
-    const LastCommand last = last_command(&last_acceleration_, &last_torque_, false);
-    status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, &arm_workspace_.clearances, {}, last, tracked_, speed);
+    const LastCommand last = last_command(&last_acceleration_, &last_torque_, command.tracking_error < close ? 1.0 : feedback_room, false);
+    status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, clearances, {}, last, tracked_, speed);
   } else {
     const LastCommand last{&last_acceleration_};
-    status = tracking_filter_->apply(arm_q_, arm_v_, feedback_, &arm_workspace_.clearances, {}, last, tracked_, speed);
+    status = tracking_filter_->apply(arm_q_, arm_v_, feedback_, clearances, {}, last, tracked_, speed);
   }
   if (status > TorqueStatus::limited) {
     command.program = std::max(command.program, status);

@@ -123,6 +123,9 @@ struct AccelerationBounds {
   void update(const JointLimits& limits, ConstVectorRef q, ConstVectorRef v, double period, const LimitMargins& margins = {},
               const Eigen::VectorXd* before = nullptr) noexcept;
 
+  /// Takes back what exceeds the acceleration limits (nv) and nobody asked for: from the limit to the wanted one (nv).
+  void draw_in(const Eigen::VectorXd& limit, ConstVectorRef wanted) noexcept;
+
   Eigen::VectorXd lower, upper;  ///< (nv) [rad/s^2 | m/s^2]
   std::vector<Limit> lower_limit, upper_limit;
   Eigen::VectorXd smooth_lower, smooth_upper;  ///< (nv) with the jerk limit; the same without a last acceleration

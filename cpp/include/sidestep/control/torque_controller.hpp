@@ -71,6 +71,8 @@ struct LastCommand {
   /// it, as drives that hold the arm themselves are told less.
   const Eigen::VectorXd* gravity = nullptr;
   const Eigen::VectorXd* gravity_change = nullptr;
+  /// Up to which the acceleration may exceed its limits, of feedback against what the model lacks, in [1, inf) [-].
+  double acceleration_factor = 1.0;
   bool binds = true;  ///< the jerk limit; else clearances alone rise no faster than it allows
 };
 
@@ -105,8 +107,6 @@ struct TorqueControllerSettings {
   bool hard_bounds = false;
   /// Position limits are moved inwards by this much [rad | m].
   double position_margin = 0.0;
-  /// Factor by which the acceleration may exceed its limits, in [1, inf): of feedback against what the model lacks [-].
-  double acceleration_factor = 1.0;
   /// Time constant of the damped stop q̈ = -v/stop_time [s].
   double stop_time = 0.1;
   /// Damping of the stop when the mass matrix is unusable, as a fraction of effort limit / velocity limit [-].
