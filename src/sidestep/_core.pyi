@@ -2256,7 +2256,7 @@ class InputSettings:
         response [1/s], default 20.0, allowed 1 to 100: to a velocity that is wanted: larger is quicker, and passes on its noise
         timeout [s], default 0.25, allowed 0.001 to inf: age from which a velocity or a twist counts as zero
         singular, default 0.05, allowed 0.0001 to 1: singular value of a frame's Jacobian [m and rad] below which a twist is damped: larger is calmer and less exact there
-        frequency [1/s], default 10.0, allowed 1 to 50: of the return to a trajectory: larger is stiffer
+        frequency [1/s], default 10.0, allowed 1 to 50: of the return to a trajectory or to the planner's path: larger is stiffer
         lead [rad], default 0.1, allowed 0.001 to 10: error from which a trajectory slows down, to a halt at twice as much; of sliding joints a fifth [m]
 
     A Controller refuses what is not allowed.

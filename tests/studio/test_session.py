@@ -21,6 +21,7 @@ from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.export import save_scenario, scenario_now
 from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page.arm import link_meshes, short_names
+from sidestep.studio.page.camera import RIGHT
 from sidestep.studio.scene_obstacle import ball, box
 from sidestep.studio.session import Session
 from sidestep.studio.simulated_scene import DRAG_ACCELERATION, DRAG_SPEED
@@ -44,6 +45,25 @@ def record(session: Session, seconds: float) -> tuple[m.Snapshot, float]:
     poses = np.array([solid_poses(things, row.poses) for row in last.rows])
     worst = exact.decided_minimum(np.array([row.q for row in last.rows]), poses)
     return last, worst.clearance.distance
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("begin", [0.05, 0.2, 0.35, 0.5, 0.6, 0.75])
+def test_a_ball_drawn_into_the_way_is_not_touched(
+    make_session: MakeSession, scenario: Scenario, begin: float
+) -> None:
+    session = make_session(scenario)
+    q = session.stage.state()[0]
+    session.handle(m.SetJointGoal(q + np.array([1.0, 0.0])))
+    run(session, begin)
+    ball = session.stage.actors[0]
+    place = ball.pose.copy()
+    place[:3, 3] -= 0.3 * RIGHT  # onto the circle of the tip
+    session.handle(m.DragObstacle(ball.thing.name, place))
+    last, clearance = record(session, 3.0)
+    assert clearance > 0.0
+    assert last.touched == 0
+    np.testing.assert_allclose(last.poses[0][:3, 3], place[:3, 3], atol=1e-3)
 
 
 def test_the_arm_arrives_past_the_ball(make_session: MakeSession, scenario: Scenario) -> None:

@@ -20,7 +20,9 @@ ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, Barrier
 
 void ClearanceBarrier::add_to(EmbeddingView out, const KinematicState& state,
                               const Obstacles& obstacles) const noexcept {
-  field_.evaluate(state, obstacles, reach_, horizon(state), out.clearances);
+  Horizon ahead = horizon(state);
+  ahead.time = std::max(ahead.time, Horizon::of_obstacles);
+  field_.evaluate(state, obstacles, reach_, ahead, out.clearances);
   add_barriers(out);
 }
 

@@ -20,6 +20,10 @@ constexpr double longest_stop = 10.0;
 constexpr double slow = 0.01;
 // Stands for a braking deceleration of zero [m/s²], so that the profile stays defined.
 constexpr double smallest_deceleration = 1e-6;
+// What accelerations and torques leave together is looked for where so small a share of what they leave alone would matter.
+constexpr double scarce = 0.05;
+constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
+constexpr double largest_acceleration = 1e3;  // stands for what has no limit [/s²]
 // Of the jerk limits that one row may take, and of the hardest deceleration that a smooth stop counts on.
 constexpr double of_jerk = 0.5, of_hardest = 0.75;
 
@@ -108,7 +112,10 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
       settings_(settings),
       urgency_(Eigen::VectorXd::Zero(normals.rows())),
       response_(Eigen::VectorXd::Zero(num_coordinates)),
-      responses_(RowMatrix::Zero(num_coordinates, normals.rows())) {}
+      responses_(RowMatrix::Zero(num_coordinates, normals.rows())),
+      least_(response_),
+      reach_data_(num_coordinates, num_coordinates),
+      reach_(num_coordinates, num_coordinates) {}
 
 bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   const Eigen::Index num = clearances.nearest.size();
@@ -169,6 +176,26 @@ double SafetyRows::hardest_by_torque(int row, const JointLimits& limits, const B
   return hardest;
 }
 
+double SafetyRows::largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& least, const Eigen::VectorXd& most,
+                                   const JointLimits& limits, const BrakingTorque& torque, double otherwise) noexcept {
+  // w n·a − |a|²/2 with so large a w that the second term does not count.
+  double size = 0.0;
+  for (Eigen::Index j = 0; j < most.size(); ++j) {
+    size = std::max(size, std::min({std::abs(least[j]), std::abs(most[j]), largest_acceleration}));
+  }
+  const double length = direction.norm();
+  reach_data_.g = -linear * size / length * direction;
+  reach_data_.lower = least;
+  reach_data_.upper = most;
+  reach_data_.A = torque.mass;
+  reach_data_.row_lower = -limits.effort - torque.bias;
+  reach_data_.row_upper = limits.effort - torque.bias;
+  if (reach_.solve(reach_data_) != QuadraticProgramStatus::solved) {
+    return otherwise;
+  }
+  return direction.dot(reach_.solution());
+}
+
 double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits, const BrakingTorque* torque) noexcept {
   const double by_limits = v.cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
   if (torque == nullptr) {
@@ -195,6 +222,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
                      const AccelerationBounds& bounds, double period, const BrakingTorque* torque,
                      const LastMotion* last) noexcept {
   const double tau = stop_time(v, limits, torque);
+  least_ = -limits.acceleration;
   const double rate = tau * settings_.rate > 1.0 ? 1.0 / tau : settings_.rate;
   const ClearanceState& approach = clearances.approach;
   const auto room_of = [&](Eigen::Index k) {
@@ -237,14 +265,23 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     const auto gradient = approach.gradients.col(k);
     const double by_torque = torque == nullptr ? infinity : hardest_by_torque(row, limits, *torque);
     const double by_limits = largest_product(gradient, -limits.acceleration, limits.acceleration);
-    const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
-    const ClosingLimits closing{std::max(settings_.braking_fraction * hardest, smallest_deceleration), hardest,
-                                rate, settings_.correction};
     const double room = room_of(k), u = -approach.rates[k];
+    // Either alone may promise more than there is: torques that brake hardest may fling joints about. Where it may matter.
+    double by_both = std::min(by_limits, by_torque);
+    const bool counts = torque != nullptr && u > 0.0 && u / rate + 0.5 * u * u / (scarce * by_both) > room;
+    if (counts) {
+      by_both = std::min(by_both, largest_by_both(gradient, least_, limits.acceleration, limits, *torque, by_both));
+    }
+    const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
+    const ClosingLimits closing{std::max(settings_.braking_fraction * by_both, smallest_deceleration), hardest,
+                                rate, settings_.correction};
     // Of the points, but no more than the mean where it says that a surface recedes: see the header.
     const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
     double required = demanded_deceleration(room, u, closing, period) - c;
-    const double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque);
+    double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque);
+    if (counts && required > 0.0) {
+      now = std::min(now, largest_by_both(gradient, bounds.lower, bounds.upper, limits, *torque, now));
+    }
     const double of_arm = -gradient.dot(v);
     const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
     const bool lasts = net > 0.0 && (u <= 0.0 || room >= u * u / (2.0 * net));

@@ -217,7 +217,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   if (q_known && v_known && mass_known && bias_known) {
     if (clearances != nullptr && clear) {
       // Without any effort limit the torque never is what braking lacks.
-      const BrakingTorque braking{mass_cholesky_, bias_};
+      const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
       const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_,
                               last.torque != nullptr ? jerk_share() : 1.0};

@@ -45,7 +45,7 @@ std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const Barrier
   return std::make_shared<GeometricSystem>(robot, std::move(parts), std::move(settings));
 }
 
-std::unique_ptr<OnlinePlanner> make_guide(const BodyClearance& body, const ControllerSettings& settings) {
+std::unique_ptr<OnlinePlanner> make_guide(const Arm& arm, const BodyClearance& body, const ControllerSettings& settings, bool torque) {
   if (!settings.planner) {
     return nullptr;
   }
@@ -58,6 +58,9 @@ std::unique_ptr<OnlinePlanner> make_guide(const BodyClearance& body, const Contr
   guide.patience = settings.planner->patience;
   guide.retry = settings.planner->retry;
   guide.seed = settings.seed;
+  if (torque && arm.has_dynamics()) {
+    guide.dynamics.emplace(arm.dynamics());
+  }
   guide.synchronous = settings.synchronous;
   return std::make_unique<OnlinePlanner>(body, guide);
 }
@@ -201,7 +204,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       posture_room_(body_),
       worker_workspace_(*system),
       look_period_(settings.planner ? settings.planner->period : default_look_period) {
-  guide = make_guide(body_, settings);
+  guide = make_guide(arm, body_, settings, torque);
   const Robot of_reference = within_margins(arm.robot(), settings, settings.speed);
   const Robot of_arm = within_margins(arm.robot(), settings, 1.0);
   const int speed_rows = settings.speed_limits ? speed_rows_.max_size() : 0;

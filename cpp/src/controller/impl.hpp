@@ -123,6 +123,9 @@ class Controller::Impl {
   void next_posture(const PoseGoal& pose) noexcept;
   void take_posture(const Posture& posture) noexcept;
   void choose_reference() noexcept;
+  /// Adds to the reference's acceleration what its pull lacks of the critical spring that follows a path, which is stiffer
+  /// than one that approaches a goal.
+  void hold_to_path(const Eigen::VectorXd& q, const Eigen::VectorXd& v, JointGoal& reference) const noexcept;
   void leave_room(bool looks) noexcept;
   const TrajectoryOrder* trajectory_order() const noexcept { return std::get_if<TrajectoryOrder>(&goal_orders_.current().order); }
   bool is_fresh() const noexcept { return order_age_ <= settings.inputs.timeout; }
@@ -184,7 +187,7 @@ class Controller::Impl {
   Posture search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles,
                          std::uint64_t attempt, std::uint64_t goal_number);
   LookAhead::Leader leader_of(const OnlinePlanner::Following& following) const;
-  static LookAhead::Leader leader_of(JointTrajectory path, double clock, double rate);
+  LookAhead::Leader leader_of(JointTrajectory path, double clock, double rate) const;
   /// Writes activation distances that leave room at places; whether the last of them is inside a barrier.
   bool lower_at(const Eigen::MatrixXd& places, Eigen::Index num, const Obstacles& obstacles,
                 GeometricSystem::Workspace& workspace, Eigen::VectorXd& activations) const noexcept;

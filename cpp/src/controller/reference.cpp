@@ -14,7 +14,6 @@ constexpr double near_moving = 0.1;       // [m] of the arm: near what moves bar
 constexpr double moving_foresight = 1.0;  // [s] in which it could be as near
 constexpr std::uint64_t most_posture_attempts = 12;  // one after the other
 constexpr double posture_pause = 2.0;                // [s] until as many more
-constexpr double path_frequency = 10.0;    // [1/s] of the critical spring that follows a path
 constexpr int periods_late = 1000;                   // a trajectory is moved on by at most so many at once
 
 }  // namespace
@@ -113,10 +112,7 @@ void Controller::Impl::choose_reference() noexcept {
     reference.velocity = attractor_.velocity;
     reference.acceleration = attractor_.acceleration;
     if (guide->following().route_number != 0) {
-      // A path is followed more stiffly than a goal is approached.
-      const double w = path_frequency, K = settings.barriers.stiffness, D = settings.barriers.damping;
-      reference.acceleration += std::max(0.0, w * w - K) * (reference.position - q_) +
-                                std::max(0.0, 2.0 * w - D) * (reference.velocity - v_);
+      hold_to_path(q_, v_, reference);
     }
   } else {
     rest_at(target_);
@@ -125,6 +121,11 @@ void Controller::Impl::choose_reference() noexcept {
   if (escape_ && !led && !target_blocked_ && !avoiding_) {
     followed_ = &escape_->pursue(reference_, arm_q_, std::numeric_limits<double>::quiet_NaN(), settings.period);
   }
+}
+
+void Controller::Impl::hold_to_path(const Eigen::VectorXd& q, const Eigen::VectorXd& v, JointGoal& reference) const noexcept {
+  const double w = settings.inputs.frequency, K = settings.barriers.stiffness, D = settings.barriers.damping;
+  reference.acceleration += std::max(0.0, w * w - K) * (reference.position - q) + std::max(0.0, 2.0 * w - D) * (reference.velocity - v);
 }
 
 void Controller::Impl::write_places(Eigen::MatrixXd& places, Eigen::Index& num) const noexcept {

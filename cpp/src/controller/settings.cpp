@@ -71,7 +71,7 @@ const std::vector<Field<InputSettings>>& fields() {
       {"timeout", &S::timeout, "s", 0.001, none, "age from which a velocity or a twist counts as zero"},
       {"singular", &S::singular, "-", 1e-4, 1.0,
        "singular value of a frame's Jacobian [m and rad] below which a twist is damped: larger is calmer and less exact there"},
-      {"frequency", &S::frequency, "1/s", 1.0, 50.0, "of the return to a trajectory: larger is stiffer"},
+      {"frequency", &S::frequency, "1/s", 1.0, 50.0, "of the return to a trajectory or to the planner's path: larger is stiffer"},
       {"lead", &S::lead, "rad", 0.001, 10.0,
        "error from which a trajectory slows down, to a halt at twice as much; of sliding joints a fifth [m]"},
   };

@@ -124,14 +124,15 @@ Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::Vect
   return posture;
 }
 
-LookAhead::Leader Controller::Impl::leader_of(JointTrajectory path, double clock, double rate) {
-  return [path = std::make_shared<const JointTrajectory>(std::move(path)), clock, rate](const Eigen::VectorXd&, double duration,
-                                                                                         Goal& goal) mutable {
+LookAhead::Leader Controller::Impl::leader_of(JointTrajectory path, double clock, double rate) const {
+  return [this, path = std::make_shared<const JointTrajectory>(std::move(path)), clock, rate](
+             const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration, Goal& goal) mutable {
     JointGoal& reference = std::get<JointGoal>(goal);
     clock += rate * duration;
     path->sample(clock, reference.position, reference.velocity, reference.acceleration);
     reference.velocity *= rate;
     reference.acceleration *= rate * rate;
+    hold_to_path(q, v, reference);
   };
 }
 
@@ -143,10 +144,11 @@ LookAhead::Leader Controller::Impl::leader_of(const OnlinePlanner::Following& fo
   if (route == nullptr) {
     return {};
   }
-  return [route, follower = following.follower, route_settings = guide->settings().route](
-             const Eigen::VectorXd& q, double duration, Goal& goal) mutable {
+  return [this, route, follower = following.follower, route_settings = guide->settings().route](
+             const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration, Goal& goal) mutable {
     JointGoal& reference = std::get<JointGoal>(goal);
     follower.advance(*route, route_settings, q, duration, reference.position, reference.velocity, reference.acceleration);
+    hold_to_path(q, v, reference);
   };
 }
 

@@ -223,7 +223,7 @@ double LookAhead::advance(Motion& motion, Stepper& stepper) {
   motion.q += period * motion.v;
   motion.obstacles.advance(period);
   if (motion.leader) {
-    motion.leader(motion.q, period, motion.goal);
+    motion.leader(motion.q, motion.v, period, motion.goal);
   } else {
     sidestep::advance(motion.goal, period);
   }

@@ -234,7 +234,8 @@ void OnlinePlanner::follow(const State& state, const Eigen::MatrixXd& path, cons
   rounded_.emplace(path_, body_, obstacles, path_margins_, planner_.workspace());
   const Eigen::VectorXd v = settings_.synchronous ? state.v : states_.get().v;
   route_ = std::make_shared<const TimedPath>(
-      make_route(*rounded_, v, body_, obstacles, settings_.route, settings_.safety, planner_.workspace(), measured));
+      make_route(*rounded_, v, body_, obstacles, settings_.route, settings_.safety, planner_.workspace(), measured,
+                 settings_.dynamics ? &*settings_.dynamics : nullptr));
   ++route_number_;
   answer(state, PlanStatus::found);
 }

@@ -18,8 +18,9 @@ constexpr double most_samples = 20'000;
 /// The passes over stations.
 class Passes {
  public:
-  Passes(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest, const PathLimits& limits)
-      : share(Eigen::VectorXd::Ones(stations.size())), s_(stations), limits_(limits) {
+  Passes(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest, const Eigen::VectorXd& usable,
+         const PathLimits& limits)
+      : share(usable), s_(stations), limits_(limits) {
     const Eigen::Index num = s_.size(), nv = limits.velocity.size();
     first_.resize(nv, num);
     second_.resize(nv, num);
@@ -179,14 +180,14 @@ Eigen::VectorXd excess(const PathTiming& timing, const PathLimits& limits) {
 }  // namespace
 
 PathTiming time_path(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest,
-                     const PathLimits& limits, double begin) {
+                     const Eigen::VectorXd& share, const PathLimits& limits, double begin) {
   if (stations.size() < 2) {
     RoundedPath::Point point;
     path.at(0.0, point);
     return {longest, point.q, Eigen::MatrixXd::Zero(point.q.size(), 1), Eigen::MatrixXd::Zero(point.q.size(), 1), Eigen::VectorXd::Zero(1)};
   }
   const double window = 2.0 * limits.acceleration.cwiseQuotient(limits.jerk).maxCoeff();
-  Passes passes(path, stations, fastest, limits);
+  Passes passes(path, stations, fastest, share, limits);
   PathTiming timing;
   for (int round = 0;; ++round) {
     const Eigen::VectorXd x = passes.run(begin);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "../settings.hpp"
 
@@ -16,12 +17,50 @@ constexpr double left_to_the_arm = 0.95;  // of the limits
 constexpr double unmeasured = 0.35;      // of the limits
 constexpr double of_closing = 0.8;       // of the speed at which a clearance may close: rows that bind are not smooth
 constexpr double at_samples = 0.88;      // of the jerk: between samples it is up to an eighth more
+constexpr double of_effort = 0.7, of_effort_rate = 0.5;  // for motion along the path: the rest is for feedback, and clearances
+constexpr double least_share = 0.05;     // of the acceleration limits, where gravity takes the effort
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
 
 /// p⁻¹ of SafetyRows: the speed [m/s] at which a clearance with this room may close.
 double closing_speed(double room, double A, double rate) {
   return room <= A / (rate * rate) ? rate * room : std::sqrt(std::max(0.0, 2.0 * A * room - A * A / (rate * rate)));
 }
+
+/// What motors leave of the limits of acceleration and jerk along a path.
+class TorqueReserve {
+ public:
+  explicit TorqueReserve(const RigidBodyDynamics& dynamics)
+      : dynamics_(dynamics),
+        workspace_(dynamics),
+        mass_(Eigen::MatrixXd::Zero(dynamics.robot().num_coordinates(), dynamics.robot().num_coordinates())),
+        gravity_(Eigen::VectorXd::Zero(mass_.rows())),
+        rest_(gravity_) {}
+
+  struct Shares {
+    double acceleration, jerk;
+  };
+  /// At a place with direction q', where the limits allow the accelerations `hardest` and the jerk `fastest` of s.
+  Shares at(const RoundedPath::Point& place, double hardest, double fastest) {
+    dynamics_.mass_matrix(place.q, workspace_, mass_);
+    dynamics_.bias(place.q, rest_, workspace_, gravity_);
+    const JointLimits& limits = dynamics_.robot().limits();
+    const Eigen::VectorXd inertia = (mass_ * place.first).cwiseAbs();
+    Shares shares{1.0, 1.0};
+    for (Eigen::Index i = 0; i < inertia.size(); ++i) {
+      const double left = std::max(0.0, limits.effort[i] - std::abs(gravity_[i]));
+      shares.acceleration = std::min(shares.acceleration, of_effort * left / std::max(inertia[i] * hardest, 1e-12));
+      shares.jerk = std::min(shares.jerk, of_effort_rate * limits.effort_rate[i] / std::max(inertia[i] * fastest, 1e-12));
+    }
+    shares.acceleration = std::max(least_share, shares.acceleration);
+    return shares;
+  }
+
+ private:
+  const RigidBodyDynamics& dynamics_;
+  RigidBodyDynamics::Workspace workspace_;
+  Eigen::MatrixXd mass_;
+  Eigen::VectorXd gravity_, rest_;
+};
 
 }  // namespace
 
@@ -56,7 +95,7 @@ Eigen::Index TimedPath::place_after(double station) const noexcept {
 
 TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const BodyClearance& body, const Obstacles& obstacles,
                      const TimedPathSettings& settings, const SafetySettings& safety, BodyClearance::Workspace& workspace,
-                     bool measured) {
+                     bool measured, const RigidBodyDynamics* dynamics) {
   TimedPath route;
   route.limits = path_limits(body.robot().limits(), settings.speed * (measured ? 1.0 : unmeasured));
   const auto num = static_cast<Eigen::Index>(std::ceil(path.length() / spacing)) + 1;
@@ -66,17 +105,40 @@ TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const Bo
   route.clearance = Eigen::VectorXd::Zero(num);
   Eigen::MatrixXd clearances = Eigen::MatrixXd::Zero(body.num_items(), num);
   Eigen::VectorXd hardest(num);  // d²s/dt² of a straight path
+  Eigen::VectorXd usable = Eigen::VectorXd::Ones(num);
+  double of_jerk = 1.0;
+  std::optional<TorqueReserve> reserve;
+  if (dynamics != nullptr) {
+    reserve.emplace(*dynamics);
+  }
   RoundedPath::Point point;
   for (Eigen::Index k = 0; k < num; ++k) {
     path.at(route.place_station[k], point);
     route.places.col(k) = point.q;
-    hardest[k] = (route.limits.acceleration.array() / point.first.cwiseAbs().array().max(1e-6)).minCoeff();
+    const auto slopes = point.first.cwiseAbs().array().max(1e-6);
+    hardest[k] = (route.limits.acceleration.array() / slopes).minCoeff();
+    if (reserve) {
+      const TorqueReserve::Shares shares = reserve->at(point, hardest[k], (route.limits.jerk.array() / slopes).minCoeff());
+      usable[k] = shares.acceleration;
+      hardest[k] *= usable[k];
+      of_jerk = std::min(of_jerk, shares.jerk);
+    }
     if (measured) {
       body.clearances(point.q, obstacles, seen, workspace, clearances.col(k));
       route.clearance[k] = std::min(seen, clearances.col(k).minCoeff());
     }
   }
+  route.limits.jerk *= of_jerk;
   const Eigen::VectorXd stations = path.stations(std::max(fine, path.length() / 2000.0));
+  const auto place_before = [&](double station) {
+    const auto k = static_cast<Eigen::Index>(station / path.length() * static_cast<double>(num - 1));
+    return std::max<Eigen::Index>(0, std::min(num - 2, k));
+  };
+  Eigen::VectorXd share = Eigen::VectorXd::Ones(stations.size());
+  for (Eigen::Index i = 0; i < stations.size() && num > 1; ++i) {
+    const Eigen::Index k = place_before(stations[i]);
+    share[i] = std::min(usable[k], usable[k + 1]);
+  }
   Eigen::VectorXd fastest = Eigen::VectorXd::Constant(stations.size(), infinity);
   if (measured) {
     Eigen::VectorXd between = Eigen::VectorXd::Constant(std::max<Eigen::Index>(1, num - 1), infinity);
@@ -91,15 +153,14 @@ TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const Bo
         }
       }
     }
-    for (Eigen::Index i = 0; i < stations.size(); ++i) {
-      const auto k = std::min(num - 2, static_cast<Eigen::Index>(stations[i] / path.length() * static_cast<double>(num - 1)));
-      fastest[i] = num > 1 ? between[std::max<Eigen::Index>(0, k)] : infinity;
+    for (Eigen::Index i = 0; i < stations.size() && num > 1; ++i) {
+      fastest[i] = between[place_before(stations[i])];
     }
   }
   path.at(0.0, point);
   const double squared = point.first.squaredNorm();
   const double begin = squared > 0.0 ? std::max(0.0, v.dot(point.first) / squared) : 0.0;
-  route.motion = time_path(path, stations, fastest, route.limits, begin);
+  route.motion = time_path(path, stations, fastest, share, route.limits, begin);
   return route;
 }
 

@@ -212,15 +212,14 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   clearances.margins[1] = test::infinity;
 
   // With torque: M = diag(4, 1), bias (6, -2): 0.3/4 (30 - 6) + 0.4 (10 - 2) = 1.8 + 3.2 = 5 again; with bias (22, -2)
-  // 0.6 + 3.2 = 3.8.
-  Eigen::MatrixXd cholesky(2, 2);
-  cholesky << 2.0, 0.0, 0.0, 1.0;
+  // 0.6 + 3.2 = 3.8, and within the accelerations as well 0.6 + 0.4 * 5 = 2.6, half of which is planned with.
+  const Eigen::MatrixXd mass = Eigen::Vector2d(4.0, 1.0).asDiagonal(), cholesky = Eigen::Vector2d(2.0, 1.0).asDiagonal();
   Eigen::VectorXd bias(2);
   bias << 22.0, -2.0;
-  const BrakingTorque torque{cholesky, bias};
+  const BrakingTorque torque{mass, cholesky, bias};
   rows.update(clearances, v, limits, anything, 0.001, &torque);
-  const double weaker = demanded_deceleration(0.1, 0.4, {1.9, 3.8, 20.0, 0.5}, 0.001);
-  BOOST_TEST(rows.lower[0] == (weaker + 0.7) / 0.5, boost::test_tools::tolerance(1e-12));
+  const double weaker = demanded_deceleration(0.1, 0.4, {1.3, 3.8, 20.0, 0.5}, 0.001);
+  BOOST_TEST(rows.lower[0] == (weaker + 0.7) / 0.5, boost::test_tools::tolerance(1e-4));
 
   // Stopping takes 0.5 s: a line of 2/s instead of 20/s.
   v << 1.0, -2.5;
@@ -236,6 +235,32 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   BOOST_TEST(rows.lower[0] < 0.0);
   BOOST_TEST(rows.satisfied_within(0, -0.999 * box, 0.999 * box));
   BOOST_TEST(!rows.satisfied_within(0, -1.001 * box, 1.001 * box));
+}
+
+BOOST_AUTO_TEST_CASE(what_accelerations_and_torques_together_give_is_counted_on) {
+  // M = (2, 1; 1, 1), torques of 4 and 0.5 Nm, accelerations of 5/s²: along (1, 1) the accelerations alone give 10, the torques
+  // alone 0.5 (a₁ + a₂ = τ₂ there). Along (1, 0) they give 5 and 4.5: with τ₂ at −0.5 Nm a₁ = 4.5 takes a₂ = −5, and no more.
+  JointLimits limits = JointLimits::unlimited(2);
+  limits.acceleration << 5.0, 5.0;
+  limits.effort << 4.2, 0.5;
+  const Eigen::MatrixXd mass = Eigen::Matrix2d{{2.0, 1.0}, {1.0, 1.0}}, cholesky = mass.llt().matrixL();
+  const Eigen::VectorXd bias = Eigen::Vector2d::Zero();
+  const BrakingTorque torque{mass, cholesky, bias};
+  Clearances clearances(2, 1);
+  clearances.nearest[0] = 0;
+  clearances.approach.gradients.col(0) << 1.0, 0.0;
+  clearances.approach.values[0] = clearances.values[0] = clearances.least[0] = 0.105;
+  clearances.approach.rates[0] = clearances.rates[0] = -1.0;
+  clearances.approach.curvatures[0] = clearances.curvatures[0] = 0.0;
+  clearances.margins[0] = test::infinity;
+  SafetyRows rows(2, {});
+  const AccelerationBounds anything(2);
+  const Eigen::VectorXd v = Eigen::Vector2d::Zero();  // the obstacle comes
+  // a₁ <= 4.7 by τ₁ and τ₂ alone (a₁ = τ₁ − τ₂); with |a₂| <= 5, a₁ = 4.5 at most, of which half is counted on.
+  rows.update(clearances, v, limits, anything, 0.001, &torque);
+  const double expected = demanded_deceleration(0.1, 1.0, {2.25, 4.7, 20.0, 0.5}, 0.001);
+  BOOST_REQUIRE(rows.size() == 1);
+  BOOST_TEST(rows.lower[0] == expected, boost::test_tools::tolerance(1e-3));
 }
 
 BOOST_AUTO_TEST_CASE(the_most_critical_are_kept_in_order) {
@@ -469,11 +494,10 @@ BOOST_AUTO_TEST_CASE(rows_ask_for_their_share_of_a_stop_along_the_path) {
   BOOST_TEST(rows.lower[0] == asked(0.08, 0.5, -20.0), close);
 
   // M = diag(4, 1): joint 1 needs 8 Nm s over the 44 Nm that a bias of −14 Nm leaves to stop in, or over 16 Nm.
-  Eigen::MatrixXd cholesky(2, 2);
-  cholesky << 2.0, 0.0, 0.0, 1.0;
+  const Eigen::MatrixXd mass = Eigen::Vector2d(4.0, 1.0).asDiagonal(), cholesky = Eigen::Vector2d(2.0, 1.0).asDiagonal();
   Eigen::VectorXd bias(2);
   bias << -14.0, 0.0;
-  const BrakingTorque torque{cholesky, bias};
+  const BrakingTorque torque{mass, cholesky, bias};
   update(0.08, 0.4, -7.0, &torque);
   BOOST_REQUIRE(rows.size() == 1);
   BOOST_TEST(rows.lower[0] == 0.4 / 0.2, close);
@@ -525,9 +549,9 @@ BOOST_AUTO_TEST_CASE(update_allocates_nothing) {
   Random random(4);
   const JointLimits limits = test::arm_limits(7);
   SafetyRows rows(7, {});
-  const Eigen::MatrixXd cholesky = Eigen::MatrixXd::Identity(7, 7);
+  const Eigen::MatrixXd mass = Eigen::MatrixXd::Identity(7, 7), cholesky = mass;
   const Eigen::VectorXd bias = Eigen::VectorXd::Zero(7), v = bias;
-  const BrakingTorque torque{cholesky, bias};
+  const BrakingTorque torque{mass, cholesky, bias};
   const AccelerationBounds bounds(7);
   for (int num : {0, 1, 16, 32, 80}) {
     const Clearances clearances = linear_clearances(random, 7, num);

@@ -19,7 +19,8 @@ Eigen::MatrixXd corner() {
 
 PathTiming timed(const RoundedPath& path, double begin = 0.0) {
   const Eigen::VectorXd stations = path.stations(0.01);
-  return time_path(path, stations, Eigen::VectorXd::Constant(stations.size(), 1e9), limits, begin);
+  return time_path(path, stations, Eigen::VectorXd::Constant(stations.size(), 1e9),
+                   Eigen::VectorXd::Ones(stations.size()), limits, begin);
 }
 
 /// Largest share of the limits that samples ask for.
@@ -119,7 +120,7 @@ BOOST_AUTO_TEST_CASE(a_motion_begins_as_fast_as_it_is_told_and_keeps_to_speeds_t
   const Eigen::VectorXd stations = path.stations(0.01);
   Eigen::VectorXd fastest = Eigen::VectorXd::Constant(stations.size(), 1e9);
   fastest.segment(80, 40).setConstant(0.3);
-  const PathTiming m = time_path(path, stations, fastest, limits, 1.0);
+  const PathTiming m = time_path(path, stations, fastest, Eigen::VectorXd::Ones(stations.size()), limits, 1.0);
   check_limits(m);
   BOOST_TEST(m.v(0, 0) == 1.0, boost::test_tools::tolerance(0.05));  // the average of half a window
   for (Eigen::Index k = 0; k < m.station.size(); ++k) {

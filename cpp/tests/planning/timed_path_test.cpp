@@ -152,3 +152,40 @@ BOOST_AUTO_TEST_CASE(the_reference_begins_as_fast_as_the_arm) {
   const TimedPath other = route_of(line(), Obstacles::none(), -v);  // it turns round
   BOOST_TEST(other.motion.v(0, 0) == 0.0);
 }
+
+BOOST_AUTO_TEST_CASE(a_path_asks_no_more_of_the_motors_than_they_have) {
+  JointLimits limits = JointLimits::unlimited(2);
+  limits.acceleration.setConstant(10.0);
+  limits.effort = Eigen::Vector2d(4.0, 2.0);
+  limits.effort_rate.setConstant(200.0);
+  const Robot plain = test::planar_arm();
+  const Robot robot("turning", plain.joints(), plain.frames(), plain.coordinate_names(), limits);
+  const Inertial link{1.0, Eigen::Vector3d(0.3, 0.0, 0.0), 0.01 * Eigen::Matrix3d::Identity()};
+  // Gravity along y takes 2.94 Nm of the second joint where it lies along x: there the least share is left.
+  for (const double pull : {0.0, -9.81}) {
+    const RigidBodyDynamics dynamics(robot, {link, link}, Eigen::Vector3d(0.0, pull, 0.0));
+    BodyClearance::Workspace w(body);
+    const RoundedPath path(line(), body, Obstacles::none(), Margins{}, w);
+    const TimedPath route = make_route(path, Eigen::Vector2d::Zero(), body, Obstacles::none(), settings, SafetySettings{}, w, true, &dynamics);
+    RigidBodyDynamics::Workspace dynamic(dynamics);
+    Eigen::MatrixXd mass(2, 2);
+    Eigen::VectorXd gravity(2), last = Eigen::VectorXd::Zero(2);
+    double share = 0.0, rate = 0.0;
+    for (Eigen::Index k = 0; k < route.motion.station.size(); ++k) {
+      dynamics.mass_matrix(route.motion.q.col(k), dynamic, mass);
+      dynamics.bias(route.motion.q.col(k), Eigen::Vector2d::Zero(), dynamic, gravity);
+      const Eigen::VectorXd torque = mass * route.motion.a.col(k);
+      for (Eigen::Index i = 0; i < 2; ++i) {
+        const double left = std::max(0.0, limits.effort[i] - std::abs(gravity[i]));
+        const double least = 0.05 * std::abs(mass(i, 0)) * route.limits.acceleration[0];
+        BOOST_TEST(std::abs(torque[i]) <= std::max(0.72 * left, least) + 0.2);  // a window of the jerk from one place to others
+        share = std::max(share, std::abs(torque[i]) / std::max(left, 1e-9));
+      }
+      rate = k == 0 ? 0.0 : std::max(rate, (torque - last).cwiseAbs().maxCoeff() / route.motion.period);
+      last = torque;
+    }
+    BOOST_TEST(rate <= 1.02 * 0.5 * 200.0);
+    BOOST_TEST((pull != 0.0 || share > 0.6));  // and uses it
+  }
+  BOOST_TEST(route_of(line(), Obstacles::none()).duration() < 1.5);
+}

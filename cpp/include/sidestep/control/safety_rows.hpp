@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sidestep/control/acceleration_bounds.hpp"
+#include "sidestep/control/quadratic_program.hpp"
 #include "sidestep/barrier/clearances.hpp"
 #include "sidestep/fields.hpp"
 #include "sidestep/kinematics/robot.hpp"
@@ -113,8 +114,9 @@ struct SafetySettings {
 template <>
 const std::vector<Field<SafetySettings>>& fields();
 
-/// What the torque adds to the knowledge of how hard the arm can brake: the Cholesky factor of M, and the bias.
+/// What the torque adds to the knowledge of how hard the arm can brake: M, its Cholesky factor, and the bias.
 struct BrakingTorque {
+  const Eigen::MatrixXd& mass;
   const Eigen::MatrixXd& mass_cholesky;
   const Eigen::VectorXd& bias;
 };
@@ -142,7 +144,8 @@ class SafetyRows {
   bool usable(const Clearances& clearances) const noexcept;
 
   /// The most critical clearances of usable ones, at velocity v (nv). The hardest deceleration is Σ_j |∂h/∂q_j|
-  /// (acceleration limit)_j or, given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less.
+  /// (acceleration limit)_j or, given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. Planned with
+  /// is a share of what both leave together, max ∇h·a with |a| and |M a + bias| within their limits, where that may matter.
   /// `bounds` are those of now. No allocation.
   void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
               const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr,
@@ -178,12 +181,18 @@ class SafetyRows {
   /// Writes M⁻¹ ∇h of the rows chosen, side by side: divisions of one wait for each other.
   void find_responses(int first, const ClearanceState& approach, const Eigen::MatrixXd& mass_cholesky) noexcept;
   double hardest_by_torque(int row, const JointLimits& limits, const BrakingTorque& torque) const noexcept;
+  /// max direction·a with lower <= a <= upper and |M a + bias| <= effort; `otherwise` where there is no such a.
+  double largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+                         const JointLimits& limits, const BrakingTorque& torque, double otherwise) noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
   Eigen::VectorXd urgency_;  // (max) predicted room of the rows chosen, ascending
   Eigen::VectorXd response_; // (nv) M v
   RowMatrix responses_;      // (nv, max) M⁻¹ ∇h of the rows chosen
+  Eigen::VectorXd least_;    // (nv) −(acceleration limits)
+  QuadraticProgramData reach_data_;
+  QuadraticProgram reach_;   // what a direction can have within accelerations and torques
 };
 
 }  // namespace sidestep

@@ -58,9 +58,9 @@ const std::vector<Field<LookAheadSettings>>& fields();
 /// simulated time. One thread at a time.
 class LookAhead {
  public:
-  /// Moves a goal on for a duration [s] while the arm is at q (nv): along a path, for example. Empty: as the goal's own
+  /// Moves a goal on for a duration [s] while the arm is at q, v (nv): along a path, for example. Empty: as the goal's own
   /// velocity says (`advance`). Each motion that is looked at has a copy.
-  using Leader = std::function<void(const Eigen::VectorXd& q, double duration, Goal& goal)>;
+  using Leader = std::function<void(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration, Goal& goal)>;
 
   /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
   /// which it names. `dynamics`: of an arm that is moved by torque; of the system's robot.

@@ -36,6 +36,7 @@ const char* name(OnlinePlannerStatus status) noexcept;
 struct OnlinePlannerConfig {
   PlannerSettings planner = {};
   TimedPathSettings route = {};
+  std::optional<RigidBodyDynamics> dynamics;  ///< of an arm that is moved by torque: paths are timed for its motors
   SafetySettings safety = {};  ///< of what follows: margin, rate and braking_fraction bound the speed near obstacles
   double period = 0.02;     ///< between two looks at the scene [s]
   double patience = 1.0;    ///< without progress the arm counts as stuck [s]

@@ -26,7 +26,8 @@ struct PathTiming {
 /// stations; between them by interpolation). Its u jumps, so s(t) is averaged over a window 2 max(a_j / jerk_j): the path stays
 /// what it is. Where the average, or the path's own bends, then ask for more acceleration or jerk than allowed, the share of the acceleration
 /// limits is lowered there and the passes repeated; what is left after `most_rounds` of it is met by a slower clock.
+/// `share`: of the acceleration limits that may be used at each station, in (0, 1].
 PathTiming time_path(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest,
-                     const PathLimits& limits, double begin);
+                     const Eigen::VectorXd& share, const PathLimits& limits, double begin);
 
 }  // namespace sidestep

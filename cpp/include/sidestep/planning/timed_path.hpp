@@ -4,6 +4,7 @@
 
 #include "sidestep/control/safety_rows.hpp"
 #include "sidestep/fields.hpp"
+#include "sidestep/model/dynamics.hpp"
 #include "sidestep/planning/body_clearance.hpp"
 #include "sidestep/planning/path_timing.hpp"
 
@@ -44,9 +45,14 @@ struct TimedPath {
 /// 1 mm; where the path itself comes nearer than the margin, that), and A = braking_fraction |dh_i/ds| (d²s/dt²)_max, the speed
 /// along the path is at most p⁻¹(s) / |dh_i/ds| where h_i shrinks. A path that is not `measured` is slow everywhere, and
 /// soon made: clearances are looked at nowhere.
+///
+/// With the dynamics of an arm that is moved by torque, accelerations along the path take no more than 0.7 of the effort that
+/// gravity leaves, and their changes no more than 0.5 of the effort's rate: at a place with s̈, s⃛ what the joints' limits allow,
+///     |M q'| s̈ share <= 0.7 (effort − |g|),     |M q'| s⃛ share_of_jerk <= 0.5 effort rate,
+/// the first with a share for each place (at least 0.05), the second with one for the path. Centrifugal forces are not counted.
 TimedPath make_route(const RoundedPath& path, const Eigen::VectorXd& v, const BodyClearance& body, const Obstacles& obstacles,
                      const TimedPathSettings& settings, const SafetySettings& safety, BodyClearance::Workspace& workspace,
-                     bool measured = true);
+                     bool measured = true, const RigidBodyDynamics* dynamics = nullptr);
 
 /// Where the reference is on a timed path: at a time of the motion, which goes more slowly as the reference gets ahead of the arm.
 struct TimedPathFollower {
