@@ -92,7 +92,7 @@ void bind_planner_settings(nb::module_& m) {
 /// What Python gets from a step of an OnlinePlanner.
 struct PlannerReference {
   OnlinePlannerStatus status;
-  OnlinePlanner::Attractor attractor;
+  OnlinePlanner::Reference reference;
 };
 
 void bind_guide(nb::module_& m) {
@@ -109,17 +109,17 @@ void bind_guide(nb::module_& m) {
   nb::class_<PlannerReference>(m, "PlannerReference",
                                "The current reference of an OnlinePlanner, and what the motion is about.")
       .def_ro("status", &PlannerReference::status)
-      .def_prop_ro("goal", [](const PlannerReference& g) { const OnlinePlanner::Attractor& a = g.attractor;
+      .def_prop_ro("goal", [](const PlannerReference& g) { const OnlinePlanner::Reference& a = g.reference;
                      return JointGoal(a.position, a.velocity, a.acceleration); },
                    "The reference, as a goal for a GeometricSystem.")
       .def_prop_ro("places",
                    [](const PlannerReference& g) {
-                     const OnlinePlanner::Attractor& a = g.attractor;
+                     const OnlinePlanner::Reference& a = g.reference;
                      return to_numpy_matrix(a.places.leftCols(a.num_places).transpose());
                    },
                    "Waypoints (k, nv) where activation distances shrink: narrow places of the path that the arm is about to\n"
                    "pass, or the goal where there is none. See Controller.activations.")
-      .def_prop_ro("arrives", [](const PlannerReference& g) { return g.attractor.arrives; },
+      .def_prop_ro("arrives", [](const PlannerReference& g) { return g.reference.arrives; },
                    "Whether activation distances shrink at the goal as well: `places` are others, and the end of the path\n"
                    "is within the lead.");
 
@@ -163,16 +163,16 @@ void bind_guide(nb::module_& m) {
       .def(
           "step",
           [](OnlinePlanner& g, const ArrayLike& q, double time) {
-            PlannerReference guidance{OnlinePlannerStatus::idle, OnlinePlanner::Attractor(g.body().robot().num_coordinates())};
+            PlannerReference guidance{OnlinePlannerStatus::idle, OnlinePlanner::Reference(g.body().robot().num_coordinates())};
             const Eigen::VectorXd at = as_vector(q, "q", g.body().robot().num_coordinates());
             const Exclusive use(&g, "the planner");
             if (!g.settings().synchronous) {
-              guidance.status = g.step(at, time, guidance.attractor);
+              guidance.status = g.step(at, time, guidance.reference);
               return guidance;
             }
             return interruptible([&](const Interrupted& interrupted) {
               const InterruptedWhile search(&g, interrupted);
-              guidance.status = g.step(at, time, guidance.attractor);
+              guidance.status = g.step(at, time, guidance.reference);
               return std::move(guidance);
             });
           },

@@ -79,17 +79,17 @@ void bind_rollout(nb::module_& m) {
                      "not finite.")
       .def(
           "__init__",
-          [](AvoidanceTrajectory* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& refuge) {
+          [](AvoidanceTrajectory* self, const Robot& robot, const ArrayLike& q, const ArrayLike& v, const ArrayLike& target) {
             const int nv = robot.num_coordinates();
             new (self) AvoidanceTrajectory(robot.limits(), as_finite_vector(q, "q", nv), as_finite_vector(v, "v", nv),
-                              as_finite_vector(refuge, "refuge", nv));
+                              as_finite_vector(target, "target", nv));
           },
-          nb::arg("robot"), nb::arg("q"), nb::arg("v"), nb::arg("refuge"))
+          nb::arg("robot"), nb::arg("q"), nb::arg("v"), nb::arg("target"))
       .def("__copy__", [](const AvoidanceTrajectory& self) { return AvoidanceTrajectory(self); })
       .def(
           "acceleration",
           [](const AvoidanceTrajectory& self, const ArrayLike& q, const ArrayLike& v, double period) {
-            const int nv = static_cast<int>(self.refuge().size());
+            const int nv = static_cast<int>(self.target().size());
             return to_numpy(self.acceleration(as_vector(q, "q", nv), as_vector(v, "v", nv), as_period(period)));
           },
           nb::arg("q"), nb::arg("v"), nb::arg("period"),
@@ -98,7 +98,7 @@ void bind_rollout(nb::module_& m) {
           "advance", [](AvoidanceTrajectory& self, double period) { self.advance(as_period(period)); }, nb::arg("period"),
           "Moves the reference on by `period` [s].")
       .def_prop_ro(
-          "refuge", [](const AvoidanceTrajectory& self) { return to_numpy(self.refuge()); }, "Where it comes to rest (nv,) [rad | m].")
+          "target", [](const AvoidanceTrajectory& self) { return to_numpy(self.target()); }, "Where it comes to rest (nv,) [rad | m].")
       .def_prop_ro(
           "position", [](const AvoidanceTrajectory& self) { return to_numpy(self.position()); }, "The reference q* (nv,) [rad | m].")
       .def_prop_ro(
@@ -130,8 +130,8 @@ void bind_rollout(nb::module_& m) {
             const int nv = self.num_coordinates();
             const Goal target = as_goal(goal, nv);
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
-            if (followed && followed->refuge().size() != nv) {
-              throw std::invalid_argument("the trajectory is for " + std::to_string(followed->refuge().size()) +
+            if (followed && followed->target().size() != nv) {
+              throw std::invalid_argument("the trajectory is for " + std::to_string(followed->target().size()) +
                                           " coordinates, the system has " + std::to_string(nv));
             }
             const Obstacles seen = obstacles;

@@ -909,7 +909,7 @@ class AvoidanceTrajectory:
     not finite.
     """
 
-    def __init__(self, robot: Robot, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, refuge: numpy.typing.ArrayLike) -> None: ...
+    def __init__(self, robot: Robot, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, target: numpy.typing.ArrayLike) -> None: ...
 
     def __copy__(self) -> AvoidanceTrajectory: ...
 
@@ -922,7 +922,7 @@ class AvoidanceTrajectory:
         """Moves the reference on by `period` [s]."""
 
     @property
-    def refuge(self) -> numpy.typing.NDArray[numpy.float64]:
+    def target(self) -> numpy.typing.NDArray[numpy.float64]:
         """Where it comes to rest (nv,) [rad | m]."""
 
     @property
@@ -2155,12 +2155,13 @@ class TrackingSettings:
         observer_share, default 0.8, allowed 0 to 1: of the effort limits that the observer may make up for
         largest_error [rad], default 0.2, allowed 0.001 to 10: between arm and reference, from which the reference begins anew
         servo_lag [rad], default 1.0, allowed 0.001 to 10: the same where the arm's own drives track position or velocity
+        stiffness [1/rad], default 0.0, allowed 0 to 100: of an impedance around the reference, effort limits per radian: lower yields more to pushes and payloads; 0: tracked stiffly
         drift_gain [1/s], default 2.0, allowed 0 to 50: by which an output of velocity returns to the reference
 
     A Controller refuses what is not allowed.
     """
 
-    def __init__(self, *, frequency: float = 60.0, damping: float = 1.0, velocity_filter: float = 0.004, observer_time: float = 0.05, observer_share: float = 0.8, largest_error: float = 0.2, servo_lag: float = 1.0, drift_gain: float = 2.0) -> None: ...
+    def __init__(self, *, frequency: float = 60.0, damping: float = 1.0, velocity_filter: float = 0.004, observer_time: float = 0.05, observer_share: float = 0.8, largest_error: float = 0.2, servo_lag: float = 1.0, stiffness: float = 0.0, drift_gain: float = 2.0) -> None: ...
 
     @property
     def frequency(self) -> float: ...
@@ -2203,6 +2204,12 @@ class TrackingSettings:
 
     @servo_lag.setter
     def servo_lag(self, value: float, /) -> None: ...
+
+    @property
+    def stiffness(self) -> float: ...
+
+    @stiffness.setter
+    def stiffness(self, value: float, /) -> None: ...
 
     @property
     def drift_gain(self) -> float: ...

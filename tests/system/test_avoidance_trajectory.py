@@ -93,7 +93,7 @@ def test_what_has_no_limits_is_flown_at_a_finite_acceleration():
 
 
 def test_bad_input_is_named(robot):
-    with pytest.raises(ValueError, match=r"refuge has shape \(3,\), expected \(7,\)"):
+    with pytest.raises(ValueError, match=r"target has shape \(3,\), expected \(7,\)"):
         AvoidanceTrajectory(robot, START, START, np.zeros(3))
     with pytest.raises(ValueError, match=r"q\[0\] is nan, must be a finite number"):
         AvoidanceTrajectory(robot, START * np.nan, START, START)

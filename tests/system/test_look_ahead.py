@@ -81,11 +81,11 @@ def test_what_a_look_finds_is_followed_one_look_later_and_without_jumps(system, 
     ]
     assert flights[:50] == [None] * 50
     first = flights[50]
-    assert np.all((first.refuge >= robot.limits.lower) & (first.refuge <= robot.limits.upper))
+    assert np.all((first.target >= robot.limits.lower) & (first.target <= robot.limits.upper))
     np.testing.assert_allclose(first.position, GOAL, atol=2e-3)  # nothing draws the arm away before
-    expected = AvoidanceTrajectory(robot, first.position, first.velocity, first.refuge)
+    expected = AvoidanceTrajectory(robot, first.position, first.velocity, first.target)
     for k, flight in enumerate(flights[51:], start=51):
-        np.testing.assert_array_equal(flight.refuge, first.refuge)
+        np.testing.assert_array_equal(flight.target, first.target)
         expected.advance(PERIOD)
         # A kept trajectory goes on as the look foresaw it, in steps of 0.01 s: off by less than one of these.
         tolerance = 0.0 if k < 100 else 0.9 * robot.limits.acceleration.max() * 0.01
@@ -109,7 +109,7 @@ def test_a_look_says_what_to_follow(system):
     assert evasion.count == 1
     ahead = ball(CENTRE + 0.1 * SPEED)
     kept = evasion.look(GOAL, GOAL, at_rest, ahead, found)  # still good
-    np.testing.assert_array_equal(kept.refuge, found.refuge)
+    np.testing.assert_array_equal(kept.target, found.target)
     for _ in range(10):
         found.advance(0.01)
     np.testing.assert_array_equal(kept.position, found.position)
@@ -146,7 +146,7 @@ def test_flights_of_joints_without_limits_are_finite():
     evasion = LookAhead(system, seed=1)
     for k in range(5):
         found = evasion.look(GOAL, GOAL, np.zeros(2), ball(CENTRE + 0.1 * k * SPEED))
-        assert np.isfinite(found.refuge).all()
+        assert np.isfinite(found.target).all()
         assert np.isfinite(found.acceleration(GOAL, np.zeros(2), PERIOD)).all()
     assert evasion.count > 0
 

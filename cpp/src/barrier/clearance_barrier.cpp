@@ -21,7 +21,7 @@ ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, Barrier
 void ClearanceBarrier::add_to(EmbeddingView out, const KinematicState& state,
                               const Obstacles& obstacles) const noexcept {
   Horizon ahead = horizon(state);
-  ahead.time = std::max(ahead.time, Horizon::of_obstacles);
+  ahead.time = std::max(ahead.time, out.horizon);
   field_.evaluate(state, obstacles, reach_, ahead, out.clearances);
   add_barriers(out);
 }

@@ -169,13 +169,14 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       arm_workspace_(*system),
       tracked_(arm.num_coordinates(), settings.safety.max_rows),
       mass_(Eigen::MatrixXd::Constant(q_.size(), q_.size(), std::numeric_limits<double>::quiet_NaN())),
+      mass_cholesky_(Eigen::MatrixXd::Zero(q_.size(), q_.size())),
       bias_(q_),
       is_sliding_(static_cast<std::size_t>(q_.size()), false),
       is_unlimited_(unlimited_joints(arm.robot())),
       target_(q_),
-      attractor_(q_.size()),
+      path_reference_(q_.size()),
       reference_(JointGoal(q_)),
-      refuge_(JointGoal(q_)),
+      avoidance_goal_(JointGoal(q_)),
       input_goal_(JointGoal(q_)),
       input_pull_(JointGoal(q_)),
       wanted_v_(q_),
@@ -204,6 +205,11 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       posture_room_(body_),
       worker_workspace_(*system),
       look_period_(settings.planner ? settings.planner->period : default_look_period) {
+  if (is_impedance() && q_.size() > most_of_impedance) {
+    throw std::invalid_argument("controller: tracking.stiffness is " + std::to_string(settings.tracking.stiffness) + " for an arm of " +
+                                std::to_string(q_.size()) + " joints, allowed: 0, or at most " + std::to_string(most_of_impedance) +
+                                " joints");
+  }
   guide = make_guide(arm, body_, settings, torque);
   const Robot of_reference = within_margins(arm.robot(), settings, settings.speed);
   const Robot of_arm = within_margins(arm.robot(), settings, 1.0);

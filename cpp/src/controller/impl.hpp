@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Eigenvalues>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -17,6 +18,7 @@
 #include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/posture_search.hpp"
+#include "sidestep/barrier/stopping_clearance.hpp"
 #include "sidestep/system/local_minimum_recovery.hpp"
 #include "sidestep/lookahead/look_ahead.hpp"
 
@@ -155,6 +157,11 @@ class Controller::Impl {
   void take_dynamics(const KinematicState& state, MassMatrix mass_matrix, Bias bias) noexcept;
   void solve_reference(MassMatrix mass_matrix, Bias bias) noexcept;
   void track(MassMatrix mass_matrix, Bias bias) noexcept;
+  bool is_impedance() const noexcept { return torque && settings.tracking.stiffness > 0.0; }
+  static constexpr int most_of_impedance = 32;  // joints
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_of_impedance, most_of_impedance>;
+  /// Writes the acceleration that an impedance around the reference asks for.
+  void write_impedance() noexcept;
   const KinematicState& arm_state() const noexcept { return apart_ ? arm_workspace_.state() : workspace.state(); }
   void limit_speed() noexcept;
   void limit_pace(double limit) noexcept;
@@ -231,7 +238,8 @@ class Controller::Impl {
   double frequency_ = 0.0;                      // of the feedback [1/s]
   GeometricSystem::Workspace arm_workspace_;
   TorqueSolution tracked_;
-  Eigen::MatrixXd mass_;
+  Eigen::MatrixXd mass_, mass_cholesky_;
+  Eigen::SelfAdjointEigenSolver<Small> modes_;  // of an impedance
   Eigen::VectorXd bias_;
   std::vector<bool> is_sliding_, is_unlimited_;
   std::vector<Eigen::Index> metric_coordinates_;  // of obstacles, planes and links: clearances in metres
@@ -242,11 +250,11 @@ class Controller::Impl {
   std::uint64_t goal_number_ = 0, posture_attempt_ = 0, tick_ = 0;
   bool has_target_ = false, posture_found_ = false, moves_ = false;
   Eigen::VectorXd target_;        // a configuration that the arm is led to
-  OnlinePlanner::Attractor attractor_;
+  OnlinePlanner::Reference path_reference_;
   OnlinePlannerStatus guide_status_ = OnlinePlannerStatus::idle;
   Goal reference_;                // JointGoal
   const Goal* followed_ = nullptr;
-  Goal refuge_;                   // JointGoal: the target of the trajectory
+  Goal avoidance_goal_;                   // JointGoal: the target of the trajectory
   // Of velocities, twists and trajectories.
   Goal input_goal_;               // JointGoal: where and how the arm is to move now
   Goal input_pull_;               // JointGoal whose pull is the acceleration that is wanted for that

@@ -107,10 +107,10 @@ void Controller::Impl::choose_reference() noexcept {
     }
   }
   if (guide) {
-    guide_status_ = guide->step(q_, time_, attractor_);
-    reference.position = attractor_.position;
-    reference.velocity = attractor_.velocity;
-    reference.acceleration = attractor_.acceleration;
+    guide_status_ = guide->step(q_, time_, path_reference_);
+    reference.position = path_reference_.position;
+    reference.velocity = path_reference_.velocity;
+    reference.acceleration = path_reference_.acceleration;
     if (guide->following().route_number != 0) {
       hold_to_path(q_, v_, reference);
     }
@@ -134,9 +134,9 @@ void Controller::Impl::write_places(Eigen::MatrixXd& places, Eigen::Index& num) 
     return;
   }
   if (guide) {
-    places.leftCols(attractor_.num_places) = attractor_.places.leftCols(attractor_.num_places);
-    num = attractor_.num_places;
-    if (!attractor_.arrives) {
+    places.leftCols(path_reference_.num_places) = path_reference_.places.leftCols(path_reference_.num_places);
+    num = path_reference_.num_places;
+    if (!path_reference_.arrives) {
       return;
     }
   }
@@ -234,7 +234,7 @@ void Controller::Impl::avoid() noexcept {
     }
   }
   if (avoiding_) {
-    std::get<JointGoal>(refuge_).position = trajectory_.refuge();
+    std::get<JointGoal>(avoidance_goal_).position = trajectory_.target();
   }
 }
 

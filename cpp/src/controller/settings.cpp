@@ -58,6 +58,8 @@ const std::vector<Field<TrackingSettings>>& fields() {
       {"observer_share", &S::observer_share, "-", 0.0, 1.0, "of the effort limits that the observer may make up for"},
       {"largest_error", &S::largest_error, "rad", 0.001, 10.0, "between arm and reference, from which the reference begins anew"},
       {"servo_lag", &S::servo_lag, "rad", 0.001, 10.0, "the same where the arm's own drives track position or velocity"},
+      {"stiffness", &S::stiffness, "1/rad", 0.0, 100.0,
+       "of an impedance around the reference, effort limits per radian: lower yields more to pushes and payloads; 0: tracked stiffly"},
       {"drift_gain", &S::drift_gain, "1/s", 0.0, 50.0, "by which an output of velocity returns to the reference"},
   };
   return all;

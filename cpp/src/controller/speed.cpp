@@ -43,7 +43,7 @@ void Controller::Impl::limit_pace(double limit) noexcept {
   if (!guide || followed_ != &reference_) {
     return;
   }
-  leader_.update(arm.robot(), attractor_.position, attractor_.velocity);
+  leader_.update(arm.robot(), path_reference_.position, path_reference_.velocity);
   const double speed = speed_rows_.fastest(leader_).speed, pace = guide->following().follower.pace;
   guide->limit_pace(pace > 0.0 && speed > of_limit * limit * pace ? of_limit * limit * pace / speed : 1.0);
 }

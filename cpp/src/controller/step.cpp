@@ -31,7 +31,8 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   choose_reference();
   leave_room(looks);
   avoid();
-  const Goal& goal = avoiding_ ? refuge_ : pulls_ ? input_pull_ : *followed_;
+  const Goal& goal = avoiding_ ? avoidance_goal_ : pulls_ ? input_pull_ : *followed_;
+  workspace.horizon = arm_workspace_.horizon = avoiding_ ? 0.0 : Horizon::of_obstacles;
   const StepStatus status = system->acceleration(q_, v_, goal, obstacles(), workspace);
   command.system = status;
   wanted_ = workspace.acceleration;

@@ -4,6 +4,7 @@
 #include <limits>
 #include <numbers>
 
+#include "../control/cholesky.hpp"
 #include "../settings.hpp"
 #include "impl.hpp"
 
@@ -12,6 +13,7 @@ namespace {
 
 constexpr double close = 0.003;        // to the reference [rad | m]: feedback keeps the acceleration limits
 constexpr double feedback_room = 20.0;  // of accelerations elsewhere: dry friction on a light wrist takes so much
+constexpr double impedance_room = 1e3;  // of accelerations that an impedance asks for: of light joints, and by impacts
 constexpr double like_reference = 0.1;  // of the acceleration limits, by which feedback may differ [-]
 constexpr double jitter = 0.1;         // of measured velocities, at rest [rad/s | m/s]
 constexpr double free_share = 0.2;     // of the largest error, from which the arm draws the reference to itself [-]
@@ -77,7 +79,8 @@ void Controller::Impl::follow_arm() noexcept {
   if (!drives_track_) {
     // What the arm cannot follow is not run away from.
     for (Eigen::Index j = 0; j < q_.size(); ++j) {
-      const double error = arm_q_[j] - q_[j], free = free_share * most * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_share : 1.0);
+      const double error = arm_q_[j] - q_[j], share = is_impedance() ? 1.0 : free_share;
+      const double free = share * most * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_share : 1.0);
       coupling_[j] = frequency_ * frequency_ * (error - std::clamp(error, -free, free));
     }
   }
@@ -170,8 +173,15 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
     tracked_.acceleration = solution.acceleration;
     return;
   }
-  const double w = frequency_;
-  feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
+  if (torque) {
+    take_dynamics(arm_workspace_.state(), mass_matrix, bias);
+  }
+  if (is_impedance()) {
+    write_impedance();
+  } else {
+    const double w = frequency_;
+    feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
+  }
   const SpeedRows* const speed = settings.speed_limits ? &arm_speed_rows_ : nullptr;
   // The reference's acceleration meets the clearances of the arm as well: they are asked again where the arm is to do something
   // else.
@@ -179,8 +189,8 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
   const Clearances* const clearances = as_reference ? nullptr : &arm_workspace_.clearances;
   TorqueStatus status;
   if (torque) {
-    take_dynamics(arm_workspace_.state(), mass_matrix, bias);
-    const LastCommand last = last_command(&last_acceleration_, &last_torque_, command.tracking_error < close ? 1.0 : feedback_room, false);
+    const double room = is_impedance() ? impedance_room : command.tracking_error < close ? 1.0 : feedback_room;
+    const LastCommand last = last_command(&last_acceleration_, &last_torque_, room, false);
     status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, clearances, {}, last, tracked_, speed);
   } else {
     const LastCommand last{&last_acceleration_};
@@ -189,6 +199,36 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
   if (status > TorqueStatus::limited) {
     command.program = std::max(command.program, status);
   }
+}
+
+void Controller::Impl::write_impedance() noexcept {
+  // M a_r + K e + D de/dt + h is sent, e = q_r − q, with the h of the model: limits and clearances know of the disturbance d, which is
+  // in the bias by now, the impedance does not make up for it. With M = L Lᵀ and L⁻¹ K L⁻ᵀ = U Λ Uᵀ the damping of all modes is ζ if
+  // D = 2ζ L U √Λ Uᵀ Lᵀ.
+  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_of_impedance, 1>;
+  feedback_ = a_;
+  if (!cholesky(mass_, mass_cholesky_)) {
+    return;
+  }
+  const Eigen::Index n = q_.size();
+  Vector K(n), force(n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const double scale = is_sliding_[static_cast<std::size_t>(j)] ? 1.0 / sliding_share : 1.0;
+    K[j] = scale * settings.tracking.stiffness * arm.robot().limits().effort[j];
+    force[j] = K[j] * (q_[j] - arm_q_[j]) + (observer_ ? observer_->disturbance()[j] : 0.0);
+  }
+  const Small L = mass_cholesky_;
+  const auto lower = L.triangularView<Eigen::Lower>();
+  Small B = K.cwiseSqrt().asDiagonal();
+  lower.solveInPlace(B);
+  modes_.compute(B.lazyProduct(B.transpose()));
+  Vector rate = v_ - arm_v_;
+  rate = lower.transpose() * rate;
+  const Vector modal = modes_.eigenvalues().cwiseMax(0.0).cwiseSqrt().cwiseProduct(modes_.eigenvectors().transpose() * rate);
+  lower.solveInPlace(force);
+  force += 2.0 * settings.tracking.damping * (modes_.eigenvectors() * modal);
+  lower.transpose().solveInPlace(force);
+  feedback_ += force;
 }
 
 void Controller::Impl::stop(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias,

@@ -13,11 +13,11 @@ constexpr double stiffness = 10.0;                // ω [1/s]
 
 }  // namespace
 
-AvoidanceTrajectory::AvoidanceTrajectory(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd refuge)
+AvoidanceTrajectory::AvoidanceTrajectory(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd target)
     : fastest_(share_of_limits * limits.velocity),
       hardest_(share_of_limits * limits.acceleration.unaryExpr(
                                      [](double limit) { return std::isfinite(limit) ? limit : unlimited_acceleration; })),
-      refuge_(std::move(refuge)),
+      target_(std::move(target)),
       position_(q),
       velocity_(v) {}
 
@@ -43,7 +43,7 @@ void AvoidanceTrajectory::advance(double period) noexcept {
 }
 
 double AvoidanceTrajectory::reference_acceleration(Eigen::Index j, double period) const noexcept {
-  const double left = refuge_[j] - position_[j], side = left < 0.0 ? -1.0 : 1.0;
+  const double left = target_[j] - position_[j], side = left < 0.0 ? -1.0 : 1.0;
   const double v = side * velocity_[j], A = hardest_[j];
   const double room = std::abs(left) - 0.5 * period * v, step = A * period;
   const double stops = room > 0.0 ? std::sqrt(step * step + 2.0 * A * room) - step : 0.0;

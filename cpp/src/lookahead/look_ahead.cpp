@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "../settings.hpp"
+#include "sidestep/barrier/stopping_clearance.hpp"
 #include "../system/random_configuration.hpp"
 
 namespace sidestep {
@@ -197,6 +198,7 @@ void LookAhead::check_interrupted() const {
 double LookAhead::advance(Motion& motion, Stepper& stepper) {
   check_interrupted();
   const double period = stepper.period;
+  workspace_.horizon = motion.flight ? 0.0 : Horizon::of_obstacles;
   bool sees;
   Eigen::VectorXd wanted;
   if (motion.flight) {
@@ -251,9 +253,9 @@ std::vector<AvoidanceTrajectory> LookAhead::draw_flights(const Motion& now, cons
   for (int number = 0; number < settings_.tries; ++number) {
     check_interrupted();
     const double spread = spreads[static_cast<std::size_t>(number / 2) % spreads.size()];
-    Eigen::VectorXd refuge =
-        number % 2 == 1 && followed ? draw(followed->refuge(), spread_of_followed) : draw(now.q, spread);
-    const AvoidanceTrajectory flight(system_->robot().limits(), now.q, now.v, std::move(refuge));
+    Eigen::VectorXd target =
+        number % 2 == 1 && followed ? draw(followed->target(), spread_of_followed) : draw(now.q, spread);
+    const AvoidanceTrajectory flight(system_->robot().limits(), now.q, now.v, std::move(target));
     references.push_back({flight, flight});
   }
   Obstacles obstacles = now.obstacles;
@@ -309,9 +311,9 @@ std::vector<LookAhead::Tried> LookAhead::promising(const Motion& now, const std:
 
 Eigen::VectorXd LookAhead::draw(const Eigen::VectorXd& q, double spread) {
   const JointLimits& limits = system_->robot().limits();
-  Eigen::VectorXd refuge(num_coordinates());
-  random_configuration(random_, limits.lower, limits.upper, q, spread, refuge);
-  return refuge;
+  Eigen::VectorXd target(num_coordinates());
+  random_configuration(random_, limits.lower, limits.upper, q, spread, target);
+  return target;
 }
 
 }  // namespace sidestep

@@ -103,16 +103,16 @@ bool OnlinePlanner::disturbed(ConstVectorRef q, const Obstacles& obstacles) noex
   return body_.nearest_moving(q, obstacles, foresight, here_) < disturbing;
 }
 
-OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor& attractor) noexcept {
-  attractor.velocity.setZero(goal_.size());
-  attractor.acceleration.setZero(goal_.size());
-  attractor.places.col(0) = goal_;
-  attractor.num_places = 1;
-  attractor.arrives = false;
+OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference& reference) noexcept {
+  reference.velocity.setZero(goal_.size());
+  reference.acceleration.setZero(goal_.size());
+  reference.places.col(0) = goal_;
+  reference.num_places = 1;
+  reference.arrives = false;
   if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite() || !std::isfinite(time)) {
-    attractor.position = goal_;
+    reference.position = goal_;
     if (q.size() == goal_.size()) {
-      attractor.position = q;
+      reference.position = q;
     }
     return goal_number_ == 0 ? OnlinePlannerStatus::idle : OnlinePlannerStatus::invalid;
   }
@@ -153,15 +153,15 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
       followed_ = answer.route_number;
       follower_.enter(*answer.route, q, velocity_);
     }
-    attractor.position.resize(goal_.size());
-    follower_.advance(*answer.route, settings_.route, q, time - last_time_, attractor.position, attractor.velocity,
-                      attractor.acceleration);
-    if (const Eigen::Index num = follower_.narrow(*answer.route, settings_.route, attractor.places); num > 0) {
-      attractor.num_places = num;
-      attractor.arrives = answer.route->length() - follower_.station <= settings_.route.lead;
+    reference.position.resize(goal_.size());
+    follower_.advance(*answer.route, settings_.route, q, time - last_time_, reference.position, reference.velocity,
+                      reference.acceleration);
+    if (const Eigen::Index num = follower_.narrow(*answer.route, settings_.route, reference.places); num > 0) {
+      reference.num_places = num;
+      reference.arrives = answer.route->length() - follower_.station <= settings_.route.lead;
     }
   } else {
-    attractor.position = goal_;
+    reference.position = goal_;
   }
   last_time_ = time;
 
@@ -170,7 +170,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Attractor
     return OnlinePlannerStatus::arrived;
   }
   const double left = ours && answer.status == PlanStatus::found ? answer.route->length() - follower_.station : 0.0;
-  const double away = (attractor.position - q).norm() + left;
+  const double away = (reference.position - q).norm() + left;
   if (ours && answer.path_number != measured_) {  // another way may be longer
     measured_ = answer.path_number;
     progress_.reset();

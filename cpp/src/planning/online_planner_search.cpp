@@ -11,7 +11,7 @@ namespace {
 constexpr double widening = 1.5;  // the margin grows by this factor each time the arm was stuck
 constexpr int widenings = 4;      // and begins anew after so many
 constexpr double shorter = 0.9;   // a straight way is shorter than the rest of a path by this factor to let go of it
-constexpr double back = 0.05;     // between places behind the attractor where an arm may find back to its path [rad]
+constexpr double back = 0.05;     // between places behind the reference where an arm may find back to its path [rad]
 
 }  // namespace
 

@@ -223,7 +223,8 @@ bool GeometricSystem::embed(ConstVectorRef q, ConstVectorRef v,
                        {w.jacobian_transposed.data() + start * q.size(), q.size(), m},
                        {w.curvatures.data() + start, m},
                        w.clearances.view(start, m),
-                       {w.activations.data() + start, m}},
+                       {w.activations.data() + start, m},
+                       w.horizon},
                       w.state_, obstacles);
     start += m;
   }

@@ -17,13 +17,13 @@ Obstacles point(double x, double y) {
   return Obstacles(Eigen::Vector3d(x, y, 0.0), Eigen::VectorXd::Constant(1, 0.02), Eigen::Matrix3Xd::Zero(3, 1));
 }
 
-/// An arm that is drawn to the attractor without delay.
+/// An arm that is drawn to the reference without delay.
 OnlinePlannerStatus follow(OnlinePlanner& guide, Eigen::VectorXd& q, double& time, double duration) {
-  OnlinePlanner::Attractor attractor(2);
+  OnlinePlanner::Reference reference(2);
   OnlinePlannerStatus status = OnlinePlannerStatus::idle;
   for (const double end = time + duration; time < end; time += 0.01) {
-    status = guide.step(q, time, attractor);
-    q += 0.2 * (attractor.position - q);
+    status = guide.step(q, time, reference);
+    q += 0.2 * (reference.position - q);
   }
   return status;
 }
@@ -36,8 +36,8 @@ BOOST_AUTO_TEST_CASE(arrives_around_an_obstacle_and_tells_of_a_blocked_goal) {
   OnlinePlanner guide(test::planar_arm_body(), settings);
   guide.set_obstacles(point(0.5, 0.0));
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  OnlinePlanner::Attractor attractor(2);
-  BOOST_TEST(name(guide.step(q, 0.0, attractor)) == "idle");
+  OnlinePlanner::Reference reference(2);
+  BOOST_TEST(name(guide.step(q, 0.0, reference)) == "idle");
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   double time = 0.0;
   BOOST_TEST(name(follow(guide, q, time, 20.0)) == "arrived");
@@ -72,20 +72,20 @@ BOOST_AUTO_TEST_CASE(the_step_allocates_nothing_while_the_guide_searches) {
   guide.set_obstacles(point(0.5, 0.0));
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  OnlinePlanner::Attractor attractor(2);
+  OnlinePlanner::Reference reference(2);
   OnlinePlannerStatus status = OnlinePlannerStatus::idle;
   double time = 0.0;
   // Until it has searched, however slow the machine is.
   while (guide.counts().searches == 0) {
-    const std::size_t allocations = test::allocations_of([&] { status = guide.step(q, time, attractor); });
+    const std::size_t allocations = test::allocations_of([&] { status = guide.step(q, time, reference); });
     BOOST_TEST(allocations == 0);
     time += 0.001;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   for (int i = 0; i < 5000 && status != OnlinePlannerStatus::arrived; ++i) {
-    const std::size_t allocations = test::allocations_of([&] { status = guide.step(q, time, attractor); });
+    const std::size_t allocations = test::allocations_of([&] { status = guide.step(q, time, reference); });
     BOOST_TEST(allocations == 0);
-    q += 0.1 * (attractor.position - q);
+    q += 0.1 * (reference.position - q);
     time += 0.01;
   }
   BOOST_TEST(name(status) == "arrived");
@@ -98,17 +98,17 @@ BOOST_AUTO_TEST_CASE(a_path_that_is_blocked_while_it_is_improved_is_given_up_at_
   guide.set_obstacles(point(0.5, 0.0));
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   const Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  OnlinePlanner::Attractor attractor(2);
+  OnlinePlanner::Reference reference(2);
   OnlinePlannerStatus status = OnlinePlannerStatus::idle;
   double time = 0.0;
   const auto step = [&] {
-    status = guide.step(q, time, attractor);
+    status = guide.step(q, time, reference);
     time += 0.001;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   };
   do {  // until it leads along its first path
     step();
-  } while (attractor.velocity.isZero());
+  } while (reference.velocity.isZero());
   BOOST_TEST(guide.counts().searches == 0);  // none is over
   Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 2);
   points.col(0) << 0.5, 0.0, 0.0;
@@ -132,19 +132,19 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_off_its_path_finds_back_to_it) {
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   RrtConnect eyes(guide.body(), settings.planner);
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  OnlinePlanner::Attractor attractor(2);
+  OnlinePlanner::Reference reference(2);
   double time = 0.0;
-  // The arm stands still: the attractor goes around the obstacle until the arm no longer sees it.
+  // The arm stands still: the reference goes around the obstacle until the arm no longer sees it.
   bool seen = true;
   for (; time < 15.0 && seen; time += 0.001) {
-    static_cast<void>(guide.step(q, time, attractor));
-    seen = eyes.sees(q, attractor.position, settings.planner.floor, obstacles);
+    static_cast<void>(guide.step(q, time, reference));
+    seen = eyes.sees(q, reference.position, settings.planner.floor, obstacles);
   }
   BOOST_TEST(!seen);
   for (int i = 0; i < 30; ++i, time += 0.001) {  // past its next look
-    static_cast<void>(guide.step(q, time, attractor));
+    static_cast<void>(guide.step(q, time, reference));
   }
-  BOOST_TEST(eyes.sees(q, attractor.position, settings.planner.floor, obstacles));
+  BOOST_TEST(eyes.sees(q, reference.position, settings.planner.floor, obstacles));
   BOOST_TEST(guide.counts().searches == 1);
   BOOST_TEST(name(follow(guide, q, time, 20.0)) == "arrived");
   BOOST_TEST(guide.counts().searches == 1);
@@ -157,12 +157,12 @@ BOOST_AUTO_TEST_CASE(an_arm_that_is_slow_is_not_stuck) {
   guide.set_obstacles(point(0.5, 0.0));
   guide.set_goal(Eigen::Vector2d(-1.0, 0.0));
   Eigen::VectorXd q = Eigen::Vector2d(1.0, 0.0);
-  OnlinePlanner::Attractor attractor(2);
+  OnlinePlanner::Reference reference(2);
   double time = 0.0;
   const auto move = [&](double speed, double duration) {
     for (const double end = time + duration; time < end; time += 0.01) {
-      static_cast<void>(guide.step(q, time, attractor));
-      const Eigen::VectorXd away = attractor.position - q;
+      static_cast<void>(guide.step(q, time, reference));
+      const Eigen::VectorXd away = reference.position - q;
       q += std::min(1.0, 0.01 * speed / std::max(away.norm(), 1e-9)) * away;
     }
   };

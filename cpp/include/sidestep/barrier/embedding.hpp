@@ -21,6 +21,7 @@ struct EmbeddingView {
   ClearanceView clearances;                         ///< for barriers of clearances; others leave it as it is
   /// Activation distances (m) in place of the embedding's own, see Barrier; empty: its own.
   Eigen::Map<const Eigen::VectorXd> activations{nullptr, 0};
+  double horizon = 0.0;  ///< τ [s] at least by which obstacles that approach are looked for, see Horizon
 };
 
 /// What one coordinate of an embedding stands for. Fixed at construction, for messages and for what acts on clearances.

@@ -19,7 +19,8 @@ struct Horizon {
   double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
 
   static constexpr double longest = 0.5;  ///< τ [s] at most, whatever the limits
-  /// τ [s] at least for obstacles: they may come without the arm's moving, and motors may brake less hard than the limits say.
+  /// τ [s] at least for obstacles, unless an avoidance trajectory leads the arm past them: they may come at an arm at rest, and motors
+  /// may brake less hard than the limits say.
   static constexpr double of_obstacles = 0.3;
 
   /// τ = max_j |v_j| / (acceleration limit)_j / 2.

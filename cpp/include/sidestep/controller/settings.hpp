@@ -51,6 +51,9 @@ struct TrackingSettings {
   double observer_share = 0.8;   ///< of the effort limits that it may make up for [-]
   double largest_error = 0.2;    ///< |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m]
   double servo_lag = 1.0;        ///< the same where the arm's own drives track the reference [rad]
+  /// κ of an impedance around the reference, for arms that are moved by torque: K_j = κ (effort limit)_j [1/rad]; of sliding joints
+  /// five times as much [1/m]. 0: none.
+  double stiffness = 0.0;
   double drift_gain = 2.0;       ///< of the output of velocity: v = v_r + gain (q_r − q) [1/s]
 };
 

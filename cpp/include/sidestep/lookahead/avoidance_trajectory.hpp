@@ -18,8 +18,8 @@ namespace sidestep {
 /// Obstacles are ignored here: the acceleration is for an AccelerationFilter or a TorqueController with clearances.
 class AvoidanceTrajectory {
  public:
-  /// From q at velocity v (nv) to its target, `refuge` (nv).
-  AvoidanceTrajectory(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd refuge);
+  /// From q at velocity v (nv) to its target, `target` (nv).
+  AvoidanceTrajectory(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd target);
 
   /// The acceleration (nv) [/s²] that follows the reference from q, v for a period [s] > 0.
   Eigen::VectorXd acceleration(ConstVectorRef q, ConstVectorRef v, double period) const;
@@ -29,7 +29,7 @@ class AvoidanceTrajectory {
   /// Moves the reference on by a period [s] > 0.
   void advance(double period) noexcept;
 
-  const Eigen::VectorXd& refuge() const noexcept { return refuge_; }
+  const Eigen::VectorXd& target() const noexcept { return target_; }
   /// The reference [rad | m, /s].
   const Eigen::VectorXd& position() const noexcept { return position_; }
   const Eigen::VectorXd& velocity() const noexcept { return velocity_; }
@@ -38,7 +38,7 @@ class AvoidanceTrajectory {
   double reference_acceleration(Eigen::Index joint, double period) const noexcept;
 
   Eigen::VectorXd fastest_, hardest_;  // V, A
-  Eigen::VectorXd refuge_, position_, velocity_;
+  Eigen::VectorXd target_, position_, velocity_;
 };
 
 }  // namespace sidestep

@@ -76,8 +76,8 @@ class OnlinePlanner {
   /// shrink, see GeometricSystem::lower_activations: at the first `num_places` columns of `places` (nv), the narrow
   /// places of the path that the arm is about to pass, or the goal where there is none; at the goal as well where the
   /// arm `arrives`: there are some, and the end of the path is within the lead.
-  struct Attractor {
-    explicit Attractor(Eigen::Index nv)
+  struct Reference {
+    explicit Reference(Eigen::Index nv)
         : position(Eigen::VectorXd::Zero(nv)),
           velocity(position),
           acceleration(position),
@@ -95,7 +95,7 @@ class OnlinePlanner {
 
   /// One step of the loop, at a time [s] that does not go back; where it is not finite, nothing changes and the status
   /// is `invalid`. Never blocks; allocates nothing unless synchronous.
-  [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Attractor& attractor) noexcept;
+  [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Reference& reference) noexcept;
 
   /// The pace that the reference may go at along the path at most, see TimedPathFollower; from the loop.
   void limit_pace(double most) noexcept { follower_.most = most; }

@@ -76,6 +76,7 @@ class GeometricSystem {
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
     Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
     Eigen::VectorXd activations;          ///< input: their activation distances (m), at first the system's
+    double horizon = 0.0;                 ///< input: τ [s] at least by which obstacles that approach are looked for, see Horizon
     GraphMetric metric;
     GoalPull pull;                        ///< ∂U, v* and the way left
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-WORDS_HEIGHT = 218  # [px] at least, what the longest words usually take: what is below them stays where it is
+WORDS_HEIGHT = 236  # [px] at least, what the longest words usually take: what is below them stays where it is
 STYLE = (
     "<style>.mantine-Slider-markLabel{translate:0 3px}</style>"  # else a slider's knob covers its least value
 )
