@@ -10,6 +10,7 @@
 #include "sidestep/system/penetration_recovery.hpp"
 #include "sidestep/system/switch.hpp"
 #include "sidestep/barrier/embedding.hpp"
+#include "sidestep/barrier/stopping_clearance.hpp"
 #include "sidestep/geometry/graph_metric.hpp"
 
 namespace sidestep {
@@ -76,7 +77,7 @@ class GeometricSystem {
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
     Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
     Eigen::VectorXd activations;          ///< input: their activation distances (m), at first the system's
-    double horizon = 0.0;                 ///< input: τ [s] at least by which obstacles that approach are looked for, see Horizon
+    double horizon = Horizon::of_obstacles;  ///< input: τ [s] at least by which obstacles that approach are looked for, see Horizon
     GraphMetric metric;
     GoalPull pull;                        ///< ∂U, v* and the way left
 
