@@ -144,8 +144,8 @@ class SafetyRows {
   bool usable(const Clearances& clearances) const noexcept;
 
   /// The most critical clearances of usable ones, at velocity v (nv). The hardest deceleration is Σ_j |∂h/∂q_j|
-  /// (acceleration limit)_j or, given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. Planned with
-  /// is a share of what both leave together, max ∇h·a with |a| and |M a + bias| within their limits, where that may matter.
+  /// (acceleration limit)_j or, given the torque, (M⁻¹∇h)·(torque − bias) at the effort limits, whichever is less. The
+  /// comfortable one is a share of what both allow together, max ∇h·a with |a| and |M a + bias| within their limits.
   /// `bounds` are those of now. No allocation.
   void update(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
               const AccelerationBounds& bounds, double period, const BrakingTorque* torque = nullptr,

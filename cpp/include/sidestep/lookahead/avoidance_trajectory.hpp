@@ -18,7 +18,7 @@ namespace sidestep {
 /// Obstacles are ignored here: the acceleration is for an AccelerationFilter or a TorqueController with clearances.
 class AvoidanceTrajectory {
  public:
-  /// From q at velocity v (nv) to its target, `target` (nv).
+  /// From q at velocity v (nv) to rest at `target` (nv).
   AvoidanceTrajectory(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd target);
 
   /// The acceleration (nv) [/s²] that follows the reference from q, v for a period [s] > 0.
