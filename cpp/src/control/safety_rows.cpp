@@ -177,7 +177,7 @@ double SafetyRows::hardest_by_torque(int row, const JointLimits& limits, const B
 }
 
 double SafetyRows::largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& least, const Eigen::VectorXd& most,
-                                   const JointLimits& limits, const BrakingTorque& torque, double otherwise) noexcept {
+                                   double otherwise) noexcept {
   // w n·a − |a|²/2 with so large a w that the second term does not count.
   double size = 0.0;
   for (Eigen::Index j = 0; j < most.size(); ++j) {
@@ -187,9 +187,6 @@ double SafetyRows::largest_by_both(ConstVectorRef direction, const Eigen::Vector
   reach_data_.g = -linear * size / length * direction;
   reach_data_.lower = least;
   reach_data_.upper = most;
-  reach_data_.A = torque.mass;
-  reach_data_.row_lower = -limits.effort - torque.bias;
-  reach_data_.row_upper = limits.effort - torque.bias;
   if (reach_.solve(reach_data_) != QuadraticProgramStatus::solved) {
     return otherwise;
   }
@@ -255,6 +252,9 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     coordinates[static_cast<std::size_t>(at)] = static_cast<int>(k);
   }
   if (torque != nullptr) {
+    reach_data_.A = torque->mass;
+    reach_data_.row_lower = -limits.effort - torque->bias;
+    reach_data_.row_upper = limits.effort - torque->bias;
     find_responses(first, approach, torque->mass_cholesky);
   }
   double hardest_stop = 0.0;
@@ -270,7 +270,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     double by_both = std::min(by_limits, by_torque);
     const bool counts = torque != nullptr && u > 0.0 && u / rate + 0.5 * u * u / (scarce * by_both) > room;
     if (counts) {
-      by_both = std::min(by_both, largest_by_both(gradient, least_, limits.acceleration, limits, *torque, by_both));
+      by_both = std::min(by_both, largest_by_both(gradient, least_, limits.acceleration, by_both));
     }
     const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * by_both, smallest_deceleration), hardest,
@@ -280,7 +280,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     double required = demanded_deceleration(room, u, closing, period) - c;
     double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque);
     if (counts && required > 0.0) {
-      now = std::min(now, largest_by_both(gradient, bounds.lower, bounds.upper, limits, *torque, now));
+      now = std::min(now, largest_by_both(gradient, bounds.lower, bounds.upper, now));
     }
     const double of_arm = -gradient.dot(v);
     const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows

@@ -181,9 +181,9 @@ class SafetyRows {
   /// Writes M⁻¹ ∇h of the rows chosen, side by side: divisions of one wait for each other.
   void find_responses(int first, const ClearanceState& approach, const Eigen::MatrixXd& mass_cholesky) noexcept;
   double hardest_by_torque(int row, const JointLimits& limits, const BrakingTorque& torque) const noexcept;
-  /// max direction·a with lower <= a <= upper and |M a + bias| <= effort; `otherwise` where there is no such a.
+  /// max direction·a with lower <= a <= upper, and |M a + bias| <= effort as `add` has written it; `otherwise` where there is no such a.
   double largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
-                         const JointLimits& limits, const BrakingTorque& torque, double otherwise) noexcept;
+                         double otherwise) noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
