@@ -20,7 +20,7 @@ def arm() -> ss.Arm:
 
 def pushed(
     arm: ss.Arm, stiffness: float, force: Force, seconds: float, obstacles: ss.Obstacles | None = None
-):
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The arm holds its neutral configuration while torques push it: q, command.torque (K, nv), clearance (K,)."""
     settings = ss.ControllerSettings(synchronous=True)
     settings.tracking.stiffness = stiffness
@@ -56,10 +56,9 @@ def test_a_push_moves_the_arm_as_far_as_the_spring_says(arm: ss.Arm, joint: int,
     effort = arm.limits.effort[joint]
     q, torque, _ = pushed(arm, stiffness, on_joint(arm, joint, 0.1 * effort, 0.2, 1.2), 2.2)
     off = q - arm.neutral
-    assert off[1190, joint] == pytest.approx(
-        0.1 / stiffness, rel=0.02
-    )  # τ/K, K = stiffness times effort limit
-    assert np.abs(np.delete(off[1190], joint)).max() < 0.02 * 0.1 / stiffness
+    expected = 0.1 / stiffness  # τ/K, K = stiffness times effort limit
+    assert off[1190, joint] == pytest.approx(expected, rel=0.02)
+    assert np.abs(np.delete(off[1190], joint)).max() < 0.02 * expected
     assert np.abs(off[-1]).max() < 5e-4  # and back
     rate = np.abs(np.diff(torque, axis=0)) / PERIOD
     assert (rate <= arm.limits.effort_rate * (1.0 + 1e-9)).all()
@@ -83,10 +82,16 @@ def test_a_push_towards_an_obstacle_ends_before_it(arm: ss.Arm) -> None:
     free, _, _ = pushed(arm, 2.0, force, 1.2)
     there = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
     there.set_obstacles(ball)
-    assert (
-        there.step(free[-1], np.zeros(arm.num_coordinates)).clearance < -0.01
-    )  # where the push would have taken it
+    at_rest = np.zeros(arm.num_coordinates)
+    assert there.step(free[-1], at_rest).clearance < -0.01  # where the push would have taken it
     q, _, clearance = pushed(arm, 2.0, force, 2.2, ball)
     assert clearance[0] > 0.05
     assert clearance.min() > 0.0045  # [m] the margin is 0.005
     assert np.abs(q[-1] - arm.neutral).max() < 0.005
+
+
+def test_only_an_arm_that_is_moved_by_torque_has_an_impedance(arm: ss.Arm) -> None:
+    settings = ss.ControllerSettings(output="acceleration")
+    settings.tracking.stiffness = 5.0
+    with pytest.raises(ValueError, match=r"tracking\.stiffness is 5\.0*, .* not moved by torque, allowed: 0"):
+        ss.Controller(arm, settings)

@@ -205,6 +205,10 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       posture_room_(body_),
       worker_workspace_(*system),
       look_period_(settings.planner ? settings.planner->period : default_look_period) {
+  if (settings.tracking.stiffness > 0.0 && !torque) {
+    throw std::invalid_argument("controller: tracking.stiffness is " + std::to_string(settings.tracking.stiffness) +
+                                ", but arm '" + arm.name() + "' is not moved by torque, allowed: 0");
+  }
   if (is_impedance() && q_.size() > most_of_impedance) {
     throw std::invalid_argument("controller: tracking.stiffness is " + std::to_string(settings.tracking.stiffness) + " for an arm of " +
                                 std::to_string(q_.size()) + " joints, allowed: 0, or at most " + std::to_string(most_of_impedance) +

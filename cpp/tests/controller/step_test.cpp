@@ -111,7 +111,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
           case 3: controller.clear_goal(); break;
           default: controller.set_goal(q); break;
         }
-        if (k % 5 == 0) {  // comes from afar at the middle of the arm where it will be, too fast for it to back off
+        if (k % 5 == 0) {  // comes from afar at the middle of the arm where it will be, too large and too fast for it to back off
           const KinematicState there = state_at(arm.robot(), k % 2 == 0 ? left : right);
           const Eigen::Vector3d at = frame_pose(arm.robot(), there, arm.robot().frame_index("link4")).translation();
           controller.set_obstacles(test::ball(at + Eigen::Vector3d(0.0, 3.0, 0.0), 0.25, {0.0, -3.0, 0.0}));
@@ -140,6 +140,28 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
     BOOST_TEST(avoided > 0U);
     BOOST_TEST(on_path > 0U);
   }
+}
+
+BOOST_AUTO_TEST_CASE(an_impedance_allocates_nothing) {
+  ControllerSettings settings;
+  settings.output = ControllerSettings::Output::torque;
+  settings.planner.reset();
+  settings.look_ahead.reset();
+  settings.tracking.stiffness = 5.0;
+  Controller controller(covered_arm(test::arm_limits(nv)), settings);
+  controller.set_goal(Eigen::VectorXd::Constant(nv, 0.3));
+  Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
+  std::size_t allocations = 0;
+  double farthest = 0.0;
+  for (int k = 0; k < 300; ++k) {
+    allocations += test::allocations_of([&] { controller.step(q, v); });
+    v += 0.001 * controller.command().acceleration;
+    v[0] += 0.001;  // a push, so that the arm is off its reference
+    q += 0.001 * v;
+    farthest = std::max(farthest, controller.command().tracking_error);
+  }
+  BOOST_TEST(allocations == 0U);
+  BOOST_TEST(farthest > 1e-4);
 }
 
 BOOST_AUTO_TEST_CASE(clearances_bind_whatever_the_goal_is) {
