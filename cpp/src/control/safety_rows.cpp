@@ -24,8 +24,9 @@ constexpr double smallest_deceleration = 1e-6;
 constexpr double scarce = 0.05;
 constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
 constexpr double largest_acceleration = 1e3;  // stands for what has no limit [/s²]
-// Of the jerk limits that one row may take, and of the hardest deceleration that a smooth stop counts on.
-constexpr double of_jerk = 0.5, of_hardest = 0.75;
+// Of the jerk limits that one row takes, leaving some to others, and takes where that is not enough; of the hardest deceleration, that
+// a smooth stop counts on.
+constexpr double of_jerk = 0.5, of_jerk_alone = 0.95, of_hardest = 0.75;
 
 /// The speed w with p(w) + delay w = room; with delay = 0 the inverse of p. Odd in the room.
 double profile_speed(double room, double delay, double A, double rate) noexcept {
@@ -114,6 +115,10 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
       response_(Eigen::VectorXd::Zero(num_coordinates)),
       responses_(RowMatrix::Zero(num_coordinates, normals.rows())),
       least_(response_),
+      effort_lower_(response_),
+      effort_upper_(response_),
+      next_lower_(response_),
+      next_upper_(response_),
       reach_data_(num_coordinates, num_coordinates),
       reach_(num_coordinates, num_coordinates) {}
 
@@ -177,7 +182,7 @@ double SafetyRows::hardest_by_torque(int row, const JointLimits& limits, const B
 }
 
 double SafetyRows::largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& least, const Eigen::VectorXd& most,
-                                   double otherwise) noexcept {
+                                   const Eigen::VectorXd& row_lower, const Eigen::VectorXd& row_upper, double otherwise) noexcept {
   // w n·a − |a|²/2 with so large a w that the second term does not count.
   double size = 0.0;
   for (Eigen::Index j = 0; j < most.size(); ++j) {
@@ -187,6 +192,8 @@ double SafetyRows::largest_by_both(ConstVectorRef direction, const Eigen::Vector
   reach_data_.g = -linear * size / length * direction;
   reach_data_.lower = least;
   reach_data_.upper = most;
+  reach_data_.row_lower = row_lower;
+  reach_data_.row_upper = row_upper;
   if (reach_.solve(reach_data_) != QuadraticProgramStatus::solved) {
     return otherwise;
   }
@@ -213,6 +220,41 @@ double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits
     return std::isfinite(by_torque) ? by_torque : 0.0;
   }
   return std::clamp(by_torque, by_limits, longest_stop * by_limits);
+}
+
+double SafetyRows::smoothed(double required, double room, double u, double c, double A, ConstVectorRef gradient, const LastMotion& last,
+                            const AccelerationBounds& bounds, const JointLimits& limits, double period) noexcept {
+  const double jerk = last.jerk_share * gradient.cwiseAbs().dot(limits.jerk);
+  if (!(jerk < infinity)) {
+    return required;
+  }
+  const double before = gradient.dot(last.acceleration);
+  const double least = -largest_product(-gradient, bounds.smooth_lower, bounds.smooth_upper);
+  const double most = largest_product(gradient, bounds.smooth_lower, bounds.smooth_upper);  // joints at a limit give no more
+  const auto raised = [&](double share) { return std::min(before + share * std::max(most - before, 0.0), most); };
+  const double lasting = last.early ? std::min(c, 0.0) : c;
+  const auto stops = [&](double x, double share) {
+    const double slowing = x + lasting, next = u - slowing * period;
+    return room - std::max(u, next) * period >= jerk_braking_distance(next, std::max(-slowing, -A), A, share * jerk);
+  };
+  const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
+  const bool enough = stops(shared, of_jerk);
+  if (required > shared) {
+    return enough ? shared : stops(alone, of_jerk_alone) ? std::min(required, alone) : required;
+  }
+  double low = std::max(required, least), high = shared;
+  if (!last.early || room <= 0.0 || low >= high || stops(low, of_jerk)) {
+    return required;
+  }
+  if (!enough) {
+    return alone;
+  }
+  constexpr int halvings = 12;
+  for (int n = 0; n < halvings; ++n) {
+    const double middle = 0.5 * (low + high);
+    (stops(middle, of_jerk) ? high : low) = middle;
+  }
+  return high;
 }
 
 void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
@@ -253,10 +295,19 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
   }
   if (torque != nullptr) {
     reach_data_.A = torque->mass;
-    reach_data_.row_lower = -limits.effort - torque->bias;
-    reach_data_.row_upper = limits.effort - torque->bias;
+    effort_lower_ = -limits.effort - torque->bias;
+    effort_upper_ = limits.effort - torque->bias;
     find_responses(first, approach, torque->mass_cholesky);
   }
+  // What motors that change their torque no faster can do next: beyond it light joints would be flung about, and little else.
+  const bool rates = torque != nullptr && last != nullptr && last->torque_lower != nullptr;
+  if (rates) {
+    next_lower_ = last->acceleration - period * limits.jerk;
+    next_upper_ = last->acceleration + period * limits.jerk;
+  }
+  const auto within_rates = [&](const auto& direction, double asked) {
+    return std::min(asked, largest_by_both(direction, next_lower_, next_upper_, *last->torque_lower, *last->torque_upper, asked));
+  };
   double hardest_stop = 0.0;
   int hardest_row = -1;  // that a stop along the path is for
   for (int row = first; row < size_; ++row) {
@@ -270,7 +321,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     double by_both = std::min(by_limits, by_torque);
     const bool counts = torque != nullptr && u > 0.0 && u / rate + 0.5 * u * u / (scarce * by_both) > room;
     if (counts) {
-      by_both = std::min(by_both, largest_by_both(gradient, least_, limits.acceleration, by_both));
+      by_both = std::min(by_both, largest_by_both(gradient, least_, limits.acceleration, effort_lower_, effort_upper_, by_both));
     }
     const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
     const ClosingLimits closing{std::max(settings_.braking_fraction * by_both, smallest_deceleration), hardest,
@@ -280,7 +331,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     double required = demanded_deceleration(room, u, closing, period) - c;
     double now = std::min(largest_product(gradient, bounds.lower, bounds.upper), by_torque);
     if (counts && required > 0.0) {
-      now = std::min(now, largest_by_both(gradient, bounds.lower, bounds.upper, now));
+      now = std::min(now, largest_by_both(gradient, bounds.lower, bounds.upper, effort_lower_, effort_upper_, now));
     }
     const double of_arm = -gradient.dot(v);
     const double net = now + std::min(c, 0.0);  // a curvature that helps fades as the arm slows
@@ -307,14 +358,11 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     }
     bool smooth = false;
     if (last != nullptr) {
-      const double jerk = of_jerk * last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
-      // Joints that are at a limit give no more.
-      const double before = gradient.dot(last->acceleration), most = largest_product(gradient, bounds.smooth_lower, bounds.smooth_upper);
-      const double rising = std::min(before + of_jerk * std::max(most - before, 0.0), most);
-      if (required > rising && jerk < infinity) {
-        const double next = u - (rising + c) * period, A = of_hardest * hardest;
-        smooth = room - std::max(u, next) * period >= jerk_braking_distance(next, std::max(-(rising + c), -A), A, jerk);
-        required = smooth ? rising : required;
+      const double asked = required;
+      required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
+      smooth = required < asked;
+      if (rates && required == asked && asked > last->acceleration.dot(gradient)) {
+        required = within_rates(gradient, required);
       }
     }
     if (hardest_row == row && smooth) {
@@ -334,6 +382,9 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     const double speed = v.norm();
     normals.row(row) = -v.transpose() / speed;
     lower[row] = hardest_stop * speed / tau;
+    if (rates) {
+      lower[row] = within_rates(normals.row(row).transpose(), lower[row]);
+    }
     lengths[row] = lengths[hardest_row];
     coordinates[static_cast<std::size_t>(row)] = coordinates[static_cast<std::size_t>(hardest_row)];
     nearest[static_cast<std::size_t>(row)] = nearest[static_cast<std::size_t>(hardest_row)];

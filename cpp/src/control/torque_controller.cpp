@@ -111,6 +111,7 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
     : nv_(robot.num_coordinates()),
       settings_((settings.validate(robot), std::move(settings))),
       limits_(robot.limits()),
+      has_rates_(limits_.effort_rate.array().isFinite().any()),
       tracking_weight_(expanded(settings_.tracking_weight, nv_)),
       torque_cost_(expanded(settings_.torque_weight, nv_).cwiseQuotient(limits_.effort.cwiseAbs2())),
       bounds_(nv_),
@@ -128,6 +129,8 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       speed_multipliers_(Eigen::VectorXd::Zero(settings_.max_speed_rows)),
       wide_lower_(Eigen::VectorXd::Zero(nv_)),
       wide_upper_(Eigen::VectorXd::Zero(nv_)),
+      jerk_lower_(wide_lower_),
+      jerk_upper_(wide_lower_),
       mass_(Eigen::MatrixXd::Zero(nv_, nv_)),
       mass_cholesky_(Eigen::MatrixXd::Zero(nv_, nv_)),
       weighted_(Eigen::VectorXd::Zero(nv_)),
@@ -215,16 +218,23 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   report_clearance(clearances, solution);
   report_clearance(second.clearances, solution);
   if (q_known && v_known && mass_known && bias_known) {
+    write_torque_rows(last);
+    const bool rates = last.torque != nullptr && has_rates_ && solution.least_clearance >= 0.0;
     if (clearances != nullptr && clear) {
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
-      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_,
-                              last.torque != nullptr ? jerk_share() : 1.0};
+      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, last.torque != nullptr ? jerk_share() : 1.0,
+                              last.early && rates, rates ? &rate_lower_ : nullptr, rates ? &rate_upper_ : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       if (two) {
         rows_.add(*second.clearances, *second.velocity, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
+      }
+    }
+    if (last.decided != nullptr) {
+      for (int k = 0; k < rows_.size(); ++k) {
+        rows_.lower[k] = std::min(rows_.lower[k], rows_.normals.row(k).dot(last.decided->transpose()));
       }
     }
     if (wanted_known && clear) {
@@ -233,27 +243,31 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       wanted_ = -velocity_ / settings_.stop_time;
     }
     const bool smooth = last.acceleration != nullptr || last.torque != nullptr;
+    if (rates && last.acceleration != nullptr && last.binds) {
+      jerk_lower_ = *last.acceleration - settings_.period * limits_.jerk;
+      jerk_upper_ = *last.acceleration + settings_.period * limits_.jerk;
+    } else {
+      jerk_lower_.setConstant(-infinity);
+      jerk_upper_.setConstant(infinity);
+    }
     write_cost();
-    write_torque_rows(&last);
     bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true;
     if (!solved && smooth) {
-      // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. First jerk gives way, or
-      // the bounds of a state that noise and disturbances change faster than torque may; then the torque's rate.
+      // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of
+      // a state that noise and disturbances change faster than torque may. The torque's rate stays, since motors take no other, until a
+      // clearance is lost.
       wanted_ = wanted_.cwiseMax(bounds_.smooth_lower).cwiseMin(bounds_.smooth_upper);
       write_cost();
       kept = false;
-      if (last.torque != nullptr) {
-        if (last.acceleration_factor > 1.0) {
-          wide_upper_ = last.acceleration_factor * limits_.acceleration;
-          wide_lower_ = -wide_upper_;
-        } else {
-          wide_lower_ = bounds_.lower;
-          wide_upper_ = bounds_.upper;
-        }
-        solved = solve_within_bounds(wide_lower_, wide_upper_, false, solution);
+      wide_lower_ = jerk_lower_.cwiseMax(bounds_.lower).cwiseMin(bounds_.upper);
+      wide_upper_ = jerk_upper_.cwiseMin(bounds_.upper).cwiseMax(bounds_.lower);
+      if (last.torque != nullptr && last.acceleration_factor > 1.0) {
+        wide_upper_ = last.acceleration_factor * limits_.acceleration;
+        wide_lower_ = -wide_upper_;
       }
-      if (!solved) {
-        write_torque_rows(nullptr);
+      solved = solve_within_bounds(wide_lower_, wide_upper_, false, solution);
+      if (!solved && last.torque != nullptr && !rates) {
+        write_torque_rows({});
         solved = solve_within_bounds(bounds_.lower, bounds_.upper, false, solution);
       }
     }
@@ -264,7 +278,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
                : free && row_multipliers_.isZero(0.0) && speed_multipliers_.isZero(0.0) ? TorqueStatus::ok
                                                                                         : TorqueStatus::limited;
     } else {
-      write_torque_rows(nullptr);
+      if (!rates) {
+        write_torque_rows({});
+      }
       kept = kept && !smooth;
       status = solve_relaxed(solution);
       if (status < TorqueStatus::relaxed && !kept) {
@@ -327,23 +343,23 @@ double TorqueController::jerk_share() const noexcept {
   return share;
 }
 
-void TorqueController::write_torque_rows(const LastCommand* last) noexcept {
+void TorqueController::write_torque_rows(const LastCommand& last) noexcept {
   hard_data_.A.topRows(nv_) = mass_;
   rate_lower_ = -limits_.effort - bias_;
   rate_upper_ = limits_.effort - bias_;
-  if (last != nullptr && last->gravity != nullptr) {
+  if (last.gravity != nullptr) {
     for (int i = 0; i < nv_; ++i) {
-      const double g = (*last->gravity)[i], lower = rate_lower_[i] + g, upper = rate_upper_[i] + g;
+      const double g = (*last.gravity)[i], lower = rate_lower_[i] + g, upper = rate_upper_[i] + g;
       if (std::abs(g) < limits_.effort[i]) {
         rate_lower_[i] = std::max(rate_lower_[i], lower);
         rate_upper_[i] = std::min(rate_upper_[i], upper);
       }
     }
   }
-  if (last != nullptr && last->torque != nullptr) {
+  if (last.torque != nullptr) {
     for (int i = 0; i < nv_; ++i) {
-      const double step = limits_.effort_rate[i] * settings_.period, before = (*last->torque)[i] - bias_[i];
-      const double change = last->gravity_change == nullptr ? 0.0 : (*last->gravity_change)[i];
+      const double step = limits_.effort_rate[i] * settings_.period, before = (*last.torque)[i] - bias_[i];
+      const double change = last.gravity_change == nullptr ? 0.0 : (*last.gravity_change)[i];
       const double lower = std::max(before, before + change) - step, upper = std::min(before, before + change) + step;
       if (lower <= upper && upper >= rate_lower_[i] && lower <= rate_upper_[i]) {
         rate_lower_[i] = std::max(rate_lower_[i], lower);

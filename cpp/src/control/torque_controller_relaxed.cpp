@@ -40,8 +40,8 @@ void TorqueController::widen_bounds() noexcept {
       lower = std::max(lower, position_lower);
       upper = std::min(upper, position_upper);
     }
-    wide_lower_[i] = lower;
-    wide_upper_[i] = upper;
+    wide_lower_[i] = std::clamp(jerk_lower_[i], lower, upper);
+    wide_upper_[i] = std::clamp(jerk_upper_[i], lower, upper);
   }
 }
 

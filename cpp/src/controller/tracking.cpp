@@ -154,6 +154,7 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
   if (torque) {
     last = last_command(&smooth_a_, &reference_torque_, 1.0, true);
   }
+  last.early = torque && !avoiding_;
   limit_speed();
   const SpeedRows* const speed = settings.speed_limits ? &speed_rows_ : nullptr;
   if (torque) {
@@ -183,17 +184,19 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
     feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
   }
   const SpeedRows* const speed = settings.speed_limits ? &arm_speed_rows_ : nullptr;
-  // The reference's acceleration meets the clearances of the arm as well: they are asked again where the arm is to do something
-  // else.
+  // The reference's acceleration meets the clearances of the arm as well, as far as can be: where the arm is to do something else,
+  // they keep what they have of it.
   const bool as_reference = ((feedback_ - a_).cwiseAbs().array() < like_reference * arm.robot().limits().acceleration.array()).all();
   const Clearances* const clearances = as_reference ? nullptr : &arm_workspace_.clearances;
   TorqueStatus status;
   if (torque) {
     const double room = is_impedance() ? impedance_room : command.tracking_error < close ? 1.0 : feedback_room;
-    const LastCommand last = last_command(&last_acceleration_, &last_torque_, room, false);
+    LastCommand last = last_command(&last_acceleration_, &last_torque_, room, false);
+    last.decided = &a_;
     status = tracking_program_->solve(arm_q_, arm_v_, feedback_, mass_, bias_, clearances, {}, last, tracked_, speed);
   } else {
-    const LastCommand last{&last_acceleration_};
+    LastCommand last{&last_acceleration_};
+    last.decided = &a_;
     status = tracking_filter_->apply(arm_q_, arm_v_, feedback_, clearances, {}, last, tracked_, speed);
   }
   if (status > TorqueStatus::limited) {

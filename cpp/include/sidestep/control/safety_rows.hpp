@@ -83,11 +83,14 @@ struct ClosingLimits {
 // not for the way back: what is asked for does not jump where closing turns into leaving.
 
 // With a jerk limit. Where a row first binds, the arm may still accelerate towards the obstacle, and would have to brake at
-// once. It need not: half of the deceleration that there is is not planned with. With b the ∇h·a of the last period and J the
-// jerk Σ |∂h/∂q_j| J_j of the clearance, half of which a row may take so that two can rise together, a row asks for no more
-// than b and half of what the smooth bounds of now leave beyond it (J T/2, of joints at no limit), as long as the smooth stop that begins with it,
-//     S(u, −(∇h·a + c)) at J/2 and at three quarters of the hardest deceleration,
-// fits into the room: S of acceleration_bounds.hpp. Where it does not, jerk gives way.
+// once. It need not: a row asks for no more than jerk allows next, as long as the smooth stop that begins with it,
+//     S(u, −(∇h·a + c)) at a share of the jerk J = Σ |∂h/∂q_j| J_j and at three quarters of the hardest deceleration,
+// fits into the room, S of acceleration_bounds.hpp. The share is one half, so that two rows can rise together; where that is not
+// enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
+// Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
+// it asks for the least after which the smooth stop fits, without a curvature that helps, which may be gone before the arm has
+// slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints would be flung about, for next to
+// nothing. While the arm is led past an obstacle, rows do not begin early: they would hold it back.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.
@@ -121,10 +124,14 @@ struct BrakingTorque {
   const Eigen::VectorXd& bias;
 };
 
-/// The acceleration of the last period (nv) [/s²], and the share of the jerk limits that there is.
+/// The acceleration of the last period (nv) [/s²], the share of the jerk limits that there is, whether rows brake early for it,
+/// and between what M q̈ may be so that torques keep their rate (nv); null without rates.
 struct LastMotion {
   const Eigen::VectorXd& acceleration;
   double jerk_share;
+  bool early = false;
+  const Eigen::VectorXd* torque_lower = nullptr;
+  const Eigen::VectorXd* torque_upper = nullptr;
 };
 
 /// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most
@@ -181,9 +188,13 @@ class SafetyRows {
   /// Writes M⁻¹ ∇h of the rows chosen, side by side: divisions of one wait for each other.
   void find_responses(int first, const ClearanceState& approach, const Eigen::MatrixXd& mass_cholesky) noexcept;
   double hardest_by_torque(int row, const JointLimits& limits, const BrakingTorque& torque) const noexcept;
-  /// max direction·a with lower <= a <= upper, and |M a + bias| <= effort as `add` has written it; `otherwise` where there is no such a.
+  /// max direction·a with lower <= a <= upper and row_lower <= M a <= row_upper; `otherwise` where there is no such a.
   double largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
-                         double otherwise) noexcept;
+                         const Eigen::VectorXd& row_lower, const Eigen::VectorXd& row_upper, double otherwise) noexcept;
+
+  /// What a row asks for where jerk is limited, see above: more early, or less where a smooth stop at A fits into the room.
+  static double smoothed(double required, double room, double closing_speed, double curvature, double A, ConstVectorRef gradient,
+                         const LastMotion& last, const AccelerationBounds& bounds, const JointLimits& limits, double period) noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
@@ -191,6 +202,8 @@ class SafetyRows {
   Eigen::VectorXd response_; // (nv) M v
   RowMatrix responses_;      // (nv, max) M⁻¹ ∇h of the rows chosen
   Eigen::VectorXd least_;    // (nv) −(acceleration limits)
+  Eigen::VectorXd effort_lower_, effort_upper_;  // (nv) of M q̈
+  Eigen::VectorXd next_lower_, next_upper_;      // (nv) q̈ by the jerk limits
   QuadraticProgramData reach_data_;
   QuadraticProgram reach_;   // what a direction can have within accelerations and torques
 };

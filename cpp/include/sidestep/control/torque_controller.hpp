@@ -74,6 +74,11 @@ struct LastCommand {
   /// Up to which the acceleration may exceed its limits, of feedback against what the model lacks, in [1, inf) [-].
   double acceleration_factor = 1.0;
   bool binds = true;  ///< the jerk limit; else clearances alone rise no faster than it allows
+  /// Where torques have a rate, clearances brake early enough to do it smoothly. Not while a trajectory leads past what is near: it
+  /// would be held back.
+  bool early = false;
+  /// (nv) What was decided of the clearances before [/s^2]: they ask for no more.
+  const Eigen::VectorXd* decided = nullptr;
 };
 
 /// Clearances at another state, which bound the same acceleration: those of the arm itself where its reference is what is
@@ -202,7 +207,7 @@ class TorqueController {
   /// The share of the jerk limits by which the torque keeps its rate, whatever the joints do; 1 without a rate.
   double jerk_share() const noexcept;
   /// Writes the torque rows: within the effort limits, and near the last torque unless null.
-  void write_torque_rows(const LastCommand* last) noexcept;
+  void write_torque_rows(const LastCommand& last) noexcept;
   void write_cost() noexcept;
   /// Writes the speed rows that the box does not satisfy, from row `first` on; their slack is variable `slack`, unless < 0.
   void write_speed_rows(QuadraticProgramData& data, int first, int slack, const Eigen::VectorXd& lower,
@@ -240,6 +245,7 @@ class TorqueController {
   int nv_;
   TorqueControllerSettings settings_;
   JointLimits limits_;
+  bool has_rates_;                                 // of effort
   Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
   AccelerationBounds bounds_;
   SafetyRows rows_;
@@ -258,6 +264,7 @@ class TorqueController {
   Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
   Eigen::VectorXd speed_multipliers_;              // of *speed_, >= 0
   Eigen::VectorXd wide_lower_, wide_upper_;        // box of the programs after the first
+  Eigen::VectorXd jerk_lower_, jerk_upper_;        // that no program leaves where torques keep a rate; else infinite
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd weighted_;                       // a column of the mass matrix, by the cost of torques
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
