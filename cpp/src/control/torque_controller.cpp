@@ -187,11 +187,12 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   if (bias_known) {
     bias_ = bias;
   }
+  jerk_share_ = mass_known && last.torque != nullptr ? find_jerk_share() : 1.0;
   solution.slack.setZero();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (q_known && v_known) {
     bounds_.update(limits_, q, v, settings_.period,
-                   {settings_.position_margin, mass_known && last.torque != nullptr ? jerk_share() : 1.0,
+                   {settings_.position_margin, jerk_share_,
                     last.acceleration_factor},
                    last.binds ? last.acceleration : nullptr);
     if (last.acceleration_factor > 1.0 && wanted_known) {
@@ -224,8 +225,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
-      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, last.torque != nullptr ? jerk_share() : 1.0,
-                              last.early && rates, rates ? &rate_lower_ : nullptr, rates ? &rate_upper_ : nullptr};
+      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, jerk_share_, last.early && rates, rates ? &rate_lower_ : nullptr, rates ? &rate_upper_ : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       if (two) {
@@ -327,7 +327,7 @@ bool TorqueController::factorise_mass() noexcept {
   return cholesky(mass_, mass_cholesky_);
 }
 
-double TorqueController::jerk_share() const noexcept {
+double TorqueController::find_jerk_share() const noexcept {
   // |M j| T <= share of the rate: what is left is for the change of the bias.
   constexpr double of_rate = 0.8;
   double share = 1.0;

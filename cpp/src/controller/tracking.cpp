@@ -16,6 +16,7 @@ constexpr double feedback_room = 20.0;  // of accelerations elsewhere: dry frict
 constexpr double impedance_room = 1e3;  // of accelerations that an impedance asks for: of light joints, and by impacts
 constexpr double like_reference = 0.1;  // of the acceleration limits, by which feedback may differ [-]
 constexpr double jitter = 0.1;         // of measured velocities, at rest [rad/s | m/s]
+constexpr double of_rate = 0.5;         // of the torque's rate, that feedback asks for [-]
 constexpr double free_share = 0.2;     // of the largest error, from which the arm draws the reference to itself [-]
 constexpr double sliding_share = 0.2;  // of the largest error, of joints that slide [m/rad]
 
@@ -168,6 +169,24 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
   }
 }
 
+double Controller::Impl::feedback_frequency() noexcept {
+  // Under a feedback that asks for more, motors that change their torque slowly would shake: ω³ |M e| and ω² |M de/dt| keep a
+  // share of the rate.
+  double w = frequency_;
+  if (torque) {
+    const Eigen::VectorXd& rate = arm.robot().limits().effort_rate;
+    for (Eigen::Index j = 0; j < q_.size(); ++j) {
+      double error = 0.0, change = 0.0;
+      for (Eigen::Index k = 0; k < q_.size(); ++k) {
+        error += mass_(j, k) * (q_[k] - arm_q_[k]);
+        change += mass_(j, k) * (v_[k] - arm_v_[k]);
+      }
+      w = std::min({w, std::cbrt(of_rate * rate[j] / std::abs(error)), std::sqrt(of_rate * rate[j] / std::abs(change))});
+    }
+  }
+  return w;
+}
+
 void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
   if (!apart_ || drives_track_) {
     tracked_.torque = solution.torque;
@@ -180,7 +199,7 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
   if (is_impedance()) {
     write_impedance();
   } else {
-    const double w = frequency_;
+    const double w = feedback_frequency();
     feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
   }
   const SpeedRows* const speed = settings.speed_limits ? &arm_speed_rows_ : nullptr;

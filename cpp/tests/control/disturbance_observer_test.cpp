@@ -4,6 +4,7 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "support/allocations.hpp"
 #include "support/numbers.hpp"
@@ -26,18 +27,23 @@ JointLimits limits_of_two() {
 struct Plant {
   Eigen::Matrix2d mass = (Eigen::Matrix2d() << 2.0, 0.4, 0.4, 0.5).finished();
   Eigen::Vector2d bias{3.0, -1.0}, rotors = Eigen::Vector2d::Zero(), disturbance = Eigen::Vector2d::Zero(), friction = Eigen::Vector2d::Zero();
-  Eigen::VectorXd v = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d payload = Eigen::Matrix2d::Zero();
+  double noise = 0.0;  // [rad/s] of measured velocities, uniform
+  Eigen::VectorXd v = Eigen::Vector2d::Zero(), measured = v;
+  std::mt19937 random{7};
 
   void step(DisturbanceObserver& observer, const Eigen::Vector2d& wanted) {
     Eigen::Matrix2d known = mass;
     known.diagonal() += observer.rotors();
     const Eigen::VectorXd torque = known * wanted + bias - observer.disturbance();
-    Eigen::Matrix2d real = mass;
+    Eigen::Matrix2d real = mass + payload;
     real.diagonal() += rotors;
     const Eigen::Vector2d dry = -friction.cwiseProduct((v / 1e-3).array().tanh().matrix());
-    const Eigen::VectorXd before = v;
+    const Eigen::VectorXd before = measured;
     v += observer_period * real.ldlt().solve(torque + disturbance + dry - bias);
-    observer.update(before, v, torque, wanted, mass, bias);
+    std::uniform_real_distribution<double> error(-noise, noise);
+    measured = v + Eigen::Vector2d(error(random), error(random));
+    observer.update(before, measured, torque, wanted, mass, bias);
   }
 };
 
@@ -106,6 +112,30 @@ BOOST_AUTO_TEST_CASE(dry_friction_is_not_taken_for_inertia) {
   }
   BOOST_TEST(observer.rotors()[0] < 0.02);  // [kg m²] of 2
   BOOST_TEST(observer.rotors()[1] < 0.02);
+}
+
+BOOST_AUTO_TEST_CASE(a_payload_is_not_taken_for_rotors) {
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  Plant plant;
+  plant.payload << 0.6, 0.35, 0.35, 0.22;
+  for (int k = 0; k < 6000; ++k) {
+    plant.step(observer, swing(k, 2.0));
+  }
+  BOOST_TEST(observer.rotors()[0] < 0.06);  // [kg m²]: a tenth of what the payload adds
+  BOOST_TEST(observer.rotors()[1] < 0.022);
+}
+
+BOOST_AUTO_TEST_CASE(rotors_are_found_beside_friction_and_noise) {
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  Plant plant;
+  plant.rotors << 0.0, 0.1;
+  plant.friction << 1.0, 1.0;
+  plant.noise = 0.01;
+  for (int k = 0; k < 6000; ++k) {
+    plant.step(observer, swing(k, 2.0));
+  }
+  BOOST_TEST(observer.rotors()[0] < 0.05);
+  BOOST_TEST(std::abs(observer.rotors()[1] - 0.1) < 0.02);
 }
 
 BOOST_AUTO_TEST_CASE(what_is_not_finite_changes_nothing_and_no_update_allocates) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "sidestep/kinematics/robot.hpp"
 
@@ -11,11 +12,14 @@ namespace sidestep {
 /// The arm moves by (M + J) v̇ + h = τ + d, with M and h of the model. The observer tells
 ///   - the disturbance d: friction, payload, wrong gravity. With the acceleration a that was predicted with the d known so
 ///     far, d changes by (M + J) (v̇ − a) T/T_o in every period T: it follows with the time constant T_o;
-///   - the inertias J of rotors (diagonal), which gears make larger than those of light links: the slope of what is missing,
-///     τ − h − M v̇, over v̇, both between 1.6 and 16 Hz, by least squares over the last seconds. Where a joint turns back,
-///     dry friction would count as inertia: those samples are left out; so is what goes with the forces of other joints'
-///     accelerations, as a payload's does.
-/// Both are bounded: |d| by a share of the effort limits, J by what the effort limit can accelerate at the acceleration limit.
+///   - the inertias J of rotors (diagonal), which gears make larger than those of light links. Of every joint j alone it fits
+///         τ − h − z = J v̇ + p z + f sign(v) + b v + c,     z = (M v̇)_j,
+///     by least squares over the last seconds of motion, all terms filtered: p is for a payload, which makes what the model has
+///     larger; f and b for dry and viscous friction. Noise of velocities is in both sides, so the sums are taken with the
+///     accelerations that were predicted (instrumental variables). What was not excited counts as zero, and J counts only where
+///     the fit explains most of what is missing.
+/// Both are bounded: |d| by a share of the effort limits, J by a tenth of what the effort limit can accelerate at
+/// the acceleration limit.
 /// No member allocates.
 class DisturbanceObserver {
  public:
@@ -31,18 +35,24 @@ class DisturbanceObserver {
   const Eigen::VectorXd& rotors() const noexcept { return rotors_; }            ///< J (nv) [kg m² | kg]
 
  private:
-  struct Filters {
-    Eigen::VectorXd quick, slow;  // two low-pass filters, whose difference is the band
+  static constexpr int num_terms = 5;                     // v̇, z, sign(v), v, 1
+  using Terms = Eigen::Matrix<double, num_terms, 1>;
+  using Seen = Eigen::Matrix<double, num_terms + 1, 1>;  // and what is missing
+  struct Joint {
+    Seen seen = Seen::Zero();
+    Terms told = Terms::Zero();  // with the acceleration that was predicted
+    Eigen::Matrix<double, num_terms, num_terms + 1> instrumented = Eigen::Matrix<double, num_terms, num_terms + 1>::Zero();
+    Eigen::Matrix<double, num_terms + 1, num_terms + 1> products = Eigen::Matrix<double, num_terms + 1, num_terms + 1>::Zero();
   };
-  void identify(Eigen::Index joint, double v, double acceleration, double coupled, double missing) noexcept;
+  void identify(Eigen::Index joint, const Seen& seen, const Terms& told) noexcept;
+
+  void find_rotor(Eigen::Index joint, double mass) noexcept;
 
   double period_, share_of_period_;
   Eigen::VectorXd most_disturbance_, most_rotor_;
   Eigen::VectorXd disturbance_, rotors_, acceleration_;
-  // Of every joint: its acceleration x, the model's force z of the other joints' accelerations, the missing force y; sums of
-  // their products; how long it moves one way.
-  Filters acceleration_band_, coupled_band_, missing_band_;
-  Eigen::VectorXd xx_, xz_, zz_, xy_, zy_, yy_, one_way_, last_v_;
+  std::vector<Joint> joints_;
+  std::size_t next_ = 0;  // whose inertia is found in this period
 };
 
 }  // namespace sidestep

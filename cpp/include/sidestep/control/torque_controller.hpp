@@ -189,6 +189,8 @@ class TorqueController {
   /// The first program of the last solve that had usable input: rows of torque limits, of clearances, and of
   /// Cartesian speed, without bounds where they are not in use.
   const QuadraticProgramData& program() const noexcept { return hard_data_; }
+  /// The share of the jerk limits by which torques kept their rate in the last solve, whatever the joints did; 1 without a rate.
+  double jerk_share() const noexcept { return jerk_share_; }
   /// Number of solves, since construction, that ended with this status.
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
@@ -205,7 +207,7 @@ class TorqueController {
   };
 
   /// The share of the jerk limits by which the torque keeps its rate, whatever the joints do; 1 without a rate.
-  double jerk_share() const noexcept;
+  double find_jerk_share() const noexcept;
   /// Writes the torque rows: within the effort limits, and near the last torque unless null.
   void write_torque_rows(const LastCommand& last) noexcept;
   void write_cost() noexcept;
@@ -246,6 +248,7 @@ class TorqueController {
   TorqueControllerSettings settings_;
   JointLimits limits_;
   bool has_rates_;                                 // of effort
+  double jerk_share_ = 1.0;
   Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
   AccelerationBounds bounds_;
   SafetyRows rows_;
