@@ -14,8 +14,9 @@ Contacts are of the exact meshes of the measured motion, between samples, with t
 The first run makes a virtual environment with the server, and one folder with the client, in Sidestep's cache folder
 (about 200 MB): the server needs older versions of NumPy and MuJoCo. The server listens on 127.0.0.1 only. Its ticks
 take 1 ms where the machine is free. Where it is not, cycles are lost, for which the robot goes on with the last
-acceleration of a stream of positions, or the last torque: the controller steps once for each lost cycle of positions. How many
-were lost is told; a stream that lost many at once may be refused for them. The controller leaves `MARGIN` of its limits.
+acceleration of a stream of positions, or the last torque: the controller steps once for each lost cycle of positions.
+How many were lost is told; a stream that lost many at once may be refused for them. The controller leaves `MARGIN` of
+its limits.
 
 Exit code 1 where a motion was refused, did not arrive or touched something.
 """

@@ -239,7 +239,7 @@ void bind_torque_controller(nb::module_& m) {
   nb::enum_<TorqueStatus>(m, "TorqueStatus", "How a control step ended, from best to worst.")
       .value("ok", TorqueStatus::ok, "tracked, no limit in the way")
       .value("limited", TorqueStatus::limited, "optimal, with a limit in the way")
-      .value("relaxed", TorqueStatus::relaxed, "limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way")
+      .value("relaxed", TorqueStatus::relaxed, "limits of jerk, joint or Cartesian speed, or acceleration gave way")
       .value("relaxed_safety", TorqueStatus::relaxed_safety, "not all clearances and position limits can be kept")
       .value("clearance_lost", TorqueStatus::clearance_lost, "the least clearance is below zero, whatever the rest")
       .value("fallback_invalid_input", TorqueStatus::fallback_invalid_input, "unusable input, damped stop")

@@ -124,7 +124,7 @@ void bind_command(nb::module_& m) {
   nb::enum_<SafetyStatus>(m, "SafetyStatus", nb::is_arithmetic(), "How safe a command is, by severity. Every command may be sent.")
       .value("ok", SafetyStatus::ok, "The motion is what the goal asks for.")
       .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
-      .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.")
+      .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.")
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");

@@ -1262,9 +1262,7 @@ class TorqueStatus(enum.Enum):
     """optimal, with a limit in the way"""
 
     relaxed = 2
-    """
-    limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way
-    """
+    """limits of jerk, joint or Cartesian speed, or acceleration gave way"""
 
     relaxed_safety = 3
     """not all clearances and position limits can be kept"""
@@ -2657,7 +2655,7 @@ class SafetyStatus(enum.IntEnum):
 
     relaxed = 2
     """
-    Limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.
+    Limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.
     """
 
     margin_lost = 3

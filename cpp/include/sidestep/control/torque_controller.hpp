@@ -17,7 +17,7 @@ namespace sidestep {
 enum class TorqueStatus {
   ok,                      ///< the wanted acceleration is tracked, no limit in the way
   limited,                 ///< optimal within the limits, and at least one of them is in the way
-  relaxed,                 ///< limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances,
+  relaxed,                 ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances,
                            ///< position or torque limits
   relaxed_safety,          ///< not all clearances and position limits can be kept (see safety, slack)
   clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest

@@ -14,7 +14,7 @@ namespace sidestep {
 enum class SafetyStatus {
   ok,              ///< the motion is what the goal asks for
   limited,         ///< a limit of the arm or a clearance bends it
-  relaxed,         ///< limits of jerk, torque rate, joint or Cartesian speed, or acceleration gave way to clearances, position
+  relaxed,         ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position
                    ///< or torque limits
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
   stopping,        ///< the input is unusable or the program was not solved: a damped stop
