@@ -112,8 +112,19 @@ def test_10_the_trajectory_arrives_on_its_path() -> None:
     assert number_after("at most", output) < 1.0  # [mrad]
 
 
-@pytest.mark.parametrize("number", ["08", "09", "10"])
-def test_hello_worlds_of_inputs_have_at_most_12_lines(number: str) -> None:
+def test_11_the_plant_arrives_and_its_rotors_are_found() -> None:
+    output = run("11")
+    assert output.startswith("arrived")
+    assert 0.03 < number_after("rotors up to", output) <= 0.12  # [kg m²]; there are 0.1
+
+
+@pytest.mark.parametrize("number", ["08", "09", "10", "11"])
+def test_hello_worlds_have_at_most_12_lines(number: str) -> None:
+    """Of C++ without includes, `main` and closing braces."""
     (path,) = EXAMPLES.glob(f"{number}_*.py")
     lines = [line for line in path.read_text(encoding="utf-8").split('"""')[-1].splitlines() if line.strip()]
     assert len(lines) <= 12
+    (path,) = (EXAMPLES / "cpp").glob(f"{number}_*.cpp")
+    lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    left_out = ("//", "#include", "int main")
+    assert len([line for line in lines if line not in ("", "}") and not line.startswith(left_out)]) <= 12
