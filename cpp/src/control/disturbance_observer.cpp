@@ -11,7 +11,8 @@ namespace {
 constexpr double filter = 0.03;     // [s] time constant of all terms: far longer than a delay, which looks like inertia
 constexpr double memory = 3.0;      // [s] of motion
 constexpr double adoption = 0.05;   // [s] in which a new estimate is taken over
-constexpr double direction = 0.02;  // [rad/s | m/s] beyond which dry friction is whole
+constexpr double direction = 0.02;  // [rad/s | m/s] at which dry friction is three quarters of the whole
+constexpr double absurd = 1e9;      // [Nm | N] that is no measurement
 constexpr double explained = 0.8;   // of the missing force's variation that has to be explained [-]
 constexpr double largest = 0.1;     // of the effort limit, that a rotor takes at the acceleration limit [-]
 // Weights of the guesses of zero: of J and of p M_jj [(rad/s²)² s]; f, b and c.
@@ -34,10 +35,9 @@ void DisturbanceObserver::identify(Eigen::Index j, const Seen& seen, const Terms
   const double share = std::min(1.0, period_ / filter);
   joint.seen += share * (seen - joint.seen);
   joint.told += share * (told - joint.told);
-  const double x = joint.told[0];
-  const double keep = std::exp(-period_ / memory * std::min(1.0, x * x));  // what is not excited is not forgotten
-  joint.instrumented = keep * joint.instrumented + period_ * joint.told * joint.seen.transpose();
-  joint.products = keep * joint.products + period_ * joint.seen * joint.seen.transpose();
+  const double x = joint.told[0], weight = period_ * std::min(1.0, x * x), keep = std::exp(-weight / memory);  // at rest nothing is
+  joint.instrumented = keep * joint.instrumented + weight * joint.told * joint.seen.transpose();               // learnt, nor forgotten
+  joint.products = keep * joint.products + weight * joint.seen * joint.seen.transpose();
 }
 
 void DisturbanceObserver::find_rotor(Eigen::Index j, double mass) noexcept {
@@ -62,7 +62,7 @@ void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::Vec
     const double moved = mass_matrix.row(j).dot(acceleration_), expected = mass_matrix.row(j).dot(predicted);
     const double surplus = moved - expected + rotors_[j] * (acceleration_[j] - predicted[j]);
     const double missing = torque[j] - bias[j] - moved;
-    if (!std::isfinite(surplus) || !std::isfinite(missing)) {
+    if (!(std::abs(surplus) < absurd) || !(std::abs(missing) < absurd)) {
       continue;
     }
     disturbance_[j] = std::clamp(disturbance_[j] + share_of_period_ * surplus, -most_disturbance_[j], most_disturbance_[j]);

@@ -186,7 +186,7 @@ double SafetyRows::largest_by_both(ConstVectorRef direction, const Eigen::Vector
   // w n·a − |a|²/2 with so large a w that the second term does not count.
   double size = 0.0;
   for (Eigen::Index j = 0; j < most.size(); ++j) {
-    size = std::max(size, std::min({std::abs(least[j]), std::abs(most[j]), largest_acceleration}));
+    size = std::max(size, std::min(std::max(std::abs(least[j]), std::abs(most[j])), largest_acceleration));
   }
   const double length = direction.norm();
   reach_data_.g = -linear * size / length * direction;
@@ -242,17 +242,21 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   if (required > shared) {
     return enough ? shared : stops(alone, of_jerk_alone) ? std::min(required, alone) : required;
   }
-  double low = std::max(required, least), high = shared;
-  if (!last.early || room <= 0.0 || low >= high || stops(low, of_jerk)) {
+  if (!last.early || room <= 0.0) {
     return required;
   }
-  if (!enough) {
-    return alone;
+  const double part = enough ? of_jerk : of_jerk_alone;
+  double low = enough ? std::max(required, least) : shared, high = enough ? shared : alone;
+  if (low >= high || stops(low, part)) {
+    return low;
+  }
+  if (!stops(high, part)) {
+    return high;
   }
   constexpr int halvings = 12;
   for (int n = 0; n < halvings; ++n) {
     const double middle = 0.5 * (low + high);
-    (stops(middle, of_jerk) ? high : low) = middle;
+    (stops(middle, part) ? high : low) = middle;
   }
   return high;
 }

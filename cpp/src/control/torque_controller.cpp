@@ -187,13 +187,12 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   if (bias_known) {
     bias_ = bias;
   }
-  jerk_share_ = mass_known && last.torque != nullptr ? find_jerk_share() : 1.0;
+  const double share = mass_known && last.torque != nullptr ? jerk_share() : 1.0;
   solution.slack.setZero();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (q_known && v_known) {
     bounds_.update(limits_, q, v, settings_.period,
-                   {settings_.position_margin, jerk_share_,
-                    last.acceleration_factor},
+                   {settings_.position_margin, share, last.acceleration_factor},
                    last.binds ? last.acceleration : nullptr);
     if (last.acceleration_factor > 1.0 && wanted_known) {
       bounds_.draw_in(limits_.acceleration, acceleration);
@@ -225,7 +224,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
-      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, jerk_share_, last.early && rates, rates ? &rate_lower_ : nullptr, rates ? &rate_upper_ : nullptr};
+      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates,
+                              rates ? &rate_lower_ : nullptr, rates ? &rate_upper_ : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       if (two) {
@@ -267,7 +267,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       }
       solved = solve_within_bounds(wide_lower_, wide_upper_, false, solution);
       if (!solved && last.torque != nullptr && !rates) {
-        write_torque_rows({});
+        write_torque_rows(LastCommand{nullptr, nullptr, last.gravity});
         solved = solve_within_bounds(bounds_.lower, bounds_.upper, false, solution);
       }
     }
@@ -279,7 +279,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
                                                                                         : TorqueStatus::limited;
     } else {
       if (!rates) {
-        write_torque_rows({});
+        write_torque_rows(LastCommand{nullptr, nullptr, last.gravity});
       }
       kept = kept && !smooth;
       status = solve_relaxed(solution);
@@ -327,14 +327,16 @@ bool TorqueController::factorise_mass() noexcept {
   return cholesky(mass_, mass_cholesky_);
 }
 
-double TorqueController::find_jerk_share() const noexcept {
+double TorqueController::jerk_share() const noexcept {
   // |M j| T <= share of the rate: what is left is for the change of the bias.
   constexpr double of_rate = 0.8;
   double share = 1.0;
   for (int i = 0; i < nv_; ++i) {
     double most = 0.0;
     for (int j = 0; j < nv_; ++j) {
-      most += std::abs(mass_(i, j)) * limits_.jerk[j];
+      if (std::isfinite(limits_.jerk[j])) {
+        most += std::abs(mass_(i, j)) * limits_.jerk[j];
+      }
     }
     if (most * share > of_rate * limits_.effort_rate[i]) {
       share = of_rate * limits_.effort_rate[i] / most;
@@ -376,8 +378,8 @@ void TorqueController::add_active(int i, double at_upper, double at_lower, doubl
   const auto joint = static_cast<std::size_t>(i);
   const auto& upper = smooth ? bounds_.smooth_upper_limit : bounds_.upper_limit;
   const auto& lower = smooth ? bounds_.smooth_lower_limit : bounds_.lower_limit;
-  const bool by_rate_up = smooth && hard_data_.row_upper[i] < limits_.effort[i] - bias_[i];
-  const bool by_rate_down = smooth && hard_data_.row_lower[i] > -limits_.effort[i] - bias_[i];
+  const bool by_rate_up = hard_data_.row_upper[i] < limits_.effort[i] - bias_[i];
+  const bool by_rate_down = hard_data_.row_lower[i] > -limits_.effort[i] - bias_[i];
   solution.active[joint] = solution.active[joint] |
                            (at_upper > 0.0   ? upper[joint]
                             : at_lower < 0.0 ? lower[joint]

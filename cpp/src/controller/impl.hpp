@@ -160,9 +160,9 @@ class Controller::Impl {
   bool is_impedance() const noexcept { return torque && settings.tracking.stiffness > 0.0; }
   static constexpr int most_of_impedance = 32;  // joints
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_of_impedance, most_of_impedance>;
-  /// Writes the acceleration that an impedance around the reference asks for.
   /// ω of the feedback [1/s].
   double feedback_frequency() noexcept;
+  /// Writes the acceleration that an impedance around the reference asks for.
   void write_impedance() noexcept;
   const KinematicState& arm_state() const noexcept { return apart_ ? arm_workspace_.state() : workspace.state(); }
   void limit_speed() noexcept;

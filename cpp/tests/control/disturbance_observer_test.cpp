@@ -136,6 +136,10 @@ BOOST_AUTO_TEST_CASE(rotors_are_found_beside_friction_and_noise) {
   }
   BOOST_TEST(observer.rotors()[0] < 0.05);
   BOOST_TEST(std::abs(observer.rotors()[1] - 0.1) < 0.02);
+  for (int k = 0; k < 60000; ++k) {  // at rest nothing is learnt or forgotten
+    plant.step(observer, Eigen::Vector2d::Zero());
+  }
+  BOOST_TEST(std::abs(observer.rotors()[1] - 0.1) < 0.02);
 }
 
 BOOST_AUTO_TEST_CASE(what_is_not_finite_changes_nothing_and_no_update_allocates) {

@@ -88,9 +88,9 @@ struct ClosingLimits {
 // fits into the room, S of acceleration_bounds.hpp. The share is one half, so that two rows can rise together; where that is not
 // enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
-// it asks for the least after which the smooth stop fits, without a curvature that helps, which may be gone before the arm has
-// slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints would be flung about, for next to
-// nothing. While the arm is led past an obstacle, rows do not begin early: they would hold it back.
+// it asks for the least after which the smooth stop fits (or for the most, where none fits), without a curvature that helps, which
+// may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
+// would be flung about, for next to nothing. While the arm is led past an obstacle, rows do not begin early: they would hold it back.
 
 /// The deceleration (u − w_max)/T [m/s²] that a clearance with `room` s [m] (may be negative) and closing speed u [m/s]
 /// demands; negative while it may still close faster. Finite for finite arguments; limits may be infinite.

@@ -132,9 +132,12 @@ struct TorqueControllerSettings {
 ///               |q̈ - last q̈| <= jerk limit T,   |torque - last torque| <= effort rate T,   where these are given
 ///
 /// The torque is eliminated by the first constraint. What is sacrificed, in this order: the task, which is the cost;
-/// jerk and torque rate; limits of Cartesian speed, and of velocity and acceleration up to the overruns (unless hard_bounds); clearances; the overruns and position
-/// limits; torque limits never. A first program has every constraint hard. If it is infeasible, the same without jerk and torque rate is solved for the
-/// acceleration nearest to what they allow. If that is infeasible, a second one adds slack
+/// jerk; limits of Cartesian speed, and of velocity and acceleration up to the overruns (unless hard_bounds); clearances; the
+/// overruns and position limits; torque limits never. Where effort has a rate, jerk is lowered by a share with which torques keep
+/// it whatever the joints do; that share gives way first, the rate and the jerk limits themselves only to bounds that they do not
+/// reach, or where a clearance is below zero. A first program has every constraint hard. If it is infeasible, the same is solved
+/// without jerk (or with the limits themselves) for the acceleration nearest to what jerk allows. If that is infeasible, a second
+/// one adds slack
 /// to the bounds, and one slack to all limits of Cartesian speed, within a box of the overruns and of position limits, at the cost p's with a price p far above the
 /// task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
 /// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of
@@ -189,8 +192,6 @@ class TorqueController {
   /// The first program of the last solve that had usable input: rows of torque limits, of clearances, and of
   /// Cartesian speed, without bounds where they are not in use.
   const QuadraticProgramData& program() const noexcept { return hard_data_; }
-  /// The share of the jerk limits by which torques kept their rate in the last solve, whatever the joints did; 1 without a rate.
-  double jerk_share() const noexcept { return jerk_share_; }
   /// Number of solves, since construction, that ended with this status.
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
@@ -207,7 +208,7 @@ class TorqueController {
   };
 
   /// The share of the jerk limits by which the torque keeps its rate, whatever the joints do; 1 without a rate.
-  double find_jerk_share() const noexcept;
+  double jerk_share() const noexcept;
   /// Writes the torque rows: within the effort limits, and near the last torque unless null.
   void write_torque_rows(const LastCommand& last) noexcept;
   void write_cost() noexcept;
@@ -248,7 +249,6 @@ class TorqueController {
   TorqueControllerSettings settings_;
   JointLimits limits_;
   bool has_rates_;                                 // of effort
-  double jerk_share_ = 1.0;
   Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
   AccelerationBounds bounds_;
   SafetyRows rows_;
@@ -267,7 +267,7 @@ class TorqueController {
   Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
   Eigen::VectorXd speed_multipliers_;              // of *speed_, >= 0
   Eigen::VectorXd wide_lower_, wide_upper_;        // box of the programs after the first
-  Eigen::VectorXd jerk_lower_, jerk_upper_;        // that no program leaves where torques keep a rate; else infinite
+  Eigen::VectorXd jerk_lower_, jerk_upper_;        // left only where bounds or torques do not reach it, where torques keep a rate; else infinite
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd weighted_;                       // a column of the mass matrix, by the cost of torques
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
