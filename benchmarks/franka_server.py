@@ -192,15 +192,13 @@ class Driver:
                     q = np.array(
                         state.q_d
                     )  # a stream of positions begins with that of the robot, and goes on from it
-                missed = max(0, round(span.to_sec() / PERIOD) - 1) if len(rows) > 1 else 0
-                lost += missed
-                command = None
-                if span.to_sec() == 0.0 and len(rows) > 1:  # no cycle has passed
-                    command = controller.command
-                elif mode == "torque" or len(rows) > 1:
-                    for _ in range(1 if mode == "torque" else 1 + missed):
-                        command = controller.step(q, v)
-                if command is None:
+                first = len(rows) == 1
+                passed = 1 if first else round(span.to_sec() / PERIOD)  # cycles
+                lost += max(0, passed - 1)
+                for _ in range(min(1, passed) if mode == "torque" else 0 if first else passed):
+                    controller.step(q, v)
+                command = controller.command
+                if mode == "position" and first:
                     out = franka.JointPositions(q.tolist())
                 elif mode == "torque":
                     out = franka.Torques(command.torque_without_gravity.tolist())

@@ -35,8 +35,9 @@ void DisturbanceObserver::identify(Eigen::Index j, const Seen& seen, const Terms
   const double share = std::min(1.0, period_ / filter);
   joint.seen += share * (seen - joint.seen);
   joint.told += share * (told - joint.told);
-  const double x = joint.told[0], weight = period_ * std::min(1.0, x * x), keep = std::exp(-weight / memory);  // at rest nothing is
-  joint.instrumented = keep * joint.instrumented + weight * joint.told * joint.seen.transpose();               // learnt, nor forgotten
+  // At rest nothing is learnt or forgotten.
+  const double x = joint.told[0], weight = period_ * std::min(1.0, x * x), keep = std::exp(-weight / memory);
+  joint.instrumented = keep * joint.instrumented + weight * joint.told * joint.seen.transpose();
   joint.products = keep * joint.products + weight * joint.seen * joint.seen.transpose();
 }
 

@@ -117,8 +117,6 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
       least_(response_),
       effort_lower_(response_),
       effort_upper_(response_),
-      next_lower_(response_),
-      next_upper_(response_),
       reach_data_(num_coordinates, num_coordinates),
       reach_(num_coordinates, num_coordinates) {}
 
@@ -304,13 +302,10 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     find_responses(first, approach, torque->mass_cholesky);
   }
   // What motors that change their torque no faster can do next: beyond it light joints would be flung about, and little else.
-  const bool rates = torque != nullptr && last != nullptr && last->torque_lower != nullptr;
-  if (rates) {
-    next_lower_ = last->acceleration - period * limits.jerk;
-    next_upper_ = last->acceleration + period * limits.jerk;
-  }
+  const RateLimits* const rates = torque != nullptr && last != nullptr ? last->rates : nullptr;
   const auto within_rates = [&](const auto& direction, double asked) {
-    return std::min(asked, largest_by_both(direction, next_lower_, next_upper_, *last->torque_lower, *last->torque_upper, asked));
+    return std::min(asked, largest_by_both(direction, rates->acceleration_lower, rates->acceleration_upper, rates->torque_lower,
+                                           rates->torque_upper, asked));
   };
   double hardest_stop = 0.0;
   int hardest_row = -1;  // that a stop along the path is for
@@ -365,7 +360,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
       const double asked = required;
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
       smooth = required < asked;
-      if (rates && required == asked && asked > last->acceleration.dot(gradient)) {
+      if (rates != nullptr && required == asked && asked > last->acceleration.dot(gradient)) {
         required = within_rates(gradient, required);
       }
     }
@@ -386,7 +381,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     const double speed = v.norm();
     normals.row(row) = -v.transpose() / speed;
     lower[row] = hardest_stop * speed / tau;
-    if (rates) {
+    if (rates != nullptr) {
       lower[row] = within_rates(normals.row(row).transpose(), lower[row]);
     }
     lengths[row] = lengths[hardest_row];

@@ -111,7 +111,6 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
     : nv_(robot.num_coordinates()),
       settings_((settings.validate(robot), std::move(settings))),
       limits_(robot.limits()),
-      has_rates_(limits_.effort_rate.array().isFinite().any()),
       tracking_weight_(expanded(settings_.tracking_weight, nv_)),
       torque_cost_(expanded(settings_.torque_weight, nv_).cwiseQuotient(limits_.effort.cwiseAbs2())),
       bounds_(nv_),
@@ -219,13 +218,18 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   report_clearance(second.clearances, solution);
   if (q_known && v_known && mass_known && bias_known) {
     write_torque_rows(last);
-    const bool rates = last.torque != nullptr && has_rates_ && solution.least_clearance >= 0.0;
+    const bool rates = last.torque != nullptr && limits_.effort_rate.array().isFinite().any() && solution.least_clearance >= 0.0;
+    if (rates && last.acceleration != nullptr) {
+      jerk_lower_ = *last.acceleration - settings_.period * limits_.jerk;
+      jerk_upper_ = *last.acceleration + settings_.period * limits_.jerk;
+    }
     if (clearances != nullptr && clear) {
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
+      const RateLimits next{jerk_lower_, jerk_upper_, rate_lower_, rate_upper_};
       const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates,
-                              rates ? &rate_lower_ : nullptr, rates ? &rate_upper_ : nullptr};
+                              rates ? &next : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       if (two) {
@@ -243,13 +247,11 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       wanted_ = -velocity_ / settings_.stop_time;
     }
     const bool smooth = last.acceleration != nullptr || last.torque != nullptr;
-    if (rates && last.acceleration != nullptr && last.binds) {
-      jerk_lower_ = *last.acceleration - settings_.period * limits_.jerk;
-      jerk_upper_ = *last.acceleration + settings_.period * limits_.jerk;
-    } else {
+    if (!rates || last.acceleration == nullptr || !last.binds) {
       jerk_lower_.setConstant(-infinity);
       jerk_upper_.setConstant(infinity);
     }
+    const LastCommand without_rate{nullptr, nullptr, last.gravity};
     write_cost();
     bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true;
     if (!solved && smooth) {
@@ -267,7 +269,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       }
       solved = solve_within_bounds(wide_lower_, wide_upper_, false, solution);
       if (!solved && last.torque != nullptr && !rates) {
-        write_torque_rows(LastCommand{nullptr, nullptr, last.gravity});
+        write_torque_rows(without_rate);
         solved = solve_within_bounds(bounds_.lower, bounds_.upper, false, solution);
       }
     }
@@ -279,7 +281,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
                                                                                         : TorqueStatus::limited;
     } else {
       if (!rates) {
-        write_torque_rows(LastCommand{nullptr, nullptr, last.gravity});
+        write_torque_rows(without_rate);
       }
       kept = kept && !smooth;
       status = solve_relaxed(solution);

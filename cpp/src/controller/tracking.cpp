@@ -203,9 +203,11 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
     feedback_ = a_ + w * w * (q_ - arm_q_) + 2.0 * settings.tracking.damping * w * (v_ - arm_v_);
   }
   const SpeedRows* const speed = settings.speed_limits ? &arm_speed_rows_ : nullptr;
-  // The reference's acceleration meets the clearances of the arm as well, as far as can be: where the arm is to do something else,
-  // they keep what they have of it; and where one is lost, since the torque's rate gives way for it.
-  const bool as_reference = command.program != TorqueStatus::clearance_lost && ((feedback_ - a_).cwiseAbs().array() < like_reference * arm.robot().limits().acceleration.array()).all();
+  // The reference's acceleration meets the clearances of the arm too, as far as possible. They are asked again where feedback wants
+  // something else, for no more than that acceleration gives them; and where one is lost, which the torque's rate gives way to.
+  const bool as_reference =
+      command.program != TorqueStatus::clearance_lost &&
+      ((feedback_ - a_).cwiseAbs().array() < like_reference * arm.robot().limits().acceleration.array()).all();
   const Clearances* const clearances = as_reference ? nullptr : &arm_workspace_.clearances;
   TorqueStatus status;
   if (torque) {

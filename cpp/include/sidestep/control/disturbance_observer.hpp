@@ -15,12 +15,11 @@ namespace sidestep {
 ///   - the inertias J of rotors (diagonal), which gears make larger than those of light links. Of every joint j alone it fits
 ///         τ − h − z = J v̇ + p z + f sign(v) + b v + c,     z = (M v̇)_j,
 ///     by least squares over the last seconds of motion, all terms filtered: p is for a payload, which makes what the model has
-///     larger; f and b for dry and viscous friction, c for what is constant. Noise of velocities is in both sides, so the sums are taken with the
-///     accelerations that were predicted (instrumental variables). What was not excited counts as zero, and J counts only where
-///     the fit explains most of what is missing.
-/// Both are bounded: |d| by a share of the effort limits, J by a tenth of what the effort limit can accelerate at
-/// the acceleration limit.
-/// No member but the constructor allocates.
+///     larger; f and b for dry and viscous friction, c for what is constant. Noise of velocities is in both sides, so the sums
+///     are taken with the accelerations that were predicted (instrumental variables). What was not excited counts as zero, and
+///     J counts only where the fit explains most of what is missing.
+/// Both are bounded: |d| by a share of the effort limits, J by a tenth of what the effort limit can accelerate at the
+/// acceleration limit. No member but the constructor allocates.
 class DisturbanceObserver {
  public:
   /// period, time: T, T_o [s], positive; share of the effort limits [-].
@@ -45,7 +44,6 @@ class DisturbanceObserver {
     Eigen::Matrix<double, num_terms + 1, num_terms + 1> products = Eigen::Matrix<double, num_terms + 1, num_terms + 1>::Zero();
   };
   void identify(Eigen::Index joint, const Seen& seen, const Terms& told) noexcept;
-
   void find_rotor(Eigen::Index joint, double mass) noexcept;
 
   double period_, share_of_period_;

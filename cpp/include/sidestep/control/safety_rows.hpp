@@ -124,14 +124,20 @@ struct BrakingTorque {
   const Eigen::VectorXd& bias;
 };
 
-/// The acceleration of the last period (nv) [/s²], the share of the jerk limits that there is, whether rows brake early for it,
-/// and between what M q̈ may be so that torques keep their rate (nv); null without rates.
+/// Of torques that have to keep a rate: between what q̈ may be next by the jerk limits, and M q̈ by the rate (nv).
+struct RateLimits {
+  const Eigen::VectorXd& acceleration_lower;
+  const Eigen::VectorXd& acceleration_upper;
+  const Eigen::VectorXd& torque_lower;
+  const Eigen::VectorXd& torque_upper;
+};
+
+/// The acceleration of the last period (nv) [/s²], the share of the jerk limits that there is, and whether rows brake early for it.
 struct LastMotion {
   const Eigen::VectorXd& acceleration;
   double jerk_share;
   bool early = false;
-  const Eigen::VectorXd* torque_lower = nullptr;
-  const Eigen::VectorXd* torque_upper = nullptr;
+  const RateLimits* rates = nullptr;  ///< null: none
 };
 
 /// One linear constraint on the acceleration per clearance, normal·q̈ ≥ lower, with unit normals ∇h/|∇h|; and at most
@@ -203,7 +209,6 @@ class SafetyRows {
   RowMatrix responses_;      // (nv, max) M⁻¹ ∇h of the rows chosen
   Eigen::VectorXd least_;    // (nv) −(acceleration limits)
   Eigen::VectorXd effort_lower_, effort_upper_;  // (nv) of M q̈
-  Eigen::VectorXd next_lower_, next_upper_;      // (nv) q̈ by the jerk limits
   QuadraticProgramData reach_data_;
   QuadraticProgram reach_;   // what a direction can have within accelerations and torques
 };

@@ -137,9 +137,8 @@ struct TorqueControllerSettings {
 /// it whatever the joints do; that share gives way first, the rate and the jerk limits themselves only to bounds that they do not
 /// reach, or where a clearance is below zero. A first program has every constraint hard. If it is infeasible, the same is solved
 /// without jerk (or with the limits themselves) for the acceleration nearest to what jerk allows. If that is infeasible, a second
-/// one adds slack
-/// to the bounds, and one slack to all limits of Cartesian speed, within a box of the overruns and of position limits, at the cost p's with a price p far above the
-/// task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
+/// one adds slack to the bounds, and one slack to all limits of Cartesian speed, within a box of the overruns and of position
+/// limits, at the cost p's with a price p far above the task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
 /// clearances of which Σ w r² is least, with w = |∇h|²/(|∇h|² + ε²), by which their rows are then lowered: first of
 /// those that are not below zero, then of those that are, w times their depth over the largest. What pulls two ways is
 /// shared, and an arm that cannot get out comes to rest. Where the torque does not reach the box, it is first widened
@@ -248,7 +247,6 @@ class TorqueController {
   int nv_;
   TorqueControllerSettings settings_;
   JointLimits limits_;
-  bool has_rates_;                                 // of effort
   Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
   AccelerationBounds bounds_;
   SafetyRows rows_;
@@ -267,7 +265,8 @@ class TorqueController {
   Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
   Eigen::VectorXd speed_multipliers_;              // of *speed_, >= 0
   Eigen::VectorXd wide_lower_, wide_upper_;        // box of the programs after the first
-  Eigen::VectorXd jerk_lower_, jerk_upper_;        // left only where bounds or torques do not reach it, where torques keep a rate; else infinite
+  // Where torques keep a rate, of the programs after the first too, left only where bounds or torques do not reach it; else infinite.
+  Eigen::VectorXd jerk_lower_, jerk_upper_;
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd weighted_;                       // a column of the mass matrix, by the cost of torques
   Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
