@@ -1,4 +1,5 @@
 #include "sidestep/model/arm.hpp"
+#include "sidestep/model/attachment.hpp"
 
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/pair.h>
@@ -188,6 +189,35 @@ void bind_arm(nb::module_& m) {
                    "SHA-256 (64 hex digits) of everything but the provenance: equal arms have equal hashes.")
       .def_prop_ro("neutral", [](const Arm& arm) { return to_numpy(arm.neutral()); },
                    "A configuration (nv,) inside the limits: the middle of each interval, 0 without limits.");
+
+  nb::class_<Attachment>(m, "Attachment", "An object that a link holds, see `Controller.attach`; `sidestep.arm.attachment` makes one.")
+      .def(
+          "__init__",
+          [](Attachment* self, const std::string& name, const std::string& link, const ArrayLike& pose, const ArrayLike& centres,
+             nb::sequence shapes, const Inertial& inertial, const std::vector<std::string>& may_touch) {
+            SolidEllipsoids cover;
+            const Eigen::MatrixXd middles = as_matrix(centres, "centres", static_cast<Eigen::Index>(nb::len(shapes)), 3);
+            for (Eigen::Index k = 0; k < middles.rows(); ++k) {
+              cover.centres.push_back(middles.row(k).transpose());
+              cover.shapes.push_back(as_matrix(shapes[static_cast<std::size_t>(k)], "shapes", 3, 3));
+            }
+            const Eigen::MatrixXd X = as_matrix(pose, "pose", 4, 4);
+            Eigen::Isometry3d X_LA;
+            X_LA.matrix() = X;
+            new (self) Attachment{name, link, X_LA, std::move(cover), inertial, may_touch};
+          },
+          nb::arg("name"), nb::kw_only(), nb::arg("link"), nb::arg("pose"), nb::arg("centres"), nb::arg("shapes"), nb::arg("inertial"),
+          nb::arg("may_touch") = std::vector<std::string>{},
+          nb::sig("def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, "
+                  "shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = ()) -> None"),
+          "pose (4, 4) of the object in the frame of `link`; solid ellipsoids {centre + shape u : |u| <= 1} that hold all of it,\n"
+          "centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may touch.")
+      .def_ro("name", &Attachment::name)
+      .def_ro("link", &Attachment::link)
+      .def_prop_ro("pose", [](const Attachment& a) { return to_numpy_matrix(a.X_LA.matrix()); }, "(4, 4) in the link's frame.")
+      .def_prop_ro("num_ellipsoids", [](const Attachment& a) { return a.cover.size(); })
+      .def_ro("inertial", &Attachment::inertial)
+      .def_ro("may_touch", &Attachment::may_touch);
 }
 
 }  // namespace sidestep::python

@@ -243,6 +243,46 @@ void bind_controller(nb::module_& m) {
                   "collections.abc.Sequence[Obstacles | sidestep.obstacles.Shape]) -> None"),
           "From the next step on: points, a shape, or a list of both, see `sidestep.obstacles.obstacles_from_shapes`, which\n"
           "covers shapes by balls without gaps. They move on by their velocities until they are set again.")
+      .def(
+          "set_arm",
+          [](Controller& self, const Arm& arm) {
+            const nb::gil_scoped_release others;
+            self.set_arm(arm);
+          },
+          nb::arg("arm"),
+          "Another body, inertias and pairs for the same joints and limits, as a finer cover that is ready later: prepared beside\n"
+          "the loop in some tenths of a second, taken over by the next step. Objects stay attached; goals are planned for anew.\n"
+          "Raises ValueError that says what differs.")
+      .def(
+          "attach",
+          [](Controller& self, nb::handle object, nb::handle geometry, nb::kwargs options) {
+            const bool is_made = nb::isinstance<Attachment>(object);
+            if (is_made != geometry.is_none()) {
+              throw nb::value_error("attach: give a name and a geometry, or an Attachment alone");
+            }
+            const Attachment made = is_made ? nb::cast<Attachment>(object)
+                                            : nb::cast<Attachment>(nb::module_::import_("sidestep.arm.attachment")
+                                                                       .attr("attachment")(object, geometry, **options));
+            const nb::gil_scoped_release others;
+            self.attach(made);
+          },
+          nb::arg("object"), nb::arg("geometry") = nb::none(), nb::arg("options"),
+          nb::sig("def attach(self, object: str | Attachment, geometry: sidestep.obstacles.Shape | numpy.typing.ArrayLike | None = None, "
+                  "**options: typing.Any) -> None"),
+          "An object that a link holds from the next step on: attach(\"cup\", Cylinder(0.04, 0.1), link=\"fr3_hand\", pose=X,\n"
+          "mass=0.3, may_touch=[\"fr3_leftfinger\", \"fr3_rightfinger\"]), with the options of `sidestep.arm.attachment`; a\n"
+          "shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and\n"
+          "its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. Takes less than a second, in\n"
+          "which steps go on. Raises ValueError that names what is wrong; nothing changes then.")
+      .def(
+          "detach",
+          [](Controller& self, const std::string& name) {
+            const nb::gil_scoped_release others;
+            self.detach(name);
+          },
+          nb::arg("name"), "Lets an object go from the next step on. Raises ValueError that lists what is attached.")
+      .def_prop_ro("attached", &Controller::attached, "The names of the objects that are attached.")
+      .def_prop_ro("arm", &Controller::arm, "The arm (of the core), with what is attached.")
       .def_prop_ro("obstacles", of_last_step([](const Controller& self) { return Obstacles(self.obstacles()); }),
                    "A copy of what the last step saw; `name_of(command.point)` of it is the name of what is nearest.")
       .def(

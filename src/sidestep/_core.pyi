@@ -5,7 +5,7 @@ C++ core of sidestep. Use the names re-exported by the sidestep package.
 from collections.abc import Sequence
 import enum
 import os
-from typing import Final, overload
+from typing import Any, Final, overload
 
 import numpy
 import numpy.typing
@@ -2009,6 +2009,36 @@ class Arm:
         A configuration (nv,) inside the limits: the middle of each interval, 0 without limits.
         """
 
+class Attachment:
+    """
+    An object that a link holds, see `Controller.attach`; `sidestep.arm.attachment` makes one.
+    """
+
+    def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = ()) -> None:
+        """
+        pose (4, 4) of the object in the frame of `link`; solid ellipsoids {centre + shape u : |u| <= 1} that hold all of it,
+        centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may touch.
+        """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def link(self) -> str: ...
+
+    @property
+    def pose(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(4, 4) in the link's frame."""
+
+    @property
+    def num_ellipsoids(self) -> int: ...
+
+    @property
+    def inertial(self) -> Inertial: ...
+
+    @property
+    def may_touch(self) -> list[str]: ...
+
 class BarrierSettings:
     """
     The spring that pulls to the goal, and the barriers that bend its way.
@@ -2847,6 +2877,35 @@ class Controller:
         From the next step on: points, a shape, or a list of both, see `sidestep.obstacles.obstacles_from_shapes`, which
         covers shapes by balls without gaps. They move on by their velocities until they are set again.
         """
+
+    def set_arm(self, arm: Arm) -> None:
+        """
+        Another body, inertias and pairs for the same joints and limits, as a finer cover that is ready later: prepared beside
+        the loop in some tenths of a second, taken over by the next step. Objects stay attached; goals are planned for anew.
+        Raises ValueError that says what differs.
+        """
+
+    def attach(self, object: str | Attachment, geometry: sidestep.obstacles.Shape | numpy.typing.ArrayLike | None = None, **options: Any) -> None:
+        """
+        An object that a link holds from the next step on: attach("cup", Cylinder(0.04, 0.1), link="fr3_hand", pose=X,
+        mass=0.3, may_touch=["fr3_leftfinger", "fr3_rightfinger"]), with the options of `sidestep.arm.attachment`; a
+        shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and
+        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. Takes less than a second, in
+        which steps go on. Raises ValueError that names what is wrong; nothing changes then.
+        """
+
+    def detach(self, name: str) -> None:
+        """
+        Lets an object go from the next step on. Raises ValueError that lists what is attached.
+        """
+
+    @property
+    def attached(self) -> list[str]:
+        """The names of the objects that are attached."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm (of the core), with what is attached."""
 
     @property
     def obstacles(self) -> Obstacles:

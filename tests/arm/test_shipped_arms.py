@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 import sidestep as ss
 from sidestep.arm import clearance_tables, shipped_arms
 from sidestep.arm.link_pairs import tables_and_pairs
-from sidestep.body.cover import CERTIFICATE_TOLERANCE
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_overshoot import overshoot
+from sidestep.body.cover_problem import CERTIFICATE_TOLERANCE
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.body.cover_surface import LinkSurface
 from sidestep.cli import app

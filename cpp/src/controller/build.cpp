@@ -91,9 +91,9 @@ LocalMinimumSettings seeded(LocalMinimumSettings settings, std::uint64_t seed) {
   return settings;
 }
 
-AvoidanceTrajectory at_rest(const Arm& arm) {
-  const Eigen::VectorXd q = Eigen::VectorXd::Zero(arm.num_coordinates());
-  return AvoidanceTrajectory(arm.robot().limits(), q, q, q);
+AvoidanceTrajectory at_rest(const Robot& robot) {
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(robot.num_coordinates());
+  return AvoidanceTrajectory(robot.limits(), q, q, q);
 }
 
 }  // namespace
@@ -121,24 +121,8 @@ Controller::Impl::Snapshot::Snapshot(const Arm& arm, const AvoidanceTrajectory& 
       places(Eigen::MatrixXd::Zero(q.size(), TimedPathFollower::most_places + 1)),
       trajectory(flight) {}
 
-Controller::Impl::Impl(Arm a, ControllerSettings s)
-    : arm(std::move(a)),
-      settings((s.validate(), std::move(s))),
-      system(make_system(arm, settings.barriers)),
-      workspace(*system),
-      solution(arm.num_coordinates(), settings.safety.max_rows),
-      command(arm.num_coordinates()),
-      torque(use_torque(arm, settings.output)),
-      goal_orders_(GoalOrder{}),
-      obstacle_orders_(ObstacleOrder{}),
-      snapshots_(Snapshot(arm, at_rest(arm))),
-      activations_(Activations{0, 0, system->activations()}),
-      postures_(FoundPosture{0, 0, {Eigen::VectorXd::Zero(arm.num_coordinates()), 0.0, 0.0}}),
-      trajectories_(FoundTrajectory{0.0, 0, false, at_rest(arm)}),
-      shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
-      body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables()),
-      here_(body_),
-      q_(Eigen::VectorXd::Zero(arm.num_coordinates())),
+StepState::StepState(const Robot& robot)
+    : q_(Eigen::VectorXd::Zero(robot.num_coordinates())),
       v_(q_),
       a_(q_),
       wanted_(q_),
@@ -150,7 +134,6 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       last_arm_q_(Eigen::VectorXd::Constant(q_.size(), std::numeric_limits<double>::quiet_NaN())),
       last_arm_v_(q_),
       turns_(q_),
-      drives_track_(settings.output == ControllerSettings::Output::position || settings.output == ControllerSettings::Output::velocity),
       reference_torque_(q_),
       last_torque_(q_),
       last_acceleration_(q_),
@@ -162,19 +145,10 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       gravity_change_(q_),
       model_mass_(Eigen::MatrixXd::Zero(q_.size(), q_.size())),
       model_bias_(q_),
-      speed_rows_(arm.robot()),
-      arm_speed_rows_(speed_rows_),
-      leader_(arm.robot()),
-      frequency_(std::min(settings.tracking.frequency, most_per_period / settings.period)),
-      arm_workspace_(*system),
-      tracked_(arm.num_coordinates(), settings.safety.max_rows),
       mass_(Eigen::MatrixXd::Constant(q_.size(), q_.size(), std::numeric_limits<double>::quiet_NaN())),
       mass_cholesky_(Eigen::MatrixXd::Zero(q_.size(), q_.size())),
       bias_(q_),
-      is_sliding_(static_cast<std::size_t>(q_.size()), false),
-      is_unlimited_(unlimited_joints(arm.robot())),
       target_(q_),
-      path_reference_(q_.size()),
       reference_(JointGoal(q_)),
       avoidance_goal_(JointGoal(q_)),
       input_goal_(JointGoal(q_)),
@@ -182,6 +156,41 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       wanted_v_(q_),
       last_wanted_v_(q_),
       pulled_(q_),
+      begin_q_(q_),
+      begin_v_(q_),
+      path_q_(q_),
+      path_v_(q_),
+      path_a_(q_),
+      trajectory_(at_rest(robot)) {}
+
+Controller::Impl::Impl(Arm a, ControllerSettings s)
+    : StepState(a.robot()),
+      arm(std::move(a)),
+      settings((s.validate(), std::move(s))),
+      system(make_system(arm, settings.barriers)),
+      workspace(*system),
+      solution(arm.num_coordinates(), settings.safety.max_rows),
+      command(arm.num_coordinates()),
+      torque(use_torque(arm, settings.output)),
+      goal_orders_(GoalOrder{}),
+      obstacle_orders_(ObstacleOrder{}),
+      snapshots_(Snapshot(arm, trajectory_)),
+      activations_(Activations{0, 0, system->activations()}),
+      postures_(FoundPosture{0, 0, {Eigen::VectorXd::Zero(arm.num_coordinates()), 0.0, 0.0}}),
+      trajectories_(FoundTrajectory{0.0, 0, false, trajectory_}),
+      measured_(last_arm_q_),
+      shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
+      body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables()),
+      here_(body_),
+      drives_track_(settings.output == ControllerSettings::Output::position || settings.output == ControllerSettings::Output::velocity),
+      speed_rows_(arm.robot()),
+      arm_speed_rows_(speed_rows_),
+      leader_(arm.robot()),
+      arm_workspace_(*system),
+      tracked_(arm.num_coordinates(), settings.safety.max_rows),
+      is_sliding_(static_cast<std::size_t>(q_.size()), false),
+      is_unlimited_(unlimited_joints(arm.robot())),
+      path_reference_(q_.size()),
       held_v_(q_),
       held_(Eigen::MatrixXd::Zero(q_.size(), std::min<Eigen::Index>(q_.size(), most_held))),
       twist_state_(arm.robot()),
@@ -189,16 +198,10 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
       projected_(jacobian_transposed_),
       most_v_(settings.speed * (1.0 - settings.limit_margin) * arm.robot().limits().velocity),
       most_a_(settings.speed * usable_acceleration * arm.robot().limits().acceleration),
-      begin_q_(q_),
-      begin_v_(q_),
-      path_q_(q_),
-      path_v_(q_),
-      path_a_(q_),
       seen_q_(q_),
       seen_v_(q_),
       seen_a_(q_),
       path_step_(q_),
-      trajectory_(at_rest(arm)),
       places_(Eigen::MatrixXd::Zero(q_.size(), TimedPathFollower::most_places + 1)),
       lowered_places_(places_),
       room_(*system),
@@ -214,6 +217,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s)
                                 std::to_string(q_.size()) + " joints, allowed: 0, or at most " + std::to_string(most_of_impedance) +
                                 " joints");
   }
+  frequency_ = std::min(settings.tracking.frequency, most_per_period / settings.period);
   guide = make_guide(arm, body_, settings, torque);
   const Robot of_reference = within_margins(arm.robot(), settings, settings.speed);
   const Robot of_arm = within_margins(arm.robot(), settings, 1.0);

@@ -63,8 +63,16 @@ void Controller::Impl::set_obstacles(Obstacles obstacles) {
 }
 
 Controller::Controller(Arm arm, ControllerSettings settings)
-    : impl_(std::make_unique<Impl>(std::move(arm), std::move(settings))) {}
-Controller::~Controller() = default;
+    : settings_(std::move(settings)),
+      impl_(std::make_unique<Impl>(arm, settings_)),
+      newest_(impl_.get()),
+      whole_(std::move(arm)),
+      has_torque_(impl_->torque) {}
+
+Controller::~Controller() {
+  delete next_.load();
+  delete retired_.load();
+}
 
 Controller::Use::Use(Controller& controller) : controller_(&controller) {
   if (controller.in_use_.exchange(true, std::memory_order_acquire)) {
@@ -73,36 +81,59 @@ Controller::Use::Use(Controller& controller) : controller_(&controller) {
 }
 
 void Controller::set_goal(const Eigen::VectorXd& position) {
-  impl_->set_goal(std::optional<Goal>(std::in_place, JointGoal(position)));
+  tell([&](Impl& impl) { impl.set_goal(std::optional<Goal>(std::in_place, JointGoal(position))); });
 }
-void Controller::set_goal(Goal goal) { impl_->set_goal(std::move(goal)); }
-void Controller::set_velocity(const Eigen::VectorXd& v) { impl_->set_velocity(v); }
-void Controller::set_twist(const std::string& frame, const Vector6d& twist, bool local) { impl_->set_twist(frame, twist, local); }
+void Controller::set_goal(Goal goal) {
+  tell([&](Impl& impl) { impl.set_goal(std::move(goal)); });
+}
+void Controller::set_velocity(const Eigen::VectorXd& v) {
+  tell([&](Impl& impl) { impl.set_velocity(v); });
+}
+void Controller::set_twist(const std::string& frame, const Vector6d& twist, bool local) {
+  tell([&](Impl& impl) { impl.set_twist(frame, twist, local); });
+}
 void Controller::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour) {
-  impl_->set_trajectory(q, times, behaviour);
+  tell([&](Impl& impl) { impl.set_trajectory(q, times, behaviour); });
 }
-void Controller::clear_goal() { impl_->set_goal(std::nullopt); }
-void Controller::set_obstacles(Obstacles obstacles) { impl_->set_obstacles(std::move(obstacles)); }
+void Controller::clear_goal() {
+  tell([](Impl& impl) { impl.set_goal(std::nullopt); });
+}
+void Controller::set_obstacles(Obstacles obstacles) {
+  tell([&](Impl& impl) { impl.set_obstacles(std::move(obstacles)); });
+}
 
-const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept { return impl_->step(q, v, nullptr, nullptr); }
+const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept {
+  take_over();
+  return impl_->step(q, v, nullptr, nullptr);
+}
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
                                 ConstVectorRef bias) noexcept {
+  take_over();
   return impl_->step(q, v, &mass_matrix, &bias);
 }
 
 const Command& Controller::command() const noexcept { return impl_->command; }
 const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacles(); }
 std::string Controller::explain() const { return impl_->explain(); }
-const Arm& Controller::arm() const noexcept { return impl_->arm; }
-const ControllerSettings& Controller::settings() const noexcept { return impl_->settings; }
+Arm Controller::arm() const {
+  const std::lock_guard lock(setters_);
+  return newest_->arm;
+}
+const ControllerSettings& Controller::settings() const noexcept { return settings_; }
 const std::vector<CoordinateLabel>& Controller::labels() const noexcept { return impl_->system->labels(); }
 const GeometricSystem& Controller::system() const noexcept { return *impl_->system; }
 const GeometricSystem::Workspace& Controller::workspace() const noexcept { return impl_->workspace; }
 const TorqueSolution& Controller::solution() const noexcept { return impl_->solution; }
 Eigen::VectorXd Controller::target() const { return impl_->target(); }
-Plan Controller::last_plan() const { return impl_->guide ? impl_->guide->last_plan() : Plan{}; }
-OnlinePlanner::Counts Controller::planner_counts() const { return impl_->guide ? impl_->guide->counts() : OnlinePlanner::Counts{}; }
-bool Controller::has_torque() const noexcept { return impl_->torque; }
+Plan Controller::last_plan() const {
+  const std::lock_guard lock(setters_);
+  return newest_->guide ? newest_->guide->last_plan() : Plan{};
+}
+OnlinePlanner::Counts Controller::planner_counts() const {
+  const std::lock_guard lock(setters_);
+  return newest_->guide ? newest_->guide->counts() : OnlinePlanner::Counts{};
+}
+bool Controller::has_torque() const noexcept { return has_torque_; }
 
 }  // namespace sidestep

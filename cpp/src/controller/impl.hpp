@@ -14,13 +14,13 @@
 #include <vector>
 
 #include "sidestep/control/acceleration_filter.hpp"
-#include "sidestep/control/disturbance_observer.hpp"
 #include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/posture_search.hpp"
 #include "sidestep/barrier/stopping_clearance.hpp"
 #include "sidestep/system/local_minimum_recovery.hpp"
 #include "sidestep/lookahead/look_ahead.hpp"
+#include "step_state.hpp"
 
 namespace sidestep {
 
@@ -28,10 +28,15 @@ namespace sidestep {
 std::vector<bool> unlimited_joints(const Robot& robot);
 
 /// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
-class Controller::Impl {
+class Controller::Impl : private StepState {
  public:
   Impl(Arm arm, ControllerSettings settings);
   ~Impl();
+
+  /// Takes over the orders of another one whose arm has the same joints; before the first step of this one.
+  void take_orders_of(Impl& before);
+  /// Goes on where another one stopped, in its thread: goals are begun anew from where the arm is, other orders go on.
+  void go_on_from(Impl& before) noexcept;
 
   void set_goal(std::optional<Goal> goal);
   void set_velocity(const Eigen::VectorXd& v);
@@ -43,6 +48,11 @@ class Controller::Impl {
                       const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
   std::string explain() const;
   Eigen::VectorXd target() const;
+  /// Measured in the last step; empty before the first. For one thread at a time.
+  Eigen::VectorXd last_q() {
+    const Eigen::VectorXd& q = measured_.get();
+    return q.allFinite() ? q : Eigen::VectorXd();
+  }
 
   const Arm arm;
   const ControllerSettings settings;
@@ -208,6 +218,7 @@ class Controller::Impl {
   TripleBuffer<Activations> activations_;
   TripleBuffer<FoundPosture> postures_;
   TripleBuffer<FoundTrajectory> trajectories_;
+  TripleBuffer<Eigen::VectorXd> measured_;  // NaN before the first step
   mutable std::mutex mutex_;  // of what follows; the step never takes it unless synchronous
   Order shown_order_;
   std::uint64_t goal_count_ = 0, obstacle_count_ = 0;
@@ -223,63 +234,26 @@ class Controller::Impl {
   std::optional<LocalMinimumRecovery> escape_;
   BodyClearance body_;
   BodyClearance::Workspace here_;
-  Eigen::VectorXd q_, v_, a_, wanted_;          // the reference: now, and its acceleration in the last period or this one
-  Eigen::VectorXd smooth_a_;                    // from which jerk goes on
-  Eigen::VectorXd next_q_, next_v_;             // after this period
-  Eigen::VectorXd arm_q_, arm_v_, last_arm_q_, last_arm_v_, turns_;  // measured
-  bool apart_ = false;                          // the arm is not exactly where the reference is
   bool drives_track_ = false;                   // the output is position or velocity
-  bool has_last_torque_ = false;
-  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, expected_v_, last_measured_v_, coupling_, feedback_, gravity_, gravity_change_;
-  Eigen::MatrixXd model_mass_;
-  Eigen::VectorXd model_bias_;
-  std::optional<DisturbanceObserver> observer_;
   SpeedRows speed_rows_, arm_speed_rows_;       // of the reference, of the arm
   int nearest_point_ = -1;                      // of obstacles
   KinematicState leader_;                       // the reference on the planner's path
-  double frequency_ = 0.0;                      // of the feedback [1/s]
   GeometricSystem::Workspace arm_workspace_;
   TorqueSolution tracked_;
-  Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::SelfAdjointEigenSolver<Small> modes_;  // of an impedance
-  Eigen::VectorXd bias_;
   std::vector<bool> is_sliding_, is_unlimited_;
   std::vector<Eigen::Index> metric_coordinates_;  // of obstacles, planes and links: clearances in metres
-  double time_ = 0.0, next_look_ = 0.0, next_posture_ = 0.0, obstacle_age_ = 0.0;
-  bool begins_goal_ = false, wakes_worker_ = false;
-  bool known_before_ = false, disturbed_ = false, target_blocked_ = false;
   Goal* goal_ = nullptr;          // in the current order
-  std::uint64_t goal_number_ = 0, posture_attempt_ = 0, tick_ = 0;
-  bool has_target_ = false, posture_found_ = false, moves_ = false;
-  Eigen::VectorXd target_;        // a configuration that the arm is led to
   OnlinePlanner::Reference path_reference_;
   OnlinePlannerStatus guide_status_ = OnlinePlannerStatus::idle;
-  Goal reference_;                // JointGoal
   const Goal* followed_ = nullptr;
-  Goal avoidance_goal_;                   // JointGoal: the target of the trajectory
-  // Of velocities, twists and trajectories.
-  Goal input_goal_;               // JointGoal: where and how the arm is to move now
-  Goal input_pull_;               // JointGoal whose pull is the acceleration that is wanted for that
-  bool pulls_ = false, begins_input_ = false, waits_ = false;
-  double order_age_ = 0.0;        // [s]
-  Eigen::VectorXd wanted_v_, last_wanted_v_, pulled_, held_v_;
+  Eigen::VectorXd held_v_;
   Eigen::MatrixXd held_;         // directions that limits hold, orthonormal (nv × 6)
-  bool has_last_wanted_v_ = false;
   KinematicState twist_state_;
   Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_, projected_;
   Eigen::VectorXd most_v_, most_a_;  // limits that motions use
-  struct Clock {
-    double time = 0.0, rate = 0.0, change = 0.0;   // s [s], ds/dt, d²s/dt² [1/s]
-    double free = 0.0, seen = -1.0;                // the path is free up to there; it is looked at there
-    double delay = 0.0;                            // behind time, at the end the last [s]
-    double room = 0.0;                             // clearance that is asked for [m]
-    bool blocked = false;
-    BodyClearance::Nearest blocker{};
-  } clock_;
-  Eigen::VectorXd begin_q_, begin_v_, path_q_, path_v_, path_a_, seen_q_, seen_v_, seen_a_, path_step_;
-  bool avoiding_ = false, pending_ = false;
-  AvoidanceTrajectory trajectory_;
-  Eigen::VectorXd own_activations_;
+  Eigen::VectorXd seen_q_, seen_v_, seen_a_, path_step_;
+  bool pending_ = false;          // a trajectory out of the way, found and not followed yet
   Eigen::MatrixXd places_, lowered_places_;
   Eigen::Index num_places_ = 0, num_lowered_ = -1;
   std::uint64_t lowered_version_ = 0;  // of obstacles
@@ -297,6 +271,12 @@ class Controller::Impl {
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };
+
+template <class Action>
+void Controller::tell(Action&& action) {
+  const std::lock_guard lock(setters_);
+  action(*newest_);
+}
 
 template <class Action>
 void Controller::Impl::guarded(Action&& action) noexcept {

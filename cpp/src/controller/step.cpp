@@ -19,6 +19,8 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
     report(false);
     return command;
   }
+  measured_.draft() = arm_q_;
+  measured_.submit();
   observe();
   follow_arm();
   const bool looks = time_ >= next_look_ || begins_goal_;
@@ -65,13 +67,16 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
 }
 
 void Controller::Impl::take_orders() noexcept {
-  if (obstacle_orders_.update()) {
+  obstacle_orders_.update();
+  if (obstacle_orders_.current().number != obstacle_number_) {
+    obstacle_number_ = obstacle_orders_.current().number;
     obstacle_age_ = 0.0;
   } else {
     obstacle_age_ += settings.period;
     obstacle_orders_.current().obstacles.advance(settings.period);
   }
-  if (goal_orders_.update()) {
+  goal_orders_.update();
+  if (goal_orders_.current().number != goal_number_) {
     GoalOrder& order = goal_orders_.current();
     goal_ = std::get_if<Goal>(&order.order);
     order_age_ = 0.0;

@@ -87,10 +87,6 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
     }
   }
   add_tables();
-  if (num_items() > max_items) {
-    throw std::invalid_argument(std::string(owner) + ": " + std::to_string(num_items()) +
-                                " links, pairs and planes; at most " + std::to_string(max_items) + " are allowed");
-  }
   reach_ = Eigen::VectorXd::Zero(nv);
   reaches_.resize(num_items(), nv);
   bends_.resize(num_items(), nv * nv);
@@ -121,6 +117,7 @@ BodyClearance::Workspace::Workspace(const BodyClearance& body)
   }
   bounds_.resize(most);
   intervals_.reserve(most_intervals);
+  open_.resize(most_intervals * body.words());
 }
 
 void BodyClearance::place(ConstVectorRef q, Workspace& w) const noexcept {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "sidestep/planning/body_clearance.hpp"
 
@@ -121,23 +122,22 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b,
     return false;
   }
   w.field_.follow(obstacles);
-  std::array<std::uint64_t, max_items / 64> all{};
-  for (int i = 0; i < num_items(); ++i) {
-    all[static_cast<std::size_t>(i / 64)] |= std::uint64_t{1} << (i % 64);
-  }
+  const std::size_t words = this->words();
+  std::fill_n(w.open_.begin(), words, ~std::uint64_t{0});
+  w.open_[words - 1] >>= 64 * words - items_.size();
   bound_motions(w.difference_, w);
   // Breadth first: what is in the way is found early.
   w.intervals_.clear();
-  w.intervals_.push_back({0.5, 0.5, all});
+  w.intervals_.push_back({0.5, 0.5});
   for (std::size_t n = 0; n < w.intervals_.size(); ++n) {
     const Workspace::Interval at = w.intervals_[n];
     w.q_ = a + at.middle * w.difference_;
     place(w.q_, w);
     move(w.difference_, w);
-    std::array<std::uint64_t, max_items / 64> open{};
+    std::uint64_t* const open = w.open_.data() + n * words;
     double decided = at.half;  // around the middle
-    for (std::size_t word = 0; word < open.size(); ++word) {
-      for (std::uint64_t left = at.open[word]; left != 0; left &= left - 1) {
+    for (std::size_t word = 0; word < words; ++word) {
+      for (std::uint64_t left = std::exchange(open[word], 0); left != 0; left &= left - 1) {
         const int bit = std::countr_zero(left);
         const int i = static_cast<int>(word) * 64 + bit;
         const Item& item = items_[static_cast<std::size_t>(i)];
@@ -162,8 +162,10 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b,
         return false;
       }
       const double half = 0.5 * (at.half - decided), away = decided + half;
-      w.intervals_.push_back({at.middle - away, half, open});
-      w.intervals_.push_back({at.middle + away, half, open});
+      for (const double middle : {at.middle - away, at.middle + away}) {
+        std::copy_n(open, words, w.open_.data() + w.intervals_.size() * words);
+        w.intervals_.push_back({middle, half});
+      }
     }
   }
   return true;

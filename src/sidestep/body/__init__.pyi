@@ -1,7 +1,7 @@
 from .body import Body as Body
 from .cover import CoverSettings as CoverSettings
 from .cover import LinkCover as LinkCover
-from .cover import TradeOff as TradeOff
+from .cover_problem import TradeOff as TradeOff
 from .cover_report import CoverRow as CoverRow
 from .cover_report import cover_table as cover_table
 from .cover_report import plot_cover as plot_cover

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
-from sidestep.body.cover_certificate import complete, grow
-from sidestep.body.cover_overshoot import Overshoot, interior_coverage, overshoot, union_volume
-from sidestep.body.cover_refine import (
-    HOP,
-    OUTLINE,
-    POLISH,
-    Ellipsoids,
-    RefineSettings,
-    initial,
-    rearranged,
-    refine,
-)
-from sidestep.body.cover_surface import Array, LinkSurface
+from sidestep.body.cover_certificate import complete
+from sidestep.body.cover_overshoot import interior_coverage, overshoot, union_volume
+from sidestep.body.cover_problem import CERTIFICATE_TOLERANCE, DRAFT, FULL, LinkProblem, TradeOff
+from sidestep.body.cover_refine import Ellipsoids
+from sidestep.body.cover_surface import Array
 from sidestep.body.fitting import LinkFit, assess, mahalanobis_squared
 from sidestep.body.mixture import Mixture
 from sidestep.body.sampling import check_components, link_seed, links_with_geometry, sample_link
@@ -32,25 +25,14 @@ if TYPE_CHECKING:
 
 ALGORITHM_VERSION = 3  # part of the cache's key: a cover of another algorithm is made again
 MAX_COMPONENTS = 80
-MEAN_AIM = 4e-3  # mean overshoot aimed at on a link of AIM_SIZE or more [m]
-MAX_AIM = 14.5e-3  # the largest, which is to be 15 mm: the search misses up to half a millimetre of a peak
-AIM_SIZE = 0.15  # a link of an arm [m]
-AIM_POWER = 0.6  # of the size, with which the aims of smaller links go: 1.4 and 4.9 mm on a finger of 25 mm
 FIXED_ALLOWANCE = 2.0  # in the mean, its square beyond MAX_AIM, of links that only self-collision sees
-BEYOND_MAX = 5.0  # what the largest overshoot costs more, as a share of its aim, where it is larger
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
 GROWTH = 1.3  # numbers of ellipsoids tried on a link grow by this factor
-CERTIFICATE_TOLERANCE = 1 / 400  # of a link's size: longest edge of a triangle that is not cut further
-TRIAL_STARTS = 2  # outlines tried while numbers of ellipsoids are compared
-TRIAL_HOPS = 10  # rearrangements tried of the best of them
-FINAL_STARTS = 10  # more of them with the final number: the best of them overshoots 5 to 15 % less
-FINAL_HOPS = 100  # more rearrangements with the final number: 5 to 15 % less again
-NUM_COARSE = 1_000  # surface points that an outline must hold, besides the triangles' corners
-NUM_FINE = 30_000  # surface points that the final refinement must hold; the proof itself needs no points
-SEARCH_DIRECTIONS = 4_000  # boundary points per ellipsoid in the search: peaks are missed by up to 0.7 mm
 NUM_SAMPLES = 4000  # surface points by which the density of the cover is assessed
 SOLID_LEVEL = 5.0  # (y - mu)^T Sigma^-1 (y - mu) on the boundary of a solid ellipsoid of covariance Sigma
 LEVEL_ROUNDING = 1e-9  # levels are larger by this share: rounding of the covariances cannot bare a corner
+
+DRAFT_COMPONENTS = 6  # ellipsoids of a link in a draft
 
 CoverProgress = Callable[[str, int, int], None]
 
@@ -64,11 +46,14 @@ class CoverSettings:
             left of `max_components`, and all links do if it is None.
         max_components: ellipsoids in all, when some are shared.
         seed: seed of the starts.
+        draft: proven like others, but made in a second or two instead of minutes: 6 ellipsoids for each link that
+            `components` leaves open, and the first outline that is found. They overshoot about twice as much.
     """
 
     components: int | Mapping[str, int] | None = None
     max_components: int = MAX_COMPONENTS
     seed: int = 0
+    draft: bool = False
 
     def validate(self, robot: Robot) -> None:
         """Raises ValueError that names the setting, its value and what is allowed on this robot."""
@@ -97,15 +82,6 @@ class CoverSettings:
     def _named(self) -> str:
         asked = self.components
         return f", and components asks for {dict(asked)}" if isinstance(asked, Mapping) else ""
-
-
-@dataclass(frozen=True)
-class TradeOff:
-    """Overshoot of one link with a number of ellipsoids [m]."""
-
-    num_components: int
-    mean_overshoot: float
-    max_overshoot: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,104 +113,6 @@ class LinkCover:
     trade_off: tuple[TradeOff, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class _Outline:
-    """Ellipsoids that hold coarse points, how strongly each point pushes, and the overshoot."""
-
-    ellipsoids: Ellipsoids
-    multipliers: Array
-    measured: Overshoot
-
-
-@dataclass(frozen=True, eq=False)
-class _Solution:
-    ellipsoids: Ellipsoids
-    measured: Overshoot
-
-
-class _LinkProblem:
-    """One link with the best cover known for every number of ellipsoids tried."""
-
-    def __init__(self, triangles: Array, *, seed: int, allowance: float = 1.0) -> None:
-        self.surface = LinkSurface(triangles)
-        self.seed = seed
-        self.allowance = allowance
-        self.coarse = self.surface.points(NUM_COARSE)
-        self.fine = self.surface.points(NUM_FINE)
-        self._nearest_fine = cKDTree(self.fine).query(self.coarse)[1]
-        self.solutions: dict[int, _Solution] = {}
-        self._finished: set[int] = set()
-
-    def solve(self, number: int) -> _Solution:
-        """A proven cover, good enough to compare numbers of ellipsoids by."""
-        if number not in self.solutions:
-            self.solutions[number] = self._hop(self._search(number, range(TRIAL_STARTS)), TRIAL_HOPS)
-        return self.solutions[number]
-
-    def finish(self, number: int) -> _Solution:
-        """The best cover found with a longer search."""
-        if number not in self._finished:  # equal links share their covers
-            starts = range(TRIAL_STARTS, TRIAL_STARTS + FINAL_STARTS)
-            best = min(self.solve(number), self._search(number, starts), key=self._excess)
-            self.solutions[number] = self._hop(best, FINAL_HOPS)
-            self._finished.add(number)
-        return self.solutions[number]
-
-    def _search(self, number: int, starts: range) -> _Solution:
-        """The best of several outlines, refined with finer points and completed."""
-        outlines = []
-        for start in starts:
-            outline = self._outline(initial(self.surface, self.coarse, number, self.seed + start), OUTLINE)
-            outlines.append((self._excess(outline), start, outline))
-        return self._polish(min(outlines, key=lambda entry: entry[:2])[2])
-
-    def _hop(self, best: _Solution, hops: int) -> _Solution:
-        """Basin hopping: rearranges the best cover and descends from there; keeps what is better."""
-        rng = np.random.default_rng(self.seed)
-        for _ in range(hops):
-            measured = best.measured
-            weights = measured.distances * measured.areas
-            moved = rearranged(self.surface, best.ellipsoids, measured.points, weights, rng)
-            outline = self._outline(moved, HOP)
-            if self._excess(outline) < self._excess(best):  # coarse points flatter
-                best = min(best, self._polish(outline), key=self._excess)
-        return best
-
-    def _outline(self, start: Ellipsoids, settings: RefineSettings) -> _Outline:
-        ellipsoids, multipliers = refine(self.surface, self.coarse, start, settings)
-        grown = grow(ellipsoids, self.coarse[:, None])
-        return _Outline(
-            ellipsoids, multipliers, overshoot(self.surface, grown, directions=settings.directions)
-        )
-
-    def _polish(self, outline: _Outline) -> _Solution:
-        """Refined with finer points and completed."""
-        pushing = np.flatnonzero(outline.multipliers)
-        fine = np.zeros(len(self.fine))
-        fine[self._nearest_fine[pushing]] = outline.multipliers[pushing]
-        return self._proven(refine(self.surface, self.fine, outline.ellipsoids, POLISH, fine)[0])
-
-    def _proven(self, ellipsoids: Ellipsoids) -> _Solution:
-        surface = self.surface
-        tolerance = CERTIFICATE_TOLERANCE * surface.size
-        covering, _ = complete(surface.triangles, ellipsoids, tolerance=tolerance, points=self.fine)
-        return _Solution(covering, overshoot(surface, covering, directions=SEARCH_DIRECTIONS))
-
-    def excess(self, number: int) -> float:
-        """Overshoot over what is aimed at: the mean of its two measures, and more beyond the aim of the largest."""
-        return self._excess(self.solve(number))
-
-    def _excess(self, found: _Outline | _Solution) -> float:
-        scale = min(1.0, self.surface.size / AIM_SIZE) ** AIM_POWER
-        mean = found.measured.mean / (MEAN_AIM * scale * self.allowance)
-        maximum = found.measured.maximum / (MAX_AIM * scale)
-        return float(0.5 * (mean + maximum) + BEYOND_MAX / self.allowance**2 * max(0.0, maximum - 1.0))
-
-    def trade_off(self) -> tuple[TradeOff, ...]:
-        found = sorted(self.solutions.items())
-        return tuple(TradeOff(k, s.measured.mean, s.measured.maximum) for k, s in found)
-
-
 def cover_links(
     robot: Robot, settings: CoverSettings, progress: CoverProgress | None = None
 ) -> tuple[tuple[LinkCover, Ellipsoids], ...]:
@@ -244,8 +122,8 @@ def cover_links(
         ValueError: if the settings do not suit the robot.
     """
     settings.validate(robot)
-    twins: dict[tuple[bytes, float], _LinkProblem] = {}
-    problems: dict[str, _LinkProblem] = {}
+    twins: dict[tuple[bytes, float], LinkProblem] = {}
+    problems: dict[str, LinkProblem] = {}
     moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
     for link in links_with_geometry(robot):
         triangles = _triangles(robot, link)
@@ -253,18 +131,29 @@ def cover_links(
         key = (np.unique(triangles.reshape(-1, 3).round(9), axis=0).tobytes(), allowance)
         if key not in twins:  # fingers are often equal
             seed = link_seed(link, seed=settings.seed)
-            twins[key] = _LinkProblem(triangles, seed=seed, allowance=allowance)
+            effort = DRAFT if settings.draft else FULL
+            twins[key] = LinkProblem(triangles, seed=seed, allowance=allowance, effort=effort)
         problems[link] = twins[key]
     numbers = _numbers(problems, settings, progress)
     total = sum(numbers.values())
-    covers: list[tuple[LinkCover, Ellipsoids]] = []
+    alike: dict[int, list[str]] = {}  # links that share a problem, one after the other
     for link, problem in problems.items():
-        if progress is not None:
-            progress(link, total + sum(cover.num_components for cover, _ in covers), 2 * total)
-        covers.append(_assess(robot, link, problem, numbers[link]))
-    if progress is not None:
-        progress(link, 2 * total, 2 * total)
-    return tuple(covers)
+        alike.setdefault(id(problem), []).append(link)
+
+    def assess_alike(links: list[str]) -> list[tuple[LinkCover, Ellipsoids]]:
+        return [_assess(robot, link, problems[link], numbers[link]) for link in links]
+
+    found: dict[str, tuple[LinkCover, Ellipsoids]] = {}
+    with ThreadPoolExecutor(
+        max_workers=os.cpu_count()
+    ) as threads:  # most of the work is NumPy's and the core's
+        for covers in as_completed([threads.submit(assess_alike, links) for links in alike.values()]):
+            for cover, ellipsoids in covers.result():
+                found[cover.link] = cover, ellipsoids
+                if progress is not None:
+                    done = sum(each.num_components for each, _ in found.values())
+                    progress(cover.link, total + done, 2 * total)
+    return tuple(found[link] for link in problems)
 
 
 def _triangles(robot: Robot, link: str) -> Array:
@@ -274,13 +163,15 @@ def _triangles(robot: Robot, link: str) -> Array:
 
 
 def _numbers(
-    problems: Mapping[str, _LinkProblem],
+    problems: Mapping[str, LinkProblem],
     settings: CoverSettings,
     progress: CoverProgress | None,
 ) -> dict[str, int]:
     asked = settings.components
     if isinstance(asked, int):
         asked = dict.fromkeys(problems, asked)
+    elif settings.draft:
+        asked = {**dict.fromkeys(problems, DRAFT_COMPONENTS), **(asked or {})}
     best = {link: 1 if asked is None else asked.get(link, 1) for link in problems}
     shared = [link for link in problems if asked is None or link not in asked]
     while shared:
@@ -308,14 +199,14 @@ def _numbers(
     return best
 
 
-def _assess(robot: Robot, link: str, problem: _LinkProblem, number: int) -> tuple[LinkCover, Ellipsoids]:
+def _assess(robot: Robot, link: str, problem: LinkProblem, number: int) -> tuple[LinkCover, Ellipsoids]:
     surface = problem.surface
     triangles = _triangles(robot, link)
     tolerance = CERTIFICATE_TOLERANCE * surface.size
     ellipsoids, certificate = complete(
         triangles, problem.finish(number).ellipsoids, tolerance=tolerance, points=triangles.reshape(-1, 3)
     )
-    measured = overshoot(surface, ellipsoids)
+    measured = overshoot(surface, ellipsoids, directions=4 * problem.effort.directions)
     mesh = robot.collision_mesh(link)
     assert mesh is not None
     closed = bool(mesh.is_watertight)
@@ -327,7 +218,10 @@ def _assess(robot: Robot, link: str, problem: _LinkProblem, number: int) -> tupl
         coverage=1.0 if certificate.complete else min(1.0, certificate.covered_area / certificate.total_area),
         mean_overshoot=measured.mean,
         max_overshoot=measured.maximum,
-        volume_ratio=union_volume(ellipsoids, np.random.default_rng(problem.seed)) / volume,
+        volume_ratio=union_volume(
+            ellipsoids, np.random.default_rng(problem.seed), problem.effort.volume_samples
+        )
+        / volume,
         volume_of="mesh" if closed else "hull",
         interior_coverage=interior_coverage(surface, ellipsoids),
         slimness=float((axes[:, 2] / axes[:, 0]).min()),

@@ -12,8 +12,6 @@ from scipy.spatial import cKDTree
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-NUM_NODES = 120_000  # of the distance field: cells of 2 to 4 mm on the links of an arm, 0.7 mm on a finger
-PIECES_PER_LINK = 6_000  # pieces of equal size on a link's surface: 4 to 7 mm on an arm, 1 mm on a finger
 NEAR_OUTSIDE, NEAR_INSIDE = 5, 2  # in cells: how far from the surface the field is exact to a piece's size
 MARGIN = 0.15  # of `size`: how far around the link the field reaches, above any overshoot worth keeping
 CANDIDATES = 12  # pieces examined for the distance of a point
@@ -121,6 +119,19 @@ class DistanceField:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
+@dataclass(frozen=True)
+class SurfaceDetail:
+    """How finely a link's surface is measured.
+
+    Attributes:
+        nodes: of the distance field: with 120,000 cells of 2 to 4 mm on the links of an arm, 0.7 mm on a finger.
+        pieces: of equal size on the surface: with 6,000 of 4 to 7 mm on an arm, 1 mm on a finger.
+    """
+
+    nodes: int = 120_000
+    pieces: int = 6_000
+
+
 class LinkSurface:
     """Triangles of a link, cut into pieces of equal size, with distances to them.
 
@@ -131,7 +142,7 @@ class LinkSurface:
         field: signed distances on a grid.
     """
 
-    def __init__(self, triangles: Array) -> None:
+    def __init__(self, triangles: Array, detail: SurfaceDetail = SurfaceDetail()) -> None:
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         areas = 0.5 * np.linalg.norm(cross, axis=1)
         self.triangles = np.ascontiguousarray(triangles)
@@ -141,11 +152,11 @@ class LinkSurface:
         axes = np.linalg.eigh(centred.T @ centred)[1]
         self.size = float(np.sort(np.ptp(corners @ axes, axis=0))[1])
         # right-angled isosceles pieces with a longest edge e have the area e^2 / 4
-        self.piece_size = float(np.sqrt(4.0 * self.area / PIECES_PER_LINK))
+        self.piece_size = float(np.sqrt(4.0 * self.area / detail.pieces))
         self.pieces = bisect_to_size(self.triangles, self.piece_size)
         centroids = self.pieces.mean(axis=1)
         self._centroids = cKDTree(centroids)
-        self.field = self._distance_field()
+        self.field = self._distance_field(detail.nodes)
 
     def distance(self, points: Array) -> Array:
         """Unsigned distance (N,) [m] of points (N, 3) to the surface, never too small.
@@ -183,12 +194,12 @@ class LinkSurface:
         u = np.where(u.sum(axis=1, keepdims=True) > 1.0, 1.0 - u, u)
         return np.asarray(self.triangles[chosen, 0] + np.einsum("nk,nki->ni", u, edges[chosen]))
 
-    def _distance_field(self) -> DistanceField:
+    def _distance_field(self, nodes: int) -> DistanceField:
         corners = self.triangles.reshape(-1, 3)
         low, high = corners.min(axis=0), corners.max(axis=0)
         margin = MARGIN * self.size
         extents = high - low + 2.0 * margin
-        spacing = float((extents.prod() / NUM_NODES) ** (1.0 / 3.0))
+        spacing = float((extents.prod() / nodes) ** (1.0 / 3.0))
         shape = np.ceil(extents / spacing).astype(int) + 2
         origin = low - margin - 0.5 * spacing
         field = DistanceField(origin, spacing, np.zeros(tuple(shape)))

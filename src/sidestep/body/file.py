@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sidestep import _core
-from sidestep.body.cover import CoverSettings, LinkCover, TradeOff
+from sidestep.body.cover import CoverSettings, LinkCover
+from sidestep.body.cover_problem import TradeOff
 from sidestep.body.fitting import FitSettings, LinkFit
 from sidestep.body.mixture import Mixture
 from sidestep.body.schema import mismatch, parse_json, shortened

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "sidestep/system/goal.hpp"
 #include "sidestep/planning/online_planner.hpp"
 #include "sidestep/model/arm.hpp"
+#include "sidestep/model/attachment.hpp"
 #include "sidestep/obstacles/obstacles.hpp"
 
 namespace sidestep {
@@ -84,6 +86,20 @@ class Controller {
   /// From the next step on. Points move on by their velocities until they are set again.
   void set_obstacles(Obstacles obstacles);
 
+  // Each of these prepares another body beside the loop, which takes a few tenths of a second, and returns; steps go on, and the
+  // next one takes it over. Goals are planned for anew, from where the arm is.
+
+  /// Another body, inertias and pairs for the same joints and limits, as a finer cover that is ready later. Objects stay
+  /// attached. Throws std::invalid_argument that says what differs.
+  void set_arm(Arm arm);
+  /// An object that a link holds from now on, see sidestep::attach; at the arm's last configuration it is taken to be apart from
+  /// all links. Throws std::invalid_argument that names what is wrong; nothing changes then.
+  void attach(const Attachment& object);
+  /// Lets it go. Throws std::invalid_argument that lists what is attached.
+  void detach(const std::string& name);
+  /// The names of what is attached.
+  std::vector<std::string> attached() const;
+
   /// One period at q [rad | m] and v [/s] (nv). A size that is wrong, or a value that is not finite, gives a damped
   /// stop with the status `stopping`.
   const Command& step(ConstVectorRef q, ConstVectorRef v) noexcept;
@@ -98,7 +114,8 @@ class Controller {
   /// One sentence: what the last command does and why, and what to do about it. For the thread of `step`; allocates.
   std::string explain() const;
 
-  const Arm& arm() const noexcept;
+  /// With what is attached; from the step after a change on.
+  Arm arm() const;
   const ControllerSettings& settings() const noexcept;
   /// What the clearances are of (m).
   const std::vector<CoordinateLabel>& labels() const noexcept;
@@ -116,7 +133,25 @@ class Controller {
 
  private:
   class Impl;
-  std::unique_ptr<Impl> impl_;
+  template <class Action>
+  void tell(Action&& action);
+  void take_over() noexcept;
+  struct Held {
+    Attachment object;
+    Eigen::VectorXd q;  // where it was attached; empty: before the first step
+  };
+  void change(const Arm& whole, std::vector<Held> held);
+
+  const ControllerSettings settings_;
+  std::unique_ptr<Impl> impl_;             // of the thread of `step`
+  std::atomic<Impl*> next_{nullptr};       // which it takes over in the next step
+  std::atomic<Impl*> retired_{nullptr};    // the one before, for another thread to destroy
+  mutable std::mutex setters_;
+  Impl* newest_;                           // of the two, which setters tell
+  mutable std::mutex changes_;             // of what follows; held while a body is prepared
+  Arm whole_;                              // without what is attached
+  std::vector<Held> held_;
+  bool has_torque_;
   std::atomic<bool> in_use_{false};
 };
 

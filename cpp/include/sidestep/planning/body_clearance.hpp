@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -69,11 +68,9 @@ class BodyClearance {
  public:
   /// `pairs` as for SelfCollisionBarrier, `tables` of other pairs as for ClearanceTableBarrier. Throws
   /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown,
-  /// a prismatic joint has no limits, or there are more than `max_items` items.
+  /// or a prismatic joint has no limits.
   BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
                 const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {});
-
-  static constexpr int max_items = 256;
 
   const Robot& robot() const noexcept { return robot_; }
   int num_items() const noexcept { return static_cast<int>(items_.size()); }
@@ -102,12 +99,12 @@ class BodyClearance {
     };
     struct Interval {
       double middle, half;
-      std::array<std::uint64_t, max_items / 64> open;  // items that are not decided on it
     };
     static constexpr std::size_t most_intervals = 4096;  // of an edge: 2 m of motion cut down to 1 mm
     std::vector<Pose> poses_;
     std::vector<Eigen::Vector3d> centres_;  // of the balls around the links
     std::vector<Interval> intervals_;
+    std::vector<std::uint64_t> open_;  // items that are not decided on an interval, a bit each: `words()` of each interval
     Eigen::VectorXd motions_, curvatures_;  // of the items along an edge
     Eigen::VectorXd lengths_, products_;    // |Δq_i|, |Δq_i| |Δq_j|
     DistanceField field_;
@@ -205,6 +202,7 @@ class BodyClearance {
     int point;
   };
 
+  std::size_t words() const noexcept { return (items_.size() + 63) / 64; }
   int add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name);
   void add_reach(Item& item, const Link& link) const;
   void add_tables();
