@@ -88,7 +88,7 @@ def test_points_that_are_not_finite_are_never_dropped_in_silence(
 
 def test_a_cloud_of_invalid_points_only_is_empty(tmp_path: Path) -> None:
     np.save(tmp_path / "blind.npy", np.full((4, 3), np.nan))
-    with pytest.warns(RuntimeWarning, match="4 of 4"), pytest.raises(ValueError, match="holds no point"):
+    with pytest.raises(ValueError, match=r"no point that can be used: 4 of 4 points are not finite$"):
         load_point_cloud(tmp_path / "blind.npy", invalid="drop")
 
 
@@ -100,104 +100,12 @@ def test_truncated_files_are_refused(written: Callable[[np.ndarray], Path]) -> N
         load_point_cloud(path)
 
 
-@pytest.mark.parametrize(
-    "array",
-    [
-        POINTS.reshape(5, 10, 3),
-        np.column_stack([POINTS, np.ones((50, 1))]),
-        np.column_stack([POINTS, np.ones((50, 4))]).reshape(10, 5, 7),
-        np.asfortranarray(POINTS),
-        POINTS.astype(">f8"),
-        np.rec.fromarrays(POINTS[:, [2, 0, 1]].T, names="Z,X,Y"),
-        np.rec.fromarrays([*POINTS.T, np.ones(50)], names="x,y,z,rgb").reshape(5, 10),
-    ],
-    ids=["image", "homogeneous", "wide image", "columns", "big endian", "named", "named image"],
-)
-@pytest.mark.parametrize("suffix", ["npy", "npz"])
-def test_arrays_of_every_layout_give_the_same_points(tmp_path: Path, array: np.ndarray, suffix: str) -> None:
-    path = tmp_path / f"cloud.{suffix}"
-    if suffix == "npy":
-        np.save(path, array)
-    else:
-        np.savez_compressed(path, points=array, colours=np.ones(3))
-    np.testing.assert_array_equal(load_point_cloud(path).points, POINTS)
-
-
-def test_half_precision_is_read_as_it_is(tmp_path: Path) -> None:
-    np.save(tmp_path / "cloud.npy", POINTS.astype(np.float16))
-    np.testing.assert_array_equal(load_point_cloud(tmp_path / "cloud.npy").points, POINTS.astype(np.float16))
-
-
-def test_archives_and_records_without_points_say_what_they_hold(tmp_path: Path) -> None:
-    np.savez(tmp_path / "two.npz", a=POINTS, b=POINTS)
-    with pytest.raises(ValueError, match="it holds a, b; allowed: one array, or one called points"):
-        load_point_cloud(tmp_path / "two.npz")
-    np.save(tmp_path / "uv.npy", np.rec.fromarrays(POINTS.T, names="u,v,w"))
-    with pytest.raises(ValueError, match="it has no fields x, y, z; its fields are u, v, w"):
-        load_point_cloud(tmp_path / "uv.npy")
-
-
-@pytest.mark.parametrize("mark", [" ", ",", ";", ", ", "\t", "   "])
-@pytest.mark.parametrize(
-    ("head", "order", "suffix"),
-    [
-        ("", [0, 1, 2], "xyz"),
-        ("# made by a camera\n\n", [0, 1, 2], "txt"),
-        ("50\n", [0, 1, 2], "pts"),
-        ("{}\n", [0, 1, 2, 0], "csv"),
-        ("# {}\n", [2, 0, 1], "csv"),
-        ("//{}\n", [2, 2, 0, 1], "asc"),
-    ],
-)
-def test_text_files_give_the_same_points(
-    tmp_path: Path, mark: str, head: str, order: list[int], suffix: str
-) -> None:
-    names, taken = [], set[int]()
-    for axis in reversed(order) if order == [2, 2, 0, 1] else order:
-        names.append("intensity" if axis in taken else "xyz"[axis])
-        taken.add(axis)
-    names = names[::-1] if order == [2, 2, 0, 1] else names
-    rows = "".join(
-        mark.join(
-            repr(float(point[axis])) if name != "intensity" else "7"
-            for axis, name in zip(order, names, strict=True)
-        )
-        + "\r\n"
-        for point in POINTS
-    )
-    (tmp_path / f"cloud.{suffix}").write_text(head.format(mark.join(names)) + rows, newline="")
-    np.testing.assert_array_equal(load_point_cloud(tmp_path / f"cloud.{suffix}").points, POINTS)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "it holds no point"),
-        ("# nothing\n", "it holds no point"),
-        ("# two\n1 2\n3 4\n", "line 2 is '1 2'; allowed: x y z and more, between blanks, commas"),
-        ("1 2 3\n4 5\n", "cannot be read"),
-        ("1 2 three\n", "cannot be read"),
-    ],
-)
-def test_text_that_is_no_cloud_is_refused(tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "cloud.txt").write_text(text)
-    with pytest.raises(ValueError, match=rf"cloud\.txt' cannot be read: .*{message}|{message}"):
-        load_point_cloud(tmp_path / "cloud.txt")
-
-
 def test_clouds_that_are_not_in_metres_are_warned_of(
     tmp_path: Path, recwarn: pytest.WarningsRecorder
 ) -> None:
     np.save(tmp_path / "mm.npy", 1000.0 * POINTS)
     with pytest.warns(RuntimeWarning, match=r"mm\.npy': half of its points are farther than .*scale=0\.001"):
         load_point_cloud(tmp_path / "mm.npy")
-    far = POINTS.astype(float)
-    far[7] = 1e30, 0.0, 0.0
-    np.save(tmp_path / "far.npy", far)
-    with pytest.warns(
-        RuntimeWarning, match=r"1 of 50 points are farther than 100 m: point 7 is at \[1\.e\+30"
-    ):
-        load_point_cloud(tmp_path / "far.npy")
     recwarn.clear()
     scaled = load_point_cloud(tmp_path / "mm.npy", scale=0.001)
     np.testing.assert_allclose(scaled.points, POINTS, rtol=1e-6)
@@ -205,6 +113,43 @@ def test_clouds_that_are_not_in_metres_are_warned_of(
     for scale in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match=f"scale is {scale}, must be positive and finite"):
             load_point_cloud(tmp_path / "mm.npy", scale=scale)
+
+
+def test_a_few_points_that_are_far_are_warned_of_and_those_that_are_nowhere_are_dropped(
+    tmp_path: Path,
+) -> None:
+    far = POINTS.astype(float)
+    far[7] = 2e3, 0.0, 0.0
+    np.save(tmp_path / "far.npy", far)
+    with pytest.warns(RuntimeWarning, match=r"1 of 50 points are farther than 100 m: one is at \[2000\."):
+        np.testing.assert_array_equal(load_point_cloud(tmp_path / "far.npy").points, far)
+    far[[9, 11], 1] = 1e30, np.nan
+    np.save(tmp_path / "nowhere.npy", far)
+    with pytest.warns(RuntimeWarning) as caught:
+        obstacles = load_point_cloud(tmp_path / "nowhere.npy")
+    np.testing.assert_array_equal(obstacles.points, np.delete(far, [9, 11], axis=0))
+    (warning,) = caught
+    for words in (
+        "1 of 50 points are not finite and 1 of 50 points are farther than 1e+07 m (point 9 is at [",
+        "1.0000e+30",
+        "were dropped; 1 of 48 points are farther than 100 m: one is at [2000.",
+    ):
+        assert words in str(warning.message)
+    with pytest.raises(ValueError, match="the first is point 9; invalid='drop' leaves them out"):
+        load_point_cloud(tmp_path / "nowhere.npy", invalid="raise")
+    np.save(tmp_path / "all.npy", np.full((3, 3), 1e30))
+    with pytest.raises(ValueError, match="no point that can be used: 3 of 3 points are farther than 1e"):
+        load_point_cloud(tmp_path / "all.npy")
+
+
+def test_a_scale_that_leaves_nothing_and_zeros_of_cameras_are_warned_of(tmp_path: Path) -> None:
+    np.save(tmp_path / "metres.npy", POINTS)
+    with pytest.warns(RuntimeWarning, match=r"no point is farther than 0\.000.* m; is the scale meant for"):
+        load_point_cloud(tmp_path / "metres.npy", scale=0.001)
+    holes = np.concatenate([POINTS, np.zeros((3, 3))])
+    np.save(tmp_path / "zeros.npy", holes)
+    with pytest.warns(RuntimeWarning, match=r"3 of 53 points are exactly \(0, 0, 0\) and were kept"):
+        np.testing.assert_array_equal(load_point_cloud(tmp_path / "zeros.npy").points, holes)
 
 
 def swapped(path: Path, old: bytes, new: bytes) -> Path:
@@ -323,25 +268,6 @@ def test_a_pcd_file_without_coordinates_names_its_fields(tmp_path: Path) -> None
     cloud.save(tmp_path / "flat.pcd")
     with pytest.raises(ValueError, match="it has no field y, z; its fields are x, intensity"):
         load_point_cloud(tmp_path / "flat.pcd")
-
-
-@pytest.mark.parametrize("voxel", [0.05, 0.3, 5.0])
-def test_merged_balls_contain_every_ball(voxel: float) -> None:
-    rng = np.random.default_rng(1)
-    points = rng.uniform(-0.5, 0.5, (2000, 3))
-    radii = rng.uniform(0.0, 0.02, 2000)
-    centres, reach = merge_in_voxels(points, radii, voxel=voxel)
-    assert len(centres) < len(points)
-    # ball i is inside ball j where |x_i - c_j| + r_i <= R_j; rounding at the scale of a metre
-    slack = reach - np.linalg.norm(points[:, None] - centres[None], axis=2) - radii[:, None]
-    assert slack.max(axis=1).min() >= -1e-12
-    assert reach.max() <= radii.max() + np.sqrt(3.0) / 2.0 * voxel + 1e-12
-
-
-def test_merging_leaves_a_lone_point_as_it_is() -> None:
-    centres, reach = merge_in_voxels([[0.1, 0.1, 0.1], [0.9, 0.9, 0.9]], [0.01, 0.02], voxel=0.2)
-    np.testing.assert_array_equal(centres, [[0.1, 0.1, 0.1], [0.9, 0.9, 0.9]])
-    np.testing.assert_array_equal(reach, [0.01, 0.02])
 
 
 def test_a_file_can_be_merged_as_it_is_read(tmp_path: Path) -> None:

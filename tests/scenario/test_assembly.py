@@ -258,6 +258,40 @@ def test_a_cloud_in_millimetres_is_scaled_and_its_holes_are_left_out(tmp_path: P
     np.testing.assert_allclose(parts.seen.points, [[1.0, 0.1, 0.2], [0.9, 0.3, 0.2]], rtol=1e-15)
 
 
+def test_a_cloud_is_placed_from_its_viewpoint(tmp_path: Path) -> None:
+    head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nVIEWPOINT 0.5 0 0 0 0 0 1\nPOINTS 1\n"
+    (tmp_path / "cloud.pcd").write_text(head + "DATA ascii\n0.1 0.2 0.3\n")
+    shape = "{type: points, file: cloud.pcd, radius: 0.01, viewpoint: true}"
+    scenario = parse(BASE.replace("{type: sphere, radius: 0.05}", shape), tmp_path)
+    parts = assemble(scenario)
+    assert isinstance(parts.seen, Obstacles)
+    # half a turn about z, 0.5 m ahead, around the obstacle's position; roundings
+    np.testing.assert_allclose(parts.seen.points, [[1.3, -0.1, 0.5]], rtol=1e-14)
+    scenario.save(tmp_path / "again.yaml")
+    assert Scenario.load(tmp_path / "again.yaml").obstacles == scenario.obstacles
+
+
+def test_a_cloud_of_many_points_is_merged_on_request(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    points = rng.uniform(0.0, 0.2, (60, 70, 3))
+    np.save(tmp_path / "cloud.npy", points)
+    shape = "{{type: points, file: cloud.npy, radius: 0.01{}}}"
+    with pytest.raises(
+        ScenarioError, match=r"cloud\.npy gives 4200 points; at most 2000 .* A voxel, here none, merges"
+    ):
+        assemble(parse(BASE.replace("{type: sphere, radius: 0.05}", shape.format("")), tmp_path))
+    text = BASE.replace("{type: sphere, radius: 0.05}", shape.format(", voxel: 0.05"))
+    text = text.replace("0.1, 0.2]", "0.1, 0.2], points: ball")
+    parts = assemble(parse(text, tmp_path))
+    assert isinstance(parts.seen, Obstacles)
+    radius = parts.seen.radii[0]
+    np.testing.assert_array_equal(parts.seen.radii, np.full(64, radius))
+    assert {item.size for item in parts.objects} == {(radius,)}
+    offsets = points.reshape(-1, 1, 3) + np.array([0.9, 0.1, 0.2]) - parts.seen.points
+    # every ball of the file is inside of one that is seen; rounding at the scale of a metre
+    assert (np.linalg.norm(offsets, axis=2).min(axis=1) + 0.01 - radius).max() <= 1e-12
+
+
 def seen_by_a_controller(text: str) -> tuple[SceneObject, Obstacles]:
     scenario = with_obstacle(text)
     (item,) = scenario.obstacles

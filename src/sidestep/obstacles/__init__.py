@@ -1,9 +1,10 @@
 """Obstacles: points with radii and velocities, from arrays, shapes, meshes and point-cloud files."""
 
 from sidestep._core import Obstacles
-from sidestep.obstacles.cloud import load_point_cloud, merge_in_voxels
+from sidestep.obstacles.cloud import load_point_cloud
 from sidestep.obstacles.scene import obstacles_from_shapes
 from sidestep.obstacles.shapes import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere
+from sidestep.obstacles.voxels import merge_in_voxels
 from sidestep.robot.pose import pose_at
 
 __all__ = [

@@ -7,13 +7,12 @@ import trimesh
 from numpy.typing import NDArray
 
 from sidestep.obstacles.ball_cover import check_count, cover
-from sidestep.robot.mesh import mesh_model
+from sidestep.obstacles.nearest_on_mesh import NearestOnMesh
 
 Array = NDArray[np.float64]
 
 FIRST_BATCH = 256  # cells of a mesh that propose balls at once; doubled every time
 TANGENT = 1e-12  # relative; a ball that is empty but for this touches the surface where it was told to
-POINT_RADIUS = 1e-9  # [m] Coal has no point; a sphere this small stands for one
 SHRINKINGS = 40  # of a ball that is to touch a mesh; each at least leaves one point behind
 
 
@@ -40,7 +39,7 @@ class _Mesh:
         self._normals = inward * normals
         self._size = float(np.linalg.norm(np.ptp(self._triangles.reshape(-1, 3), axis=0)))
         self._area = 0.5 * float(lengths.sum())
-        self._nearest = _Nearest(mesh) if self._closed else None
+        self._nearest = NearestOnMesh(self._triangles) if self._closed else None
 
     def cells(self, excess: float) -> Array:
         if not self._closed:  # on the surface: a ball holds a triangle whose corners are within the excess
@@ -84,25 +83,3 @@ class _Mesh:
         middle = 0.5 * (a + b)
         normals = cells[:, 9:12]
         return np.concatenate([np.hstack([a, middle, c, normals]), np.hstack([middle, b, c, normals])])
-
-
-class _Nearest:
-    """The nearest points of a mesh, by Coal: exact to rounding."""
-
-    def __init__(self, mesh: trimesh.Trimesh) -> None:
-        import coal  # here: only a closed mesh needs it, and it takes longer to import than a robot to load
-
-        self._coal, self._model = coal, mesh_model(mesh)
-        self._point = coal.Sphere(POINT_RADIUS)
-        self._request = coal.DistanceRequest()
-        self._at = coal.Transform3s()
-
-    def of(self, points: Array) -> tuple[Array, Array]:
-        """Nearest points (N, 3) of the mesh to points (N, 3), and distances (N,)."""
-        nearest = np.empty_like(points)
-        for index, point in enumerate(points):
-            result = self._coal.DistanceResult()
-            placed = self._coal.Transform3s(np.eye(3), point)
-            self._coal.distance(self._model, self._at, self._point, placed, self._request, result)
-            nearest[index] = result.getNearestPoint1()
-        return nearest, np.linalg.norm(nearest - points, axis=1)

@@ -18,13 +18,12 @@ from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
 from sidestep.distance import SceneObject
 from sidestep.distance.scene import Kind, check_scene
-from sidestep.obstacles import load_point_cloud
 from sidestep.obstacles.shapes import EXTENT
 from sidestep.robot.degrees import degrees_hint
 from sidestep.robot.mesh import read_mesh
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario.config import controller_settings_of
-from sidestep.scenario.perception import View, seen_at, view_of
+from sidestep.scenario.perception import View, cloud_balls, seen_at, view_of
 from sidestep.scenario.scenario import (
     BasePose,
     JointState,
@@ -247,11 +246,12 @@ def solids(scenario: Scenario, item: Obstacle, name: str) -> tuple[SceneObject, 
             return (solid("box", (x, y, z)),)
         case Shape(type="mesh", file=str(file)):
             return (solid("mesh", mesh=_mesh(scenario.file(file), shape.scale or 1.0)),)
-        case Shape(type="points", file=str(file), radius=float(radius)):
-            cloud = load_point_cloud(scenario.file(file), scale=shape.scale or 1.0).points
+        case Shape(type="points", file=str(file)):
+            cloud, radius = cloud_balls(shape, scenario.file(file))
             if len(cloud) > MAX_CLOUD_POINTS:
                 raise ValueError(
-                    f"shape.file: {file} has {len(cloud)} points; at most {MAX_CLOUD_POINTS} are simulated"
+                    f"shape.file: {file} gives {len(cloud)} points; at most {MAX_CLOUD_POINTS} are simulated. A voxel, "
+                    f"here {shape.voxel or 'none'}, merges those in a cell of that edge [m]"
                 )
             ball = solid("sphere", (radius,))
             return tuple(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -10,12 +11,12 @@ import trimesh
 
 from sidestep._core import Obstacles
 from sidestep.distance import SceneObject
-from sidestep.obstacles import Box, Capsule, Cylinder, Plane
+from sidestep.obstacles import Box, Capsule, Cylinder, Plane, load_point_cloud
 from sidestep.obstacles.covering import check_spacing, square
 from sidestep.obstacles.mesh_cover import mesh_balls
 from sidestep.obstacles.shapes import Balls
 from sidestep.robot.pose import moved
-from sidestep.scenario.scenario import Obstacle
+from sidestep.scenario.scenario import Obstacle, Shape
 
 Array = npt.NDArray[np.float64]
 
@@ -43,8 +44,21 @@ def view_of(item: Obstacle, thing: SceneObject, *, bare: bool) -> View:
     if bare or item.shape.type in ("sphere", "points"):
         centre = np.zeros((1, 3)) if thing.mesh is None else thing.mesh.bounds.mean(axis=0, keepdims=True)
         has_size = not bare or item.points == "ball"
-        return View(thing, centre, np.array([float(item.shape.radius or 0.0) if has_size else 0.0]))
+        is_ball = has_size and thing.kind == "sphere"
+        return View(thing, centre, np.array([thing.size[0] if is_ball else 0.0]))
     return View(thing, *_balls(thing, item.excess))
+
+
+def cloud_balls(shape: Shape, path: Path) -> tuple[Array, float]:
+    """Points (n, 3) of a shape of points in its frame, and the radius of all their balls [m]."""
+    cloud = load_point_cloud(
+        path,
+        radius=shape.radius or 0.0,
+        voxel=shape.voxel,
+        scale=shape.scale or 1.0,
+        viewpoint=shape.viewpoint,
+    )
+    return np.array(cloud.points), float(cloud.radii.max())
 
 
 def _surface_points(item: Obstacle, thing: SceneObject) -> Array:

@@ -91,6 +91,8 @@ class Shape:
     extent: float | None = None
     file: str | None = None
     scale: float | None = None
+    voxel: float | None = None
+    viewpoint: bool = False
 
 
 @dataclass(frozen=True)

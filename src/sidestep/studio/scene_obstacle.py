@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.distance import SceneObject
-from sidestep.obstacles import load_point_cloud, merge_in_voxels
+from sidestep.obstacles import merge_in_voxels
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import solids
-from sidestep.scenario.perception import View, view_of
+from sidestep.scenario.perception import View, cloud_balls, view_of
 from sidestep.scenario.scenario import Obstacle, Shape, Vector3
 
 Array = npt.NDArray[np.float64]
@@ -53,27 +53,29 @@ class SceneObstacle:
             self.obstacle.position, from_roll_pitch_yaw(np.deg2rad(self.obstacle.rotation_deg).tolist())
         )
 
-    @cached_property
+    @property
     def cloud(self) -> Array | None:
         """Points (n, 3) of a point cloud in its frame [m], None of another shape."""
+        return None if self._cloud_balls is None else self._cloud_balls[0]
+
+    @cached_property
+    def _cloud_balls(self) -> tuple[Array, float] | None:
         shape = self.obstacle.shape
         if shape.type != "points" or shape.file is None:
             return None
-        points: Array = load_point_cloud(
-            (self.folder / shape.file).resolve(), scale=shape.scale or 1.0
-        ).points
+        points, radius = cloud_balls(shape, (self.folder / shape.file).resolve())
         if len(points) > CLOUD_LIMIT:
             raise ValueError(
                 f"{self.name}: the cloud has {len(points)} points; the studio takes at most {CLOUD_LIMIT}: "
-                "thin it with sidestep.obstacles.merge_in_voxels"
+                "give the shape a voxel, which merges those in a cell of that edge [m]"
             )
-        return points
+        return points, radius
 
     @cached_property
     def solids(self) -> tuple[SceneObject, ...]:
         """What it is made of, at the start: one solid, or a ball for each point of a cloud."""
-        if self.cloud is not None:
-            radius = float(self.obstacle.shape.radius or 0.0)
+        if self._cloud_balls is not None:
+            cloud, radius = self._cloud_balls
             return tuple(
                 SceneObject(
                     f"{self.name}.{k}",
@@ -82,7 +84,7 @@ class SceneObstacle:
                     pose=self.start @ pose_at(p),
                     motion="moving",
                 )
-                for k, p in enumerate(self.cloud)
+                for k, p in enumerate(cloud)
             )
         bare = dataclasses.replace(self.obstacle, velocity=(0.0, 0.0, 0.0), motion=None)
         scenario = Scenario(name=self.name, robot=None, start=None, goal=None, folder=self.folder)  # type: ignore[arg-type]
@@ -100,13 +102,12 @@ class SceneObstacle:
         Balls are told as they are; other shapes as balls that cover the surface without a gap. With `bare`, as the
         scenario file asks by `points`.
         """
-        if self.cloud is None:
+        if self._cloud_balls is None:
             view = self._bare_view if bare else self._full_view
             return view.points, view.radii
         has_size = not bare or self.obstacle.points == "ball"
-        return self.cloud, np.full(
-            len(self.cloud), float(self.obstacle.shape.radius or 0.0) if has_size else 0.0
-        )
+        cloud, radius = self._cloud_balls
+        return cloud, np.full(len(cloud), radius if has_size else 0.0)
 
     @cached_property
     def _bare_view(self) -> View:
