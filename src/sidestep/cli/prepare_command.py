@@ -17,6 +17,14 @@ def prepare(
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
     tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    effort_limit: Annotated[
+        list[str] | None,
+        typer.Option(help="JOINT=VALUE [Nm or N], in place of the file's; of a file; may be repeated."),
+    ] = None,
+    velocity_limit: Annotated[
+        list[str] | None,
+        typer.Option(help="JOINT=VALUE [rad/s or m/s], in place of the file's; of a file; may be repeated."),
+    ] = None,
     quiet: QuietOption = False,
 ) -> None:
     """Prepare an arm once: what a `Controller` needs, in one file that C++ reads alone.
@@ -35,8 +43,31 @@ def prepare(
     def show(stage: str, item: str, done: int, in_all: int) -> None:
         terminal.print(f"{stage}: {item} ({done} of {in_all})", highlight=False, soft_wrap=True)
 
-    options = {"package_dirs": package_dir, "tip": tip}
+    options = {
+        "package_dirs": package_dir,
+        "tip": tip,
+        "effort_limits": by_joint(effort_limit, "--effort-limit"),
+        "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
+    }
     given = {name: value for name, value in options.items() if value}
     arm = Arm.load(source, progress=show, **given)  # type: ignore[arg-type]
     arm.save(out)
     terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)
+
+
+def by_joint(texts: list[str] | None, option: str) -> dict[str, float]:
+    """Values of an option that is written JOINT=VALUE.
+
+    Raises:
+        ValueError: names the option, what was written and what is allowed.
+    """
+    values = {}
+    for text in texts or ():
+        joint, _, value = text.rpartition("=")
+        try:
+            values[joint] = float(value)
+        except ValueError:
+            joint = ""
+        if not joint:
+            raise ValueError(f"{option} is {text!r}; allowed: JOINT=VALUE, for example {option} joint1=87")
+    return values
