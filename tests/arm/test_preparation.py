@@ -58,9 +58,21 @@ def test_the_command_takes_limits_by_joint(tmp_path: Path) -> None:
     np.testing.assert_array_equal(arm.limits.velocity, [2.0, 3.0])
 
 
+def test_the_studio_takes_limits_by_joint(tmp_path: Path) -> None:
+    from sidestep.studio.start import starting_scenario
+
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(planar_arm(2))
+    chosen = starting_scenario(urdf=urdf, effort_limits={"joint1": 87.0}, velocity_limits={"joint2": 1.5})
+    assert chosen.robot.effort_limits == {"joint1": 87.0}
+    assert chosen.robot.velocity_limits == {"joint2": 1.5}
+    with pytest.raises(ValueError, match="limits of joints go with --urdf"):
+        starting_scenario(robot="planar2", effort_limits={"joint1": 87.0})
+
+
 @pytest.mark.parametrize("text", ["joint1", "=3", "joint1=fast", "joint1="])
 def test_a_limit_that_is_written_wrong_is_named(tmp_path: Path, text: str) -> None:
-    from sidestep.cli.prepare_command import by_joint
+    from sidestep.cli.limit_options import by_joint
 
     with pytest.raises(
         ValueError, match=re.escape(f"--effort-limit is {text!r}; allowed: JOINT=VALUE, for example")

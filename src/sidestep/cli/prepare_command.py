@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sidestep.cli.limit_options import EffortLimitOption, VelocityLimitOption, by_joint
 from sidestep.cli.output import QuietOption, console
 
 
@@ -17,14 +18,8 @@ def prepare(
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
     tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
-    effort_limit: Annotated[
-        list[str] | None,
-        typer.Option(help="JOINT=VALUE [Nm or N], in place of the file's; of a file; may be repeated."),
-    ] = None,
-    velocity_limit: Annotated[
-        list[str] | None,
-        typer.Option(help="JOINT=VALUE [rad/s or m/s], in place of the file's; of a file; may be repeated."),
-    ] = None,
+    effort_limit: EffortLimitOption = None,
+    velocity_limit: VelocityLimitOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """Prepare an arm once: what a `Controller` needs, in one file that C++ reads alone.
@@ -53,21 +48,3 @@ def prepare(
     arm = Arm.load(source, progress=show, **given)  # type: ignore[arg-type]
     arm.save(out)
     terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)
-
-
-def by_joint(texts: list[str] | None, option: str) -> dict[str, float]:
-    """Values of an option that is written JOINT=VALUE.
-
-    Raises:
-        ValueError: names the option, what was written and what is allowed.
-    """
-    values = {}
-    for text in texts or ():
-        joint, _, value = text.rpartition("=")
-        try:
-            values[joint] = float(value)
-        except ValueError:
-            joint = ""
-        if not joint:
-            raise ValueError(f"{option} is {text!r}; allowed: JOINT=VALUE, for example {option} joint1=87")
-    return values
