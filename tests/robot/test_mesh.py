@@ -12,7 +12,7 @@ from sidestep.robot.mesh import read_mesh, simplified
 def test_files_that_are_no_mesh_are_named(tmp_path: Path) -> None:
     broken = tmp_path / "broken.stl"
     broken.write_bytes(b"solid x")
-    with pytest.raises(ValueError, match=r"mesh file '.*broken\.stl' (cannot be read|holds no triangles)"):
+    with pytest.raises(ValueError, match=r"mesh file '.*broken\.stl' is truncated: it ends in its header"):
         read_mesh(broken)
     empty = tmp_path / "points.obj"
     empty.write_text("v 0 0 0\n")
@@ -35,3 +35,74 @@ def test_simplified_keeps_the_shape() -> None:
     assert radii.max() <= 0.1 + 1e-12
     assert radii.min() >= 0.1 - 0.02 * np.sqrt(3)
     np.testing.assert_allclose(coarse.bounds, sphere.bounds, atol=0.01)
+
+
+POINTS = "0 0 0 1 0 0 0 1 0 0 0 1"
+PART = """<geometry id="g{k}"><mesh><source id="p{k}"><float_array id="a{k}" count="12">{points}</float_array>
+<technique_common><accessor source="#a{k}" count="4" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v{k}"><input semantic="POSITION"
+source="#p{k}"/></vertices><triangles material="m{k}" count="4"><input semantic="VERTEX" source="#v{k}" offset="0"/>
+<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry>"""
+NODE = """<node><instance_geometry url="#g{k}"><bind_material><technique_common><instance_material symbol="m{k}"
+target="#m{k}"/></technique_common></bind_material></instance_geometry></node>"""
+
+
+def collada(extra: str = "", nodes: str = NODE.format(k=1) + NODE.format(k=2)) -> str:
+    """Two tetrahedra, 5 m apart; their materials are in `extra` or nowhere."""
+    parts = PART.format(k=1, points=POINTS) + PART.format(k=2, points="5 0 0 6 0 0 5 1 0 5 0 1")
+    return (
+        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/>'
+        f"{extra}<library_geometries>{parts}</library_geometries><library_visual_scenes><visual_scene id='s'>{nodes}"
+        '</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>'
+    )
+
+
+EFFECT = """<library_effects><effect id="e"><profile_COMMON><newparam sid="t"><sampler2D>
+<source>gone</source></sampler2D></newparam>
+<technique sid="c"><phong><diffuse><texture texture="t" texcoord="U"/></diffuse></phong></technique>
+</profile_COMMON></effect></library_effects>"""
+MATERIALS = '<library_materials><material id="m2"><instance_effect url="#{}"/></material></library_materials>'
+
+
+@pytest.mark.parametrize(
+    "extra", ["", EFFECT, EFFECT + MATERIALS.format("e"), MATERIALS.format("gone"),
+              '<library_images><image id="i"><init_from>gone.png</init_from></image></library_images>',
+              '<library_lights><light id="l"/></library_lights>']
+)  # fmt: skip
+def test_broken_materials_do_not_take_parts_away(tmp_path: Path, extra: str) -> None:
+    path = tmp_path / "two.dae"
+    path.write_text(collada(extra))
+    mesh = read_mesh(path)
+    assert len(mesh.faces) == 8
+    np.testing.assert_array_equal(mesh.bounds, [[0, 0, 0], [6, 1, 1]])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("<triangles", "<tristrips", "triangle strips"),
+        ('url="#g2"', 'url="#gone"', "cannot be read: .*gone"),
+        ('source="#p2"', 'source="#gone"', "cannot be read"),
+        ("<instance_geometry", "<instance_controller", "a skinned or morphed shape"),
+        ("<p>0 2 1", "<p>0 2 x", "cannot be read"),
+    ],
+)
+def test_a_part_that_does_not_arrive_is_an_error(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = tmp_path / "two.dae"
+    path.write_text(collada().replace(old, new).replace(f"</{old[1:]}>", f"</{new[1:]}>"))
+    with pytest.raises(ValueError, match=rf"mesh file '.*two\.dae' .*{message}"):
+        read_mesh(path)
+
+
+def test_the_format_is_that_of_the_content(tmp_path: Path) -> None:
+    box = trimesh.creation.box(extents=(1.0, 2.0, 3.0))
+    for name, kind in (
+        ("no_suffix", "stl"),
+        ("wrong.obj", "stl_ascii"),
+        ("wrong.stl", "ply"),
+        ("wrong.dae", "glb"),
+    ):
+        content = box.export(file_type=kind)
+        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+        np.testing.assert_allclose(read_mesh(tmp_path / name).extents, [1.0, 2.0, 3.0])

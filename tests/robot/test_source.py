@@ -47,7 +47,9 @@ def test_references_from_a_string(packages: Path) -> None:
     )
     check_mesh(Robot.from_urdf(MESH_URDF.format((packages / "arm/meshes/box.stl").as_uri())))
     check_mesh(Robot.from_urdf(MESH_URDF.format(packages / "arm/meshes/box.stl")))
-    with pytest.raises(ValueError, match=r"'http://x/box.stl'; allowed: package://, file:// and plain paths"):
+    with pytest.raises(
+        ValueError, match=r"'http://x/box.stl'; allowed: package://, model://, file:// and plain paths"
+    ):
         Robot.from_urdf(MESH_URDF.format("http://x/box.stl"))
 
 

@@ -139,9 +139,9 @@ def test_limits_can_be_given() -> None:
         Robot.from_urdf(planar_arm(2), acceleration_limits=[1, -1])
 
 
-def test_unusable_limits_of_the_file_can_be_replaced() -> None:
-    with pytest.raises(
-        ValueError, match=r"'held': velocity limit is 0.0, must be positive.*pass velocity_limits or"
-    ):
-        Robot.from_urdf(EVERY_JOINT)
+def test_limits_that_the_file_lacks_can_be_given(recwarn: pytest.WarningsRecorder) -> None:
     assert Robot.from_urdf(EVERY_JOINT, velocity_limits=1, effort_limits=1).num_coordinates == 5
+    given = Robot.from_urdf(EVERY_JOINT, velocity_limits={"held": 0.5}, effort_limits={"held": 7})
+    assert not recwarn.list
+    held = given.coordinate_names.index("held")
+    assert (given.limits.velocity[held], given.limits.effort[held]) == (0.5, 7.0)

@@ -1,6 +1,7 @@
 """From a scenario to the parts of a run."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,10 @@ import pytest
 
 from sidestep._core import Controller, DistanceSwitch, GeometricSystem, Obstacles
 from sidestep.distance import SceneObject
+from sidestep.robot import planar_arm
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
-from sidestep.scenario.assembly import assemble, solids
+from sidestep.scenario.assembly import Assembly, assemble, solids
 from sidestep.scenario.perception import seen_at, view_of
 
 BASE = """\
@@ -317,3 +319,52 @@ def test_capsules_and_planes_are_solids_and_balls_with_their_names() -> None:
     assert (seen.points[:, 1] - seen.radii).min() >= 1.99 - 1e-9
     with pytest.raises(ScenarioError, match="free is true; a plane can only be fixed"):
         with_obstacle("{name: wall, free: true, shape: {type: plane}, position: [0, 2, 0]}")
+
+
+LACKING = """
+format: 1
+name: lacking
+robot: {{urdf: arm.urdf{more}}}
+start: {{unit: rad, position: [0, 0]}}
+goal: {{unit: rad, position: [0.5, 0.3]}}
+method: {method}
+simulation: {{mode: {mode}, duration: 0.1}}
+"""
+
+
+@pytest.mark.filterwarnings("ignore:.*no effort limit:RuntimeWarning")
+@pytest.mark.parametrize("method", ["custom", "reactive"])
+def test_torque_needs_effort_limits_and_inertias(tmp_path: Path, method: str) -> None:
+    text = re.sub(r'effort="[^"]*"', 'effort="0"', planar_arm(2))
+    (tmp_path / "arm.urdf").write_text(text)
+
+    def assembled(mode: str, more: str = "") -> Assembly:
+        return assemble(parse(LACKING.format(method=method, mode=mode, more=more), tmp_path))
+
+    with pytest.raises(
+        ScenarioError,
+        match=r"simulation\.mode is 'torque', and joints of robot 'planar2' have no effort limit: joint1, joint2; "
+        r"write robot\.effort_limits: \{joint1: 87\.0\} \[Nm \| N\], or mode: kinematic",
+    ):
+        assembled("torque")
+    assert np.isinf(assembled("kinematic").robot.limits.effort).all()
+    given = assembled("torque", ", effort_limits: {joint1: 87, joint2: 12.5}, velocity_limits: {joint2: 0.5}")
+    np.testing.assert_array_equal(given.robot.limits.effort, [87.0, 12.5])
+    np.testing.assert_array_equal(given.robot.limits.velocity, [5.0, 0.5])
+    with pytest.raises(ScenarioError, match=r"no coordinate 'elbow'; its joints are: joint1, joint2"):
+        assembled("kinematic", ", effort_limits: {elbow: 87}")
+    with pytest.raises(ScenarioError, match="effort_limits"):
+        assembled("kinematic", ", effort_limits: {joint1: -1}")
+    massless = re.sub(r"<inertial>.*?</inertial>", "", planar_arm(2), flags=re.DOTALL)
+    (tmp_path / "arm.urdf").write_text(massless)
+    with pytest.raises(ScenarioError, match=r"no moving link of robot 'planar2' has an <inertial> with mass"):
+        assembled("torque")
+    assert assembled("kinematic").robot.num_coordinates == 2
+
+
+def test_limits_by_joint_go_with_a_file() -> None:
+    text = LACKING.format(method="custom", mode="kinematic", more="").replace(
+        "urdf: arm.urdf", "name: planar2"
+    )
+    with pytest.raises(ScenarioError, match="effort_limits go with 'urdf', not with a named robot"):
+        assemble(parse(text.replace("planar2}", "planar2, effort_limits: {joint1: 1}}")))

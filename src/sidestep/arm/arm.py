@@ -19,6 +19,7 @@ if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without 
     from sidestep.arm.preparation import Progress
     from sidestep.body import Body
     from sidestep.robot import Robot
+    from sidestep.robot.limits import LimitValues
 
 
 class Arm(_core.Arm):
@@ -56,13 +57,13 @@ class Arm(_core.Arm):
         package_dirs: Sequence[str | Path] = (),
         base_pose: ArrayLike | None = None,
         tip: str | None = None,
-        locked: Mapping[str, float] | None = None,
+        locked: Mapping[str, ArrayLike] | None = None,
         locked_beyond_limits: bool = False,
-        acceleration_limits: ArrayLike | None = None,
-        velocity_limits: ArrayLike | None = None,
-        effort_limits: ArrayLike | None = None,
-        jerk_limits: ArrayLike | None = None,
-        effort_rate_limits: ArrayLike | None = None,
+        acceleration_limits: LimitValues | None = None,
+        velocity_limits: LimitValues | None = None,
+        effort_limits: LimitValues | None = None,
+        jerk_limits: LimitValues | None = None,
+        effort_rate_limits: LimitValues | None = None,
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
         allowed: Sequence[tuple[str, str]] = (),

@@ -35,7 +35,11 @@ def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str) -> P
         add(joint.placement, joint.axis, joint.multiplier, joint.offset)
     for frame in robot.frames:
         add(frame.placement)
-    for inertial in robot.inertials:
+    try:
+        inertials = robot.inertials
+    except ValueError:  # one that no body has: the arm is then made without dynamics, with a warning
+        inertials = ()
+    for inertial in inertials:
         add(inertial.mass, inertial.com, inertial.inertia)
     return body_cache.cache_directory().parent / "arms" / f"{digest.hexdigest()}.arm"
 

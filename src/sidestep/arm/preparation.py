@@ -42,8 +42,7 @@ def prepare(
         progress: called as progress(stage, item, done, in_all).
 
     Raises:
-        ValueError: names what is wrong: a body that does not cover or belongs to another robot, an unknown link, a
-            link's inertia.
+        ValueError: names what is wrong: a body that does not cover or belongs to another robot, an unknown link.
     """
     for pair in allowed:
         for link in pair:
@@ -96,12 +95,23 @@ def _of_stage(stage: str, progress: Progress | None) -> CoverProgress | None:
 
 
 def _inertials(robot: Robot) -> Sequence[_core.Inertial]:
-    """One per joint; none if some motion has no mass, with a warning if the description has inertias at all."""
-    if all(inertial.mass == 0.0 for inertial in robot.inertials):
+    """One per joint; none if some motion has no mass, or an inertia is of no body, with a warning if the description
+    has inertias at all."""
+    try:
+        inertials = robot.inertials
+    except ValueError as error:
+        warnings.warn(
+            f"robot {robot.name!r}: {error}; the arm has no dynamics, so correct the <inertia>, or give mass "
+            "matrix and bias to what needs them",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+        return ()
+    if all(inertial.mass == 0.0 for inertial in inertials):
         return ()
     eigenvalues = np.linalg.eigvalsh(robot.mass_matrix(robot.neutral))
     if eigenvalues[0] > _NO_MASS * eigenvalues[-1]:
-        return robot.inertials
+        return inertials
     warnings.warn(
         f"robot {robot.name!r}: some motion moves no mass, because links lack <inertial>; "
         "the arm has no dynamics, so give mass matrix and bias to what needs them",

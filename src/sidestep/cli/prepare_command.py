@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sidestep.cli.limit_options import EffortLimitOption, VelocityLimitOption, by_joint
 from sidestep.cli.output import QuietOption, console
 
 
@@ -17,6 +18,8 @@ def prepare(
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
     tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    effort_limit: EffortLimitOption = None,
+    velocity_limit: VelocityLimitOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """Prepare an arm once: what a `Controller` needs, in one file that C++ reads alone.
@@ -35,7 +38,12 @@ def prepare(
     def show(stage: str, item: str, done: int, in_all: int) -> None:
         terminal.print(f"{stage}: {item} ({done} of {in_all})", highlight=False, soft_wrap=True)
 
-    options = {"package_dirs": package_dir, "tip": tip}
+    options = {
+        "package_dirs": package_dir,
+        "tip": tip,
+        "effort_limits": by_joint(effort_limit, "--effort-limit"),
+        "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
+    }
     given = {name: value for name, value in options.items() if value}
     arm = Arm.load(source, progress=show, **given)  # type: ignore[arg-type]
     arm.save(out)

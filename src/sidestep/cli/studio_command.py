@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sidestep.cli.limit_options import EffortLimitOption, VelocityLimitOption, by_joint
 from sidestep.cli.output import console
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ def studio(
     package_dir: Annotated[
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
+    effort_limit: EffortLimitOption = None,
+    velocity_limit: VelocityLimitOption = None,
     method: Annotated[
         str | None,
         typer.Option(
@@ -77,7 +80,14 @@ def studio(
     from sidestep.studio.start import starting_scenario
     from sidestep.studio.systems import numbers_of
 
-    chosen = starting_scenario(scenario, robot=robot, urdf=urdf, package_dirs=package_dir or ())
+    chosen = starting_scenario(
+        scenario,
+        robot=robot,
+        urdf=urdf,
+        package_dirs=package_dir or (),
+        effort_limits=by_joint(effort_limit, "--effort-limit"),
+        velocity_limits=by_joint(velocity_limit, "--velocity-limit"),
+    )
     if method is None:
         method = numbers_of(chosen)[0]
     if not headless and (screenshot or video):

@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sidestep.robot.mesh import read_mesh
+from sidestep.robot.mesh_file import kind_of
 
 if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
     import trimesh
 
 Array = NDArray[np.float64]
 _SECTIONS = 64  # sides of a cylinder: 1 - cos(pi / 64) = 0.12 % of the radius is cut off
+_CAP_SECTIONS = 80  # of a capsule, around and along: less than 0.1 % of the radius is cut off
 _SUBDIVISIONS = 4  # of an icosahedron, 5120 triangles: 0.11 % of the radius is cut off at the largest
-GeometryKind = Literal["mesh", "box", "cylinder", "sphere"]
+GeometryKind = Literal["mesh", "box", "cylinder", "capsule", "sphere"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +43,10 @@ class Geometry:
     """A mesh file or a primitive shape, placed in a link frame.
 
     Args:
-        kind: "mesh", "box", "cylinder" (along z) or "sphere".
+        kind: "mesh", "box", "cylinder" (along z), "capsule" (along z) or "sphere".
         placement: pose (4, 4) of the shape in the link frame.
-        size: box: edge lengths (x, y, z); cylinder: (radius, length); sphere: (radius,); mesh: (). [m]
+        size: box: edge lengths (x, y, z); cylinder: (radius, length); capsule: the same, its length without the
+            caps; sphere: (radius,); mesh: (). [m]
         path: the mesh file, None for a primitive.
         scale: factor per axis (3,) on the file's vertices, before `placement`.
     """
@@ -57,7 +60,7 @@ class Geometry:
     def mesh(self) -> trimesh.Trimesh:
         """The shape as triangles in the link frame [m]; loaded once, copy it before you change it.
 
-        Cylinders and spheres become inscribed polyhedra, less than 0.15 % of the radius inside the surface.
+        Cylinders, capsules and spheres become inscribed polyhedra, less than 0.15 % of the radius inside the surface.
 
         Raises:
             ValueError: the file holds no triangles or cannot be read as a mesh.
@@ -75,6 +78,10 @@ class Geometry:
             mesh = trimesh.creation.box(extents=self.size)
         elif self.kind == "cylinder":
             mesh = trimesh.creation.cylinder(radius=self.size[0], height=self.size[1], sections=_SECTIONS)
+        elif self.kind == "capsule":
+            mesh = trimesh.creation.capsule(
+                radius=self.size[0], height=self.size[1], count=2 * [_CAP_SECTIONS]
+            )
         else:
             mesh = trimesh.creation.icosphere(radius=self.size[0], subdivisions=_SUBDIVISIONS)
         mesh.apply_transform(self.placement)
@@ -111,6 +118,6 @@ def _file_mesh(path: Path) -> trimesh.Trimesh:
     import trimesh
 
     mesh = read_mesh(path)
-    if path.suffix.lower() == ".dae" and mesh.units is not None:
+    if kind_of(path) == "dae" and mesh.units is not None:
         mesh.apply_transform(np.diag([*[trimesh.units.unit_conversion(mesh.units, "meters")] * 3, 1.0]))
     return mesh

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sidestep.robot.collada_file import shape_alone
+from sidestep.robot.mesh_file import fault_of, kind_of
+
 if TYPE_CHECKING:  # they are imported where a mesh is made: they take longer to import than a robot to load
     import coal
     import trimesh
@@ -15,13 +18,23 @@ if TYPE_CHECKING:  # they are imported where a mesh is made: they take longer to
 def read_mesh(path: Path) -> trimesh.Trimesh:
     """The triangles of a file that trimesh reads (.stl, .obj, .dae, .ply, .glb …), in the file's coordinates.
 
+    The format is that of the content, where it tells. COLLADA is read without its materials.
+
     Raises:
-        ValueError: the file cannot be read as a mesh, or holds no triangles.
+        ValueError: the file cannot be read as a mesh, or holds no triangles; says why.
     """
     import trimesh
 
+    fault = fault_of(path)
+    if fault:
+        raise ValueError(f"mesh file '{path}' {fault}")
+    kind = kind_of(path)
     try:
-        mesh = trimesh.load_mesh(path)
+        if kind == "dae":
+            # a broken part raises: trimesh would leave it out
+            mesh = trimesh.load_mesh(shape_alone(path), file_type="dae", ignore_broken=False)
+        else:
+            mesh = trimesh.load_mesh(path, file_type=kind or None)
     except Exception as error:  # the readers behind trimesh raise anything; the user needs the file's name
         raise ValueError(f"mesh file '{path}' cannot be read: {error}") from error
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:

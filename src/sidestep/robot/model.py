@@ -14,7 +14,11 @@ from numpy.typing import ArrayLike
 from sidestep import _core
 from sidestep.robot import catalogue
 from sidestep.robot.degrees import degrees_hint
+from sidestep.robot.limits import LimitValues
 from sidestep.robot.link import Array, Geometry, Link
+from sidestep.robot.mesh_file import extents_of
+from sidestep.robot.plausibility import arm_length, check_size
+from sidestep.robot.remarks import Remarks
 from sidestep.robot.source import read_description
 from sidestep.robot.tool import tree_with_tool
 from sidestep.robot.tree import KinematicTree, build_tree
@@ -55,20 +59,23 @@ class Robot(_core.Robot):
         package_dirs: Sequence[str | Path] = (),
         base_pose: ArrayLike | None = None,
         tip: str | None = None,
-        locked: Mapping[str, float] | None = None,
+        locked: Mapping[str, ArrayLike] | None = None,
         locked_beyond_limits: bool = False,
-        acceleration_limits: ArrayLike | None = None,
-        velocity_limits: ArrayLike | None = None,
-        effort_limits: ArrayLike | None = None,
-        jerk_limits: ArrayLike | None = None,
-        effort_rate_limits: ArrayLike | None = None,
+        acceleration_limits: LimitValues | None = None,
+        velocity_limits: LimitValues | None = None,
+        effort_limits: LimitValues | None = None,
+        jerk_limits: LimitValues | None = None,
+        effort_rate_limits: LimitValues | None = None,
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
     ) -> Robot:
         """Reads a robot from a URDF or xacro file, or from URDF text.
 
-        Joints may be revolute, continuous, prismatic, fixed or mimic, and may branch. Mesh files are looked
-        up now and loaded when first used.
+        Joints may be revolute, continuous, prismatic, fixed or mimic, and may branch. Floating and planar joints
+        are held at a pose. Mesh files are looked up now and loaded when first used. What other readers of URDF
+        accept loads; what was left out, or is implausible, is said in one RuntimeWarning of each kind.
+
+        Limits are a number for all joints, one per coordinate (nv,), or `{joint: value}` for some of them.
 
         Args:
             source: a path, or the XML text itself (starts with `<`).
@@ -78,17 +85,19 @@ class Robot(_core.Robot):
             tip: a link; keeps the joints from the root to it, and links fixed rigidly to links before it.
                 What hangs on the tip itself, and every other branch that moves, is dropped.
             locked: joints held at a value [rad | m]; joints that mimic them are held too, and may be named too.
+                Floating and planar joints at a pose (4, 4), or x, y, z [m], roll, pitch, yaw [rad]; where they
+                are written by default.
             locked_beyond_limits: accept values of `locked` outside the file's limits, as published data has.
-            acceleration_limits: number or (nv,) [rad/s^2 | m/s^2]; 10 by default (URDF has none).
-            velocity_limits: number or (nv,) [rad/s | m/s], in place of the file's.
-            effort_limits: number or (nv,) [Nm | N], in place of the file's.
-            jerk_limits: number or (nv,) [rad/s^3 | m/s^3]; 100/s times the acceleration limits by default.
-            effort_rate_limits: number or (nv,) [Nm/s | N/s]; none by default.
+            acceleration_limits: [rad/s^2 | m/s^2]; 10 by default (URDF has none).
+            velocity_limits: [rad/s | m/s], in place of the file's; none where neither gives one.
+            effort_limits: [Nm | N], in place of the file's; none where neither gives one. Torque output needs them.
+            jerk_limits: [rad/s^3 | m/s^3]; 100/s times the acceleration limits by default.
+            effort_rate_limits: [Nm/s | N/s]; none by default.
             name: in place of the file's.
             xacro_arguments: values of `<xacro:arg>`.
 
         Raises:
-            FileNotFoundError: the description or a mesh is missing.
+            FileNotFoundError: the description or a mesh of a collision shape is missing; names every one.
             ValueError: anything wrong in the file or the arguments, named together with what is allowed.
         """
         description = read_description(source, package_dirs=package_dirs, xacro_arguments=xacro_arguments)
@@ -105,6 +114,7 @@ class Robot(_core.Robot):
             jerk_limits=jerk_limits,
             effort_rate_limits=effort_rate_limits,
         )
+        urdf.remarks.warn(urdf.label, stacklevel=2)
         return cls(name or urdf.name, tree)
 
     @classmethod
@@ -196,6 +206,12 @@ class Robot(_core.Robot):
         if link not in self._meshes:
             import trimesh
 
+            remarks = Remarks()
+            for geometry in geometries:  # the sizes of other files are checked when the description is read
+                if geometry.path is not None and extents_of(geometry.path) is None:
+                    size = float(geometry.mesh().extents.max())
+                    check_size(link, size, arm_length(self.joints), remarks)
+            remarks.warn(f"robot {self.name!r}", stacklevel=2)
             meshes = [geometry.mesh() for geometry in geometries]
             merged: Any = trimesh.util.concatenate(meshes) if meshes else None
             self._meshes[link] = merged

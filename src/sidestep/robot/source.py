@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import contextlib
 import io
-import posixpath
 import re
 import sys
 import tempfile
@@ -13,71 +12,22 @@ import types
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PureWindowsPath
-from urllib.parse import unquote, urlparse
+from pathlib import Path
+
+from sidestep.robot.formats import macros_alone, other_root, refuse_content
+from sidestep.robot.packages import Packages
 
 _XACRO_MARKS = ("ros.org/wiki/xacro", "ros.org/xacro")  # namespaces that xacro documents declare
+_SUBSTITUTION = re.compile(r"\$\((?:find|arg|env|optenv|dirname|eval)\b[^)]*\)")
 
 
 @dataclass(frozen=True)
 class Description:
-    """The XML tree of a robot description and the folders its file references are looked up in."""
+    """The XML tree of a robot description and the packages its file references are looked up in."""
 
     root: ElementTree.Element
     label: str  # what errors call the description: its path, or "URDF string"
-    folder: Path | None  # of the URDF file, None for a string
-    package_dirs: tuple[Path, ...]
-
-    def resolve(self, uri: str, owner: str) -> Path:
-        """The file behind `package://NAME/REST`, `file://PATH` or a plain path.
-
-        A package is looked up as PARENT/NAME and as a folder itself called NAME, first in `package_dirs`,
-        then in the folders above the URDF; a relative path in the URDF's folder, then in `package_dirs`.
-
-        Raises:
-            FileNotFoundError: names `owner`, the reference and the folders searched.
-            ValueError: another scheme, or a `package://` reference that leaves its package.
-        """
-        try:
-            parsed = urlparse(uri)
-        except ValueError as error:
-            raise ValueError(f"{owner} refers to {uri!r}, which is no address: {error}") from error
-        parents = () if self.folder is None else (self.folder, *self.folder.parents)
-        if parsed.scheme == "package":
-            package, rest = _inside_package(
-                unquote(parsed.netloc), unquote(parsed.path), f"{owner} refers to {uri!r}"
-            )
-            searched = [*self.package_dirs, *parents]
-            candidates = [
-                path
-                for base in searched
-                for path in ([base / rest] if base.name == package else []) + [base / package / rest]
-            ]
-        elif parsed.scheme == "file":
-            searched, candidates = [], [Path(unquote(parsed.path))]
-        elif "://" in uri:
-            raise ValueError(f"{owner} refers to {uri!r}; allowed: package://, file:// and plain paths")
-        else:
-            searched = [*parents[:1], *self.package_dirs]
-            candidates = [Path(uri)] if Path(uri).is_absolute() else [base / uri for base in searched]
-        for candidate in candidates:
-            if candidate.is_file():
-                return candidate.resolve()
-        folders = ", ".join(str(base) for base in searched) or "no folder (pass package_dirs)"
-        raise FileNotFoundError(f"{owner} refers to {uri!r}, which does not exist; searched in: {folders}")
-
-
-def _inside_package(package: str, path: str, what: str) -> tuple[str, str]:
-    """The name of a package and a path in it without `..`, whatever the path is written with.
-
-    Raises:
-        ValueError: they name a file outside; begins with `what`.
-    """
-    rest = posixpath.normpath(path.replace("\\", "/").lstrip("/"))
-    leaves = rest.split("/")[0] == ".." or package in (".", "..") or any(mark in package for mark in "/\\")
-    if leaves or "\0" in package + rest or PureWindowsPath(rest).drive:
-        raise ValueError(f"{what}, which leaves the package; allowed: a file below package://NAME/")
-    return package, rest
+    packages: Packages
 
 
 def read_description(
@@ -99,13 +49,22 @@ def read_description(
         path = Path(source).resolve()
         if not path.is_file():
             raise FileNotFoundError(f"robot description {path} does not exist or is not a file")
+        refuse_content(path)
         label, text, folder = str(path), read_xml(path), path.parent
+    packages = Packages(directories, folder)
     root = parse_xml(text, label)
-    if any(mark in tag for mark in _XACRO_MARKS for tag in _qualified_names(root)):
-        root = parse_xml(_expand(text, label, folder, directories, dict(xacro_arguments or {})), label)
+    if _uses_xacro(root):
+        macros = [
+            (element.get("name", ""), element.get("params", ""))
+            for element in root.iter()
+            if isinstance(element.tag, str) and element.tag.endswith("}macro")
+        ]
+        root = parse_xml(_expand(text, label, folder, packages, dict(xacro_arguments or {})), label)
+        if macros and root.find("link") is None:
+            raise ValueError(macros_alone(label, macros))
     elif xacro_arguments:
         raise ValueError(f"{label} uses no xacro, but xacro_arguments are given: {sorted(xacro_arguments)}")
-    return Description(root, label, folder, directories)
+    return Description(root, label, packages)
 
 
 def read_xml(path: Path) -> str:
@@ -145,18 +104,26 @@ def parse_xml(text: str, label: str) -> ElementTree.Element:
     except (ElementTree.ParseError, ValueError) as error:  # ValueError: characters that no encoding has
         raise ValueError(f"{label} is not well-formed XML: {error}") from error
     if root.tag != "robot":
-        raise ValueError(f"{label}: the root element is <{root.tag}>, must be <robot>")
+        raise ValueError(f"{label}: the root element is <{root.tag}>, must be <robot>{other_root(root.tag)}")
     return root
 
 
-def _qualified_names(root: ElementTree.Element) -> Iterator[str]:
-    """Names of elements, the namespace in braces in front; a declared but unused namespace does not show."""
-    return (element.tag for element in root.iter() if isinstance(element.tag, str))
+def _uses_xacro(root: ElementTree.Element) -> bool:
+    """Whether elements of xacro, or its substitutions such as `$(find NAME)`, are in a description.
+
+    A namespace that is declared and not used does not show.
+    """
+    for element in root.iter():
+        if not isinstance(element.tag, str):  # a comment
+            continue
+        if any(mark in element.tag for mark in _XACRO_MARKS):
+            return True
+        if any(_SUBSTITUTION.search(value) for value in (*element.attrib.values(), element.text or "")):
+            return True
+    return False
 
 
-def _expand(
-    text: str, label: str, folder: Path | None, package_dirs: tuple[Path, ...], arguments: dict[str, str]
-) -> str:
+def _expand(text: str, label: str, folder: Path | None, packages: Packages, arguments: dict[str, str]) -> str:
     import xacro
 
     messages = io.StringIO()  # xacro prints its warnings; they go into the error, or nowhere
@@ -166,7 +133,7 @@ def _expand(
             path = Path(temporary) / "robot.xacro"
             path.write_text(text, encoding="utf-8")
         try:
-            with contextlib.redirect_stderr(messages), _findable_packages(package_dirs, folder):
+            with contextlib.redirect_stderr(messages), _findable(packages):
                 return str(xacro.process_file(str(path), mappings=arguments).toxml())
         except Exception as error:  # xacro evaluates expressions, so any exception can come out of it
             detail = f"{error} {messages.getvalue()}".strip()
@@ -174,19 +141,15 @@ def _expand(
 
 
 @contextlib.contextmanager
-def _findable_packages(package_dirs: tuple[Path, ...], folder: Path | None) -> Iterator[None]:
+def _findable(packages: Packages) -> Iterator[None]:
     """Answers xacro's `$(find NAME)`, which asks ROS's ament index, from the same folders as `package://`."""
     name = "ament_index_python.packages"
-    parents = () if folder is None else (folder, *folder.parents)
 
     def get_package_share_directory(package: str) -> str:
-        for base in (*package_dirs, *parents):
-            for candidate in (base, base / package):
-                if candidate.name == package and candidate.is_dir():
-                    return str(candidate)
-        searched = (
-            ", ".join(str(base) for base in (*package_dirs, *parents)) or "no folder (pass package_dirs)"
-        )
+        folder = packages.find(package)
+        if folder is not None:
+            return str(folder)
+        searched = ", ".join(str(base) for base in packages.searched) or "no folder (pass package_dirs)"
         raise FileNotFoundError(f"$(find {package}): no such package; searched in: {searched}")
 
     stand_in = types.ModuleType(name)

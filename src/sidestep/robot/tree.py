@@ -12,15 +12,19 @@ from numpy.typing import ArrayLike
 
 from sidestep._core import Frame, Joint, JointLimits, JointType, real_array
 from sidestep.robot.degrees import DEGREES_HINT, degrees_hint, looks_like_degrees
+from sidestep.robot.limits import LimitValues, limits_of, position_bounds, stands_still
 from sidestep.robot.link import Array, Link
-from sidestep.robot.pose import about_axis, checked_pose, pose_at
+from sidestep.robot.plausibility import check_meshes
+from sidestep.robot.pose import about_axis, checked_pose, from_roll_pitch_yaw, pose_at
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
 CORE_TOLERANCE = 1e-9  # on R Rᵀ - 1, the core's own
 FOLLOWER_TOLERANCE = 1e-6  # [rad | m] of a locked mimic joint: values are written down with a few digits
-DEFAULT_ACCELERATION_LIMIT = 10.0
-"""Acceleration limit where none is given, [rad/s^2] or [m/s^2], as URDF has none: the FR3's official value on
-every joint, that of the thesis's controller, and the order of what other arms of this size are rated for."""
+
+HELD_POSE = (
+    "has several coordinates, and is held where it is written; pass its pose in locked to hold it elsewhere"
+)
+HELD_LIMITS = "lower and upper limit are the same, so that it is held there"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +53,29 @@ def build_tree(
     *,
     base_pose: ArrayLike | None,
     tip: str | None,
-    locked: Mapping[str, float] | None,
+    locked: Mapping[str, ArrayLike] | None,
     locked_beyond_limits: bool,
-    acceleration_limits: ArrayLike | None,
-    velocity_limits: ArrayLike | None,
-    effort_limits: ArrayLike | None,
-    jerk_limits: ArrayLike | None,
-    effort_rate_limits: ArrayLike | None,
+    acceleration_limits: LimitValues | None,
+    velocity_limits: LimitValues | None,
+    effort_limits: LimitValues | None,
+    jerk_limits: LimitValues | None,
+    effort_rate_limits: LimitValues | None,
 ) -> KinematicTree:
     """Folds `urdf` into moving joints and frames; see `Robot.from_urdf` for the arguments and the rules."""
-    drives = _drives(urdf, _checked_locks(urdf, locked or {}, beyond_limits=locked_beyond_limits))
-    _check_followers(urdf, locked or {}, drives)
+    poses, values = _poses_and_values(urdf, locked or {})
+    locks = _checked_locks(urdf, values, beyond_limits=locked_beyond_limits)
+    still = [
+        joint for joint in urdf.joints.values() if joint.moves and joint.mimic is None and stands_still(joint)
+    ]
+    still = [joint for joint in still if joint.name not in locks]
+    drives = _drives(urdf, locks | {joint.name: position_bounds(joint)[0] for joint in still})
+    _check_followers(urdf, values, drives)
     kept = _kept_joints(urdf, drives, tip)
+    for joint in kept:
+        if joint in still:
+            urdf.remarks.add(HELD_LIMITS, f"joint {joint.name!r} ({position_bounds(joint)[0]:g})")
+        if joint.free and joint.name not in poses:
+            urdf.remarks.add(HELD_POSE, f"{joint.type} joint {joint.name!r}")
     names = [joint.name for joint in kept if joint.moves and drives[joint.name].source == joint.name]
     if not names:
         raise ValueError(f"{urdf.label} has no movable joint left; give another tip or lock fewer joints")
@@ -77,7 +92,7 @@ def build_tree(
         parent, X_PL = placed[joint.parent]
         X_PJ = X_PL @ joint.placement
         if not joint.moves:
-            placed[joint.child] = (parent, X_PJ)
+            placed[joint.child] = (parent, X_PJ @ poses[joint.name] if joint.name in poses else X_PJ)
             continue
         drive = drives[joint.name]
         if drive.source is None:
@@ -102,24 +117,53 @@ def build_tree(
         )
         placed[joint.child] = (len(joints) - 1, np.eye(4))
 
-    limits = _limits(
+    limits = limits_of(
         [urdf.joints[name] for name in names],
         label=urdf.label,
-        acceleration=DEFAULT_ACCELERATION_LIMIT if acceleration_limits is None else acceleration_limits,
+        remarks=urdf.remarks,
+        acceleration=acceleration_limits,
         velocity=velocity_limits,
         effort=effort_limits,
         jerk=jerk_limits,
         effort_rate=effort_rate_limits,
     )
+    links = tuple(urdf.links[link] for link in placed)
+    check_meshes(links, joints, urdf.remarks)
     frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
     return KinematicTree(
         tuple(joints),
         frames,
         tuple(names),
         limits,
-        tuple(urdf.links[link] for link in placed),
+        links,
         {joint.name: drives[joint.name].offset for joint in kept if joint.moves and _held(drives, joint)},
     )
+
+
+def _poses_and_values(
+    urdf: Urdf, locked: Mapping[str, ArrayLike]
+) -> tuple[dict[str, Array], dict[str, float]]:
+    """Of `locked`, the poses of joints with several coordinates, and the positions of the others."""
+    poses: dict[str, Array] = {}
+    values: dict[str, float] = {}
+    for name, value in locked.items():
+        joint = urdf.joints.get(name)
+        if joint is None or not joint.free:
+            number = real_array(value, f"locked: {name!r}")
+            if number.shape != ():
+                raise ValueError(f"locked: {name!r} has shape {number.shape}, must be one number")
+            values[name] = value if isinstance(value, int | float) else float(number)
+            continue
+        array = real_array(value, f"locked: {name!r}")
+        if array.shape == (6,) and np.isfinite(array).all():
+            array = pose_at(array[:3], from_roll_pitch_yaw(array[3:].tolist()))
+        elif array.shape != (4, 4):
+            raise ValueError(
+                f"locked: {joint.type} joint {name!r} has shape {array.shape}; allowed: a pose (4, 4), or x, y, z [m], "
+                "roll, pitch, yaw [rad]"
+            )
+        poses[name] = checked_pose(array, f"locked: {name!r}")
+    return poses, values
 
 
 def _checked_locks(urdf: Urdf, locked: Mapping[str, float], *, beyond_limits: bool) -> dict[str, float]:
@@ -132,8 +176,7 @@ def _checked_locks(urdf: Urdf, locked: Mapping[str, float], *, beyond_limits: bo
             raise ValueError(
                 f"locked: joint {name!r} {kind}; joints that can be locked: {', '.join(_lockable(urdf))}"
             )
-        limit = joint.limit
-        lower, upper = (-math.inf, math.inf) if limit is None else (limit.lower, limit.upper)
+        lower, upper = position_bounds(joint)
         if not math.isfinite(value) or not (beyond_limits or lower <= value <= upper):
             hint = "" if joint.type == "prismatic" else degrees_hint([value])
             raise ValueError(f"locked: {name!r} = {value} is outside its limits [{lower}, {upper}]{hint}")
@@ -159,7 +202,9 @@ def _check_followers(urdf: Urdf, locked: Mapping[str, float], drives: dict[str, 
 
 
 def _lockable(urdf: Urdf) -> list[str]:
-    return [joint.name for joint in urdf.joints.values() if joint.moves and joint.mimic is None]
+    return [
+        joint.name for joint in urdf.joints.values() if (joint.moves or joint.free) and joint.mimic is None
+    ]
 
 
 def _held(drives: dict[str, _Drive], joint: UrdfJoint) -> bool:
@@ -228,66 +273,3 @@ def _motion(joint: UrdfJoint, value: float) -> Array:
     if joint.type == "prismatic":
         return pose_at(value * joint.axis)
     return pose_at(np.zeros(3), about_axis(joint.axis, value))
-
-
-def _limits(
-    joints: list[UrdfJoint],
-    *,
-    label: str,
-    acceleration: ArrayLike,
-    velocity: ArrayLike | None,
-    effort: ArrayLike | None,
-    jerk: ArrayLike | None,
-    effort_rate: ArrayLike | None,
-) -> JointLimits:
-    unlimited = math.inf
-    for joint in joints:
-        limit = joint.limit
-        if limit is None:
-            continue
-        if not limit.lower < limit.upper:
-            raise ValueError(
-                f"{label}: joint {joint.name!r}: lower limit {limit.lower} must be below upper {limit.upper}"
-                "; a joint without end is continuous"
-            )
-        for what, value, given in (("velocity", limit.velocity, velocity), ("effort", limit.effort, effort)):
-            if given is None and not value > 0.0:
-                raise ValueError(
-                    f"{label}: joint {joint.name!r}: {what} limit is {value}, must be positive; correct the "
-                    f"file, pass {what}_limits or lock the joint"
-                )
-    names = [joint.name for joint in joints]
-    return JointLimits(
-        lower=np.array([-unlimited if j.limit is None else j.limit.lower for j in joints]),
-        upper=np.array([unlimited if j.limit is None else j.limit.upper for j in joints]),
-        velocity=_per_coordinate(
-            [unlimited if j.limit is None else j.limit.velocity for j in joints]
-            if velocity is None
-            else velocity,
-            "velocity_limits",
-            names,
-        ),
-        acceleration=_per_coordinate(acceleration, "acceleration_limits", names),
-        effort=_per_coordinate(
-            [unlimited if j.limit is None else j.limit.effort for j in joints] if effort is None else effort,
-            "effort_limits",
-            names,
-        ),
-        jerk=None if jerk is None else _per_coordinate(jerk, "jerk_limits", names),
-        effort_rate=None
-        if effort_rate is None
-        else _per_coordinate(effort_rate, "effort_rate_limits", names),
-    )
-
-
-def _per_coordinate(value: ArrayLike, what: str, names: list[str]) -> Array:
-    array = real_array(value, what)
-    if array.shape not in ((), (len(names),)):
-        raise ValueError(
-            f"{what} has shape {array.shape}, expected a number or ({len(names)},) for {', '.join(names)}"
-        )
-    array = np.broadcast_to(array, (len(names),)).copy()
-    for name, entry in zip(names, array, strict=True):
-        if not entry > 0.0:
-            raise ValueError(f"{what}: {entry} for {name!r}, must be positive")
-    return array

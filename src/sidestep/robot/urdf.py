@@ -5,28 +5,33 @@ from __future__ import annotations
 import math
 import warnings
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from sidestep.robot.degrees import DEGREES_HINT, looks_like_degrees
-from sidestep.robot.link import Array, Geometry, Inertial, Link
-from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
+from sidestep.robot.elements import attribute, number, numbers, placement, short
+from sidestep.robot.link import Array, Inertial, Link
+from sidestep.robot.plausibility import check_inertia
+from sidestep.robot.remarks import Remarks
 from sidestep.robot.source import Description
+from sidestep.robot.urdf_geometry import shapes_of
 
-JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed")
-_INERTIA_ROUNDING = 1e-12  # [kg m^2] a CAD export's zero; the lightest finger has 1e-7
-GEOMETRY_TYPES = ("mesh", "box", "cylinder", "sphere")
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+FREE_TYPES = ("floating", "planar")  # have more than one coordinate; they are held at a pose
+
+NO_MASS = "<inertial> has no <mass>, and is left out"
+NO_INERTIA = "<inertial> has no whole <inertia>; the mass counts as a point"
 
 
 @dataclass(frozen=True)
 class UrdfLimit:
-    """The limit element of a joint; position [rad | m], velocity [/s], effort [Nm | N]."""
+    """The limit element of a joint; position [rad | m], velocity [/s], effort [Nm | N]; None where not given."""
 
     lower: float
     upper: float
-    velocity: float
-    effort: float
+    velocity: float | None
+    effort: float | None
 
 
 @dataclass(frozen=True)
@@ -53,41 +58,67 @@ class UrdfJoint:
 
     @property
     def moves(self) -> bool:
-        return self.type != "fixed"
+        """Whether it has one coordinate."""
+        return self.type != "fixed" and not self.free
+
+    @property
+    def free(self) -> bool:
+        """Whether it has more than one coordinate."""
+        return self.type in FREE_TYPES
 
 
 @dataclass(frozen=True, eq=False)
 class Urdf:
-    """A checked description: every link is reached from `root`, every joint refers to what exists."""
+    """A checked description: every link is reached from `root`, every joint refers to what exists.
+
+    `remarks` has what was left out or looks wrong.
+    """
 
     name: str
     label: str
     links: dict[str, Link]
     joints: dict[str, UrdfJoint]
     root: str
+    remarks: Remarks = field(default_factory=Remarks)
 
 
 def parse_urdf(description: Description) -> Urdf:
     """Reads every link and joint.
 
     Raises:
-        ValueError: an element, its owner and what is allowed. FileNotFoundError: a missing mesh file.
+        ValueError: an element, its owner and what is allowed; every mesh file of a collision shape that cannot be
+            used, and why. FileNotFoundError: the same where some file is missing.
     """
+    remarks = Remarks()
     links: dict[str, Link] = {}
+    faults: list[str] = []
+    missing = False
     for element in description.root.findall("link"):
-        link = _link(element, description)
-        if link.name in links:
-            raise ValueError(f"{description.label}: link {link.name!r} is defined twice")
-        links[link.name] = link
+        name = attribute(element, "name", f"{description.label}: a link")
+        owner = f"{description.label}: link {name!r}"
+        if name in links:
+            raise ValueError(f"{description.label}: link {name!r} is defined twice")
+        shapes = shapes_of(element, description, owner, remarks)
+        faults += shapes.faults
+        missing = missing or shapes.missing
+        inertial = element.find("inertial")
+        links[name] = Link(
+            name=name,
+            inertial=None if inertial is None else _inertial(inertial, owner, remarks),
+            collisions=tuple(shapes.collisions),
+            visuals=tuple(shapes.visuals),
+        )
     joints: dict[str, UrdfJoint] = {}
     for element in description.root.findall("joint"):
-        joint = _joint(element, description.label)
+        joint = _joint(element, description.label, remarks)
         if joint.name in joints:
             raise ValueError(f"{description.label}: joint {joint.name!r} is defined twice")
         joints[joint.name] = joint
     root = _root(links, joints, description.label)
+    if faults:
+        raise (FileNotFoundError if missing else ValueError)("\n".join(faults))
     _warn_of_degrees(description, joints)
-    return Urdf(description.root.get("name", "robot"), description.label, links, joints, root)
+    return Urdf(description.root.get("name", "robot"), description.label, links, joints, root, remarks)
 
 
 def _warn_of_degrees(description: Description, joints: dict[str, UrdfJoint]) -> None:
@@ -153,9 +184,9 @@ def _root(links: dict[str, Link], joints: dict[str, UrdfJoint], label: str) -> s
     return roots[0]
 
 
-def _joint(element: ElementTree.Element, label: str) -> UrdfJoint:
-    owner = f"{label}: joint {_attribute(element, 'name', f'{label}: a joint')!r}"
-    kind = _attribute(element, "type", owner)
+def _joint(element: ElementTree.Element, label: str, remarks: Remarks) -> UrdfJoint:
+    owner = f"{label}: joint {attribute(element, 'name', f'{label}: a joint')!r}"
+    kind = attribute(element, "type", owner)
     if kind not in JOINT_TYPES:
         raise ValueError(f"{owner} has type {kind!r}; allowed: {', '.join(JOINT_TYPES)}")
     ends = {}
@@ -163,11 +194,11 @@ def _joint(element: ElementTree.Element, label: str) -> UrdfJoint:
         end = element.find(role)
         if end is None:
             raise ValueError(f"{owner} has no <{role}>")
-        ends[role] = _attribute(end, "link", f"{owner}: <{role}>")
+        ends[role] = attribute(end, "link", f"{owner}: <{role}>")
     axis = np.array([1.0, 0.0, 0.0])  # the URDF default
     axis_element = element.find("axis")
-    if axis_element is not None and kind != "fixed":
-        axis = np.array(_numbers(axis_element, "xyz", owner, count=3))
+    if axis_element is not None and kind not in ("fixed", *FREE_TYPES):
+        axis = np.array(numbers(axis_element, "xyz", owner, count=3))
         length = float(np.linalg.norm(axis))
         if length == 0.0:
             raise ValueError(f"{owner}: axis is zero, must have a direction")
@@ -175,21 +206,21 @@ def _joint(element: ElementTree.Element, label: str) -> UrdfJoint:
     limit = _limit(element.find("limit"), kind, owner)
     mimic_element = element.find("mimic")
     mimic = None
-    if mimic_element is not None and kind != "fixed":
+    if mimic_element is not None and kind not in ("fixed", *FREE_TYPES):
         mimic = UrdfMimic(
-            joint=_attribute(mimic_element, "joint", f"{owner}: <mimic>"),
-            multiplier=_number(mimic_element, "multiplier", f"{owner}: <mimic>", default=1.0),
-            offset=_number(mimic_element, "offset", f"{owner}: <mimic>", default=0.0),
+            joint=attribute(mimic_element, "joint", f"{owner}: <mimic>"),
+            multiplier=number(mimic_element, "multiplier", f"{owner}: <mimic>", default=1.0),
+            offset=number(mimic_element, "offset", f"{owner}: <mimic>", default=0.0),
         )
     name = str(element.get("name"))
     return UrdfJoint(
-        name, kind, ends["parent"], ends["child"], _placement(element, owner), axis, limit, mimic
+        name, kind, ends["parent"], ends["child"], placement(element, owner, remarks), axis, limit, mimic
     )
 
 
 def _limit(element: ElementTree.Element | None, kind: str, owner: str) -> UrdfLimit | None:
     """The limit of a moving joint. Revolute and prismatic joints must have one; a continuous one may."""
-    if kind == "fixed":
+    if kind in ("fixed", *FREE_TYPES):
         return None
     if element is None:
         if kind == "continuous":
@@ -198,115 +229,39 @@ def _limit(element: ElementTree.Element | None, kind: str, owner: str) -> UrdfLi
     where = f"{owner}: <limit>"
     lower, upper = -math.inf, math.inf
     if kind != "continuous":
-        lower = _number(element, "lower", where, default=0.0, finite=False)
-        upper = _number(element, "upper", where, default=0.0, finite=False)
+        lower = number(element, "lower", where, default=0.0, finite=False)
+        upper = number(element, "upper", where, default=0.0, finite=False)
     return UrdfLimit(
         lower=lower,
         upper=upper,
-        velocity=_number(element, "velocity", where, finite=False),
-        effort=_number(element, "effort", where, finite=False),
+        velocity=_positive(element, "velocity", where),
+        effort=_positive(element, "effort", where),
     )
 
 
-def _link(element: ElementTree.Element, description: Description) -> Link:
-    name = _attribute(element, "name", f"{description.label}: a link")
-    owner = f"{description.label}: link {name!r}"
-    inertial = element.find("inertial")
-    return Link(
-        name=name,
-        inertial=None if inertial is None else _inertial(inertial, owner),
-        collisions=tuple(_geometry(item, description, owner) for item in element.findall("collision")),
-        visuals=tuple(_geometry(item, description, owner) for item in element.findall("visual")),
-    )
+def _positive(element: ElementTree.Element, key: str, where: str) -> float | None:
+    """A limit; None where it is missing, zero or negative, as exporters write what they do not know."""
+    if not element.get(key):
+        return None
+    value = number(element, key, where, finite=False)
+    return value if value > 0.0 else None
 
 
-def _inertial(element: ElementTree.Element, owner: str) -> Inertial:
+def _inertial(element: ElementTree.Element, owner: str, remarks: Remarks) -> Inertial | None:
     where = f"{owner}: <inertial>"
     mass_element, inertia_element = element.find("mass"), element.find("inertia")
-    if mass_element is None or inertia_element is None:
-        raise ValueError(f"{where} needs <mass> and <inertia>")
-    mass = _number(mass_element, "value", where)
+    if mass_element is None:
+        remarks.add(NO_MASS, short(owner))
+        return None
+    mass = number(mass_element, "value", where)
     if mass < 0.0:
         raise ValueError(f"{where}: mass is {mass}, must not be negative")
-    xx, yy, zz = (_number(inertia_element, key, where) for key in ("ixx", "iyy", "izz"))
-    xy, xz, yz = (_number(inertia_element, key, where, default=0.0) for key in ("ixy", "ixz", "iyz"))
-    if min(xx, yy, zz) < -_INERTIA_ROUNDING:
-        raise ValueError(f"{where}: ixx, iyy, izz are {xx}, {yy}, {zz}, must not be negative")
-    placement = _placement(element, where)
-    rotation = placement[:3, :3]
-    inertia = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
-    return Inertial(mass, placement[:3, 3], inertia)
-
-
-def _geometry(element: ElementTree.Element, description: Description, owner: str) -> Geometry:
-    where = f"{owner}: <{element.tag}>"
-    container = element.find("geometry")
-    shapes = [] if container is None else list(container)
-    if len(shapes) != 1 or shapes[0].tag not in GEOMETRY_TYPES:
-        found = ", ".join(f"<{shape.tag}>" for shape in shapes) or "nothing"
-        raise ValueError(f"{where}: <geometry> holds {found}; allowed: one of {', '.join(GEOMETRY_TYPES)}")
-    shape, placement = shapes[0], _placement(element, where)
-    if shape.tag == "mesh":
-        scale = _numbers(shape, "scale", where, count=3, default="1 1 1")
-        if 0.0 in scale:
-            raise ValueError(f"{where}: mesh scale {scale} must not be zero")
-        path = description.resolve(_attribute(shape, "filename", where), owner)
-        return Geometry("mesh", placement, path=path, scale=np.array(scale))
-    if shape.tag == "box":
-        size = _numbers(shape, "size", where, count=3)
-    elif shape.tag == "cylinder":
-        size = (_number(shape, "radius", where), _number(shape, "length", where))
-    else:
-        size = (_number(shape, "radius", where),)
-    if min(size) <= 0.0:
-        raise ValueError(f"{where}: {shape.tag} dimensions {size} must be positive")
-    if shape.tag == "box":
-        return Geometry("box", placement, size=size)
-    return Geometry("cylinder" if shape.tag == "cylinder" else "sphere", placement, size=size)
-
-
-def _placement(element: ElementTree.Element, owner: str) -> Array:
-    """The pose (4, 4) of <origin>: roll, pitch, yaw about fixed axes, translation; identity if absent."""
-    origin = element.find("origin")
-    if origin is None:
-        return np.eye(4)
-    where = f"{owner}: <origin>"
-    rpy = _numbers(origin, "rpy", where, count=3, default="0 0 0")
-    return pose_at(_numbers(origin, "xyz", where, count=3, default="0 0 0"), from_roll_pitch_yaw(rpy))
-
-
-def _attribute(element: ElementTree.Element, key: str, owner: str) -> str:
-    value = element.get(key)
-    if not value:
-        raise ValueError(f"{owner}: <{element.tag}> has no attribute {key!r}")
-    return value
-
-
-def _number(
-    element: ElementTree.Element, key: str, owner: str, *, default: float | None = None, finite: bool = True
-) -> float:
-    if default is not None and element.get(key) is None:
-        return default
-    text = _attribute(element, key, owner)
-    try:
-        value = float(text)
-    except ValueError:
-        raise ValueError(f"{owner}: {key} is {text!r}, must be a number") from None
-    if math.isnan(value) or (finite and math.isinf(value)):
-        raise ValueError(f"{owner}: {key} is {text!r}, must be a finite number")
-    return value
-
-
-def _numbers(
-    element: ElementTree.Element, key: str, owner: str, *, count: int, default: str | None = None
-) -> tuple[float, ...]:
-    text = element.get(key) or default
-    if text is None:
-        raise ValueError(f"{owner}: <{element.tag}> has no attribute {key!r}")
-    try:
-        values = tuple(float(part) for part in text.split())
-    except ValueError:
-        values = ()
-    if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise ValueError(f"{owner}: {key} is {text!r}, must be {count} finite numbers")
-    return values
+    X = placement(element, where, remarks)
+    if inertia_element is None or not all(inertia_element.get(key) for key in ("ixx", "iyy", "izz")):
+        remarks.add(NO_INERTIA, short(owner))
+        return Inertial(mass, X[:3, 3], np.zeros((3, 3)))
+    xx, yy, zz = (number(inertia_element, key, where) for key in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (number(inertia_element, key, where, default=0.0) for key in ("ixy", "ixz", "iyz"))
+    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    check_inertia(mass, own, short(owner), remarks)
+    return Inertial(mass, X[:3, 3], X[:3, :3] @ own @ X[:3, :3].T)

@@ -92,6 +92,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
     """
     _at("simulation", scenario, scenario.check_steps)
     robot = _at("robot", scenario, partial(load_robot, scenario))
+    _at("simulation.mode", scenario, partial(check_torque, scenario, robot))
     start = _at("start.position", scenario, partial(coordinates, scenario.start, robot, "start.position"))
     velocity = _at("start.velocity", scenario, partial(start_velocity, scenario.start, robot))
     objects: list[SceneObject] = []
@@ -174,7 +175,8 @@ def load_robot(scenario: Scenario) -> Robot:
     """The robot that a scenario asks for; raises ValueError or FileNotFoundError that says what is wrong."""
     choice: RobotConfig = scenario.robot
     if choice.name is not None:
-        extras = [key for key in ("package_dirs", "tip", "locked", "base") if getattr(choice, key)]
+        of_file = ("package_dirs", "tip", "locked", "base", "effort_limits", "velocity_limits")
+        extras = [key for key in of_file if getattr(choice, key)]
         if extras:
             raise ValueError(f"{', '.join(extras)} go with 'urdf', not with a named robot")
         return Robot.named(choice.name)
@@ -185,7 +187,28 @@ def load_robot(scenario: Scenario) -> Robot:
         tip=choice.tip,
         locked=choice.locked,
         base_pose=None if choice.base is None else pose_of(choice.base),
+        effort_limits=choice.effort_limits,
+        velocity_limits=choice.velocity_limits,
     )
+
+
+def check_torque(scenario: Scenario, robot: Robot) -> None:
+    """Raises ValueError where the motion is by torque, and the robot lacks effort limits or inertias for it."""
+    if scenario.simulation.mode != "torque":
+        return
+    names = [
+        name for name, most in zip(robot.coordinate_names, robot.limits.effort, strict=True) if np.isinf(most)
+    ]
+    if names:
+        raise ValueError(
+            f"simulation.mode is 'torque', and joints of robot {robot.name!r} have no effort limit: "
+            f"{', '.join(names)}; write robot.effort_limits: {{{names[0]}: 87.0}} [Nm | N], or mode: kinematic"
+        )
+    if all(inertial.mass == 0.0 for inertial in robot.inertials):
+        raise ValueError(
+            f"simulation.mode is 'torque', and no moving link of robot {robot.name!r} has an <inertial> with mass; "
+            "write them into its description, or mode: kinematic"
+        )
 
 
 def coordinates(state: JointState, robot: Robot, name: str) -> Array:

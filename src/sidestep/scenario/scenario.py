@@ -35,7 +35,10 @@ class BasePose:
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """A robot by name, or by URDF file with the joints `locked` [rad | m], a `tip` and a `base`."""
+    """A robot by name, or by URDF file with the joints `locked` [rad | m], a `tip`, a `base`, and limits by joint.
+
+    effort_limits [Nm | N], velocity_limits [rad/s | m/s]: in place of those of the file.
+    """
 
     name: str | None = None
     urdf: str | None = None
@@ -43,6 +46,8 @@ class RobotConfig:
     tip: str | None = None
     locked: dict[str, float] | None = None
     base: BasePose | None = None
+    effort_limits: dict[str, float] | None = None
+    velocity_limits: dict[str, float] | None = None
 
 
 @dataclass(frozen=True)

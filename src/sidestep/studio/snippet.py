@@ -139,6 +139,9 @@ def robot_code(robot: RobotConfig, scenario: Scenario) -> str:
         parts.append(f"locked={robot.locked!r}")
     if robot.base is not None:
         parts.append(f"base_pose={pose_of(robot.base).tolist()!r}")
+    for limits in ("effort_limits", "velocity_limits"):
+        if getattr(robot, limits) is not None:
+            parts.append(f"{limits}={getattr(robot, limits)!r}")
     return f"ss.Robot.from_urdf({', '.join(parts)})"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,8 @@ def starting_scenario(
     robot: str | None = None,
     urdf: Path | None = None,
     package_dirs: Sequence[Path] = (),
+    effort_limits: Mapping[str, float] | None = None,
+    velocity_limits: Mapping[str, float] | None = None,
 ) -> Scenario:
     """A scenario by file or name, or one ball beside the way of a robot that turns its first joint.
 
@@ -36,12 +38,19 @@ def starting_scenario(
     """
     if sum(choice is not None for choice in (scenario, robot, urdf)) > 1:
         raise ValueError("give one of a scenario, --robot and --urdf")
+    if urdf is None and (effort_limits or velocity_limits):
+        raise ValueError("limits of joints go with --urdf; a scenario file has robot.effort_limits")
     if scenario is not None:
         return Scenario.load(scenario)
     choice = (
         RobotConfig(name=robot or DEFAULT_ROBOT)
         if urdf is None
-        else RobotConfig(urdf=str(urdf), package_dirs=tuple(str(folder) for folder in package_dirs))
+        else RobotConfig(
+            urdf=str(urdf),
+            package_dirs=tuple(str(folder) for folder in package_dirs),
+            effort_limits=dict(effort_limits or {}) or None,
+            velocity_limits=dict(velocity_limits or {}) or None,
+        )
     )
     return scenario_of(choice)
 

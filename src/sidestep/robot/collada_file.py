@@ -1,0 +1,57 @@
+"""COLLADA geometry without its materials: what has no part in a shape cannot break it."""
+
+from __future__ import annotations
+
+import io
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+_NO_SHAPE = frozenset(
+    (
+        *(
+            f"library_{kind}"
+            for kind in ("materials", "effects", "images", "lights", "cameras", "animations")
+        ),
+        *(
+            f"library_{kind}"
+            for kind in ("animation_clips", "physics_materials", "physics_models", "physics_scenes")
+        ),
+        *("library_force_fields", "bind_material", "instance_light", "instance_camera", "extra"),
+        *("instance_physics_scene", "lines", "linestrips"),
+    )
+)
+_UNREAD = {  # elements with a shape that the reader behind trimesh passes over
+    "instance_controller": "a skinned or morphed shape",
+    "tristrips": "triangle strips",
+    "trifans": "triangle fans",
+    "convex_mesh": "a convex mesh",
+    "spline": "a spline",
+}
+
+
+def shape_alone(path: Path) -> io.BytesIO:
+    """The file without materials, lights, cameras and animations, for trimesh.
+
+    Raises:
+        ValueError: it is no XML, or has a kind of shape that is not read; does not name the file.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise ValueError(f"it is no well-formed XML: {error}") from error
+    for element in list(root.iter()):
+        for child in list(element):
+            if _name(child) in _NO_SHAPE:
+                element.remove(child)
+    for element in root.iter():
+        if _name(element) in _UNREAD:
+            raise ValueError(f"it holds {_UNREAD[_name(element)]} (<{_name(element)}>), which is not read")
+        if _name(element) in ("triangles", "polylist", "polygons"):
+            element.attrib.pop("material", None)
+    return io.BytesIO(ElementTree.tostring(root))
+
+
+def _name(element: ElementTree.Element) -> str:
+    tag: Any = element.tag  # comments have a function
+    return tag.rpartition("}")[2] if isinstance(tag, str) else ""

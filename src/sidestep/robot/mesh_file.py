@@ -1,0 +1,111 @@
+"""Mesh files as bytes: what is wrong with one, what it holds, and how large it is, without reading its triangles."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+_STL_HEADER = 84  # bytes: 80 of text, 4 of the number of triangles
+_STL_TRIANGLE = 50  # bytes
+_TAIL = 4096  # bytes at the end in which the last element of a text file is looked for
+_MOST_TEXT = 2_000_000  # bytes of a text file whose vertices are read for its size: a tenth of a second
+_OBJ_VERTEX = re.compile(rb"^v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_COLLADA_END = re.compile(rb"</(?:\w+:)?COLLADA\s*>")
+_LFS = b"version https://git-lfs"
+
+
+def fault_of(path: Path) -> str:
+    """What is wrong with a mesh file, "" if nothing is seen; looks at its size, beginning and end."""
+    size = path.stat().st_size
+    if size == 0:
+        return "is empty (0 bytes)"
+    with path.open("rb") as file:
+        head = file.read(_STL_HEADER)
+        file.seek(max(size - _TAIL, 0))
+        tail = file.read()
+    if head.startswith(_LFS):
+        return "is a Git LFS pointer, not the mesh; run `git lfs pull` in its repository"
+    kind = kind_of(path)
+    if kind == "stl" and _is_binary_stl(path):
+        count = int.from_bytes(head[80:84], "little")
+        if count == 0:
+            return "holds no triangles: its header says 0"
+        if size < _STL_HEADER + _STL_TRIANGLE * count:
+            there = max(size - _STL_HEADER, 0) // _STL_TRIANGLE
+            return f"is truncated: its header says {count} triangles, {there} are there"
+    elif kind == "stl":
+        if size > _TAIL or b"facet" in tail:
+            return "" if b"endsolid" in tail else "is truncated: it has no endsolid"
+        return "holds no triangles" if b"endsolid" in tail else "is truncated: it ends in its header"
+    elif kind == "dae" and _COLLADA_END.search(tail) is None:
+        return "is truncated: it does not end with </COLLADA>"
+    elif kind == "glb" and len(head) >= 12 and size < int.from_bytes(head[8:12], "little"):
+        return f"is truncated: its header says {int.from_bytes(head[8:12], 'little')} bytes, {size} are there"
+    return ""
+
+
+def kind_of(path: Path) -> str:
+    """The format of a mesh file, as the suffix of its name would be: by content where it tells, else by name."""
+    with path.open("rb") as file:
+        head = file.read(1024)
+    suffix = path.suffix.lower().lstrip(".")
+    if head.startswith(b"glTF"):
+        return "glb"
+    if head.startswith((b"ply\n", b"ply\r")):
+        return "ply"
+    if b"<COLLADA" in head:
+        return "dae"
+    if suffix == "stl":
+        return "stl"
+    if head.lstrip().startswith(b"solid") and b"facet" in head:
+        return "stl"
+    whole = _STL_HEADER + _STL_TRIANGLE * int.from_bytes(head[80:84], "little")
+    if len(head) >= _STL_HEADER and path.stat().st_size == whole:
+        return "stl"
+    return suffix
+
+
+def extents_of(path: Path) -> NDArray[np.float64] | None:
+    """The edges (3,) of the box around a mesh, in the file's unit; None where that takes reading it as a mesh."""
+    kind = kind_of(path)
+    if kind == "obj" or (kind == "stl" and not _is_binary_stl(path)):
+        if path.stat().st_size > _MOST_TEXT:
+            return None
+        return _size((_OBJ_VERTEX if kind == "obj" else _STL_VERTEX).findall(path.read_bytes()))
+    if kind != "stl":
+        return None
+    content = np.memmap(path, dtype=np.uint8, mode="r")[_STL_HEADER:]
+    count = len(content) // _STL_TRIANGLE
+    rows = content[: count * _STL_TRIANGLE].reshape(count, _STL_TRIANGLE)
+    corners = np.ascontiguousarray(rows[:, 12:48]).view("<f4").reshape(-1, 3)
+    return _size(corners)
+
+
+def _size(corners: NDArray[np.float32] | Sequence[tuple[bytes, ...]]) -> NDArray[np.float64] | None:
+    """Edges (3,) of the box around corners (N, 3); None where they are no finite numbers."""
+    try:
+        array = np.asarray(corners, dtype=np.float64)
+    except ValueError:
+        return None
+    if not len(array) or not np.isfinite(array).all():
+        return None
+    return np.asarray(array.max(axis=0) - array.min(axis=0), dtype=np.float64)
+
+
+def _is_binary_stl(path: Path) -> bool:
+    """Whether an STL is not text: many binary ones begin with "solid" as text does."""
+    with path.open("rb") as file:
+        head = file.read(1024)
+    if not head.lstrip().startswith(b"solid"):
+        return True
+    size = path.stat().st_size
+    if len(head) >= _STL_HEADER and size == _STL_HEADER + _STL_TRIANGLE * int.from_bytes(
+        head[80:84], "little"
+    ):
+        return True
+    return re.search(rb"[^\t\n\v\f\r -\xff]", head) is not None

@@ -1,0 +1,96 @@
+"""What a description says that no arm has: inertias, velocities, efforts and sizes of meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sidestep._core import Joint, JointType
+from sidestep.robot.link import Array, Link
+from sidestep.robot.mesh_file import extents_of
+from sidestep.robot.remarks import Remarks
+
+_NEGATIVE = 1e-6  # of the largest principal inertia: rounding of a file
+_TRIANGLE = 1e-2  # of the largest principal inertia: files write three digits
+_ROUNDING = 1e-12  # [kg m^2] a CAD export's zero; the lightest finger has 1e-7
+_MOST_GYRATION = 10.0  # [m] radius; links are shorter than that
+_MOST_VELOCITY = 50.0  # [rad/s | m/s] 480 rpm: joints of arms turn at up to 20 rad/s
+_MOST_EFFORT = 1e6  # [Nm | N] the largest arms have some 1e4
+_LARGE, _SMALL = 10.0, 0.01  # edges of a mesh as a share of the arm's length: 1 mm for 1 m is 1000
+_LEAST_LENGTH = 0.5  # [m] of an arm, for this: one of a single joint has none
+
+IMPOSSIBLE_INERTIA = (
+    "no rigid body has such an inertia: principal inertias are positive, and each at most the sum of the other two; "
+    "the likely cause is a wrong sign or unit, or an <inertia> about another point than the centre of mass"
+)
+LARGE_INERTIA = (
+    "the inertia is too large for the mass; the likely cause is kg mm^2 or g mm^2 in place of kg m^2"
+)
+FAST = (
+    "so fast is no joint; the likely cause is deg/s in place of rad/s, or a placeholder: pass velocity_limits"
+)
+STRONG = "so strong is no joint; the likely cause is a placeholder: pass effort_limits"
+LARGE_MESH = (
+    'the mesh is far larger than the arm; the likely cause is millimetres: write scale="0.001 0.001 0.001"'
+)
+SMALL_MESH = (
+    "the mesh is far smaller than the arm; the likely cause is a scale on a file that is in metres already"
+)
+
+
+def check_inertia(mass: float, inertia: Array, owner: str, remarks: Remarks) -> None:
+    """Remarks on a rotational inertia (3, 3) about the centre of mass that no body of this mass has."""
+    principal = np.linalg.eigvalsh(inertia)
+    most = float(np.abs(principal).max())
+    what = f"{owner} ({', '.join(f'{value:.3g}' for value in principal)} kg m^2 at {mass:g} kg)"
+    negative = principal[0] < -_NEGATIVE * most - _ROUNDING
+    if negative or principal[2] > principal[0] + principal[1] + _TRIANGLE * most + _ROUNDING:
+        remarks.add(IMPOSSIBLE_INERTIA, what)
+    elif mass > 0.0 and most > mass * _MOST_GYRATION**2:
+        remarks.add(LARGE_INERTIA, what)
+
+
+def check_limits(names: Sequence[str], velocity: Array, effort: Array, remarks: Remarks) -> None:
+    """Remarks on velocity and effort limits that no joint has; infinite ones are none."""
+    for values, most, kind, what in (
+        (velocity, _MOST_VELOCITY, FAST, "velocity"),
+        (effort, _MOST_EFFORT, STRONG, "effort"),
+    ):
+        for name, value in zip(names, values, strict=True):
+            if most < value < np.inf:
+                remarks.add(kind, f"{what} limit {value:g} of joint {name!r}")
+
+
+def check_meshes(links: Sequence[Link], joints: Sequence[Joint], remarks: Remarks) -> None:
+    """Remarks on meshes far larger or smaller than the arm, as far as files tell their size without being read."""
+    length = arm_length(joints)
+    sizes = []
+    for link in links:
+        for geometry in link.geometries:
+            extents = None if geometry.path is None else extents_of(geometry.path)
+            if extents is None:
+                continue
+            size = float((extents * np.abs(geometry.scale)).max())
+            sizes.append((size, f"link {link.name!r} ({size:.3g} m, the arm {length:.3g} m)"))
+            check_size(link.name, size, length, remarks)
+    if sizes and max(sizes)[0] < _SMALL * length:
+        for _, what in sizes:
+            remarks.add(SMALL_MESH, what)
+
+
+def check_size(link: str, size: float, length: float, remarks: Remarks) -> None:
+    """A remark on a mesh far larger than the arm; its longest edge and the arm's length [m]."""
+    if size > _LARGE * max(length, _LEAST_LENGTH):
+        remarks.add(LARGE_MESH, f"link {link!r} ({size:.3g} m, the arm {length:.3g} m)")
+
+
+def arm_length(joints: Sequence[Joint]) -> float:
+    """The longest way over the joints [m], stretched; without the strokes of prismatic ones."""
+    reach: list[float] = []
+    for joint in joints:
+        before = 0.0 if joint.parent < 0 else reach[joint.parent]
+        own = 0.0 if joint.parent < 0 else float(np.linalg.norm(joint.placement[:3, 3]))
+        reach.append(before + own)
+    turning = any(joint.type == JointType.revolute for joint in joints)
+    return max(reach, default=0.0) if turning else 0.0
