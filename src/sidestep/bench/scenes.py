@@ -207,7 +207,7 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
             "motion_s": _upper([o.time_s for _, o in solved]),
             "time_ratio": _upper([i.time_ratio for i, _ in solved if i.time_ratio is not None]),
             "jerk_time_ratio": _upper(jerk_ratios),
-            "jerk_time_ratio_unsolved": sum(np.isnan(ratio) for ratio in jerk_ratios),
+            "jerk_time_ratio_unsolved": int(np.isnan(jerk_ratios).sum()),
             "min_clearance_mm": _lower(clearances, 1e3),
         }
     figures["goal_beyond_limits"] = sum(item.goal_beyond_limits > 0.0 for item in items)
