@@ -49,8 +49,9 @@ def jerk_limited_optimum(
         |q' v| ≤ velocity,   |q' a + q'' v²| ≤ acceleration   at nodes,
         |q' u + 3 q'' v a + q''' v³| ≤ jerk                    at both ends of an interval.
 
-    Ipopt starts from TOPP-RA's timing, stretched; then from a smooth one. None where it does not converge from
-    either, or what it finds breaks a limit between nodes by more than `EXCESS`.
+    Ipopt starts from TOPP-RA's timing, stretched; then from a smooth one. Intervals that break a limit between nodes
+    by more than `EXCESS` are divided, and the program is solved again. None where Ipopt converges from neither start,
+    or an interval still breaks a limit after `REFINEMENTS`.
 
     Raises:
         MissingExtraError: casadi is not installed.

@@ -120,5 +120,7 @@ def topp_ra_timing(path: ExecutedPath, limits: Limits) -> PathTiming | None:
     if found is None:
         return None
     v, a = found
+    if np.any(v[1:] + v[:-1] <= 0.0):  # it stands still on the way
+        return None
     h = 2.0 * np.diff(grid) / (v[1:] + v[:-1])
     return PathTiming(grid, v, np.append(a, a[-1]), np.zeros(GRID), h)
