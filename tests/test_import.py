@@ -180,6 +180,12 @@ def test_the_extras_hold_what_the_errors_say() -> None:
 @pytest.mark.parametrize(
     ("hidden", "code", "extra"),
     [
+        (
+            "casadi",
+            "from sidestep.bench.scenes import SceneSettings, run_scenes; "
+            "run_scenes(SceneSettings(robot='planar3', jerk_time_ratio=True), [None])",
+            "bench",
+        ),
         ("trimesh", "import sidestep as ss; ss.Robot.named('planar3').collision_mesh('link1')", "prepare"),
         (
             "scipy",

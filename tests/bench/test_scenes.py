@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,6 +65,40 @@ def test_the_report_counts_them(result: SceneResult) -> None:
     assert document["unknown_joints"] == ["gripper"]
     assert [(item["set"], item["index"]) for item in document["failures"]] == [("sweep", 2)]
     json.dumps(document, allow_nan=False)
+
+
+def test_motions_without_an_optimum_are_counted(result: SceneResult) -> None:
+    free, inside = result.outcomes
+    ratios = (1.25, 1.5, float("nan"))
+    several = replace(result, outcomes=(*(replace(free, jerk_time_ratio=ratio) for ratio in ratios), inside))
+    figures = several.to_document()["all"]
+    assert figures["jerk_time_ratio"]["median"] == pytest.approx(1.375)
+    assert figures["jerk_time_ratio_unsolved"] == 1
+    plain = result.to_document()["all"]
+    assert plain["jerk_time_ratio"] is None
+    assert plain["jerk_time_ratio_unsolved"] == 0
+
+
+def test_the_optimum_needs_its_package_before_anything_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(ModuleNotFoundError, match="casadi"):
+        run_scenes(replace(SETTINGS, jerk_time_ratio=True), read_motion_bench_maker(PLANAR))
+
+
+@pytest.mark.slow
+def test_the_command_states_the_time_over_the_optimum(tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    command = ["bench", "motionbenchmaker", str(PLANAR), "--robot", "planar3", "--method", "unswitched"]
+    run = CliRunner().invoke(
+        app,
+        [*command, "--optimum", "--jobs", "1", "--problems", "1", "--json", str(out)],
+        env={"COLUMNS": "220"},
+    )
+    assert run.exit_code == 0, run.output
+    assert "over optimum" in run.output
+    figures = json.loads(out.read_text())["all"]
+    assert figures["jerk_time_ratio_unsolved"] == 0
+    assert 1.0 < figures["jerk_time_ratio"]["median"] < figures["time_ratio"]["median"]
 
 
 @pytest.mark.slow

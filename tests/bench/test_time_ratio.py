@@ -5,7 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sidestep._core import JointLimits
-from sidestep.bench.time_ratio import KNOTS, ratio_to_optimum
+from sidestep.bench import jerk_limited_optimum
+from sidestep.bench.executed_path import SHORTEST
+from sidestep.bench.time_ratio import KNOTS, ratio_to_jerk_limited_optimum, ratio_to_optimum
 
 
 def limits(velocity: float, acceleration: float) -> JointLimits:
@@ -16,6 +18,7 @@ def limits(velocity: float, acceleration: float) -> JointLimits:
         velocity=velocity * pair,
         acceleration=acceleration * pair,
         effort=pair,
+        jerk=100.0 * acceleration * pair,
     )
 
 
@@ -50,3 +53,21 @@ def test_a_path_too_short_for_a_spline_has_none(way: float):
 def test_without_limits_there_is_no_optimum():
     q, duration = straight(1.0, 4.0)
     assert ratio_to_optimum(q, duration, limits(np.inf, 4.0)) is None
+
+
+def test_with_a_limit_of_jerk_the_ratio_is_smaller_and_nan_where_none_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    q, duration = straight(1.0, 4.0)
+    found = ratio_to_jerk_limited_optimum(q, 2.0 * duration, limits(5.0, 4.0))
+    assert found is not None
+    # 10 ms for each ramp of acceleration: 1 s becomes 1.01 s; jerk switches at nodes alone
+    assert_allclose(found, 2.0 / 1.01, rtol=0.01)
+    monkeypatch.setattr(jerk_limited_optimum, "ITERATIONS", 2)
+    assert np.isnan(ratio_to_jerk_limited_optimum(q, duration, limits(5.0, 4.0)))
+
+
+def test_with_a_limit_of_jerk_too_a_short_path_or_no_limit_has_none():
+    q, duration = straight(1.0, 4.0)
+    assert ratio_to_jerk_limited_optimum(q, duration, limits(np.inf, 4.0)) is None
+    assert ratio_to_jerk_limited_optimum(0.9 * SHORTEST * q, duration, limits(5.0, 4.0)) is None

@@ -22,7 +22,7 @@ from sidestep.bench.parallel import Progress, Worker, cpu_name, run_tasks
 from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
-from sidestep.bench.time_ratio import ratio_to_optimum
+from sidestep.bench.time_ratio import ratio_to_jerk_limited_optimum, ratio_to_optimum
 from sidestep.distance import Clearance, EllipsoidClearance, SceneObject
 
 Array = npt.NDArray[np.float64]
@@ -40,6 +40,7 @@ class SceneSettings:
         point_radius: of those points [m].
         only_clearances: measure start and goal and move nothing.
         time_ratio: of the motions that arrive, see `ratio_to_optimum`; needs the package toppra.
+        jerk_time_ratio: of the same motions, see `ratio_to_jerk_limited_optimum`; needs casadi as well.
 
     Raises:
         ValueError: jobs below 1, a length that is not positive.
@@ -53,6 +54,7 @@ class SceneSettings:
     point_radius: float = POINT_RADIUS
     only_clearances: bool = False
     time_ratio: bool = False
+    jerk_time_ratio: bool = False
 
     def __post_init__(self) -> None:
         if self.jobs < 1:
@@ -98,6 +100,7 @@ class SceneOutcome:
         tolerance: of arriving [rad | m]. arrives: it should arrive; False where the goal stays blocked.
         ended: what the guide said at the end; empty without a guide.
         time_ratio: see `ratio_to_optimum`; None where it was not asked for or there is none.
+        jerk_time_ratio: see `ratio_to_jerk_limited_optimum`; None where it was not asked for, NaN where none is found.
     """
 
     set: str
@@ -116,6 +119,7 @@ class SceneOutcome:
     arrives: bool = True
     ended: str = ""
     time_ratio: float | None = None
+    jerk_time_ratio: float | None = None
 
     @property
     def solved(self) -> bool:
@@ -184,6 +188,7 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
     moved = [item.outcome for item in items if item.outcome is not None]
     solved = [(item, item.outcome) for item in items if item.solved and item.outcome is not None]
     clearances = [o.min_clearance_m for _, o in solved if o.min_clearance_m is not None]
+    jerk_ratios = [i.jerk_time_ratio for i, _ in solved if i.jerk_time_ratio is not None]
     figures: dict[str, Any] = {"problems": len(items)}
     if moved:
         figures |= {
@@ -201,6 +206,8 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
             "path_length_rad": _upper([i.path_length for i, _ in solved]),
             "motion_s": _upper([o.time_s for _, o in solved]),
             "time_ratio": _upper([i.time_ratio for i, _ in solved if i.time_ratio is not None]),
+            "jerk_time_ratio": _upper(jerk_ratios),
+            "jerk_time_ratio_unsolved": int(np.isnan(jerk_ratios).sum()),
             "min_clearance_mm": _lower(clearances, 1e3),
         }
     figures["goal_beyond_limits"] = sum(item.goal_beyond_limits > 0.0 for item in items)
@@ -242,9 +249,12 @@ def run_scenes(
 
     Raises:
         ValueError: no problem, or one that the robot's joints do not fit.
+        MissingExtraError: a ratio is asked for whose package is not installed.
     """
     if not problems:
         raise ValueError("there is no problem to run")
+    if settings.jerk_time_ratio:
+        import casadi  # noqa: F401  here, before anything moves
     return collect(settings, partial(_Worker, settings), list(problems), progress)
 
 
@@ -301,9 +311,13 @@ def judged(
     """
     published = problem.goal if goal is None else goal
     motion = None if settings.only_clearances else arm.move(problem, settings.motion)
-    ratio = None
-    if settings.time_ratio and motion is not None and motion.arrived:
-        ratio = ratio_to_optimum(motion.q, settings.motion.period * (len(motion.q) - 1), arm.robot.limits)
+    ratio = jerk_ratio = None
+    if motion is not None and motion.arrived:
+        duration, limits = settings.motion.period * (len(motion.q) - 1), arm.robot.limits
+        if settings.time_ratio:
+            ratio = ratio_to_optimum(motion.q, duration, limits)
+        if settings.jerk_time_ratio:
+            jerk_ratio = ratio_to_jerk_limited_optimum(motion.q, duration, limits)
     outcome = SceneOutcome(
         set=set,
         index=problem.index,
@@ -321,5 +335,6 @@ def judged(
         arrives=arrives,
         ended="" if motion is None else motion.ended,
         time_ratio=ratio,
+        jerk_time_ratio=jerk_ratio,
     )
     return outcome, StepTimes() if motion is None else times_of(motion)

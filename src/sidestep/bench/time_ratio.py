@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import logging
-from typing import Protocol
-
 import numpy as np
 import numpy.typing as npt
+
+from sidestep.bench import path_timing
+from sidestep.bench.executed_path import SHORTEST, ExecutedPath
+from sidestep.bench.jerk_limited_optimum import jerk_limited_optimum
+from sidestep.bench.topp_ra import Limits, fastest_along
 
 Array = npt.NDArray[np.float64]
 
 KNOTS = 0.05  # [rad | m] of arc length between two knots of the spline
 GRID = 10  # points of TOPP-RA per knot
-
-
-class Limits(Protocol):
-    """Velocity and acceleration limits (nv,) of joints."""
-
-    @property
-    def velocity(self) -> Array: ...
-
-    @property
-    def acceleration(self) -> Array: ...
 
 
 def ratio_to_optimum(q: Array, duration: float, limits: Limits) -> float | None:
@@ -38,9 +30,7 @@ def ratio_to_optimum(q: Array, duration: float, limits: Limits) -> float | None:
 
 def optimum_over(q: Array, limits: Limits) -> float | None:
     """The duration [s] of TOPP-RA along a motion's path, see `ratio_to_optimum`."""
-    import toppra
-    from toppra.algorithm import TOPPRA
-    from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+    from scipy.interpolate import CubicSpline
 
     if not (np.isfinite(limits.velocity).all() and np.isfinite(limits.acceleration).all()):
         return None
@@ -52,11 +42,25 @@ def optimum_over(q: Array, limits: Limits) -> float | None:
         return None
     at = np.linspace(0.0, s[-1], knots + 1)
     way = np.column_stack([np.interp(at, s, column) for column in q.T])
-    logging.getLogger("toppra").setLevel(logging.ERROR)
-    bounds = [
-        JointVelocityConstraint(np.column_stack([-limits.velocity, limits.velocity])),
-        JointAccelerationConstraint(np.column_stack([-limits.acceleration, limits.acceleration])),
-    ]
     grid = np.linspace(0.0, s[-1], GRID * knots + 1)
-    found = TOPPRA(bounds, toppra.SplineInterpolator(at, way), gridpoints=grid).compute_trajectory(0.0, 0.0)
-    return None if found is None else float(found.duration)
+    found = fastest_along(CubicSpline(at, way), grid, limits)
+    if found is None:
+        return None
+    speed, _ = found
+    return float(np.sum(2.0 * np.diff(grid) / (speed[1:] + speed[:-1])))
+
+
+def ratio_to_jerk_limited_optimum(q: Array, duration: float, limits: path_timing.Limits) -> float | None:
+    """Time of a motion over the shortest one on its path within velocity, acceleration and jerk limits [-].
+
+    The path is the smooth spline of `ExecutedPath` through positions `q` (T, nv); see `jerk_limited_optimum` for the
+    shortest motion over it, from rest to rest. NaN where no such spline or no optimum is found. None where there is
+    nothing to find: a path shorter than `SHORTEST`, or a limit that is not finite.
+    """
+    if not all(np.isfinite(limit).all() for limit in (limits.velocity, limits.acceleration, limits.jerk)):
+        return None
+    if np.linalg.norm(np.diff(q, axis=0), axis=1).sum() < SHORTEST:
+        return None
+    path = ExecutedPath.through(q)
+    found = None if path is None else jerk_limited_optimum(path, limits)
+    return float("nan") if found is None else duration / found.timing.duration

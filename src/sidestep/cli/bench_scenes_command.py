@@ -38,6 +38,7 @@ COLUMNS = (  # title, key of the figures, decimals, which quantiles
     ("path [rad | m]", "path_length_rad", 2, ("median", "p95", "p99")),
     ("motion [s]", "motion_s", 2, ("median", "p95", "p99")),
     ("over TOPP-RA", "time_ratio", 2, ("median", "p95", "p99")),
+    ("over optimum", "jerk_time_ratio", 2, ("median", "p95", "p99")),
     ("clearance [mm]", "min_clearance_mm", 1, ("min", "p5", "median")),
 )
 
@@ -55,6 +56,9 @@ def motion_bench_maker(
     only: Annotated[list[str] | None, typer.Option(help="Only this set; may be repeated.")] = None,
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Measure starts and goals only, move nothing.")
+    ] = False,
+    optimum: Annotated[
+        bool, typer.Option("--optimum", help="Also the time over the shortest with a limit of jerk; slow.")
     ] = False,
     spacing: SpacingOption = SPACING,
     point_radius: PointRadiusOption = POINT_RADIUS,
@@ -74,6 +78,8 @@ def motion_bench_maker(
 
     Over TOPP-RA: time of a motion over that of the time-optimal one along the path it took, from rest to rest,
     within the same velocity and acceleration limits and without a limit of jerk. Needs the `bench` extra.
+
+    Over optimum (`--optimum`): the same with the limit of jerk too, by a nonlinear program; takes seconds a motion.
     """
     from sidestep.bench import read_motion_bench_maker, run_scenes
 
@@ -85,7 +91,8 @@ def motion_bench_maker(
     chosen = _first_of_sets(found, only or sets, problems)
     motion = {"period": period, "duration": duration, "tolerance": tolerance, "torque": torque}
     points = {"spacing": spacing, "point_radius": point_radius}
-    settings = _settings(robot, method, jobs, motion, **points, only_clearances=clearances, time_ratio=True)
+    ratios = {"time_ratio": True, "jerk_time_ratio": optimum}
+    settings = _settings(robot, method, jobs, motion, **points, **ratios, only_clearances=clearances)
     run_and_report(
         settings,
         lambda show: run_scenes(settings, chosen, progress=show),
@@ -173,7 +180,12 @@ def run_and_report(
     if not quiet:
         terminal.print(_ends(document))
         if not settings.only_clearances:
-            terminal.print(_motions(document))
+            terminal.print(_motions(document, optimum=settings.jerk_time_ratio))
+            unsolved = document["all"]["jerk_time_ratio_unsolved"]
+            if unsolved:
+                terminal.print(
+                    f"no optimum found for {unsolved} of the motions, which are not in 'over optimum'"
+                )
         for item in document.get("failures", ()):
             line = f"{item['set']} {item['index']}  {'; '.join(item['reasons'])}"
             terminal.print(line, highlight=False, markup=False)
@@ -187,14 +199,15 @@ def _rows(document: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     return [*document["sets"].items(), ("all", document["all"])]
 
 
-def _motions(document: dict[str, Any]) -> object:
+def _motions(document: dict[str, Any], *, optimum: bool) -> object:
+    columns = [column for column in COLUMNS if optimum or column[1] != "jerk_time_ratio"]
     caption = "median, 95 %, 99 % of solved; clearance: min, 5 %, median"
-    titles = (title for title, *_ in COLUMNS)
+    titles = (title for title, *_ in columns)
     table = figures_table("set", "solved", "touched", "limits", *titles, caption=caption)
     for name, figures in _rows(document):
         cells = [f"{figures['solved']} of {figures['problems']}"]
         cells += [str(figures["collision"] + figures["self_collision"]), str(figures["limit_violations"])]
-        for _, key, decimals, which in COLUMNS:
+        for _, key, decimals, which in columns:
             values = figures[key]
             cells.append("-" if values is None else "  ".join(f"{values[q]:.{decimals}f}" for q in which))
         table.add_row(name, *cells)

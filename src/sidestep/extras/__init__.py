@@ -19,7 +19,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "studio": ("viser", "websockets"),
     "headless": ("av", "playwright"),
     "thesis": ("sklearn", "threadpoolctl"),
-    "bench": ("pinocchio", "toppra"),
+    "bench": ("casadi", "pinocchio", "toppra"),
 }
 _CHAIN = ("prepare", "simulation", "studio", "headless")  # each holds those before it
 # The extra that holds all that a room needs; one that is not here needs what it imports.
