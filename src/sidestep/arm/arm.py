@@ -227,8 +227,7 @@ class Arm(_core.Arm):
         from sidestep.robot.catalogue import recipe
         from sidestep.robot.descriptions import described
 
-        file = None if shipped is not None else described(name)
-        if file is not None:
+        if (file := described(name)) is not None:
             options = {"name": name, "package_dirs": file.package_dirs, **given}
             return cls._prepared(lambda: _described(file.path, options), name, allowed, progress, cache)
         recipe(name)  # raises, with the known names

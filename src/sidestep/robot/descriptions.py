@@ -7,6 +7,8 @@ import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 
+from sidestep.robot.catalogue import RECIPES
+
 
 @dataclass(frozen=True)
 class DescribedRobot:
@@ -20,11 +22,13 @@ def described(name: str) -> DescribedRobot | None:
     """The description of a name that one of the packages knows, which may download it; None of any other name.
 
     `robot_descriptions` has a module of each name, with URDF_PATH, XACRO_PATH or MJCF_PATH. `mujoco_menagerie` has
-    folders by name, of which the model is taken, not the scene.
+    folders by name, of which the model is taken, not the scene. Names of `sidestep.robots()` are neither's.
 
     Raises:
         FileNotFoundError: the package knows the name and cannot give its files.
     """
+    if any(recipe.name == name for recipe in RECIPES):
+        return None
     return _robot_description(name) or _menagerie(name)
 
 

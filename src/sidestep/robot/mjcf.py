@@ -24,6 +24,7 @@ from sidestep.robot.mjcf_joints import (
     name_of,
 )
 from sidestep.robot.pose import about_axis, from_quaternion, pose_at
+from sidestep.robot.source import read_xml
 from sidestep.robot.urdf import Urdf, UrdfJoint, UrdfMimic
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
@@ -31,6 +32,7 @@ if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
 
 WORLD = "world"  # MuJoCo's name of body 0, here that of the root link
 _PROLOGUE = re.compile(r"(?:\s|<\?.*?\?>|<!--.*?-->|<![A-Z][^>]*>)*<([\w:.-]+)", re.DOTALL)
+_INCLUDE = re.compile(r"""<include\s[^>]*?file\s*=\s*["']([^"']+)""")
 _LISTED = 6  # names in a warning
 
 
@@ -112,7 +114,7 @@ def read_mjcf(source: str | Path) -> Mjcf:
     text = isinstance(source, str) and source.lstrip().startswith("<")
     label = "MJCF string" if text else str(Path(source).resolve())
     try:
-        spec = mujoco.MjSpec.from_string(source) if text else mujoco.MjSpec.from_file(str(source))
+        spec = mujoco.MjSpec.from_string(source) if text else _parsed(Path(source).resolve())
         spec.compiler.fusestatic = False  # fixed bodies are links, with names
         spec.compiler.discardvisual = False
         model = spec.compile()
@@ -120,6 +122,28 @@ def read_mjcf(source: str | Path) -> Mjcf:
         kind = FileNotFoundError if "opening file" in str(error) else ValueError
         raise kind(f"{label} is refused by MuJoCo: {error}") from error
     return _Reader(model, label, spec.modelname).read()
+
+
+def _parsed(path: Path) -> mujoco.MjSpec:
+    """MuJoCo reads files of two suffixes alone; of another it gets the text, and what that includes."""
+    import mujoco
+
+    if path.suffix.lower() in (".xml", ".urdf"):
+        return mujoco.MjSpec.from_file(str(path))
+    text = read_xml(path)
+    spec = mujoco.MjSpec.from_string(text, include=_included(text, path.parent))
+    spec.modelfiledir = str(path.parent)
+    return spec
+
+
+def _included(text: str, folder: Path) -> dict[str, bytes]:
+    """The files that MJCF text includes, and those that they include, by the names they are referred to."""
+    found: dict[str, bytes] = {}
+    for name in _INCLUDE.findall(text):
+        if (folder / name).is_file() and name not in found:
+            found[name] = (folder / name).read_bytes()
+            found |= _included(found[name].decode("utf-8", errors="replace"), folder)
+    return found
 
 
 @dataclass
