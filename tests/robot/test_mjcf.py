@@ -219,6 +219,14 @@ def test_couplings_by_a_curve_and_loops_are_left_open() -> None:
         Robot.from_mjcf(model_of(FINGERS, loop), **LIMITS)
 
 
+def test_of_joints_alike_the_first_leads_all() -> None:
+    both = (
+        """<equality><joint joint1="left" joint2="thumb"/><joint joint1="right" joint2="thumb"/></equality>"""
+    )
+    robot = Robot.from_mjcf(model_of(FINGERS, both), **LIMITS)
+    assert robot.coordinate_names == ["left"]
+
+
 def test_a_coupling_in_a_circle_is_left_out() -> None:
     twice = (
         """<equality><joint joint1="left" joint2="right"/><joint joint1="right" joint2="left"/></equality>"""

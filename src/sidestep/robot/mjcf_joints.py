@@ -153,7 +153,7 @@ def couplings(model: mujoco.MjModel, driven: Actuation) -> tuple[dict[int, Coupl
     """Joints that follow others by `<equality><joint>`, and what could not be read.
 
     MuJoCo's equation is y - y0 = c0 + c1 (x - x0) + c2 (x - x0)^2 + …, with y0 and x0 the positions `qpos0`. Of the two
-    the one without actuator follows; of two alike, y.
+    the one without actuator follows; of two alike, the later one.
     """
     import mujoco
 
@@ -176,15 +176,14 @@ def couplings(model: mujoco.MjModel, driven: Actuation) -> tuple[dict[int, Coupl
         forward = Coupling(x, c1, y0 + c0 - c1 * x0)
         back = Coupling(y, 1.0 / c1, x0 - (y0 + c0) / c1)
         choices = [(y, forward), (x, back)]
-        if (y in driven.joints and x not in driven.joints) or y in found:
+        if (y in driven.joints, -y) > (x in driven.joints, -x):
             choices.reverse()
-        follower, coupling = choices[0]
-        source = coupling.source
-        assert source is not None
-        if follower in found or _end(found, source) == follower:
+        for follower, coupling in choices:
+            if follower not in found and _end(found, x + y - follower) != follower:
+                found[follower] = coupling
+                break
+        else:
             remarks.append(f"{names} are coupled once more than they can be; this coupling is left out")
-            continue
-        found[follower] = coupling
     return found, remarks
 
 
