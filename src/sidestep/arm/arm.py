@@ -77,11 +77,13 @@ class Arm(_core.Arm):
         in the user's cache.
 
         Args:
-            source: a name of `sidestep.robots()`, the path of an `.arm` file, or a URDF or xacro file (or URDF text).
+            source: a name of `sidestep.robots()`, the path of an `.arm` file, or a URDF, xacro or MJCF file
+                (or its text); or a name of the packages `robot_descriptions` or `mujoco_menagerie`, where those are
+                installed.
             package_dirs, base_pose, tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits,
                 effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments: of a description, as in
                 `Robot.from_urdf`; of a name `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
-            allowed: pairs of links that may touch: they get no clearance.
+            allowed: pairs of links that may touch, beside those of the description: they get no clearance.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
                 "tables" or "pairs", the item a link or a pair of links.
             cache: whether a prepared arm is read from and written to the user's cache (SIDESTEP_CACHE_DIR overrides its
@@ -224,7 +226,11 @@ class Arm(_core.Arm):
         if shipped is not None and not given and not allowed:
             return cls(_core.Arm.read(shipped), description=describe)
         from sidestep.robot.catalogue import recipe
+        from sidestep.robot.descriptions import described
 
+        if (file := described(name)) is not None:
+            options = {"name": name, "package_dirs": file.package_dirs, **given}
+            return cls._prepared(lambda: _described(file.path, options), name, allowed, progress, cache)
         recipe(name)  # raises, with the known names
         _refuse_options(given, ("locked", "locked_beyond_limits"), f"robot {name!r}, which has its own")
         return cls._prepared(describe, name, allowed, progress, cache)
@@ -242,6 +248,7 @@ class Arm(_core.Arm):
         from sidestep.arm.preparation import prepare
 
         robot = describe()
+        allowed = tuple(dict.fromkeys((*robot.allowed_pairs, *allowed)))
 
         def make() -> _core.Arm:
             return prepare(robot, allowed=allowed, source=source, progress=progress)

@@ -25,7 +25,7 @@ from sidestep.robot import Robot
 Array = npt.NDArray[np.float64]
 Pair = tuple[str, str]
 
-DESCRIPTIONS = (".urdf", ".xacro")  # suffixes of files, as against names
+DESCRIPTIONS = (".urdf", ".xacro", ".xml", ".mjcf")  # suffixes of files, as against names
 
 
 def load_robot(robot: str, *, locked: Mapping[str, float] | None = None) -> Robot:

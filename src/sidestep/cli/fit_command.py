@@ -25,7 +25,7 @@ class CovarianceChoice(StrEnum):
 
 def fit(
     robot: Annotated[str | None, typer.Argument(help="A name from `sidestep robots`; or use --urdf.")] = None,
-    urdf: Annotated[Path | None, typer.Option(help="URDF or xacro file.")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="URDF, xacro or MJCF file.")] = None,
     package_dir: Annotated[
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,

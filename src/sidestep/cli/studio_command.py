@@ -30,7 +30,7 @@ def studio(
         typer.Argument(help="A scenario file (YAML), or a name from `sidestep scenarios`; or use --robot."),
     ] = None,
     robot: Annotated[str | None, typer.Option(help="A name from `sidestep robots` [default: fr3].")] = None,
-    urdf: Annotated[Path | None, typer.Option(help="URDF or xacro file of a robot.")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="URDF, xacro or MJCF file of a robot.")] = None,
     package_dir: Annotated[
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,

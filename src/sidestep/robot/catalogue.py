@@ -151,7 +151,8 @@ def recipe(name: str) -> Recipe:
     close = difflib.get_close_matches(name, known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     raise ValueError(
-        f"no robot is named {name!r}{hint}; known: {', '.join(known)}; or load any URDF by its path"
+        f"no robot is named {name!r}{hint}; known: {', '.join(known)}; load any URDF or MJCF by its path; "
+        "or install robot_descriptions or mujoco_menagerie, whose names are known too"
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -14,11 +13,12 @@ from numpy.typing import ArrayLike
 from sidestep import _core
 from sidestep.robot import catalogue
 from sidestep.robot.degrees import degrees_hint
+from sidestep.robot.descriptions import described
+from sidestep.robot.fingerprint import fingerprint_of
 from sidestep.robot.limits import LimitValues
 from sidestep.robot.link import Array, Geometry, Link
-from sidestep.robot.mesh_file import extents_of
-from sidestep.robot.plausibility import arm_length, check_size
-from sidestep.robot.remarks import Remarks
+from sidestep.robot.mjcf import is_mjcf, no_mjcf, read_mjcf, warn_of_defaults
+from sidestep.robot.plausibility import arm_length, warn_of_sizes
 from sidestep.robot.source import read_description
 from sidestep.robot.tool import tree_with_tool
 from sidestep.robot.tree import KinematicTree, build_tree
@@ -28,14 +28,12 @@ if TYPE_CHECKING:  # imported where they are used: each takes longer to import t
     import pinocchio as pin
     import trimesh
 
-_HASH_DECIMALS = 9  # lengths [m] and angles are hashed to 1e-9: below any mesh's accuracy, above rounding
-
 
 class Robot(_core.Robot):
-    """An arm read from a URDF: kinematics in the core, links with geometry and inertia, limits, dynamics.
+    """An arm read from a URDF or MJCF: kinematics in the core, links with geometry and inertia, limits, dynamics.
 
     nq = nv = `num_coordinates`: continuous joints are plain angles; mimic joints share the coordinate and the
-    limits of their source. Make one with `from_urdf` or `named`.
+    limits of their source. Make one with `from_urdf`, `from_mjcf` or `named`.
     """
 
     def __init__(self, name: str, tree: KinematicTree) -> None:
@@ -48,6 +46,8 @@ class Robot(_core.Robot):
         )
         self._links = tree.links
         self._held = dict(tree.held)
+        self._postures: dict[str, Array] = {}
+        self._allowed_pairs: tuple[tuple[str, str], ...] = ()
         self._link_by_name = {link.name: link for link in tree.links}
         self._meshes: dict[str, trimesh.Trimesh | None] = {}
 
@@ -69,7 +69,7 @@ class Robot(_core.Robot):
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
     ) -> Robot:
-        """Reads a robot from a URDF or xacro file, or from URDF text.
+        """Reads a robot from a URDF or xacro file, or from URDF text; an MJCF of any suffix as `from_mjcf` does.
 
         Joints may be revolute, continuous, prismatic, fixed or mimic, and may branch. Floating and planar joints
         are held at a pose. Mesh files are looked up now and loaded when first used. What other readers of URDF
@@ -100,8 +100,16 @@ class Robot(_core.Robot):
             FileNotFoundError: the description or a mesh of a collision shape is missing; names every one.
             ValueError: anything wrong in the file or the arguments, named together with what is allowed.
         """
-        description = read_description(source, package_dirs=package_dirs, xacro_arguments=xacro_arguments)
-        urdf = parse_urdf(description)
+        if is_mjcf(source):
+            if package_dirs or xacro_arguments:
+                raise ValueError("package_dirs and xacro_arguments are of URDF; the description is MJCF")
+            mjcf = read_mjcf(source)
+            urdf = mjcf.urdf
+        else:
+            mjcf = None
+            urdf = parse_urdf(
+                read_description(source, package_dirs=package_dirs, xacro_arguments=xacro_arguments)
+            )
         tree = build_tree(
             urdf,
             base_pose=base_pose,
@@ -114,14 +122,69 @@ class Robot(_core.Robot):
             jerk_limits=jerk_limits,
             effort_rate_limits=effort_rate_limits,
         )
+        robot = cls(name or urdf.name, tree)
         urdf.remarks.warn(urdf.label, stacklevel=2)
-        return cls(name or urdf.name, tree)
+        if mjcf is not None:
+            robot._take_extras(mjcf.postures(tree.coordinate_names), mjcf.allowed_pairs)
+            warn_of_defaults(mjcf, tree.coordinate_names, velocity_limits, effort_limits)
+        return robot
+
+    @classmethod
+    def from_mjcf(
+        cls,
+        source: str | Path,
+        *,
+        base_pose: ArrayLike | None = None,
+        tip: str | None = None,
+        locked: Mapping[str, float] | None = None,
+        locked_beyond_limits: bool = False,
+        acceleration_limits: LimitValues | None = None,
+        velocity_limits: LimitValues | None = None,
+        effort_limits: LimitValues | None = None,
+        jerk_limits: LimitValues | None = None,
+        effort_rate_limits: LimitValues | None = None,
+        name: str | None = None,
+    ) -> Robot:
+        """Reads a robot from a file of MuJoCo, which must be installed, or from MJCF text.
+
+        The bodies that joints move are the robot, with what they stand on; floors, furniture and free objects are left
+        out, with a warning. Bodies and named sites become links below a root link `world`. Ball and free joints are
+        held. `<equality><joint>` makes mimic joints, `<exclude>` `allowed_pairs`, `<key>` `postures`. Effort limits are
+        those of the actuators. Velocity limits that the file lacks are 2 rad/s and 0.2 m/s, with a warning.
+
+        Args:
+            source: a path, or the XML text itself (starts with `<`).
+            base_pose: pose (4, 4) of the file's world in the world, identity by default.
+            tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits, effort_limits, jerk_limits,
+                effort_rate_limits, name: as in `from_urdf`.
+
+        Raises:
+            FileNotFoundError: the file or one that it refers to is missing.
+            ValueError: MuJoCo refuses the file, nothing in it moves, or an argument is wrong.
+            ModuleNotFoundError: MuJoCo is not installed; says how to install it.
+        """
+        if not is_mjcf(source):
+            raise no_mjcf(source)
+        return cls.from_urdf(
+            source,
+            base_pose=base_pose,
+            tip=tip,
+            locked=locked,
+            locked_beyond_limits=locked_beyond_limits,
+            acceleration_limits=acceleration_limits,
+            velocity_limits=velocity_limits,
+            effort_limits=effort_limits,
+            jerk_limits=jerk_limits,
+            effort_rate_limits=effort_rate_limits,
+            name=name,
+        )
 
     @classmethod
     def named(
         cls, name: str, *, locked: Mapping[str, float] | None = None, locked_beyond_limits: bool = False
     ) -> Robot:
-        """One of the robots listed by `sidestep.robots()`, such as "fr3", "fr3_arm", "panda" or "planar2".
+        """One of the robots listed by `sidestep.robots()`, such as "fr3", "fr3_arm", "panda" or "planar2"; or a name of
+        the packages `robot_descriptions` ("panda_mj_description") or `mujoco_menagerie`, where they are installed.
 
         Args:
             name: of the list.
@@ -131,6 +194,14 @@ class Robot(_core.Robot):
             ValueError: unknown name, wrong `locked`. FileNotFoundError: its package is not installed; says what
                 to install.
         """
+        if (file := described(name)) is not None:
+            return cls.from_urdf(
+                file.path,
+                package_dirs=file.package_dirs,
+                locked=locked,
+                locked_beyond_limits=locked_beyond_limits,
+                name=name,
+            )
         recipe = catalogue.recipe(name)
         return cls.from_urdf(
             recipe.source(),
@@ -170,7 +241,26 @@ class Robot(_core.Robot):
             ValueError: that names the argument and what is allowed. FileNotFoundError: there is no such mesh.
         """
         tree = tree_with_tool(self, self._links, self._held, name, shape, link=link, pose=pose, mass=mass)
-        return Robot(self.name, tree)
+        robot = Robot(self.name, tree)
+        robot._take_extras(self._postures, self._allowed_pairs)
+        return robot
+
+    def _take_extras(self, postures: Mapping[str, Array], allowed_pairs: Sequence[tuple[str, str]]) -> None:
+        """Postures and pairs of the description, those pairs alone whose links are here."""
+        self._postures = dict(postures)
+        self._allowed_pairs = tuple(
+            pair for pair in allowed_pairs if all(end in self._link_by_name for end in pair)
+        )
+
+    @property
+    def postures(self) -> dict[str, Array]:
+        """Named configurations (nv,) of the description: the keyframes of an MJCF."""
+        return {name: q.copy() for name, q in self._postures.items()}
+
+    @property
+    def allowed_pairs(self) -> tuple[tuple[str, str], ...]:
+        """Links that may touch, by the description: `<exclude>` of an MJCF."""
+        return self._allowed_pairs
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -206,12 +296,7 @@ class Robot(_core.Robot):
         if link not in self._meshes:
             import trimesh
 
-            remarks = Remarks()
-            for geometry in geometries:  # the sizes of other files are checked when the description is read
-                if geometry.path is not None and extents_of(geometry.path) is None:
-                    size = float(geometry.mesh().extents.max())
-                    check_size(link, size, arm_length(self.joints), remarks)
-            remarks.warn(f"robot {self.name!r}", stacklevel=2)
+            warn_of_sizes(self.name, link, geometries, arm_length(self.joints))
             meshes = [geometry.mesh() for geometry in geometries]
             merged: Any = trimesh.util.concatenate(meshes) if meshes else None
             self._meshes[link] = merged
@@ -288,31 +373,7 @@ class Robot(_core.Robot):
 
         Limits, inertias, file names and the base pose, on which a fitted body does not depend, do not enter.
         """
-        digest = hashlib.sha256()
-
-        def add(*items: object) -> None:
-            for item in items:
-                if isinstance(item, np.ndarray):
-                    item = (np.round(item, _HASH_DECIMALS) + 0.0).tolist()  # + 0.0 makes -0.0 into 0.0
-                digest.update(repr(item).encode() + b"\n")
-
-        base = np.linalg.inv(self.frames[0].placement)
-        for joint in self.joints:
-            placement = base @ joint.placement if joint.parent < 0 else joint.placement
-            add("joint", joint.name, joint.type.name, joint.parent, placement, joint.axis, joint.coordinate)
-            add(joint.multiplier, joint.offset)
-        for frame, link in zip(self.frames, self._links, strict=True):
-            add(
-                "link",
-                frame.name,
-                frame.joint,
-                base @ frame.placement if frame.joint < 0 else frame.placement,
-            )
-            for geometry in link.geometries:
-                add(geometry.kind, geometry.placement, geometry.size, geometry.scale)
-                if geometry.path is not None:
-                    add(hashlib.sha256(geometry.path.read_bytes()).hexdigest())
-        return digest.hexdigest()
+        return fingerprint_of(self, self._links)
 
     @cached_property
     def _dynamics(self) -> _core.RigidBodyDynamics:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sidestep._core import Joint, JointType
-from sidestep.robot.link import Array, Link
+from sidestep.robot.link import Array, Geometry, Link
 from sidestep.robot.mesh_file import extents_of
 from sidestep.robot.remarks import Remarks
 
@@ -94,3 +94,12 @@ def arm_length(joints: Sequence[Joint]) -> float:
         reach.append(before + own)
     turning = any(joint.type == JointType.revolute for joint in joints)
     return max(reach, default=0.0) if turning else 0.0
+
+
+def warn_of_sizes(robot: str, link: str, geometries: Sequence[Geometry], length: float) -> None:
+    """Checks the meshes of a link whose sizes `check_meshes` could not tell, and warns; loads them."""
+    remarks = Remarks()
+    for geometry in geometries:
+        if geometry.path is not None and extents_of(geometry.path) is None:
+            check_size(link, float(geometry.mesh().extents.max()), length, remarks)
+    remarks.warn(f"robot {robot!r}", stacklevel=3)

@@ -1,0 +1,122 @@
+"""Shapes of an MJCF, as MuJoCo compiles them."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import tempfile
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.robot.link import Array, Geometry
+from sidestep.robot.pose import from_quaternion, pose_at
+
+if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
+    import mujoco
+
+_SUBDIVISIONS = 4  # of an ellipsoid's icosahedron, as of a sphere's
+_TRIANGLE = np.dtype(
+    [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
+)  # of binary STL
+
+
+def shapes_of(
+    model: mujoco.MjModel, geoms: Iterable[int]
+) -> tuple[list[Geometry], list[Geometry], list[str]]:
+    """The shapes of a body that can collide, the others, and the kinds of those without volume (plane, hfield).
+
+    A geom can collide if its contype or conaffinity is not zero. A capsule becomes a cylinder and two spheres.
+    """
+    collisions: list[Geometry] = []
+    visuals: list[Geometry] = []
+    without_volume = []
+    for geom in geoms:
+        shapes = _shapes(model, geom)
+        if not shapes:
+            without_volume.append(_kind(model, geom))
+        collides = bool(model.geom_contype[geom]) or bool(model.geom_conaffinity[geom])
+        (collisions if collides else visuals).extend(shapes)
+    return collisions, visuals, without_volume
+
+
+def _kind(model: mujoco.MjModel, geom: int) -> str:
+    import mujoco
+
+    return str(mujoco.mjtGeom(int(model.geom_type[geom])).name).removeprefix("mjGEOM_").lower()
+
+
+def _shapes(model: mujoco.MjModel, geom: int) -> list[Geometry]:
+    quaternion = np.array(model.geom_quat[geom], dtype=float)
+    X = pose_at(model.geom_pos[geom], from_quaternion(quaternion / np.linalg.norm(quaternion)))
+    size = [float(length) for length in model.geom_size[geom]]
+    match _kind(model, geom):
+        case "box":
+            return [Geometry("box", X, size=(2.0 * size[0], 2.0 * size[1], 2.0 * size[2]))]
+        case "sphere":
+            return [Geometry("sphere", X, size=(size[0],))]
+        case "cylinder":
+            return [Geometry("cylinder", X, size=(size[0], 2.0 * size[1]))]
+        case "capsule":
+            ends = [X @ pose_at([0.0, 0.0, side * size[1]]) for side in (-1.0, 1.0)]
+            cylinder = Geometry("cylinder", X, size=(size[0], 2.0 * size[1]))
+            return [cylinder, *(Geometry("sphere", end, size=(size[0],)) for end in ends)]
+        case "ellipsoid":
+            return [Geometry("mesh", X, path=_unit_sphere(), scale=np.array(size))]
+        case "mesh" | "sdf":
+            return [Geometry("mesh", X, path=_mesh_file(model, int(model.geom_dataid[geom])))]
+    return []
+
+
+def _mesh_file(model: mujoco.MjModel, mesh: int) -> Path:
+    """A mesh as MuJoCo holds it, scaled and in its own frame, which `geom_pos` and `geom_quat` place."""
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    at, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    vertices = np.asarray(model.mesh_vert[first : first + count], dtype=float)
+    return _stored(vertices, model.mesh_face[at : at + faces], str(model.mesh(mesh).name) or f"mesh{mesh}")
+
+
+@cache
+def _unit_sphere() -> Path:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=_SUBDIVISIONS)
+    return _stored(np.asarray(ball.vertices), np.asarray(ball.faces), "unit_sphere")
+
+
+def _stored(vertices: Array, faces: npt.NDArray[np.integer], name: str) -> Path:
+    """A binary STL in the user's cache, or in a folder of this process where that cannot be written."""
+    triangles = np.zeros(len(faces), dtype=_TRIANGLE)
+    triangles["corners"] = vertices[faces]
+    content = bytes(80) + np.uint32(len(faces)).tobytes() + triangles.tobytes()
+    digest = hashlib.sha256(content).hexdigest()[:16]
+    file = f"{re.sub(r'[^A-Za-z0-9_.-]', '_', name)[:60]}-{digest}.stl"
+    with contextlib.suppress(OSError):
+        return _written(_cache_folder() / file, content)
+    return _written(_own_folder() / file, content)
+
+
+def _written(path: Path, content: bytes) -> Path:
+    if not path.is_file() or path.stat().st_size != len(content):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(f".{os.getpid()}.part")
+        part.write_bytes(content)
+        part.replace(path)
+    return path
+
+
+def _cache_folder() -> Path:
+    from sidestep.body.cache import cache_directory  # a body is made from robots: not at the top
+
+    return cache_directory().parent / "meshes"
+
+
+@cache
+def _own_folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix="sidestep-meshes-"))
