@@ -30,7 +30,11 @@ def main() -> None:
         if arguments.again:
             shipped_arms.FOLDER = Path(nothing)
         for name in arguments.names or [entry.name for entry in ss.robots()]:
-            arm = prepare(ss.Robot.named(name), progress=show)
+            robot = ss.Robot.named(name)
+            body = ss.Body.cover(
+                robot, effort="best", progress=lambda link, done, in_all: show("cover", link, done, in_all)
+            )
+            arm = prepare(robot, body=body, progress=show)
             path = folder / f"{name}{shipped_arms.SUFFIX}"
             arm.save(path)
             print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB, {arm.content_hash[:12]}", flush=True)

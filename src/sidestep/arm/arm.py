@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,6 +49,7 @@ class Arm(_core.Arm):
         """
         super().__init__(arm)
         self._description = description
+        self._request: tuple[str | Path, Mapping[str, Any]] | None = None
 
     @classmethod
     def load(
@@ -67,6 +69,7 @@ class Arm(_core.Arm):
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
         allowed: Sequence[tuple[str, str]] = (),
+        draft: bool = False,
         progress: Progress | None = None,
         cache: bool = True,
     ) -> Arm:
@@ -84,6 +87,9 @@ class Arm(_core.Arm):
                 effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments: of a description, as in
                 `Robot.from_urdf`; of a name `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
             allowed: pairs of links that may touch, beside those of the description: they get no clearance.
+            draft: prepare in seconds what serves until the fine body is there, see `Refinement`: proven to cover the
+                arm like the fine one, with fewer ellipsoids, which are larger, so that the arm keeps farther off. Where
+                the user's cache has the fine arm, it is taken.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
                 "tables" or "pairs", the item a link or a pair of links.
             cache: whether a prepared arm is read from and written to the user's cache (SIDESTEP_CACHE_DIR overrides its
@@ -109,8 +115,9 @@ class Arm(_core.Arm):
             "xacro_arguments": xacro_arguments,
         }
         given = {key: value for key, value in options.items() if not _is_default(value)}
+        how = _How(tuple(allowed), draft, progress, cache)
         if _is_text(source):
-            return cls._prepared(lambda: _described(source, given), "URDF text", allowed, progress, cache)
+            return cls._prepared(lambda: _described(source, given), "URDF text", how, (source, given))
         path = Path(source)
         if path.suffix.lower() == SUFFIX:
             _refuse_options(
@@ -118,8 +125,8 @@ class Arm(_core.Arm):
             )
             return cls(_core.Arm.read(path))
         if path.suffix or len(path.parts) != 1 or path.is_file():
-            return cls._prepared(lambda: _described(path, given), path.name, allowed, progress, cache)
-        return cls._named(str(source), given, allowed, progress, cache)
+            return cls._prepared(lambda: _described(path, given), path.name, how, (source, given))
+        return cls._named(str(source), given, how)
 
     @classmethod
     def from_robot(
@@ -148,6 +155,11 @@ class Arm(_core.Arm):
 
     def __repr__(self) -> str:
         return f"Arm({self.name!r}, {self.num_coordinates} coordinates, {self.content_hash[:12]})"
+
+    @property
+    def is_draft(self) -> bool:
+        """Whether it was prepared in seconds, and a `Refinement` makes a finer one."""
+        return self._request is not None
 
     @property
     def robot(self) -> _core.Robot:
@@ -213,9 +225,7 @@ class Arm(_core.Arm):
         cls,
         name: str,
         given: Mapping[str, Any],
-        allowed: Sequence[tuple[str, str]],
-        progress: Progress | None,
-        cache: bool,
+        how: _How,
     ) -> Arm:
         def describe() -> Robot:
             from sidestep.robot import Robot
@@ -223,38 +233,51 @@ class Arm(_core.Arm):
             return Robot.named(name, **given)
 
         shipped = shipped_file(name)
-        if shipped is not None and not given and not allowed:
+        if shipped is not None and not given and not how.allowed:
             return cls(_core.Arm.read(shipped), description=describe)
         from sidestep.robot.catalogue import recipe
         from sidestep.robot.descriptions import described
 
         if (file := described(name)) is not None:
             options = {"name": name, "package_dirs": file.package_dirs, **given}
-            return cls._prepared(lambda: _described(file.path, options), name, allowed, progress, cache)
+            return cls._prepared(lambda: _described(file.path, options), name, how, (name, given))
         recipe(name)  # raises, with the known names
         _refuse_options(given, ("locked", "locked_beyond_limits"), f"robot {name!r}, which has its own")
-        return cls._prepared(describe, name, allowed, progress, cache)
+        return cls._prepared(describe, name, how, (name, given))
 
     @classmethod
     def _prepared(
         cls,
         describe: Callable[[], Robot],
-        source: str,
-        allowed: Sequence[tuple[str, str]],
-        progress: Progress | None,
-        cache: bool,
+        label: str,
+        how: _How,
+        request: tuple[str | Path, Mapping[str, Any]],
     ) -> Arm:
         from sidestep.arm.cache import arm_path, stored_or_made
         from sidestep.arm.preparation import prepare
 
         robot = describe()
-        allowed = tuple(dict.fromkeys((*robot.allowed_pairs, *allowed)))
+        allowed = tuple(dict.fromkeys((*robot.allowed_pairs, *how.allowed)))
+        draft = how.draft and not (how.cache and arm_path(robot, allowed, label).exists())
 
         def make() -> _core.Arm:
-            return prepare(robot, allowed=allowed, source=source, progress=progress)
+            return prepare(robot, allowed=allowed, source=label, draft=draft, progress=how.progress)
 
-        arm = stored_or_made(arm_path(robot, allowed, source), make) if cache else make()
-        return cls(arm, description=lambda: robot)
+        made = stored_or_made(arm_path(robot, allowed, label, draft), make) if how.cache else make()
+        arm = cls(made, description=lambda: robot)
+        if draft:
+            arm._request = request[0], {**request[1], "allowed": how.allowed}
+        return arm
+
+
+@dataclass(frozen=True)
+class _How:
+    """How an arm is prepared, see `Arm.load`."""
+
+    allowed: tuple[tuple[str, str], ...]
+    draft: bool
+    progress: Progress | None
+    cache: bool
 
 
 def _described(source: str | Path, options: Mapping[str, Any]) -> Robot:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from sidestep import _core
-from sidestep.body.cover_problem import DRAFT, LinkProblem
+from sidestep.body.cover_problem import EFFORTS, LinkProblem
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.obstacles.shapes import Capsule, Cylinder, Shape, Sphere, is_shape
 from sidestep.robot.pose import checked_pose
@@ -92,7 +92,7 @@ def _cover(name: str, geometry: Shape | ArrayLike, components: int) -> tuple[Ell
         triangles, outside = _hull(name, np.asarray(geometry, dtype=np.float64)), 0.0
     if not len(triangles) or not np.isfinite(triangles).all():
         raise ValueError(f"attach {name!r}: the geometry has no triangles, or some that are not finite")
-    problem = LinkProblem(triangles, seed=0, effort=DRAFT)
+    problem = LinkProblem(triangles, seed=0, effort=EFFORTS["draft"])
     cover = problem.finish(components).ellipsoids
     return _larger(cover, outside) if outside > 0.0 else cover, triangles.reshape(-1, 3)
 

@@ -17,7 +17,7 @@ from sidestep.robot import Robot
 FORMAT_VERSION = 1  # to be raised with the version of the file format (cpp/src/model/arm_file.cpp)
 
 
-def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str) -> Path:
+def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str, draft: bool = False) -> Path:
     """The file of one arm; its name is a hash of what it is made from and of the algorithms that make it."""
     digest = hashlib.sha256()
 
@@ -26,11 +26,15 @@ def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str) -> P
             digest.update((item.tobytes() if isinstance(item, np.ndarray) else repr(item).encode()) + b"\n")
 
     add(FORMAT_VERSION, source, robot.name, sorted(sorted(pair) for pair in allowed))
-    add(body_cache.cache_path(robot, CoverSettings()).name, clearance_tables.stored_at(robot).name)
+    add(
+        body_cache.cache_path(robot, CoverSettings(effort="draft" if draft else "fine")).name,
+        clearance_tables.stored_at(robot).name,
+    )
     pairs = link_pairs
-    add(pairs.SAMPLES, pairs.FEW, pairs.TOUCHING, pairs.WAYS, pairs.NEAR, pairs.SHARE)
+    add(pairs.FEW, pairs.TOUCHING, pairs.NEAR, pairs.SHARE, pairs.DRAFT if draft else pairs.FULL)
     limits = robot.limits
     add(limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.effort)
+    add(limits.jerk, limits.effort_rate)
     for joint in robot.joints:  # the fingerprint leaves the base pose out, and rounds
         add(joint.placement, joint.axis, joint.multiplier, joint.offset)
     for frame in robot.frames:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -27,12 +27,29 @@ Pair: TypeAlias = tuple[str, str]
 Progress: TypeAlias = Callable[[str, int, int], None]
 
 ALGORITHM_VERSION = 1
-SPACING = 0.1  # [rad | m] of control points, at most
 BEYOND = 2  # control points beyond a limit: with one a spline ends at the limit
 NEAR = 0.03  # [m] clearance below which the error is measured
-CHECKS = 400  # random configurations by which what is left of it is taken off everywhere
 STEP = 1e-6  # [m] control points are multiples of it, rounded down: far below the error of a table
 TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class TableEffort:
+    """How densely distances are measured.
+
+    Attributes:
+        spacing: of control points, at most [rad | m].
+        cells: near contact whose error is measured, at most; random ones of more.
+        checks: random configurations by which what is left of the error is taken off everywhere.
+    """
+
+    spacing: float
+    cells: int
+    checks: int
+
+
+FULL = TableEffort(spacing=0.1, cells=1_000_000, checks=400)
+DRAFT = TableEffort(spacing=0.3, cells=200, checks=50)
 
 
 @dataclass(frozen=True)
@@ -53,7 +70,13 @@ class ClearanceTables:
         return (*((table.first, table.second) for table in self.tables), *self.apart)
 
 
-def clearance_tables(robot: Robot, *, progress: Progress | None = None) -> ClearanceTables:
+def clearance_tables(
+    robot: Robot,
+    *,
+    effort: TableEffort = FULL,
+    only: Sequence[Pair] | None = None,
+    progress: Progress | None = None,
+) -> ClearanceTables:
     """Measures the distance of the exact meshes of pairs with two coordinates between, over these.
 
     Neighbours but one are always close, and covering ellipsoids, which are larger than links, overlap there. Their
@@ -70,27 +93,29 @@ def clearance_tables(robot: Robot, *, progress: Progress | None = None) -> Clear
     cannot be read or written.
 
     Args:
-        robot: with collision meshes.
+        robot: with collision meshes. effort: how densely they are measured. only: of these pairs, which are not kept.
         progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
     """
     shipped = shipped_arms.with_clearances_of(robot)
     if shipped is not None:
         measured = {(table.first, table.second) for table in shipped.tables}
-        found = (pair for pair, _, _ in _pairs_of_two(robot, SelfCollision(robot)))
+        found = (pair for pair, _, _ in _pairs_of_two(robot, SelfCollision(robot), effort))
         return ClearanceTables(tuple(shipped.tables), tuple(pair for pair in found if pair not in measured))
+    if only is not None:
+        return _measure(robot, effort, progress, only)
     return cache.stored_or_made(
-        stored_at(robot),
+        stored_at(robot, effort),
         _read,
-        lambda: _measure(robot, progress),
+        lambda: _measure(robot, effort, progress),
         _write,
         ("clearance tables are unreadable and are made again", "the clearance tables are not cached"),
     )
 
 
-def stored_at(robot: Robot) -> Path:
+def stored_at(robot: Robot, effort: TableEffort = FULL) -> Path:
     """The file of the tables of a robot; its name is a hash of what they are made from."""
     ends = robot.limits.lower.tolist(), robot.limits.upper.tolist()  # which the fingerprint leaves out
-    numbers = (robot.name, robot.fingerprint, *ends, ALGORITHM_VERSION, SPACING, BEYOND, NEAR, CHECKS)
+    numbers = (robot.name, robot.fingerprint, *ends, ALGORITHM_VERSION, BEYOND, NEAR, effort)
     return cache.cache_directory() / f"tables-{hashlib.sha256(repr(numbers).encode()).hexdigest()}.npz"
 
 
@@ -105,18 +130,18 @@ class _Axis:
     periodic: bool
 
     @classmethod
-    def of(cls, robot: Robot, coordinate: int) -> _Axis | None:
+    def of(cls, robot: Robot, coordinate: int, spacing: float) -> _Axis | None:
         moved = [joint for joint in robot.joints if joint.coordinate == coordinate]
         turns = all(joint.type == JointType.revolute and abs(joint.multiplier) == 1.0 for joint in moved)
         lower, upper = robot.limits.lower[coordinate], robot.limits.upper[coordinate]
         if turns and not upper - lower < TURN:
-            count = int(np.ceil(TURN / SPACING))
+            count = int(np.ceil(TURN / spacing))
             return cls(coordinate, -np.pi, TURN / count, count, periodic=True)
         if not np.isfinite(upper - lower):
             return None
-        cells = max(1, int(np.ceil((upper - lower) / SPACING)))
-        spacing = (upper - lower) / cells
-        return cls(coordinate, lower - BEYOND * spacing, spacing, cells + 2 * BEYOND + 1, periodic=False)
+        cells = max(1, int(np.ceil((upper - lower) / spacing)))
+        step = (upper - lower) / cells
+        return cls(coordinate, lower - BEYOND * step, step, cells + 2 * BEYOND + 1, periodic=False)
 
     @property
     def points(self) -> Array:
@@ -128,11 +153,16 @@ class _Axis:
         return slice(None) if self.periodic else slice(BEYOND, self.count - BEYOND)
 
 
-def _measure(robot: Robot, progress: Progress | None = None) -> ClearanceTables:
+def _measure(
+    robot: Robot,
+    effort: TableEffort,
+    progress: Progress | None = None,
+    only: Sequence[Pair] | None = None,
+) -> ClearanceTables:
     check = SelfCollision(robot)
     tables: list[ClearanceTable] = []
     apart: list[Pair] = []
-    found = _pairs_of_two(robot, check)
+    found = [entry for entry in _pairs_of_two(robot, check, effort) if only is None or entry[0] in only]
     for done, (pair, between, axes) in enumerate(found):
         if progress is not None:
             progress(", ".join(pair), done, len(found))
@@ -151,16 +181,18 @@ def _measure(robot: Robot, progress: Progress | None = None) -> ClearanceTables:
         if least[axes[0].inside, axes[1].inside].min() > 0.0:
             apart.append(pair)
         else:
-            tables.append(_table(pair, axes, _continued(grid, axes), distance, _near(least, axes)))
+            tables.append(_table(pair, axes, _continued(grid, axes), distance, _near(least, axes), effort))
     return ClearanceTables(tuple(tables), tuple(apart))
 
 
-def _pairs_of_two(robot: Robot, check: SelfCollision) -> list[tuple[Pair, tuple[int, ...], list[_Axis]]]:
+def _pairs_of_two(
+    robot: Robot, check: SelfCollision, effort: TableEffort
+) -> list[tuple[Pair, tuple[int, ...], list[_Axis]]]:
     """The pairs of links with two coordinates between that have control points."""
     found: list[tuple[Pair, tuple[int, ...], list[_Axis]]] = []
     for pair in check.pairs:
         between = check.coordinates_between(*pair)
-        axes = [axis for c in between if (axis := _Axis.of(robot, c)) is not None]
+        axes = [axis for c in between if (axis := _Axis.of(robot, c, effort.spacing)) is not None]
         if len(between) == 2 and len(axes) == 2:
             found.append((pair, between, axes))
     return found
@@ -193,10 +225,17 @@ def _steepest(values: Array, axis: int, step: float) -> Array:
 
 
 def _table(
-    pair: Pair, axes: list[_Axis], control: Array, distance: Callable[[float, float], float], near: Mask
+    pair: Pair,
+    axes: list[_Axis],
+    control: Array,
+    distance: Callable[[float, float], float],
+    near: Mask,
+    effort: TableEffort,
 ) -> ClearanceTable:
     """With the excess over the distance taken off: where it was found, then the largest that is left everywhere."""
     rng, cells = np.random.default_rng(0), np.argwhere(near)
+    if len(cells) > effort.cells:
+        cells = cells[np.sort(rng.choice(len(cells), effort.cells, replace=False))]
 
     def excess(table: ClearanceTable, cell: npt.NDArray[np.int_]) -> float:
         x, y = (axis.points[k] + axis.spacing * rng.uniform() for axis, k in zip(axes, cell, strict=True))
@@ -210,7 +249,7 @@ def _table(
     ends = ["wrap" if axis.periodic else "constant" for axis in axes]
     control = control - maximum_filter(found, size=4, mode=ends)
     table = _spline(pair, axes, control)
-    checked = cells[rng.integers(len(cells), size=CHECKS)] if len(cells) else cells
+    checked = cells[rng.integers(len(cells), size=effort.checks)] if len(cells) else cells
     left = max((excess(table, cell) for cell in checked), default=0.0)
     return _spline(pair, axes, STEP * np.floor((control - left) / STEP))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
@@ -11,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import ClearanceTable, Obstacles, SelfCollisionBarrier
+from sidestep.arm import clearance_tables as tables_room
 from sidestep.arm import shipped_arms
-from sidestep.arm.clearance_tables import Progress, clearance_tables
+from sidestep.arm.clearance_tables import Progress, TableEffort, clearance_tables
 from sidestep.body import Body, cache
 from sidestep.body.file import write_text
 from sidestep.distance import SelfCollision
@@ -21,15 +23,34 @@ from sidestep.robot import Robot
 Array: TypeAlias = npt.NDArray[np.float64]
 LinkPair: TypeAlias = tuple[str, str, float]
 
-SAMPLES = 3000  # random configurations, of which the gaps between ellipsoids are taken
 FEW = 3  # coordinates between two links of which so many samples are dense enough to calibrate a contact
 TOUCHING = 20  # samples in which they touch that are needed for it
-WAYS = 200  # from samples in which they touch to others, on which the contact is looked for
 NEAR = 0.002  # distance of meshes that counts as touching [m]
 SHARE = 0.95  # of samples in which the meshes are apart that the ellipsoids must be: otherwise they are no measure
 
 
-def barrier_pairs(robot: Robot, body: Body, *, progress: Progress | None = None) -> tuple[LinkPair, ...]:
+@dataclass(frozen=True)
+class PairEffort:
+    """How long contacts are looked for.
+
+    Attributes:
+        samples: random configurations, of which the gaps between ellipsoids are taken.
+        ways: from samples in which they touch to others, on which the contact is looked for.
+        tables: of the pairs that have them.
+    """
+
+    samples: int
+    ways: int
+    tables: TableEffort
+
+
+FULL = PairEffort(samples=3000, ways=200, tables=tables_room.FULL)
+DRAFT = PairEffort(samples=600, ways=60, tables=tables_room.DRAFT)
+
+
+def barrier_pairs(
+    robot: Robot, body: Body, *, effort: PairEffort = FULL, progress: Progress | None = None
+) -> tuple[LinkPair, ...]:
     """The pairs of links that may touch, with the gap at which they do: (first, second, contact).
 
     Covering ellipsoids are larger than links: neighbours but one overlap while their meshes are apart. Where at most
@@ -43,17 +64,17 @@ def barrier_pairs(robot: Robot, body: Body, *, progress: Progress | None = None)
     read or written.
 
     Args:
-        robot: with collision meshes. body: a covering body of it.
+        robot: with collision meshes. body: a covering body of it. effort: how long they are looked for.
         progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
     """
     stored = cache.stored_or_made(
-        stored_at(robot, body),
+        stored_at(robot, body, effort),
         _read_pairs,
-        lambda: _find_pairs(robot, body, progress),
+        lambda: _find_pairs(robot, body, effort, progress),
         lambda file, pairs: write_text(file, json.dumps(pairs, indent=1) + "\n"),
         ("pairs of links are unreadable and are made again", "the pairs of links are not cached"),
     )
-    apart = clearance_tables(robot).apart
+    apart = clearance_tables(robot, effort=effort.tables).apart
     return tuple(pair for pair in stored if pair[:2] not in apart)
 
 
@@ -61,6 +82,7 @@ def tables_and_pairs(
     robot: Robot,
     body: Body,
     *,
+    effort: PairEffort = FULL,
     progress: Progress | None = None,
     pair_progress: Progress | None = None,
 ) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
@@ -69,32 +91,49 @@ def tables_and_pairs(
     Both are read from the arm that comes with Sidestep, where there is one of these meshes, position limits and cover.
 
     Args:
-        robot: with collision meshes. body: a covering body of it.
+        robot: with collision meshes. body: a covering body of it. effort: how long they are looked for.
         progress: of the tables, as in `clearance_tables`. pair_progress: of the other pairs, as in `barrier_pairs`.
     """
     shipped = shipped_arms.with_clearances_of(robot)
     if shipped is not None and shipped_arms.has_body(shipped, body):
         return tuple(shipped.tables), tuple(shipped.pairs)
-    exact = clearance_tables(robot, progress=progress)
-    pairs = barrier_pairs(robot, body, progress=pair_progress)
+    if effort is DRAFT:
+        return _draft(robot, body, progress, pair_progress)
+    exact = clearance_tables(robot, effort=effort.tables, progress=progress)
+    pairs = barrier_pairs(robot, body, effort=effort, progress=pair_progress)
     return exact.tables, tuple(pair for pair in pairs if pair[:2] not in exact.pairs)
+
+
+def _draft(
+    robot: Robot, body: Body, progress: Progress | None, pair_progress: Progress | None
+) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
+    """Covers wherever they measure well enough, as tables take longer; tables of the other pairs that can have one."""
+    pairs = _find_pairs(robot, body, DRAFT, pair_progress)
+    found = {pair[:2] for pair in pairs}
+    left = [
+        pair for pair in SelfCollision(robot).pairs if pair not in found and set(body.links).issuperset(pair)
+    ]
+    exact = clearance_tables(robot, effort=DRAFT.tables, only=left, progress=progress)
+    return exact.tables, pairs
 
 
 def _read_pairs(path: Path) -> tuple[LinkPair, ...]:
     return tuple((str(a), str(b), float(contact)) for a, b, contact in json.loads(path.read_text()))
 
 
-def stored_at(robot: Robot, body: Body) -> Path:
+def stored_at(robot: Robot, body: Body, effort: PairEffort = FULL) -> Path:
     """The file of the pairs of a body; its name is a hash of what they are made from."""
     ends = robot.limits.lower.tolist(), robot.limits.upper.tolist()  # which the fingerprint leaves out
-    numbers = (robot.name, robot.fingerprint, *ends, body.links, SAMPLES, FEW, TOUCHING, WAYS, NEAR, SHARE)
+    numbers = (robot.name, robot.fingerprint, *ends, body.links, FEW, TOUCHING, NEAR, SHARE, effort)
     key = hashlib.sha256(repr(numbers).encode())
     for array in (body.means, np.array(body.covariances), body.levels):
         key.update(np.ascontiguousarray(array).tobytes())
     return cache.cache_directory() / f"pairs-{key.hexdigest()}.json"
 
 
-def _find_pairs(robot: Robot, body: Body, progress: Progress | None) -> tuple[LinkPair, ...]:
+def _find_pairs(
+    robot: Robot, body: Body, effort: PairEffort, progress: Progress | None
+) -> tuple[LinkPair, ...]:
     check = SelfCollision(robot)
     pairs = [pair for pair in check.pairs if set(body.links).issuperset(pair)]
     if not pairs:
@@ -105,21 +144,21 @@ def _find_pairs(robot: Robot, body: Body, progress: Progress | None) -> tuple[Li
     def gaps(q: Array) -> Array:
         return barrier.evaluate(q, rest, Obstacles.none()).clearances
 
-    configurations = np.array([robot.random_configuration(rng) for _ in range(SAMPLES)])
+    configurations = np.array([robot.random_configuration(rng) for _ in range(effort.samples)])
     found = np.array([gaps(q) for q in configurations])
     result = []
     for k, pair in enumerate(pairs):
         if progress is not None:
             progress(", ".join(pair), k, len(pairs))
         few = len(check.coordinates_between(*pair)) <= FEW
-        looked = slice(0, SAMPLES if few else SAMPLES // 10)
+        looked = slice(0, effort.samples if few else effort.samples // 10)
         # Ellipsoids cover links: those of links that touch overlap.
         overlap = np.flatnonzero(found[looked, k] < 0.0)
         touch = np.array([check.within(configurations[i], *pair, NEAR) for i in overlap], dtype=bool)
         contact = 0.0
         if few and touch.sum() >= TOUCHING:
-            apart = np.setdiff1d(np.arange(SAMPLES), overlap[touch])
-            ends = zip(rng.choice(overlap[touch], WAYS), rng.choice(apart, WAYS), strict=True)
+            apart = np.setdiff1d(np.arange(effort.samples), overlap[touch])
+            ends = zip(rng.choice(overlap[touch], effort.ways), rng.choice(apart, effort.ways), strict=True)
             first = [_first_touch(check, pair, configurations[i], configurations[j]) for i, j in ends]
             contact = min(0.0, max(float(gaps(q)[k]) for q in first))
         below = int((found[overlap[~touch], k] < contact).sum())

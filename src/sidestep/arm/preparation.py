@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from sidestep import _core
-from sidestep.arm.link_pairs import tables_and_pairs
+from sidestep.arm.link_pairs import DRAFT, FULL, tables_and_pairs
 from sidestep.body import Body
 from sidestep.body.cover import CoverProgress
 from sidestep.robot import Robot
@@ -30,15 +30,17 @@ def prepare(
     body: Body | None = None,
     allowed: Sequence[Pair] = (),
     source: str = "",
+    draft: bool = False,
     progress: Progress | None = None,
 ) -> _core.Arm:
-    """Everything that is made once for a robot. Minutes, unless the user's cache has the parts.
+    """Everything that is made once for a robot. Minutes, a draft seconds, unless the user's cache has the parts.
 
     Args:
         robot: with geometry.
         body: a covering body of it; `Body.cover(robot)` by default.
         allowed: pairs of links that may touch, in either order: they get no clearance.
         source: what the provenance calls the description; the robot's name by default.
+        draft: with fewer ellipsoids, which are larger, and tables and pairs by fewer samples.
         progress: called as progress(stage, item, done, in_all).
 
     Raises:
@@ -48,7 +50,7 @@ def prepare(
         for link in pair:
             robot.link(link)
     if body is None:
-        body = Body.cover(robot, progress=_of_stage("cover", progress))
+        body = Body.cover(robot, effort="draft" if draft else "fine", progress=_of_stage("cover", progress))
     elif body.fingerprint and body.fingerprint != robot.fingerprint:
         raise ValueError(f"the body was made for robot {body.robot_name!r}, not for {robot.name!r} as it is")
     elif body.levels is None:
@@ -56,7 +58,11 @@ def prepare(
             "the body does not cover its links (it has no levels); Body.cover(robot) makes one that does"
         )
     tables, pairs = tables_and_pairs(
-        robot, body, progress=_of_stage("tables", progress), pair_progress=_of_stage("pairs", progress)
+        robot,
+        body,
+        effort=DRAFT if draft else FULL,
+        progress=_of_stage("tables", progress),
+        pair_progress=_of_stage("pairs", progress),
     )
     may_touch = {frozenset(pair) for pair in allowed}
     return _core.Arm(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from sidestep.body import cache as fit_cache
 from sidestep.body import file as body_file
 from sidestep.body.cover import MAX_COMPONENTS as MAX_COVER_COMPONENTS
 from sidestep.body.cover import CoverProgress, CoverSettings, LinkCover, cover_mixtures, density_fit
+from sidestep.body.cover_problem import EffortName
 from sidestep.body.fitting import Components, FitSettings, LinkFit, Progress, fit_links
 from sidestep.body.mixture import CovarianceType
 from sidestep.body.selection import MAX_COMPONENTS
@@ -142,6 +144,7 @@ class Body(_core.Body):
         components: int | Mapping[str, int] | None = None,
         max_components: int = MAX_COVER_COMPONENTS,
         seed: int = 0,
+        effort: EffortName = "fine",
         progress: CoverProgress | None = None,
         cache: bool = True,
     ) -> Body:
@@ -165,6 +168,7 @@ class Body(_core.Body):
                 overshoot, relative to the size of the link, is even; all links do if it is None.
             max_components: ellipsoids in all; fewer are used if every link overshoots little enough.
             seed: seed of the starts.
+            effort: "draft", "fine" or "best", see `CoverSettings`.
             progress: called as progress(link, done, in_all); not called when the cache answers.
             cache: whether to take covers that come with Sidestep, and to read and write the user's cache
                 (SIDESTEP_CACHE_DIR overrides its place).
@@ -174,9 +178,15 @@ class Body(_core.Body):
         """
         if isinstance(components, Mapping):
             components = dict(components)
-        settings = CoverSettings(components=components, max_components=max_components, seed=seed)
+        settings = CoverSettings(
+            components=components, max_components=max_components, seed=seed, effort=effort
+        )
         settings.validate(robot)
-        shipped = shipped_arms.with_body_of(robot) if cache and settings == CoverSettings() else None
+        shipped = (
+            shipped_arms.with_body_of(robot)
+            if cache and replace(settings, effort=CoverSettings.effort) == CoverSettings()
+            else None
+        )
         if shipped is not None:
             return cls._shipped(shipped, robot, settings)
         return cls._made(

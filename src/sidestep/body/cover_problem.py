@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,12 +30,16 @@ BEYOND_MAX = 5.0  # what the largest overshoot costs more, as a share of its aim
 CERTIFICATE_TOLERANCE = 1 / 400  # of a link's size: longest edge of a triangle that is not cut further
 
 
+EffortName: TypeAlias = Literal["draft", "fine", "best"]
+
+
 @dataclass(frozen=True)
 class Effort:
     """How long covers are looked for; all of them are proven.
 
     Attributes:
         detail: of the surface, which distances are measured to.
+        most: ellipsoids of a link, of those that links share: more hold a box little better, and cost every step.
         trial_starts: outlines tried while numbers of ellipsoids are compared.
         trial_hops: rearrangements tried of the best of them.
         final_starts: more of them with the final number: the best of 10 overshoots 5 to 15 % less.
@@ -42,10 +47,12 @@ class Effort:
         coarse: surface points that an outline must hold, besides the triangles' corners.
         fine: surface points that the final refinement must hold; the proof itself needs no points.
         directions: boundary points per ellipsoid in the search: with 4,000 peaks are missed by up to 0.7 mm.
+        final_directions: the same for the cover that is kept; 0: what the search has measured.
         volume_samples: of the union's volume: with 200,000 its standard error is below 0.5 %.
     """
 
     detail: SurfaceDetail
+    most: int
     trial_starts: int
     trial_hops: int
     final_starts: int
@@ -53,23 +60,53 @@ class Effort:
     coarse: int
     fine: int
     directions: int
+    final_directions: int
     volume_samples: int
 
 
-FULL = Effort(
-    SurfaceDetail(), 2, 10, 10, 100, coarse=1_000, fine=30_000, directions=4_000, volume_samples=200_000
-)
-DRAFT = Effort(
-    SurfaceDetail(nodes=16_000, pieces=1_500),
-    1,
-    0,
-    0,
-    0,
-    coarse=400,
-    fine=4_000,
-    directions=1_000,
-    volume_samples=10_000,
-)
+EFFORTS: dict[EffortName, Effort] = {
+    "draft": Effort(
+        SurfaceDetail(nodes=16_000, pieces=1_500),
+        most=6,
+        trial_starts=1,
+        trial_hops=0,
+        final_starts=0,
+        final_hops=0,
+        coarse=400,
+        fine=4_000,
+        directions=1_000,
+        final_directions=0,
+        volume_samples=10_000,
+    ),
+    "fine": Effort(
+        SurfaceDetail(),
+        most=16,
+        trial_starts=1,
+        trial_hops=2,
+        final_starts=3,
+        final_hops=20,
+        coarse=1_000,
+        fine=30_000,
+        directions=2_000,
+        final_directions=16_000,
+        volume_samples=200_000,
+    ),
+    "best": Effort(
+        SurfaceDetail(),
+        most=80,
+        trial_starts=2,
+        trial_hops=10,
+        final_starts=10,
+        final_hops=100,
+        coarse=1_000,
+        fine=30_000,
+        directions=4_000,
+        final_directions=16_000,
+        volume_samples=200_000,
+    ),
+}
+
+FINE = EFFORTS["fine"]
 
 
 @dataclass(frozen=True)
@@ -99,7 +136,7 @@ class _Solution:
 class LinkProblem:
     """One link with the best cover known for every number of ellipsoids tried."""
 
-    def __init__(self, triangles: Array, *, seed: int, allowance: float = 1.0, effort: Effort = FULL) -> None:
+    def __init__(self, triangles: Array, *, seed: int, allowance: float = 1.0, effort: Effort = FINE) -> None:
         self.surface = LinkSurface(triangles, effort.detail)
         self.seed = seed
         self.allowance = allowance

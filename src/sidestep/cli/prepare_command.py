@@ -20,12 +20,15 @@ def prepare(
     tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
     effort_limit: EffortLimitOption = None,
     velocity_limit: VelocityLimitOption = None,
+    draft: Annotated[
+        bool, typer.Option(help="In seconds: a body that covers the arm as surely, with larger ellipsoids.")
+    ] = False,
     quiet: QuietOption = False,
 ) -> None:
     """Prepare an arm once: what a `Controller` needs, in one file that C++ reads alone.
 
-    Covers every link, measures clearance tables and finds pairs of links that may touch: minutes for a new robot,
-    moments where the user's cache has it. Exit code: 0 when the file is written, 2 on bad input.
+    Covers every link, measures clearance tables and finds pairs of links that may touch: minutes for a new robot, with
+    --draft seconds, moments where the user's cache has it. Exit code: 0 when the file is written, 2 on bad input.
     """
     if out.suffix.lower() != ".arm":
         raise ValueError(f"--out is {out}; an arm file ends with .arm")
@@ -45,6 +48,6 @@ def prepare(
         "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
     }
     given = {name: value for name, value in options.items() if value}
-    arm = Arm.load(source, progress=show, **given)  # type: ignore[arg-type]
+    arm = Arm.load(source, draft=draft, progress=show, **given)  # type: ignore[arg-type]
     arm.save(out)
     terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)
