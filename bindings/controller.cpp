@@ -195,14 +195,22 @@ void bind_controller(nb::module_& m) {
           "__init__",
           [](Controller* self, const Arm& arm, const std::optional<ControllerSettings>& settings) {
             new (self) Controller(arm, settings.value_or(ControllerSettings{}));
+            if (self->has_torque() && !arm.has_dynamics()) {
+              const std::string words = "arm '" + arm.name() + "' has no inertias, so torque output needs the arm's own mass matrix and "
+                                        "bias in every step: step(q, v, mass_matrix, bias)";
+              if (PyErr_WarnEx(PyExc_RuntimeWarning, words.c_str(), 1) != 0) {
+                throw nb::python_error();
+              }
+            }
           },
           nb::arg("arm"), nb::arg("settings") = nb::none())
       .def(
           "set_goal",
           [](Controller& self, nb::handle goal) { self.set_goal(as_goal(goal, self.arm().num_coordinates())); },
           nb::arg("goal"),
-          nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal) -> None"),
-          "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose. Raises\n"
+          nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None"),
+          "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose, or poses\n"
+          "of several frames at once, as of two arms. Joints that no pose asks to move stay where they are, and evade. Raises\n"
           "ValueError that names the joint, its value and what is allowed; the goal before stays.")
       .def(
           "set_velocity",

@@ -9,6 +9,17 @@
 namespace sidestep::python {
 
 Goal as_goal(nb::handle value, Eigen::Index nv) {
+  if ((nb::isinstance<nb::list>(value) || nb::isinstance<nb::tuple>(value)) && nb::len(value) > 0 &&
+      nb::isinstance<PoseGoal>(value[0])) {
+    PoseGoal all = nb::cast<const PoseGoal&>(value[0]);
+    for (std::size_t k = 1; k < nb::len(value); ++k) {
+      if (!nb::isinstance<PoseGoal>(value[k])) {
+        throw nb::type_error("goal: a list holds pose goals alone");
+      }
+      all.add(nb::cast<const PoseGoal&>(value[k]));
+    }
+    return all;
+  }
   if (nb::isinstance<PoseGoal>(value)) {
     return nb::cast<const PoseGoal&>(value);
   }

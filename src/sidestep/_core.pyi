@@ -2841,9 +2841,10 @@ class Controller:
 
     def __init__(self, arm: Arm, settings: ControllerSettings | None = None) -> None: ...
 
-    def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal) -> None:
+    def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None:
         """
-        From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose. Raises
+        From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose, or poses
+        of several frames at once, as of two arms. Joints that no pose asks to move stay where they are, and evade. Raises
         ValueError that names the joint, its value and what is allowed; the goal before stays.
         """
 

@@ -67,9 +67,15 @@ std::unique_ptr<OnlinePlanner> make_guide(const Arm& arm, const BodyClearance& b
 
 bool use_torque(const Arm& arm, ControllerSettings::Output output) {
   const bool possible = arm.has_dynamics() && arm.robot().limits().effort.allFinite();
-  if (output == ControllerSettings::Output::torque && !arm.robot().limits().effort.allFinite()) {
-    throw std::invalid_argument("controller: output is torque, but arm '" + arm.name() +
-                                "' has joints without an effort limit; give effort limits, or ask for acceleration");
+  std::string without;
+  for (int j = 0; j < arm.num_coordinates(); ++j) {
+    if (!std::isfinite(arm.robot().limits().effort[j])) {
+      without += (without.empty() ? "'" : ", '") + arm.robot().coordinate_names()[static_cast<std::size_t>(j)] + "'";
+    }
+  }
+  if (output == ControllerSettings::Output::torque && !without.empty()) {
+    throw std::invalid_argument("controller: output is torque, but arm '" + arm.name() + "' has no effort limit of " + without +
+                                "; give them when it is loaded (effort_limits), or ask for acceleration");
   }
   return output == ControllerSettings::Output::torque || (output == ControllerSettings::Output::automatic && possible);
 }

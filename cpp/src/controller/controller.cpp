@@ -1,6 +1,7 @@
 // The public face, and what is set from any thread.
 #include "sidestep/controller/controller.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -37,9 +38,13 @@ void Controller::Impl::set_goal(std::optional<Goal> goal) {
     if (auto* joint = std::get_if<JointGoal>(&*goal)) {
       joint->position = joint->position.cwiseMax(robot.limits().lower).cwiseMin(robot.limits().upper);
     } else {
+      const auto set_stiffness = [&](PoseGoal& pose) {
+        pose.settings.position_stiffness = pose_position_share * settings.barriers.stiffness;
+        pose.settings.orientation_stiffness = pose_rotation_share * settings.barriers.stiffness;
+      };
       PoseGoal& pose = std::get<PoseGoal>(*goal);
-      pose.settings.position_stiffness = pose_position_share * settings.barriers.stiffness;
-      pose.settings.orientation_stiffness = pose_rotation_share * settings.barriers.stiffness;
+      set_stiffness(pose);
+      std::for_each(pose.others.begin(), pose.others.end(), set_stiffness);
     }
   }
   put(goal ? Order(std::move(*goal)) : Order());

@@ -101,7 +101,7 @@ class Controller::Impl : private StepState {
     Eigen::VectorXd begin_q, begin_v;
     double clock = 0.0, rate = 0.0;
     bool by_pose = false;                // the pose goal itself is followed, as it moves
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // where it is now
+    double order_age = 0.0;              // for how long it has moved [s]
     OnlinePlanner::Following following;
     Eigen::MatrixXd places;              // where barriers leave room (nv × num_places)
     Eigen::Index num_places = 0;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 #include <utility>
+#include <vector>
 
 #include "../system/random_configuration.hpp"
 #include "../settings.hpp"
@@ -41,8 +42,13 @@ double size_of(const Posture& posture) noexcept { return std::hypot(posture.posi
 class Descent {
  public:
   Descent(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, double limit_room)
-      : robot_(robot), goal_(goal), interval_(finite_interval(robot, near, limit_room)), state_(robot), rest_(Eigen::VectorXd::Zero(near.size())) {
-    frame_ = robot.frame_index(goal.frame().name);
+      : robot_(robot), interval_(finite_interval(robot, near, limit_room)), state_(robot), rest_(Eigen::VectorXd::Zero(near.size())) {
+    add(goal);
+    for (const PoseGoal& other : goal.others) {
+      add(other);
+    }
+    error_.resize(6 * static_cast<Eigen::Index>(frames_.size()));
+    jacobian_.resize(error_.size(), near.size());
   }
 
   const Eigen::VectorXd& lower() const noexcept { return interval_.first; }
@@ -55,24 +61,21 @@ class Descent {
     int fruitless = 0;
     for (int k = 0; k < iterations; ++k) {
       state_.update(robot_, q, rest_);
-      const Vector6d error = error_here();
-      const double size = error.norm();
+      Posture here{q, 0.0, 0.0};
+      look(here);
+      const double size = error_.norm();
       fruitless = size > progress * least ? fruitless + 1 : 0;
       if (size < least) {
         least = size;
-        best = {q, error.head<3>().norm(), error.tail<3>().norm()};
+        best = std::move(here);
       }
       if (size < accuracy || fruitless == most_fruitless) {
         break;
       }
-      Eigen::MatrixXd J = frame_jacobian(robot_, state_, frame_);
-      if (goal_.settings.position_only) {
-        J.bottomRows<3>().setZero();
-      }
       const double damping = std::min(largest_damping, size);
-      Eigen::Matrix<double, 6, 6> gram = J * J.transpose();
+      Eigen::MatrixXd gram = jacobian_ * jacobian_.transpose();
       gram.diagonal().array() += damping * damping;
-      Eigen::VectorXd step = J.transpose() * gram.ldlt().solve(error);
+      Eigen::VectorXd step = jacobian_.transpose() * gram.ldlt().solve(error_);
       const double largest = step.cwiseAbs().maxCoeff();
       if (largest > largest_step) {
         step *= largest_step / largest;
@@ -83,21 +86,35 @@ class Descent {
   }
 
  private:
-  Vector6d error_here() const {
-    const Eigen::Isometry3d X = frame_pose(robot_, state_, frame_);
-    Vector6d error;
-    error.head<3>() = goal_.pose.translation() - X.translation();
-    error.tail<3>() = goal_.settings.position_only ? Eigen::Vector3d::Zero().eval()
-                                                   : rotation_vector(goal_.pose.linear() * X.linear().transpose());
-    return error;
+  void add(const PoseGoal& goal) { frames_.push_back({&goal, robot_.frame_index(goal.frame().name)}); }
+
+  /// Error and Jacobian of all frames, one below the other; the largest errors of them.
+  void look(Posture& posture) {
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      const auto& [goal, frame] = frames_[k];
+      const auto row = 6 * static_cast<Eigen::Index>(k);
+      const Eigen::Isometry3d X = frame_pose(robot_, state_, frame);
+      auto J = jacobian_.middleRows<6>(row);
+      J = frame_jacobian(robot_, state_, frame);
+      error_.segment<3>(row) = goal->pose.translation() - X.translation();
+      if (goal->settings.position_only) {
+        J.bottomRows<3>().setZero();
+        error_.segment<3>(row + 3).setZero();
+      } else {
+        error_.segment<3>(row + 3) = rotation_vector(goal->pose.linear() * X.linear().transpose());
+      }
+      posture.position_error = std::max(posture.position_error, error_.segment<3>(row).norm());
+      posture.rotation_error = std::max(posture.rotation_error, error_.segment<3>(row + 3).norm());
+    }
   }
 
   const Robot& robot_;
-  const PoseGoal& goal_;
   std::pair<Eigen::VectorXd, Eigen::VectorXd> interval_;
   KinematicState state_;
   Eigen::VectorXd rest_;
-  int frame_;
+  std::vector<std::pair<const PoseGoal*, int>> frames_;
+  Eigen::VectorXd error_;
+  Eigen::MatrixXd jacobian_;
 };
 
 }  // namespace
@@ -108,8 +125,13 @@ PoseError pose_error(const PoseGoal& goal, const KinematicState& state) noexcept
   const KinematicState::Link& link = state.link(goal.frame().joint);
   const Eigen::Vector3d p = link.p_WL + link.R_WL * goal.frame().X_JF.translation();
   const Eigen::Matrix3d R = link.R_WL * goal.frame().X_JF.linear();
-  return {(p - goal.pose.translation()).norm(),
-          goal.settings.position_only ? 0.0 : rotation_vector(goal.pose.linear().transpose() * R).norm()};
+  PoseError largest{(p - goal.pose.translation()).norm(),
+                    goal.settings.position_only ? 0.0 : rotation_vector(goal.pose.linear().transpose() * R).norm()};
+  for (const PoseGoal& other : goal.others) {
+    const PoseError error = pose_error(other, state);
+    largest = {std::max(largest.position, error.position), std::max(largest.rotation, error.rotation)};
+  }
+  return largest;
 }
 
 Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, const PostureSearchSettings& settings,

@@ -255,9 +255,7 @@ void Controller::Impl::write_snapshot() noexcept {
     s.clock = clock_.time;
     s.rate = clock_.rate;
   }
-  if (const PoseGoal* pose = pose_goal()) {
-    s.pose = pose->pose;
-  }
+  s.order_age = order_age_;
   if (const auto* joint = std::get_if<JointGoal>(followed_)) {
     s.followed = *joint;
   }

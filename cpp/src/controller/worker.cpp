@@ -83,7 +83,7 @@ void Controller::Impl::look(const Snapshot& s) {
     Goal followed = s.followed;
     if (s.by_pose && pose != nullptr) {
       followed = *pose;
-      std::get<PoseGoal>(followed).pose = s.pose;
+      advance(followed, s.order_age);
     }
     LookAhead::Leader leader = leader_of(s.following);
     if (auto* trajectory = std::get_if<TrajectoryOrder>(&order); trajectory != nullptr && s.on_trajectory) {

@@ -98,6 +98,23 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
   }
 }
 
+PoseGoal& PoseGoal::add(PoseGoal other) {
+  if (other.joints_hash_ != joints_hash_) {
+    throw std::invalid_argument("pose goal: the pose of frame '" + other.frame_.name + "' is of a robot with other joints");
+  }
+  std::vector<PoseGoal> more = std::move(other.others);
+  other.others.clear();
+  more.insert(more.begin(), std::move(other));
+  for (PoseGoal& one : more) {
+    const auto same = [&](const PoseGoal& known) { return known.frame_.name == one.frame_.name; };
+    if (same(*this) || std::any_of(others.begin(), others.end(), same)) {
+      throw std::invalid_argument("pose goal: frame '" + one.frame_.name + "' has two poses, allowed: one of each frame");
+    }
+    others.push_back(std::move(one));
+  }
+  return *this;
+}
+
 bool advance(Goal& goal, double duration) noexcept {
   if (auto* joint = std::get_if<JointGoal>(&goal)) {
     const auto velocity = joint->velocity + duration * joint->acceleration;
@@ -110,7 +127,10 @@ bool advance(Goal& goal, double duration) noexcept {
     joint->velocity = velocity;
     return true;
   }
-  PoseGoal& frame = std::get<PoseGoal>(goal);
+  return advance(std::get<PoseGoal>(goal), duration);
+}
+
+bool advance(PoseGoal& frame, double duration) noexcept {
   const Eigen::Vector3d position = frame.pose.translation() + duration * frame.twist.head<3>();
   const Eigen::Vector3d turn = duration * frame.twist.tail<3>();
   const double angle = turn.norm();
@@ -121,15 +141,34 @@ bool advance(Goal& goal, double duration) noexcept {
   if (angle > 0.0) {
     frame.pose.linear() = Eigen::AngleAxisd(angle, turn / angle) * frame.pose.linear();
   }
-  return true;
+  return std::all_of(frame.others.begin(), frame.others.end(), [&](PoseGoal& other) { return advance(other, duration); });
 }
 
 bool is_moving(const Goal& goal) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
     return !joint->velocity.isZero(0.0) || !joint->acceleration.isZero(0.0);
   }
-  return !std::get<PoseGoal>(goal).twist.isZero(0.0);
+  const PoseGoal& pose = std::get<PoseGoal>(goal);
+  return !pose.twist.isZero(0.0) ||
+         std::any_of(pose.others.begin(), pose.others.end(), [](const PoseGoal& other) { return !other.twist.isZero(0.0); });
 }
+
+namespace {
+
+GoalFault check_pose(const PoseGoal& frame, const Robot& robot) noexcept {
+  if (!frame.is_for(robot) ||
+      !frame.pose.matrix().allFinite() || !frame.twist.allFinite() || !frame.settings.rest.allFinite()) {
+    return GoalFault::invalid;
+  }
+  GoalFault worst = (frame.pose.translation() - frame.shoulder()).norm() > frame.reach() ? GoalFault::out_of_reach : GoalFault::none;
+  for (const PoseGoal& other : frame.others) {
+    const GoalFault fault = check_pose(other, robot);
+    worst = fault == GoalFault::invalid || worst == GoalFault::none ? fault : worst;
+  }
+  return worst;
+}
+
+}  // namespace
 
 GoalFault check(const Goal& goal, const Robot& robot) noexcept {
   if (const auto* joint = std::get_if<JointGoal>(&goal)) {
@@ -142,13 +181,7 @@ GoalFault check(const Goal& goal, const Robot& robot) noexcept {
       return is_outside(sized(joint->position, nv), robot.limits(), nv, limit_rounding) ? GoalFault::outside_limits : GoalFault::none;
     });
   }
-  const PoseGoal& frame = std::get<PoseGoal>(goal);
-  if (!frame.is_for(robot) ||
-      !frame.pose.matrix().allFinite() || !frame.twist.allFinite() || !frame.settings.rest.allFinite()) {
-    return GoalFault::invalid;
-  }
-  return (frame.pose.translation() - frame.shoulder()).norm() > frame.reach() ? GoalFault::out_of_reach
-                                                                              : GoalFault::none;
+  return check_pose(std::get<PoseGoal>(goal), robot);
 }
 
 GoalPull::GoalPull(int nv)
@@ -193,6 +226,17 @@ int GoalPull::farthest_coordinate() const noexcept {
 }
 
 void GoalPull::update(const PoseGoal& goal, const KinematicState& state) noexcept {
+  potential = position_error = 0.0;
+  joint_error = rotation_error = nan;
+  gradient.setZero();
+  velocity.setZero();
+  add(goal, goal.settings.posture_stiffness > 0.0, state);
+  for (const PoseGoal& other : goal.others) {
+    add(other, false, state);
+  }
+}
+
+void GoalPull::add(const PoseGoal& goal, bool posture, const KinematicState& state) noexcept {
   const PoseGoalSettings& settings = goal.settings;
   const KinematicState::Link& link = state.link(goal.frame().joint);
   const Eigen::Matrix3d R = link.R_WL * goal.frame().X_JF.linear();
@@ -202,10 +246,11 @@ void GoalPull::update(const PoseGoal& goal, const KinematicState& state) noexcep
   const Eigen::Vector3d offset = p - goal.pose.translation();
   const Eigen::Vector3d phi = rotation_vector(goal.pose.linear().transpose() * R);
   const double k_R = settings.position_only ? 0.0 : settings.orientation_stiffness;
-  potential = 0.5 * settings.position_stiffness * offset.squaredNorm() + 0.5 * k_R * phi.squaredNorm();
-  joint_error = nan;
-  position_error = offset.norm();
-  rotation_error = settings.position_only ? nan : phi.norm();
+  potential += 0.5 * settings.position_stiffness * offset.squaredNorm() + 0.5 * k_R * phi.squaredNorm();
+  position_error = std::max(position_error, offset.norm());
+  if (!settings.position_only) {
+    rotation_error = std::isnan(rotation_error) ? phi.norm() : std::max(rotation_error, phi.norm());
+  }
   Vector6d force;
   force << settings.position_stiffness * offset, k_R * (R * phi);
 
@@ -218,11 +263,9 @@ void GoalPull::update(const PoseGoal& goal, const KinematicState& state) noexcep
       jacobian_transposed_.row(mover.coordinate).tail<3>() += mover.screw.angular.transpose();
     }
   }
-  gradient = jacobian_transposed_.lazyProduct(force);
+  gradient += jacobian_transposed_.lazyProduct(force);
 
-  const bool posture = settings.posture_stiffness > 0.0;
   const bool moving = !goal.twist.isZero(0.0);
-  velocity.setZero();
   if (!posture && !moving) {
     return;
   }
@@ -236,7 +279,7 @@ void GoalPull::update(const PoseGoal& goal, const KinematicState& state) noexcep
   }
   if (moving) {
     const Vector6d seen = factor.solve(goal.twist);
-    velocity = jacobian_transposed_.lazyProduct(seen);
+    velocity += jacobian_transposed_.lazyProduct(seen);
   }
 }
 

@@ -11,7 +11,7 @@ namespace sidestep {
 /// A configuration for a pose goal.
 struct Posture {
   Eigen::VectorXd q;      ///< (nv) [rad | m]
-  double position_error;  ///< distance of the frame from the goal [m]
+  double position_error;  ///< distance of the farthest frame from its goal [m]
   double rotation_error;  ///< angle between them [rad]; 0 where the orientation is free
   double room = 0.0;      ///< [m] as the search was told; less than zero: something is in the way
 
@@ -19,7 +19,7 @@ struct Posture {
   bool found() const noexcept;
 };
 
-/// How far a frame is from a pose goal: distance [m] and angle [rad], 0 where the orientation is free. No allocation.
+/// How far the farthest frame of a pose goal is: distance [m] and angle [rad], 0 where the orientation is free. No allocation.
 struct PoseError {
   double position, rotation;
 };

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "sidestep/system/gain.hpp"
 #include "sidestep/kinematics/kinematic_state.hpp"
@@ -60,9 +61,14 @@ struct PoseGoal {
   PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Isometry3d& pose, PoseGoalSettings settings = {},
            const Vector6d& twist = Vector6d::Zero());
 
+  /// Adds a pose that another frame is to have at the same time, as of a second arm: U and v* are summed, and rest and posture
+  /// stiffness of `other` do not count. Throws std::invalid_argument on a goal of another robot and a frame that has one.
+  PoseGoal& add(PoseGoal other);
+
   Eigen::Isometry3d pose;     ///< X_WF* in the world
   Vector6d twist;             ///< how it moves, in the world: velocity of its origin [m/s], angular velocity [rad/s]
   PoseGoalSettings settings;
+  std::vector<PoseGoal> others;  ///< see `add`; without others of their own
 
   const Frame& frame() const noexcept { return frame_; }
   /// Whether it was made for a robot with these joints.
@@ -88,6 +94,7 @@ using Goal = std::variant<JointGoal, PoseGoal>;
 /// Moves a goal for `duration` [s] as its velocity and acceleration say. False where that gives what is not finite:
 /// then it stays where it is. No allocation.
 bool advance(Goal& goal, double duration) noexcept;
+bool advance(PoseGoal& goal, double duration) noexcept;
 
 /// Whether a goal has a velocity or an acceleration.
 bool is_moving(const Goal& goal) noexcept;
@@ -114,7 +121,7 @@ struct GoalPull {
   double potential = 0.0;      ///< U, without the posture pull
   Eigen::VectorXd gradient;    ///< ∂U/∂q − a* (nv), posture pull included
   Eigen::VectorXd velocity;    ///< v* (nv)
-  // How far the goal is; NaN where the goal has no such part.
+  // How far the goal is, the farthest of its frames; NaN where the goal has no such part.
   double joint_error = nan;     ///< largest |q − q*| [rad | m]
   double position_error = nan;  ///< |p − p*| [m]
   double rotation_error = nan;  ///< |φ| [rad], at most π
@@ -126,6 +133,7 @@ struct GoalPull {
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   void update(const JointGoal& goal, const KinematicState& state, const Gain& stiffness) noexcept;
   void update(const PoseGoal& goal, const KinematicState& state) noexcept;
+  void add(const PoseGoal& goal, bool has_posture, const KinematicState& state) noexcept;
 
   Eigen::VectorXd displacement_;
   Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_;
