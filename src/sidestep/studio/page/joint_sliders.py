@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 STEP_DEGREES, STEP_METRES = 0.1, 0.001
+DECIMALS = 3  # that are shown
 FEWEST_STEPS = 20  # of a slider: a stroke of some millimetres gets finer ones
 
 
@@ -37,6 +38,7 @@ class JointSliders:
         self._factors = np.array(
             [180.0 / np.pi if k in turning else 1.0 for k in range(robot.num_coordinates)]
         )
+        self._q = np.array(robot.neutral)
         self._sliders: list[Any] = []
         lower, upper = robot._finite_interval()
         labels = short_names(robot.coordinate_names)
@@ -50,7 +52,7 @@ class JointSliders:
                 min=low,
                 max=high,
                 step=step,
-                initial_value=float(np.clip(round(rest, 4), low, high)),
+                initial_value=float(np.clip(round(rest, DECIMALS), low, high)),
                 hint=f"{hint} {name}",
             )
             slider.on_update(self._moved)
@@ -58,8 +60,9 @@ class JointSliders:
 
     def show(self, q: Array) -> None:
         """Puts the sliders where q (nv,) is, whoever set it."""
+        self._q = np.array(q)
         for slider, value in zip(self._sliders, self._factors * q, strict=True):
-            slider.value = float(np.clip(round(float(value), 4), slider.min, slider.max))
+            slider.value = float(np.clip(round(float(value), DECIMALS), slider.min, slider.max))
 
     def remove(self) -> None:
         """Takes them off the page."""
@@ -69,6 +72,7 @@ class JointSliders:
     async def _moved(self, event: Any) -> None:
         if event.client is None:  # set by `show`
             return
-        values = np.array([slider.value for slider in self._sliders]) / self._factors
+        k = self._sliders.index(event.target)
+        self._q[k] = self._sliders[k].value / self._factors[k]  # the others are not rounded to what they show
         limits = self._robot.limits
-        self._on_move(np.clip(values, limits.lower, limits.upper))
+        self._on_move(np.clip(self._q, limits.lower, limits.upper))
