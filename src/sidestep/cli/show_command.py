@@ -39,7 +39,7 @@ def show(
     Nothing is prepared for that. Ends with Ctrl-C. With --json it writes what was read, and which links touch in the
     middle of the joints, and shows nothing. Exit code: 0, or 2 when the robot cannot be read.
     """
-    from sidestep.show.reading import read
+    from sidestep.studio.show.reading import read
 
     options: dict[str, Any] = {
         "package_dirs": package_dir,
@@ -50,12 +50,12 @@ def show(
     }
     reading = read(source, {name: value for name, value in options.items() if value})
     if json is not None:
-        from sidestep.show.document import document_with_touching
+        from sidestep.studio.show.document import document_with_touching
 
         write_json(document_with_touching(reading), json)
         return
     from sidestep.cli.studio_command import open_browser
-    from sidestep.show.show import Show
+    from sidestep.studio.show.show import Show
 
     terminal = console()
     with Show(reading, port=port) as running:

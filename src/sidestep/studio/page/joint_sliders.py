@@ -62,7 +62,9 @@ class JointSliders:
         """Puts the sliders where q (nv,) is, whoever set it."""
         self._q = np.array(q)
         for slider, value in zip(self._sliders, self._factors * q, strict=True):
-            slider.value = float(np.clip(round(float(value), DECIMALS), slider.min, slider.max))
+            shown = float(np.clip(round(float(value), DECIMALS), slider.min, slider.max))
+            if slider.value != shown:  # the one that is being moved is left alone
+                slider.value = shown
 
     def remove(self) -> None:
         """Takes them off the page."""

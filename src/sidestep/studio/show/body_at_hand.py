@@ -6,7 +6,7 @@ from sidestep.arm.shipped_arms import with_body_of
 from sidestep.body import Body
 from sidestep.body.cache import cache_path
 from sidestep.body.cover import CoverSettings
-from sidestep.show.reading import Reading
+from sidestep.studio.show.reading import Reading
 
 
 def body_at_hand(reading: Reading) -> Body | None:

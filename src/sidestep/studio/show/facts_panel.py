@@ -5,11 +5,11 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any
 
-from sidestep.show.document import document
-from sidestep.show.facts import joints_html, links_html, robot_html
-from sidestep.show.reading import Reading
-from sidestep.show.touching import Touching
 from sidestep.studio.page.words import stamped
+from sidestep.studio.show.document import document
+from sidestep.studio.show.facts import joints_html, links_html, robot_html
+from sidestep.studio.show.reading import Reading
+from sidestep.studio.show.touching import Touching
 
 if TYPE_CHECKING:
     import viser

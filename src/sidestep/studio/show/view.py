@@ -12,16 +12,16 @@ import numpy.typing as npt
 from sidestep.drawing.palette import ORANGE
 from sidestep.robot import Robot
 from sidestep.robot.pose import moved
-from sidestep.show.body_at_hand import body_at_hand
-from sidestep.show.facts import configuration_html
-from sidestep.show.facts_panel import FactsPanel
-from sidestep.show.reading import Reading
-from sidestep.show.shapes import DrawableShapes
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import SKIN, ArmView, BodyView, merged_meshes, reach
 from sidestep.studio.page.camera import Viewpoint
 from sidestep.studio.page.joint_sliders import JointSliders
 from sidestep.studio.page.scene import point_cameras, set_up_scene
+from sidestep.studio.show.body_at_hand import body_at_hand
+from sidestep.studio.show.facts import configuration_html
+from sidestep.studio.show.facts_panel import FactsPanel
+from sidestep.studio.show.reading import Reading
+from sidestep.studio.show.shapes import DrawableShapes
 
 if TYPE_CHECKING:
     import trimesh

@@ -7,7 +7,7 @@ from typing import Any
 
 from sidestep._core import Joint, JointType
 from sidestep.robot import Robot
-from sidestep.show.reading import Reading
+from sidestep.studio.show.reading import Reading
 
 
 def document(reading: Reading) -> dict[str, Any]:
@@ -85,8 +85,8 @@ def finite(value: float) -> float | None:
 
 def document_with_touching(reading: Reading) -> dict[str, Any]:
     """The same after the meshes are loaded: with what they warn of, and the links that touch at `Robot.neutral`."""
-    from sidestep.show.shapes import drawable_shapes
-    from sidestep.show.touching import TouchCheck
+    from sidestep.studio.show.shapes import drawable_shapes
+    from sidestep.studio.show.touching import TouchCheck
 
     shapes = drawable_shapes(reading.robot)
     q = reading.robot.neutral

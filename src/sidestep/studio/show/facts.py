@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from sidestep.show.touching import Touching
+from sidestep.studio.show.touching import Touching
 
 Document = dict[str, Any]
 ALARM = "#D55E00"  # vermillion, as all that needs a look

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sidestep.robot import Geometry, Robot
-from sidestep.show.reading import collected_warnings
+from sidestep.studio.show.reading import collected_warnings
 
 Shapes = dict[str, tuple[Geometry, ...]]
 

@@ -6,14 +6,14 @@ import logging
 import threading
 from typing import TYPE_CHECKING
 
-from sidestep.show.facts_panel import FactsPanel
-from sidestep.show.reading import Reading
-from sidestep.show.touching import TouchMonitor
 from sidestep.studio.guard import Guard
 from sidestep.studio.server import HOST, address_of, check_port, guarded_server
+from sidestep.studio.show.facts_panel import FactsPanel
+from sidestep.studio.show.reading import Reading
+from sidestep.studio.show.touching import TouchMonitor
 
 if TYPE_CHECKING:
-    from sidestep.show.view import ShowView
+    from sidestep.studio.show.view import ShowView
 
 PORT = 8891  # beside the studio's
 LOADED = 120.0  # [s] at most until the arm is on the page, for `wait_ready`
@@ -83,10 +83,10 @@ class Show:
 
     def _load(self) -> None:
         try:
-            from sidestep.show.shapes import (
+            from sidestep.studio.show.shapes import (
                 drawable_shapes,  # loads meshes: seconds, and so does what it imports
             )
-            from sidestep.show.view import ShowView
+            from sidestep.studio.show.view import ShowView
 
             shapes = drawable_shapes(self._reading.robot)
             self.panel.add_warnings(shapes.warnings)
