@@ -18,6 +18,7 @@ from sidestep.arm.shipped_arms import shipped_file
 from sidestep.robot import Robot
 from sidestep.studio.show import touching as touching_module
 from sidestep.studio.show.reading import read
+from sidestep.studio.show.shapes import drawable_shapes
 from sidestep.studio.show.show import Show
 from sidestep.studio.show.touching import Touching, TouchMonitor
 
@@ -168,3 +169,9 @@ def test_what_touches_is_measured_once_the_joints_rest(monkeypatch: pytest.Monke
     assert told.wait(PATIENCE)
     monitor.stop()
     assert asked == [1.0]
+
+
+def test_loading_ends_where_the_page_is_stopped() -> None:
+    looked = iter([False, True])  # after the first link
+    shapes = drawable_shapes(Robot.named("planar3"), lambda: next(looked))
+    assert list(shapes.seen) == ["base"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from sidestep.robot import Geometry, Robot
@@ -25,13 +26,15 @@ class DrawableShapes:
     warnings: tuple[str, ...]
 
 
-def drawable_shapes(robot: Robot) -> DrawableShapes:
-    """Loads every mesh of a robot, which may take seconds."""
+def drawable_shapes(robot: Robot, stopped: Callable[[], bool] = lambda: False) -> DrawableShapes:
+    """Loads every mesh of a robot, which may take seconds; where it is `stopped`, those of further links not."""
     seen: Shapes = {}
     collision: Shapes = {}
     broken: list[str] = []
     with collected_warnings() as told:
         for link in robot.links:
+            if stopped():
+                break
             visuals, collisions = (
                 _readable(link.name, shapes, broken) for shapes in (link.visuals, link.collisions)
             )

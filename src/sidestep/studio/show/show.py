@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from sidestep.studio.show.view import ShowView
 
 PORT = 8891  # beside the studio's
+ENDING = 10.0  # [s] at most until the loading of meshes ends
 LOADED = 120.0  # [s] at most until the arm is on the page, for `wait_ready`
 
 
@@ -78,7 +79,7 @@ class Show:
         """Ends threads and server."""
         self._stopping.set()
         self._touch.stop()
-        self._thread.join(timeout=2.0)
+        self._thread.join(timeout=ENDING)
         self.server.stop()
 
     def _load(self) -> None:
@@ -88,7 +89,9 @@ class Show:
             )
             from sidestep.studio.show.view import ShowView
 
-            shapes = drawable_shapes(self._reading.robot)
+            shapes = drawable_shapes(self._reading.robot, self._stopping.is_set)
+            if self._stopping.is_set():
+                return
             self.panel.add_warnings(shapes.warnings)
             self.view = ShowView(self.server, self._reading, shapes, self.panel, self._touch.look)
             self.panel.tell("")
