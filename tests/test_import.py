@@ -213,7 +213,7 @@ def test_the_extras_hold_what_the_errors_say() -> None:
         ("trimesh", "import sidestep.studio.simulated_scene", "studio"),
         (
             "viser",
-            "from sidestep.studio.studio import Studio, _server; _server('127.0.0.1', 0, None)",
+            "from sidestep.studio.server import guarded_server; guarded_server('127.0.0.1', 0, None)",
             "studio",
         ),
         ("playwright", "from sidestep.studio import headless; headless.check_browser()", "headless"),

@@ -13,7 +13,7 @@ import pytest
 
 from sidestep import Scenario, cli
 from sidestep.cli import run_command, studio_command
-from sidestep.studio import headless, studio
+from sidestep.studio import headless, server
 
 
 def invoke(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
@@ -61,7 +61,7 @@ def test_the_demo_is_the_cluster_of_balls_with_barriers(
 def test_it_listens_to_this_machine_alone_unless_told_otherwise(
     monkeypatch: pytest.MonkeyPatch, opened: list[tuple[Scenario, dict[str, Any]]]
 ) -> None:
-    assert studio.HOST == "127.0.0.1"
+    assert server.HOST == "127.0.0.1"
     assert invoke(monkeypatch, "studio", "--robot", "planar2", "--no-browser") == 0
     assert invoke(monkeypatch, "studio", "--robot", "planar2", "--host", "0.0.0.0", "--port", "0") == 0
     assert [options["host"] for _, options in opened] == ["127.0.0.1", "0.0.0.0"]

@@ -24,7 +24,8 @@ from websockets.exceptions import InvalidStatus
 from sidestep.cli import studio_command
 from sidestep.studio.guard import Guard, placed
 from sidestep.studio.headless import Window, go_to, new_page
-from sidestep.studio.studio import Studio, _server
+from sidestep.studio.server import guarded_server
+from sidestep.studio.studio import Studio
 from studio.looker import NO_CHROMIUM, PATIENCE
 
 TOO_LATE = 20.0  # [s]
@@ -212,7 +213,7 @@ def test_a_server_knows_its_own_names(host: str, own: list[str], foreign: list[s
 
 def test_a_server_for_all_asks_for_the_token_too() -> None:
     guard = Guard("0.0.0.0")
-    server = _server("0.0.0.0", 0, guard)
+    server = guarded_server("0.0.0.0", 0, guard)
     try:
         running: Any = SimpleNamespace(port=server.get_port())
         assert shake_hands(running, "/", host="127.0.0.1:{port}") == 403
@@ -227,7 +228,7 @@ def test_a_viser_that_cannot_be_guarded_is_an_error(monkeypatch: pytest.MonkeyPa
     unguarded = SimpleNamespace(stop=lambda: stopped.append(True))
     monkeypatch.setattr(viser, "ViserServer", lambda **_: unguarded)
     with pytest.raises(RuntimeError, match=r"starts its server in a way that the studio cannot guard"):
-        _server("127.0.0.1", 0, Guard("127.0.0.1"))
+        guarded_server("127.0.0.1", 0, Guard("127.0.0.1"))
     assert stopped == [True]
 
 

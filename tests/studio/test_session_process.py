@@ -19,9 +19,9 @@ from sidestep.studio import messages as m
 from sidestep.studio import session_process
 from sidestep.studio.command_queue import CommandQueue, add
 from sidestep.studio.headless import Window, check_files, save_animation
+from sidestep.studio.server import address_of, check_port
 from sidestep.studio.session import Session
 from sidestep.studio.session_process import FRAME, IDLE_FRAME, Beginning, SessionProcess, _Pacer, serve
-from sidestep.studio.studio import address_of, check_port
 
 PATIENCE = 120.0  # [s] at most for anything
 

@@ -115,18 +115,23 @@ class Arm(_core.Arm):
             "xacro_arguments": xacro_arguments,
         }
         given = {key: value for key, value in options.items() if not _is_default(value)}
-        how = _How(tuple(allowed), draft, progress, cache)
-        if _is_text(source):
-            return cls._prepared(lambda: _described(source, given), "URDF text", how, (source, given))
-        path = Path(source)
-        if path.suffix.lower() == SUFFIX:
-            _refuse_options(
-                [*given, *(["allowed"] if allowed else [])], (), f"arm file '{path}', which is prepared"
-            )
+        text = isinstance(source, str) and source.lstrip().startswith("<")
+        path = Path("URDF text" if text else source)
+        if not text and path.suffix.lower() == SUFFIX:
+            if refused := [*given, *(["allowed"] if allowed else [])]:
+                raise ValueError(f"{refused[0]} cannot be given for arm file '{path}', which is prepared")
             return cls(_core.Arm.read(path))
-        if path.suffix or len(path.parts) != 1 or path.is_file():
-            return cls._prepared(lambda: _described(path, given), path.name, how, (source, given))
-        return cls._named(str(source), given, how)
+
+        def describe() -> Robot:
+            from sidestep.robot.any_source import robot_from
+
+            return robot_from(source, given)
+
+        shipped = None if given or allowed else shipped_file(str(source))
+        if shipped is not None and not path.is_file():
+            return cls(_core.Arm.read(shipped), description=describe)
+        how = _How(tuple(allowed), draft, progress, cache)
+        return cls._prepared(describe, path.name, how, (source, given))
 
     @classmethod
     def from_robot(
@@ -221,31 +226,6 @@ class Arm(_core.Arm):
         return robot
 
     @classmethod
-    def _named(
-        cls,
-        name: str,
-        given: Mapping[str, Any],
-        how: _How,
-    ) -> Arm:
-        def describe() -> Robot:
-            from sidestep.robot import Robot
-
-            return Robot.named(name, **given)
-
-        shipped = shipped_file(name)
-        if shipped is not None and not given and not how.allowed:
-            return cls(_core.Arm.read(shipped), description=describe)
-        from sidestep.robot.catalogue import recipe
-        from sidestep.robot.descriptions import described
-
-        if (file := described(name)) is not None:
-            options = {"name": name, "package_dirs": file.package_dirs, **given}
-            return cls._prepared(lambda: _described(file.path, options), name, how, (name, given))
-        recipe(name)  # raises, with the known names
-        _refuse_options(given, ("locked", "locked_beyond_limits"), f"robot {name!r}, which has its own")
-        return cls._prepared(describe, name, how, (name, given))
-
-    @classmethod
     def _prepared(
         cls,
         describe: Callable[[], Robot],
@@ -280,22 +260,5 @@ class _How:
     cache: bool
 
 
-def _described(source: str | Path, options: Mapping[str, Any]) -> Robot:
-    from sidestep.robot import Robot
-
-    return Robot.from_urdf(source, **options)
-
-
-def _is_text(source: str | Path) -> bool:
-    return isinstance(source, str) and source.lstrip().startswith("<")
-
-
 def _is_default(value: object) -> bool:
     return value is None or value is False or (isinstance(value, tuple | list | dict) and not value)
-
-
-def _refuse_options(given: Sequence[str] | Mapping[str, Any], known: Sequence[str], of: str) -> None:
-    for option in given:
-        if option not in known:
-            allowed = f"; allowed: {', '.join(known)}" if known else ""
-            raise ValueError(f"{option} cannot be given for {of}{allowed}")

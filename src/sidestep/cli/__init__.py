@@ -16,6 +16,7 @@ from sidestep.cli import (
     prepare_command,
     reproduce_command,
     run_command,
+    show_command,
     studio_command,
 )
 from sidestep.extras import MissingExtraError
@@ -31,6 +32,7 @@ app = typer.Typer(
 )
 app.command("demo")(run_command.demo)
 app.command("run")(run_command.run)
+app.command("show")(show_command.show)
 app.command("studio")(studio_command.studio)
 app.command("scenarios")(list_commands.scenarios)
 app.command("schema")(list_commands.schema)

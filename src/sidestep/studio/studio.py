@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import errno
-import socket
 import threading
 import time as clock
 from collections.abc import Mapping
@@ -15,12 +12,13 @@ from sidestep.scenario.assembly import load_robot
 from sidestep.studio import guard as g
 from sidestep.studio import messages as m
 from sidestep.studio.clearance_monitor import ExactClearanceMonitor
+from sidestep.studio.server import HOST, address_of, check_port, guarded_server
 from sidestep.studio.session_process import Beginning, SessionProcess
 
 if TYPE_CHECKING:
     from sidestep.studio.page.view import View
 
-HOST, PORT = "127.0.0.1", 8890
+PORT = 8890
 NOTEBOOK_HEIGHT = 640  # [px]
 NOTEBOOK_SCALE = (
     0.7  # the output of a cell is narrow: at full size the panels would leave little of the scene
@@ -64,7 +62,7 @@ class Studio:
         check_port(host, port)
         robot = load_robot(scenario)
         guard = g.Guard(host)
-        server = _server(host, port, guard)
+        server = guarded_server(host, port, guard)
         from sidestep.studio.page.view import View
 
         self.server, self.host, self.port = server, host, server.get_port()
@@ -158,52 +156,3 @@ class Studio:
         if now - self._last_truth > STEP_OF_TRUTH and self.view.robot.num_coordinates == len(row.q):
             self._last_truth = now
             self._truth.look(self.view.robot, row, self.view.epoch)
-
-
-def address_of(host: str, port: int) -> str:
-    """The address of a page that is served at a host, a name or number of this machine.
-
-    A number stays one: the name localhost may lead to a number at which another user listens, who would get the token.
-    """
-    name = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host)
-    if name is None:
-        name = f"[{host}]" if ":" in host else host
-    return f"http://{name}:{port}"
-
-
-def check_port(host: str, port: int) -> None:
-    """Raises OSError with what to do when nothing can listen at this address."""
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    except socket.gaierror as error:
-        raise OSError(f"--host {host}: {error.strerror or error}") from error
-    with contextlib.closing(socket.socket(family, kind, protocol)) as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            trial.bind(address)
-        except OSError as error:
-            if error.errno == errno.EADDRINUSE:
-                raise OSError(
-                    f"port {port} is taken, perhaps by another studio; choose another with --port"
-                ) from error
-            raise OSError(f"cannot listen at {host}:{port}: {error.strerror}") from error
-
-
-def _server(host: str, port: int, guard: g.Guard):  # type: ignore[no-untyped-def]
-    import rich
-    import viser
-
-    quiet = rich.get_console().quiet
-    rich.get_console().quiet = True  # viser prints a banner of its own
-    try:
-        with g.placed(guard):
-            server = viser.ViserServer(host=host, port=port, label="Sidestep", verbose=False)
-        if not guard.placed:
-            server.stop()
-            raise RuntimeError(
-                f"viser {viser.__version__} starts its server in a way that the studio cannot guard; "
-                "pip install 'viser==1.1.*'"
-            )
-        return server
-    finally:
-        rich.get_console().quiet = quiet

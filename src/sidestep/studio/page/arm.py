@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from sidestep.robot import Robot
+from sidestep.robot import Geometry, Robot
 from sidestep.robot.mesh import simplified
 from sidestep.robot.pose import pose_vector
 from sidestep.studio.page import colours
@@ -34,7 +34,10 @@ TWO_DEVIATIONS = 4.0  # level of the ellipsoids of a body that is not calibrated
 
 
 class ArmView:
-    """An arm of `link_meshes`; `ghost` makes it see-through, in the colour of the goal."""
+    """An arm of `link_meshes`; `ghost` makes it see-through, in the colour of the goal.
+
+    Links with a mesh have a frame, and those of `frames`.
+    """
 
     def __init__(
         self,
@@ -44,6 +47,7 @@ class ArmView:
         name: str,
         *,
         ghost: bool = False,
+        frames: Iterable[str] = (),
     ) -> None:
         self._robot, self._name = robot, name
         self.root = server.scene.add_frame(name, show_axes=False)
@@ -52,8 +56,9 @@ class ArmView:
         self._shades: dict[str, int] = {}
         self._apart: tuple[Array, Array] = np.zeros(0), np.zeros(0)
         moving = {frame.name: frame.joint >= 0 for frame in robot.frames}
-        for link, mesh in meshes.items():
+        for link in dict.fromkeys((*meshes, *frames)):
             self._frames[link] = server.scene.add_frame(f"{name}/{link}", show_axes=False)
+        for link, mesh in meshes.items():
             colour = colours.GOAL if ghost else colours.LINK if moving[link] else colours.BASE
             if ghost and not moving[link]:
                 continue  # the base stands where the arm's own does
@@ -98,6 +103,11 @@ class ArmView:
             if link in self._meshes:
                 moved = np.abs(self._robot.pose(q, link) - self._robot.pose(self._q, link))[:3]
                 self._meshes[link].visible = bool(moved[:, 3].max() + LEVER * moved[:, :3].max() > SAME)
+
+    def set_meshes_visible(self, visible: bool) -> None:
+        """Shows or hides the meshes; what else is fixed to the frames stays."""
+        for mesh in self._meshes.values():
+            mesh.visible = visible
 
     @property
     def q(self) -> Array:
@@ -180,12 +190,17 @@ def reach(robot: Robot) -> float:
 
 def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:
     """What each link looks like, in its frame, together at most `MOST_TRIANGLES`."""
+    return merged_meshes({link.name: link.visuals or link.collisions for link in robot.links})
+
+
+def merged_meshes(geometries: Mapping[str, Sequence[Geometry]]) -> dict[str, trimesh.Trimesh]:
+    """The shapes of each link as one mesh in its frame, all together at most `MOST_TRIANGLES`."""
     whole: dict[str, trimesh.Trimesh] = {}
-    for link in robot.links:
-        shapes = [geometry.mesh() for geometry in link.visuals or link.collisions]
-        if shapes:
-            merged: Any = trimesh.util.concatenate([trimesh.Trimesh(s.vertices, s.faces) for s in shapes])
-            whole[link.name] = merged
+    for link, shapes in geometries.items():
+        parts = [shape.mesh() for shape in shapes]
+        if parts:
+            merged: Any = trimesh.util.concatenate([trimesh.Trimesh(s.vertices, s.faces) for s in parts])
+            whole[link] = merged
     meshes, cell = whole, FIRST_CELL
     while (count := sum(len(mesh.faces) for mesh in meshes.values())) > MOST_TRIANGLES:
         if meshes is not whole:

@@ -31,6 +31,7 @@ from sidestep.studio.page.obstacles import ObstacleViews
 from sidestep.studio.page.plots import Plots
 from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
+from sidestep.studio.page.scene import point_cameras, set_up_scene
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
 from sidestep.studio.page.words import begun, in_box, stamped
@@ -41,9 +42,7 @@ if TYPE_CHECKING:
     import viser
 
 WORDS_EVERY = 0.15  # [s] nobody reads faster
-GRID_DEPTH = 0.05  # [m] below the base: a planar arm, half as thick, does not lie in the grid
 NEAR = 2.0  # of the arm's reach: obstacles farther off need not be in the window as it opens
-SKY_LIGHT = 2.4  # so that lit faces have about the colour that the legend shows
 MAIN_WIDTH, PLOT_WIDTH = 365, 290  # [px]
 
 
@@ -68,7 +67,7 @@ class View:
         self.epoch = 0  # grows when clearances that were asked for before no longer count
         self._replayed = False
         self._told, self._reported = 0.0, ""
-        self._set_up_scene()
+        set_up_scene(server)
         gui = server.gui
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         panel = gui.add_panel()
@@ -277,25 +276,6 @@ class View:
         if content != self._words.content:
             self._words.content = content
 
-    def _set_up_scene(self) -> None:
-        scene = self._server.scene
-        scene.set_up_direction("+z")
-        scene.add_grid(
-            "/grid",
-            width=3.0,
-            height=3.0,
-            cell_size=0.1,
-            section_size=0.5,
-            shadow_opacity=0.2,
-            position=(0.0, 0.0, -GRID_DEPTH),
-        )
-        # Light without an environment map: such a map tints the colours, and takes seconds to prepare in a browser
-        # without a graphics card.
-        scene.configure_environment_map(hdri=None)
-        scene.add_light_hemisphere(
-            "/light", sky_color=(255, 255, 255), ground_color=(170, 170, 170), intensity=SKY_LIGHT
-        )
-
     def _point_cameras(self, scenario: Scenario, robot: Robot) -> None:
         """Where all windows look from, those to come as well: arm, goal and obstacles fill them."""
         start = coordinates(scenario.start, robot, "start")
@@ -304,9 +284,7 @@ class View:
         beside = [np.array(item.position) for item in scenario.obstacles]
         near = [place for place in beside if np.linalg.norm(place) < NEAR * reach(robot)]
         self._viewpoint = Viewpoint.of(np.array([*places, *near]))
-        cameras: list[Any] = [client.camera for client in self._server.get_clients().values()]
-        for camera in (self._server.initial_camera, *cameras):
-            camera.position, camera.look_at = self._viewpoint.position, self._viewpoint.target
+        point_cameras(self._server, self._viewpoint)
 
     def _add_switches(self) -> None:
         gui = self._server.gui
