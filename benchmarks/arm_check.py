@@ -26,9 +26,11 @@ Array = npt.NDArray[np.float64]
 STATES = 5  # random configurations at which frames are compared
 ARM_JOINTS = 4  # of a chain from the base to a tip that counts as an arm
 
+STILL = "not an arm: no moving joint"
+
 # What errors say, and the cause under which they are counted; the first that fits.
 CAUSES = (
-    ("not an arm: no moving joint", r"no movable joint left|no body that moves by a hinge"),
+    (STILL, r"no movable joint left|no body that moves by a hinge"),
     ("mesh file broken or empty", r"which is (?:empty|truncated)|which holds no triangles"),
     ("mesh file is a Git LFS pointer", r"Git LFS pointer"),
     ("missing file of an MJCF", r"is refused by MuJoCo: .*opening file"),

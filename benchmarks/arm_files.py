@@ -56,12 +56,12 @@ MAKERS = {
     "Fourier": r"gr1t?\d?|n1|fourier",
     "Franka Robotics": r"fr3|fer|fp3|panda|franka|frankie",
     "Ghost Robotics": r"vision60|spirit40\w*",
-    "Hello Robot": r"stretch\w*",
+    "Hello Robot": r"stretch_?[34]?",
     "IHMC": r"alex|alexander",
     "IIT": r"icub\w*|centauro|hyq|walkman|coman",
     "KIT": r"armar\w*",
     "Kinova": r"j2[ns]\w+|jaco\d?|gen[23]\w*|kinova\d?|mico",
-    "KUKA": r"iiwa\d*|lbr\w*|kr\d+\w*|lwr\w*|kuka",
+    "KUKA": r"iiwa\d*|lbr(?:_?iiwa)?(?:_?\d+)?|kr\d+\w*|lwr\w*|kuka",
     "LeRobot": r"so_?arm\w*|so_?10[01]|lekiwi|koch",
     "Lynxmotion": r"al5d",
     "NASA": r"valkyrie|r2",
@@ -73,11 +73,11 @@ MAKERS = {
     "Techman": r"tm\d+\w*|techman",
     "Trossen": r"[vprw]x\d+s?|viperx|widowx|wxai|aloha|interbotix|trossen",
     "UFACTORY": r"x_?arm_?\d?|lite_?6|uf850",
-    "Unimation": r"puma\w*",
+    "Unimation": r"puma\d*",
     "Unitree": r"z1|b1|b2|a1|g1|h1|h2|go[12]|d1|laikago|aliengo|unitree",
     "Universal Robots": r"ur_?(?:3|5|7|8|10|12|15|16|18|20|30)e?|universal_?robots",
     "Willow Garage": r"pr2",
-    "Yaskawa": r"hc\d+\w*|gp\d+\w*|motoman|yaskawa",
+    "Yaskawa": r"hc\d+|gp\d+|motoman|yaskawa",
 }
 _PATTERNS = {
     maker: re.compile(rf"(?<![a-z0-9])(?:{names})(?![a-z0-9])", re.IGNORECASE)

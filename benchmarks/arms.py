@@ -31,7 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from arm_check import check, prepare
+from arm_check import STILL, check, prepare
 from arm_files import PACKAGES, files_of_folder, files_of_package, maker_and_arm
 from guarded import CrashedError, GuardedProcess
 
@@ -40,6 +40,7 @@ from sidestep.bench.parallel import cpu_name
 
 EQUAL = 1e-9  # [m | 1] of the entries of a pose: rounding of a chain of a few dozen of them is below 1e-13
 REACH_JOINTS = range(4, 9)
+MESSAGE = 300  # characters of an error that are kept
 CRASHED, TOO_LONG = "crashed", "took too long"
 Row = dict[str, Any]
 
@@ -172,6 +173,14 @@ def print_table(rows: list[Row], shown: Callable[[str], str]) -> None:
     )
 
 
+def told(row: Row, shown: str) -> Row:
+    """A row for the file of results, without folders of this machine and the rest of long messages."""
+    kept = {key: value for key, value in row.items() if key != "message"} | {"path": shown}
+    if row.get("cause", STILL) != STILL:
+        kept["message"] = row["message"].replace(row["path"], shown)[:MESSAGE]
+    return kept
+
+
 def collect(given: argparse.Namespace) -> tuple[list[Path], dict[str, int | None]]:
     """The files, and how many each package and folder has; None for a package that is not there."""
     names = given.packages if given.packages is not None else () if given.folders else PACKAGES
@@ -268,7 +277,7 @@ def main() -> int:
             "cpu": cpu_name(),
             "sources": numbers,
             "summary": counts,
-            "files": [{**row, "path": shown(row["path"])} for row in rows],
+            "files": [told(row, shown(row["path"])) for row in rows],
         }
         Path(given.json).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return (
