@@ -206,7 +206,9 @@ def test_a_package_of_xacro_that_is_not_found_is_the_folder_with_the_file(packag
     (packages / "arm" / "urdf" / "part.xacro").write_text(PART)
     path = packages / "arm" / "urdf" / "arm.xacro"
     path.write_text(XACRO.replace("$(find arm)", "$(find arm_support)"))
-    with pytest.warns(RuntimeWarning, match=r"there is no package 'arm_support'; .*arm is taken for it") as said:
+    with pytest.warns(
+        RuntimeWarning, match=r"there is no package 'arm_support'; .*arm is taken for it"
+    ) as said:
         robot = Robot.from_urdf(path)
     assert robot.pose([0.0], "tip")[0, 3] == pytest.approx(0.6)
     assert len(said) == 1
