@@ -207,6 +207,33 @@ def test_angles_that_are_left_out_are_zero() -> None:
         Robot.from_urdf(text.replace('rpy="0.1 0.2"', 'rpy="0 0 0 0"'))
 
 
+def test_commas_between_numbers_are_left_out() -> None:
+    text = TWO.replace('<origin xyz="0.5 0 0"/>', '<origin xyz="0.5, 0, 0" rpy="0.1, 0.2 0.3"/>', 1)
+    robot, said = load(text)
+    assert said == [
+        "URDF string: joint 'joint2': <origin>: rpy '0.1, 0.2 0.3', joint 'joint2': <origin>: xyz '0.5, 0, 0': there "
+        "are commas between numbers, where spaces are asked for; they are left out"
+    ]
+    same_kinematics(robot, text.replace(",", ""))
+    with pytest.raises(ValueError, match="xyz is '0,5 0 0 0', must be 3 finite numbers"):
+        Robot.from_urdf(TWO.replace('xyz="0.5 0 0"', 'xyz="0,5 0 0 0"', 1))  # a decimal comma is none of them
+
+
+def test_prefixes_that_nothing_declares_are_read_over() -> None:
+    """Drake's limits in files of robots, and Gazebo's plugins."""
+    extra = '<gazebo><controller:plugin name="p"><!-- é --></controller:plugin></gazebo></robot>'
+    text = TWO.replace("<limit ", '<limit drake:acceleration="2.5" ').replace("</robot>", extra)
+    robot, said = load(text)
+    assert "drake" in text
+    assert said == []
+    same_kinematics(robot, TWO)
+    np.testing.assert_array_equal(robot.limits.upper, Robot.from_urdf(TWO).limits.upper)
+    with pytest.raises(ValueError, match="unbound prefix"):
+        Robot.from_urdf(TWO.replace("</robot>", '<xacro:include filename="hand.xacro"/></robot>'))
+    with pytest.raises(ValueError, match="not well-formed XML: mismatched tag"):
+        Robot.from_urdf(text.replace("</gazebo>", ""))
+
+
 @pytest.mark.parametrize(
     ("edit", "said", "inertia"),
     [

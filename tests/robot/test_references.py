@@ -72,6 +72,21 @@ def test_a_path_of_another_machine_is_found_by_its_tail(workspace: Path, uri: st
         Robot.from_urdf(path)  # a name alone could be another link's
 
 
+@pytest.mark.parametrize("uri", ["meshes/box.stl", "folder_b/meshes/box.stl", "../gone/meshes/box.stl"])
+def test_a_path_relative_to_a_folder_above_is_found(workspace: Path, uri: str) -> None:
+    """Of the package, or of where the program ran that wrote the file."""
+    (workspace / "folder_b" / "urdf").mkdir()
+    path = workspace / "folder_b" / "urdf" / "arm.urdf"
+    path.write_text(ONE.format(uri))
+    with pytest.warns(
+        RuntimeWarning, match=r"box\.stl' at .*folder_b/meshes/box\.stl: is found elsewhere than"
+    ):
+        check(Robot.from_urdf(path))
+    path.write_text(ONE.format("box.stl"))
+    with pytest.raises(FileNotFoundError, match="which does not exist; searched in: "):
+        Robot.from_urdf(path)
+
+
 def test_advice_is_given_where_it_applies(workspace: Path) -> None:
     path = workspace / "folder_a" / "arm.urdf"
     path.write_text(ONE.format("meshes/gone.stl"))

@@ -199,3 +199,19 @@ def test_xacro(packages: Path, capfd: pytest.CaptureFixture[str]) -> None:
         Robot.from_urdf(XACRO)
     with pytest.raises(ValueError, match=r"uses no xacro, but xacro_arguments are given: \['reach'\]"):
         Robot.from_urdf(planar_arm(2), xacro_arguments={"reach": "1"})
+
+
+def test_a_package_of_xacro_that_is_not_found_is_the_folder_with_the_file(packages: Path) -> None:
+    """Folders of a repository are given other names than their packages have."""
+    (packages / "arm" / "urdf" / "part.xacro").write_text(PART)
+    path = packages / "arm" / "urdf" / "arm.xacro"
+    path.write_text(XACRO.replace("$(find arm)", "$(find arm_support)"))
+    with pytest.warns(
+        RuntimeWarning, match=r"there is no package 'arm_support'; .*arm is taken for it"
+    ) as said:
+        robot = Robot.from_urdf(path)
+    assert robot.pose([0.0], "tip")[0, 3] == pytest.approx(0.6)
+    assert len(said) == 1
+    (packages / "arm" / "urdf" / "part.xacro").unlink()
+    with pytest.raises(ValueError, match=r"\$\(find arm_support\): no such package; searched in"):
+        Robot.from_urdf(path)

@@ -11,6 +11,7 @@ from sidestep.robot.link import Array
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.robot.remarks import Remarks
 
+COMMAS = "there are commas between numbers, where spaces are asked for; they are left out"
 SHORT_RPY = "rpy has fewer than 3 numbers; those that are left out count as 0"
 
 
@@ -20,11 +21,11 @@ def placement(element: ElementTree.Element, owner: str, remarks: Remarks) -> Arr
     if origin is None:
         return np.eye(4)
     where = f"{owner}: <origin>"
-    rpy = numbers(origin, "rpy", where, count=3, default="0 0 0", fewer=(1, 2))
+    rpy = numbers(origin, "rpy", where, remarks, count=3, default="0 0 0", fewer=(1, 2))
     if len(rpy) < 3:
         remarks.add(SHORT_RPY, f"{short(owner)}: rpy {origin.get('rpy')!r}")
         rpy = (*rpy, 0.0, 0.0)[:3]
-    return pose_at(numbers(origin, "xyz", where, count=3, default="0 0 0"), from_roll_pitch_yaw(rpy))
+    return pose_at(numbers(origin, "xyz", where, remarks, count=3, default="0 0 0"), from_roll_pitch_yaw(rpy))
 
 
 def short(owner: str) -> str:
@@ -56,10 +57,16 @@ def number(
     return value
 
 
+def words(text: str) -> list[str]:
+    """What stands between spaces, without commas at the ends: "0.1, 0 0" is read, "0,1 0 0" is not."""
+    return [part.removesuffix(",") for part in text.split()]
+
+
 def numbers(
     element: ElementTree.Element,
     key: str,
     owner: str,
+    remarks: Remarks,
     *,
     count: int,
     default: str | None = None,
@@ -70,9 +77,11 @@ def numbers(
     if text is None:
         raise ValueError(f"{owner}: <{element.tag}> has no attribute {key!r}")
     try:
-        values = tuple(float(part) for part in text.split())
+        values = tuple(float(part) for part in words(text))
     except ValueError:
         values = ()
     if len(values) not in (count, *fewer) or not all(math.isfinite(value) for value in values):
         raise ValueError(f"{owner}: {key} is {text!r}, must be {count} finite numbers")
+    if "," in text:
+        remarks.add(COMMAS, f"{short(owner)}: {key} {text!r}")
     return values

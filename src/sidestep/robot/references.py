@@ -34,8 +34,9 @@ def resolve(uri: str, owner: str, packages: Packages) -> Reference:
 
     A package or model is looked up as PARENT/NAME, as a folder itself called NAME, and as a folder whose
     package.xml says NAME; first in `package_dirs`, then in the folders above the description. A relative path
-    is looked up in the description's folder, then in `package_dirs`. A path of another machine, or in a package
-    that is not found, is looked up by its tail below the same folders, the longest tail first.
+    is looked up in the description's folder, then in `package_dirs`. A path that is not there, of another machine
+    or relative to another folder, and one in a package that is not found, are looked up by their tail below the
+    same folders and those above the description, the longest tail first.
 
     Raises:
         ValueError: another scheme, or a `package://` reference that leaves its package; begins with `owner`.
@@ -63,8 +64,8 @@ def resolve(uri: str, owner: str, packages: Packages) -> Reference:
         written = written.replace("\\", "/") if foreign else written
         searched = () if absolute else (*own_folder, *packages.package_dirs)
         candidates = [] if foreign else [Path(written)] if absolute else [base / written for base in searched]
-        tails = [re.sub(r"^/?[A-Za-z]:", "", written) if foreign else written] if absolute else []
-        searched = packages.searched if absolute else searched
+        tails = [re.sub(r"^/?[A-Za-z]:", "", written) if foreign else written]
+        searched = packages.searched if absolute or len(_parts(written)) >= _LEAST_TAIL else searched
         advice = ""
     for candidate in candidates:
         if candidate.is_file():
@@ -91,8 +92,13 @@ def inside_package(package: str, path: str, what: str) -> tuple[str, str]:
 
 
 def _by_tail(path: str, packages: Packages) -> Iterator[Path]:
-    """Places of a file that was written for another machine: the longest tail of its path first."""
-    parts = [part for part in posixpath.normpath(path).split("/") if part not in ("", ".", "..")]
+    """Places of a file that is not where it is written: the longest tail of its path first."""
+    parts = _parts(path)
     for first in range(max(len(parts) - _LEAST_TAIL + 1, 0)):
         for base in packages.searched:
             yield base.joinpath(*parts[first:])
+
+
+def _parts(path: str) -> list[str]:
+    """Folders and name of a path, without steps upwards."""
+    return [part for part in posixpath.normpath(path).split("/") if part not in ("", ".", "..")]

@@ -9,9 +9,12 @@ import re
 import sys
 import tempfile
 import types
+import warnings
 import xml.etree.ElementTree as ElementTree
+import xml.parsers.expat as expat
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from sidestep.robot.formats import macros_alone, other_root, refuse_content
@@ -100,12 +103,34 @@ def parse_xml(text: str, label: str) -> ElementTree.Element:
         ValueError: not XML, or another root than `<robot>`; begins with `label`.
     """
     try:
-        root = ElementTree.fromstring(text)
+        root = _tree(text)
     except (ElementTree.ParseError, ValueError) as error:  # ValueError: characters that no encoding has
         raise ValueError(f"{label} is not well-formed XML: {error}") from error
     if root.tag != "robot":
         raise ValueError(f"{label}: the root element is <{root.tag}>, must be <robot>{other_root(root.tag)}")
     return root
+
+
+def _tree(text: str) -> ElementTree.Element:
+    """The tree of XML text; of prefixes that nothing declares, such as <drake:joint>, tags and keys have the name.
+
+    One of xacro is an error, since its elements would count as nothing.
+    """
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        if error.code != expat.errors.codes[expat.errors.XML_ERROR_UNBOUND_PREFIX] or "<xacro:" in text:
+            raise
+    builder = ElementTree.TreeBuilder()
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise ElementTree.ParseError(str(error)) from error
+    return builder.close()
 
 
 def _uses_xacro(root: ElementTree.Element) -> bool:
@@ -133,7 +158,7 @@ def _expand(text: str, label: str, folder: Path | None, packages: Packages, argu
             path = Path(temporary) / "robot.xacro"
             path.write_text(text, encoding="utf-8")
         try:
-            with contextlib.redirect_stderr(messages), _findable(packages):
+            with contextlib.redirect_stderr(messages), _findable(packages, text, label):
                 return str(xacro.process_file(str(path), mappings=arguments).toxml())
         except Exception as error:  # xacro evaluates expressions, so any exception can come out of it
             detail = f"{error} {messages.getvalue()}".strip()
@@ -141,16 +166,33 @@ def _expand(text: str, label: str, folder: Path | None, packages: Packages, argu
 
 
 @contextlib.contextmanager
-def _findable(packages: Packages) -> Iterator[None]:
-    """Answers xacro's `$(find NAME)`, which asks ROS's ament index, from the same folders as `package://`."""
+def _findable(packages: Packages, text: str, label: str) -> Iterator[None]:
+    """Answers xacro's `$(find NAME)`, which asks ROS's ament index, from the same folders as `package://`.
+
+    Of a package that is not found, a folder above the description that has the file counts, with a warning.
+    """
     name = "ament_index_python.packages"
 
     def get_package_share_directory(package: str) -> str:
-        folder = packages.find(package)
+        folder = packages.find(package) or _standing_in(package)
         if folder is not None:
             return str(folder)
         searched = ", ".join(str(base) for base in packages.searched) or "no folder (pass package_dirs)"
         raise FileNotFoundError(f"$(find {package}): no such package; searched in: {searched}")
+
+    @cache
+    def _standing_in(package: str) -> Path | None:
+        for rest in re.findall(rf"\$\(find\s+{re.escape(package)}\s*\)/*([^\s\"'<>$]+)", text):
+            for base in packages.parents:
+                if "/" in rest and (base / rest).is_file():
+                    warnings.warn(
+                        f"{label}: there is no package {package!r}; {base} is taken for it, which has {rest}; "
+                        "check that it is the right one",
+                        RuntimeWarning,
+                        stacklevel=2,
+                    )
+                    return base
+        return None
 
     stand_in = types.ModuleType(name)
     stand_in.get_package_share_directory = get_package_share_directory  # type: ignore[attr-defined]

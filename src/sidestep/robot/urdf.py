@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sidestep.robot.degrees import DEGREES_HINT, looks_like_degrees
-from sidestep.robot.elements import attribute, number, numbers, placement, short
+from sidestep.robot.elements import attribute, number, numbers, placement, short, words
 from sidestep.robot.link import Array, Inertial, Link
 from sidestep.robot.plausibility import check_inertia
 from sidestep.robot.remarks import Remarks
@@ -134,7 +134,7 @@ def _warn_of_degrees(description: Description, joints: dict[str, UrdfJoint]) -> 
     for element in (found for way in read for found in description.root.findall(way)):
         origin = element.find("origin")
         rpy = "" if origin is None else origin.get("rpy", "")
-        if any(looks_like_degrees(float(part)) for part in rpy.split()):
+        if any(looks_like_degrees(float(part)) for part in words(rpy)):
             odd.append(f"rpy {rpy!r} of <{element.tag}> {element.get('name', '')!r}")
     if odd:
         more = f" and {len(odd) - 3} more" if len(odd) > 3 else ""
@@ -198,7 +198,7 @@ def _joint(element: ElementTree.Element, label: str, remarks: Remarks) -> UrdfJo
     axis = np.array([1.0, 0.0, 0.0])  # the URDF default
     axis_element = element.find("axis")
     if axis_element is not None and kind not in ("fixed", *FREE_TYPES):
-        axis = np.array(numbers(axis_element, "xyz", owner, count=3))
+        axis = np.array(numbers(axis_element, "xyz", owner, remarks, count=3))
         length = float(np.linalg.norm(axis))
         if length == 0.0:
             raise ValueError(f"{owner}: axis is zero, must have a direction")

@@ -104,7 +104,7 @@ def _shape(
     if shape.tag == "mesh":
         return _mesh(shape, X, description, owner, where, remarks, found)
     if shape.tag == "box":
-        size = numbers(shape, "size", where, count=3)
+        size = numbers(shape, "size", where, remarks, count=3)
     elif shape.tag == "sphere":
         size = (number(shape, "radius", where),)
     else:
@@ -139,7 +139,7 @@ def _mesh(
     remarks: Remarks,
     found: Shapes,
 ) -> Geometry | None:
-    scale = numbers(shape, "scale", where, count=3, default="1 1 1", fewer=(1,))
+    scale = numbers(shape, "scale", where, remarks, count=3, default="1 1 1", fewer=(1,))
     if len(scale) == 1:
         remarks.add(ONE_SCALE, f"{short(where)} {shape.get('scale')!r}")
         scale = scale * 3
