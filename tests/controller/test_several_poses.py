@@ -8,7 +8,8 @@ import sidestep as ss
 LINK = """<link name="{n}"><inertial><origin xyz="0.12 0 0"/><mass value="1"/>
   <inertia ixx="0.001" iyy="0.006" izz="0.006" ixy="0" ixz="0" iyz="0"/></inertial>
   <collision><origin xyz="0.12 0 0"/><geometry><sphere radius="0.05"/></geometry></collision></link>"""
-JOINT = """<joint name="{n}" type="revolute"><origin xyz="{xyz}"/><parent link="{p}"/><child link="{c}"/><axis xyz="{axis}"/>
+JOINT = """<joint name="{n}" type="revolute"><origin xyz="{xyz}"/><parent link="{p}"/><child link="{c}"/>
+  <axis xyz="{axis}"/>
   <limit lower="-2.5" upper="2.5" velocity="2" effort="60"/></joint>"""
 
 
@@ -93,8 +94,8 @@ def test_goals_that_cannot_be_one_are_refused(arm):
     left, right = goals(arm, np.zeros(9))
     with pytest.raises(ValueError, match="frame 'left4' has two poses"):
         controller.set_goal([left, right, left])
+    other = ss.PoseGoal(ss.Arm.load("fr3").robot, "fr3_hand", np.eye(4))
     with pytest.raises(ValueError, match="other joints"):
-        fr3 = ss.Arm.load("fr3")
-        controller.set_goal([left, ss.PoseGoal(fr3.robot, "fr3_hand", np.eye(4))])
+        controller.set_goal([left, other])
     with pytest.raises(TypeError, match="pose goals alone"):
         controller.set_goal([left, np.zeros(9)])
