@@ -51,3 +51,39 @@ def test_a_wrong_file_is_refused(text: str, message: str) -> None:
         read_srdf(text, ["a"])
     with pytest.raises(FileNotFoundError, match="does not exist"):
         read_srdf("nowhere.srdf", ["a"])
+
+
+URDF = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
+  <joint name="x" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+    <limit velocity="1" effort="1"/></joint>
+  <joint name="y" type="continuous"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
+    <limit velocity="1" effort="1"/></joint></robot>"""
+STATES = """<group_state name="home" group="arm"><joint name="x" value="0.5"/><joint name="y" value="-1"/></group_state>
+  <group_state name="half" group="arm"><joint name="x" value="0.5"/></group_state></robot>"""
+
+
+def test_the_file_beside_a_urdf_is_found_and_another_can_be_given(tmp_path: Path) -> None:
+    (tmp_path / "urdf").mkdir()
+    (tmp_path / "config").mkdir()
+    urdf = tmp_path / "urdf" / "my.urdf"
+    urdf.write_text(URDF)
+    assert Robot.from_urdf(urdf).allowed_pairs == ()
+    (tmp_path / "config" / "other.srdf").write_text(TEXT.replace('name="arm"', 'name="leg"'))
+    assert Robot.from_urdf(urdf).allowed_pairs == ()  # of another robot
+    (tmp_path / "config" / "arm.srdf").write_text(TEXT.replace("</robot>", STATES))
+    robot = Robot.from_urdf(urdf)
+    assert robot.allowed_pairs == (("a", "b"),)
+    assert {name: q.tolist() for name, q in robot.postures.items()} == {"home": [0.5, -1.0]}
+    given = tmp_path / "given.srdf"
+    given.write_text('<robot name="any"><disable_collisions link1="a" link2="c"/></robot>')
+    assert Robot.from_urdf(urdf, srdf=given).allowed_pairs == (("a", "c"),)
+    assert Robot.from_urdf(URDF, srdf=given).allowed_pairs == (("a", "c"),)
+    given.write_text(TEXT.replace("</robot>", STATES).replace('value="-1"', 'value="up"'))
+    with pytest.raises(ValueError, match=r"'home' has a joint without a number"):
+        Robot.from_urdf(urdf, srdf=given)
+    with pytest.raises(FileNotFoundError, match=r"gone\.srdf does not exist"):
+        Robot.from_urdf(urdf, srdf=tmp_path / "gone.srdf")
+
+
+def test_the_robots_of_the_list_check_every_pair() -> None:
+    assert Robot.named("panda").allowed_pairs == ()

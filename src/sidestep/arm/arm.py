@@ -68,6 +68,7 @@ class Arm(_core.Arm):
         effort_rate_limits: LimitValues | None = None,
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
+        srdf: str | Path | None = None,
         allowed: Sequence[tuple[str, str]] = (),
         draft: bool = False,
         progress: Progress | None = None,
@@ -84,7 +85,7 @@ class Arm(_core.Arm):
                 (or its text); or a name of the packages `robot_descriptions` or `mujoco_menagerie`, where those are
                 installed.
             package_dirs, base_pose, tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits,
-                effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments: of a description, as in
+                effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments, srdf: of a description, as in
                 `Robot.from_urdf`; of a name `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
             allowed: pairs of links that may touch, beside those of the description: they get no clearance.
             draft: prepare in seconds what serves until the fine body is there, see `Refinement`: proven to cover the
@@ -113,6 +114,7 @@ class Arm(_core.Arm):
             "effort_rate_limits": effort_rate_limits,
             "name": name,
             "xacro_arguments": xacro_arguments,
+            "srdf": srdf,
         }
         given = {key: value for key, value in options.items() if not _is_default(value)}
         text = isinstance(source, str) and source.lstrip().startswith("<")

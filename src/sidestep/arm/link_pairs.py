@@ -26,6 +26,7 @@ LinkPair: TypeAlias = tuple[str, str, float]
 FEW = 3  # coordinates between two links of which so many samples are dense enough to calibrate a contact
 TOUCHING = 20  # samples in which they touch that are needed for it
 NEAR = 0.002  # distance of meshes that counts as touching [m]
+CHECKS = 100  # configurations by which a coarse table is judged
 SHARE = 0.95  # of samples in which the meshes are apart that the ellipsoids must be: otherwise they are no measure
 
 

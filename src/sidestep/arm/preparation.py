@@ -14,6 +14,7 @@ from sidestep import _core
 from sidestep.arm.link_pairs import DRAFT, FULL, tables_and_pairs
 from sidestep.body import Body
 from sidestep.body.cover import CoverProgress
+from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 
 Pair: TypeAlias = tuple[str, str]
@@ -64,6 +65,7 @@ def prepare(
         progress=_of_stage("tables", progress),
         pair_progress=_of_stage("pairs", progress),
     )
+    _warn_of_touching(robot)
     may_touch = {frozenset(pair) for pair in allowed}
     return _core.Arm(
         robot=robot,
@@ -92,6 +94,17 @@ def prepare(
             date=_today(),
         ),
     )
+
+
+def _warn_of_touching(robot: Robot) -> None:
+    found = [pair for pair, reason in SelfCollision(robot).left_out.items() if reason == "always"]
+    if found:
+        words = ", ".join(f"{first!r} and {second!r}" for first, second in found)
+        warnings.warn(
+            f"robot {robot.name!r}: these links overlap wherever they are, and may touch: {words}",
+            RuntimeWarning,
+            stacklevel=5,
+        )
 
 
 def _of_stage(stage: str, progress: Progress | None) -> CoverProgress | None:

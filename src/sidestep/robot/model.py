@@ -20,6 +20,7 @@ from sidestep.robot.link import Array, Geometry, Link
 from sidestep.robot.mjcf import is_mjcf, no_mjcf, read_mjcf, warn_of_defaults
 from sidestep.robot.plausibility import arm_length, warn_of_sizes
 from sidestep.robot.source import read_description
+from sidestep.robot.srdf import read_extras
 from sidestep.robot.tool import tree_with_tool
 from sidestep.robot.tree import KinematicTree, build_tree
 from sidestep.robot.urdf import parse_urdf
@@ -68,12 +69,15 @@ class Robot(_core.Robot):
         effort_rate_limits: LimitValues | None = None,
         name: str | None = None,
         xacro_arguments: Mapping[str, str] | None = None,
+        srdf: str | Path | None = None,
     ) -> Robot:
         """Reads a robot from a URDF or xacro file, or from URDF text; an MJCF of any suffix as `from_mjcf` does.
 
         Joints may be revolute, continuous, prismatic, fixed or mimic, and may branch. Floating and planar joints
         are held at a pose. Mesh files are looked up now and loaded when first used. What other readers of URDF
         accept loads; what was left out, or is implausible, is said in one RuntimeWarning of each kind.
+
+        An SRDF beside the file says which links may touch, and named postures.
 
         Limits are a number for all joints, one per coordinate (nv,), or `{joint: value}` for some of them.
 
@@ -95,14 +99,17 @@ class Robot(_core.Robot):
             effort_rate_limits: [Nm/s | N/s]; none by default.
             name: in place of the file's.
             xacro_arguments: values of `<xacro:arg>`.
+            srdf: a file in place of the one beside it.
 
         Raises:
             FileNotFoundError: the description or a mesh of a collision shape is missing; names every one.
             ValueError: anything wrong in the file or the arguments, named together with what is allowed.
         """
         if is_mjcf(source):
-            if package_dirs or xacro_arguments:
-                raise ValueError("package_dirs and xacro_arguments are of URDF; the description is MJCF")
+            if package_dirs or xacro_arguments or srdf:
+                raise ValueError(
+                    "package_dirs, xacro_arguments and srdf are of URDF; the description is MJCF"
+                )
             mjcf = read_mjcf(source)
             urdf = mjcf.urdf
         else:
@@ -127,6 +134,9 @@ class Robot(_core.Robot):
         if mjcf is not None:
             robot._take_extras(mjcf.postures(tree.coordinate_names), mjcf.allowed_pairs)
             warn_of_defaults(mjcf, tree.coordinate_names, velocity_limits, effort_limits)
+        else:
+            extras = read_extras(srdf, source, urdf.name, tree.coordinate_names, robot._link_by_name)
+            robot._take_extras(*extras)
         return robot
 
     @classmethod
@@ -203,7 +213,7 @@ class Robot(_core.Robot):
                 name=name,
             )
         recipe = catalogue.recipe(name)
-        return cls.from_urdf(
+        robot = cls.from_urdf(
             recipe.source(),
             tip=recipe.tip,
             locked={**recipe.locked, **(locked or {})},
@@ -215,6 +225,8 @@ class Robot(_core.Robot):
             effort_rate_limits=recipe.effort_rate_limits,
             name=name,
         )
+        robot._allowed_pairs = ()  # an SRDF beside it lets links touch that can: their clearances are known here
+        return robot
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.num_coordinates} coordinates, {len(self._links)} links)"
@@ -254,12 +266,12 @@ class Robot(_core.Robot):
 
     @property
     def postures(self) -> dict[str, Array]:
-        """Named configurations (nv,) of the description: the keyframes of an MJCF."""
+        """Named configurations (nv,) of the description: keyframes of an MJCF, group states of an SRDF."""
         return {name: q.copy() for name, q in self._postures.items()}
 
     @property
     def allowed_pairs(self) -> tuple[tuple[str, str], ...]:
-        """Links that may touch, by the description: `<exclude>` of an MJCF."""
+        """Links that may touch, by the description: `<exclude>` of an MJCF, or an SRDF."""
         return self._allowed_pairs
 
     @property
@@ -310,8 +322,7 @@ class Robot(_core.Robot):
 
     def random_configuration(self, rng: np.random.Generator) -> Array:
         """A configuration (nv,), uniform within the limits; within ±pi where a coordinate has none."""
-        lower, upper = self._finite_interval()
-        return rng.uniform(lower, upper)
+        return rng.uniform(*self._finite_interval())
 
     def check_configuration(self, q: ArrayLike, name: str = "q") -> Array:
         """`q` as an array (nv,) after checking its shape, that it is finite, and the position limits.
@@ -359,10 +370,7 @@ class Robot(_core.Robot):
 
     @cached_property
     def pinocchio(self) -> pin.Model:
-        """The same tree for Pinocchio, with a coordinate per moving joint (mimic joints have their own).
-
-        Needs the package `pin`, which nothing else of Sidestep does.
-        """
+        """The same tree for Pinocchio (package `pin`), with a coordinate per moving joint, also of mimic joints."""
         from sidestep.robot.pinocchio_model import pinocchio_model
 
         return pinocchio_model(self, self._links)

@@ -1,10 +1,14 @@
-"""Which links may touch, from an SRDF: the semantic description that MoveIt's setup assistant writes."""
+"""Which links may touch, and named postures, from an SRDF: the description that MoveIt's setup assistant writes."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sidestep.robot.source import parse_xml, read_xml
 
@@ -25,14 +29,7 @@ def read_srdf(source: str | Path, links: Iterable[str]) -> tuple[Pair, ...]:
         FileNotFoundError: there is no such file.
         ValueError: it is not an SRDF, or an element lacks a link.
     """
-    if isinstance(source, str) and source.lstrip().startswith("<"):
-        label, text = "SRDF string", source.lstrip()
-    else:
-        label = str(source)
-        if not Path(source).is_file():
-            raise FileNotFoundError(f"SRDF {label} does not exist or is not a file")
-        text = read_xml(Path(source))
-    root = parse_xml(text, label)
+    root, label = _root(source)
 
     def named(tag: str, *keys: str) -> set[frozenset[str]]:
         found = set()
@@ -51,3 +48,69 @@ def read_srdf(source: str | Path, links: Iterable[str]) -> tuple[Pair, ...]:
         for a, b in itertools.combinations(links, 2)
         if frozenset((a, b)) not in on and (frozenset((a, b)) in off or loose.intersection((a, b)))
     )
+
+
+def read_postures(source: str | Path, joints: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """The `<group_state>`s of an SRDF that give every one of some joints a value: name -> (nv,) [rad | m].
+
+    Raises:
+        FileNotFoundError, ValueError: as `read_srdf`.
+    """
+    root, label = _root(source)
+    postures = {}
+    for state in root.findall("group_state"):
+        try:
+            values = {
+                joint.get("name"): float(joint.get("value", "").split()[0])
+                for joint in state.findall("joint")
+            }
+        except (ValueError, IndexError):
+            raise ValueError(
+                f"{label}: the <group_state> {state.get('name')!r} has a joint without a number as value"
+            ) from None
+        if all(joint in values for joint in joints):
+            postures[state.get("name", "")] = tuple(values[joint] for joint in joints)
+    return postures
+
+
+def srdf_beside(path: Path, robot: str) -> Path | None:
+    """The SRDF that belongs to a URDF or xacro file, None without one.
+
+    It stands beside the file, or in `srdf` or `config` near it, and its `<robot name>` is the robot's. Of several it is
+    that with the file's stem.
+    """
+    folders = [path.parent, path.parent / "srdf", path.parent.parent / "srdf", path.parent.parent / "config"]
+    stem = path.name.split(".")[0]
+    found = [file for folder in folders if folder.is_dir() for file in sorted(folder.glob("*.srdf"))]
+    for file in sorted(found, key=lambda file: file.stem != stem):
+        try:
+            root, _ = _root(file)
+        except ValueError:  # broken, or a template: nobody asked for it
+            continue
+        if root.tag == "robot" and root.get("name") == robot:
+            return file
+    return None
+
+
+def read_extras(
+    srdf: str | Path | None, urdf: str | Path, robot: str, joints: Sequence[str], links: Iterable[str]
+) -> tuple[dict[str, NDArray[np.float64]], tuple[Pair, ...]]:
+    """Postures and pairs that may touch, of an SRDF or the one beside a URDF (`srdf_beside`); none without one."""
+    is_text = isinstance(urdf, str) and urdf.lstrip().startswith("<")
+    file = srdf or (None if is_text else srdf_beside(Path(urdf), robot))
+    if not file:
+        return {}, ()
+    postures = {name: np.array(values) for name, values in read_postures(file, joints).items()}
+    return postures, read_srdf(file, links)
+
+
+def _root(source: str | Path) -> tuple[Element, str]:
+    """The root element of an SRDF, and what errors call it."""
+    if isinstance(source, str) and source.lstrip().startswith("<"):
+        label, text = "SRDF string", source.lstrip()
+    else:
+        label = str(source)
+        if not Path(source).is_file():
+            raise FileNotFoundError(f"SRDF {label} does not exist or is not a file")
+        text = read_xml(Path(source))
+    return parse_xml(text, label), label
