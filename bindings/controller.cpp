@@ -206,7 +206,7 @@ void bind_controller(nb::module_& m) {
           nb::arg("arm"), nb::arg("settings") = nb::none())
       .def(
           "set_goal",
-          [](Controller& self, nb::handle goal) { self.set_goal(as_goal(goal, self.arm().num_coordinates())); },
+          [](Controller& self, nb::handle goal) { self.set_goal(as_goal(goal, self.num_coordinates())); },
           nb::arg("goal"),
           nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None"),
           "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose, or poses\n"
@@ -214,7 +214,7 @@ void bind_controller(nb::module_& m) {
           "ValueError that names the joint, its value and what is allowed; the goal before stays.")
       .def(
           "set_velocity",
-          [](Controller& self, nb::handle v) { self.set_velocity(as_vector(v, "v", self.arm().num_coordinates())); },
+          [](Controller& self, nb::handle v) { self.set_velocity(as_vector(v, "v", self.num_coordinates())); },
           nb::arg("v"), nb::sig("def set_velocity(self, v: numpy.typing.ArrayLike) -> None"),
           "Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. Obstacles steer the\n"
           "arm around them and stop it. After `inputs.timeout` without another order the arm stops. Raises ValueError that\n"
@@ -233,7 +233,7 @@ void bind_controller(nb::module_& m) {
           "set_trajectory",
           [](Controller& self, nb::handle q, nb::handle times, nb::handle behaviour) {
             const Eigen::VectorXd at = as_vector(times, "times");
-            const Eigen::MatrixXd rows = as_matrix(q, "q", at.size(), self.arm().num_coordinates());
+            const Eigen::MatrixXd rows = as_matrix(q, "q", at.size(), self.num_coordinates());
             self.set_trajectory(rows.transpose(), at, as_enum<TrajectoryBehaviour>(behaviour, "behaviour"));
           },
           nb::arg("q"), nb::arg("times"), nb::arg("behaviour") = "keep_path",
@@ -296,7 +296,7 @@ void bind_controller(nb::module_& m) {
       .def(
           "step",
           [](Controller& self, const ArrayLike& q, const ArrayLike& v, nb::handle mass_matrix, nb::handle bias) {
-            const int nv = self.arm().num_coordinates();
+            const int nv = self.num_coordinates();
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
             if (mass_matrix.is_none() != bias.is_none()) {
               throw nb::value_error("mass_matrix and bias go together: give both or none");
@@ -359,7 +359,7 @@ void bind_controller(nb::module_& m) {
   m.def(
       "integrate",
       [](Controller& controller, const ArrayLike& q, const ArrayLike& v, int steps, nb::handle goal, double tolerance) {
-        const int nv = controller.arm().num_coordinates();
+        const int nv = controller.num_coordinates();
         const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv),
                               end = goal.is_none() ? Eigen::VectorXd() : as_vector(goal, "goal", nv);
         const Controller::Use use(controller);

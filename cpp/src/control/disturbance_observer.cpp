@@ -76,4 +76,13 @@ void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::Vec
   next_ = (next_ + 1) % joints_.size();
 }
 
+void DisturbanceObserver::change_model(const Eigen::VectorXd& change) noexcept {
+  for (Eigen::Index j = 0; j < disturbance_.size(); ++j) {
+    if (std::isfinite(change[j]) && change[j] * disturbance_[j] < 0.0) {
+      disturbance_[j] += std::copysign(std::min(std::abs(change[j]), std::abs(disturbance_[j])), change[j]);
+    }
+  }
+  std::fill(joints_.begin(), joints_.end(), Joint{});
+}
+
 }  // namespace sidestep

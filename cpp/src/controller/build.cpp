@@ -169,14 +169,14 @@ StepState::StepState(const Robot& robot)
       path_a_(q_),
       trajectory_(at_rest(robot)) {}
 
-Controller::Impl::Impl(Arm a, ControllerSettings s)
+Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
     : StepState(a.robot()),
       arm(std::move(a)),
       settings((s.validate(), std::move(s))),
       system(make_system(arm, settings.barriers)),
       workspace(*system),
       solution(arm.num_coordinates(), settings.safety.max_rows),
-      command(arm.num_coordinates()),
+      command(c),
       torque(use_torque(arm, settings.output)),
       goal_orders_(GoalOrder{}),
       obstacle_orders_(ObstacleOrder{}),

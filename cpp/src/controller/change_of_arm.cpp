@@ -31,7 +31,6 @@ void Controller::Impl::take_orders_of(Impl& before) {
 
 void Controller::Impl::go_on_from(Impl& before) noexcept {
   static_cast<StepState&>(*this) = before;
-  command = before.command;
   solution = before.solution;
   tracked_ = before.tracked_;
   obstacle_orders_.update();
@@ -44,11 +43,31 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
     std::swap(order.order, before.goal_orders_.current().order);
     goal_ = before.goal_ == nullptr ? nullptr : before.goal_ == &before.input_goal_ ? &input_goal_ : std::get_if<Goal>(&order.order);
   }
-  // What was found for the body before does not hold for this one.
-  has_target_ = posture_found_ = target_blocked_ = wakes_worker_ = false;
-  posture_attempt_ = 0;
+  // The target stays; a way to it is looked for anew.
+  target_blocked_ = false;
   next_posture_ = next_look_ = 0.0;
-  begins_goal_ = goal_ != nullptr && !has_input();
+  if (guide && has_target_) {
+    guide->set_goal(target_);
+  }
+  wakes_worker_ = true;
+  begins_goal_ = begins_goal_ || (goal_ != nullptr && !moves_ && !has_target_);
+  if (avoiding_ && evasion_ && settings.synchronous) {
+    guarded([&] { evasion_->resume(trajectory_); });
+  }
+  // What the arm weighs more by the new model, the observer has seen before.
+  if (dynamics_ && known_before_) {
+    twist_state_.update(arm.robot(), arm_q_, arm_v_);
+    dynamics_->gravity(twist_state_, *dynamics_workspace_, gravity_change_);
+    feedback_ = gravity_change_ - gravity_;
+    gravity_ = gravity_change_;
+    if (observer_) {
+      observer_->change_model(feedback_);
+    }
+  }
+  // Bounds of this step are those of the clearances of the last.
+  twist_state_.update(arm.robot(), q_, v_);
+  has_last_wanted_v_ = false;
+  static_cast<void>(system->acceleration(q_, v_, input_pull_, obstacles(), workspace));
   clock_.seen = -1.0;
   clock_.free = clock_.time;
   clock_.blocked = false;
@@ -61,8 +80,12 @@ void Controller::take_over() noexcept {
   }
   if (Impl* const next = next_.exchange(nullptr, std::memory_order_acquire)) {
     next->go_on_from(*impl_);
-    retired_.store(impl_.release(), std::memory_order_release);
+    Impl* const last = impl_.release();
     impl_.reset(next);
+    last->retire();
+    last->before = retired_.load(std::memory_order_relaxed);
+    while (!retired_.compare_exchange_weak(last->before, last, std::memory_order_release, std::memory_order_relaxed)) {
+    }
   }
 }
 
@@ -71,16 +94,24 @@ void Controller::change(const Arm& whole, std::vector<Held> held) {
   for (const Held& one : held) {
     arm = sidestep::attach(arm, one.object, one.q);
   }
-  auto fresh = std::make_unique<Impl>(std::move(arm), settings_);
-  std::unique_ptr<Impl> passed_over, retired;  // end after the lock
-  const std::lock_guard lock(setters_);
-  fresh->take_orders_of(*newest_);
-  passed_over.reset(next_.exchange(nullptr));
-  retired.reset(retired_.exchange(nullptr, std::memory_order_acquire));
-  newest_ = fresh.get();
-  next_.store(fresh.release(), std::memory_order_release);
-  whole_ = whole;
-  held_ = std::move(held);
+  auto fresh = std::make_unique<Impl>(std::move(arm), settings_, command_);
+  std::unique_ptr<Impl> passed_over;  // ends after the lock
+  {
+    const std::lock_guard lock(setters_);
+    fresh->take_orders_of(*newest_);
+    passed_over.reset(next_.exchange(nullptr));
+    newest_ = fresh.get();
+    next_.store(fresh.release(), std::memory_order_release);
+    whole_ = whole;
+    held_ = std::move(held);
+  }
+  destroy(retired_.exchange(nullptr, std::memory_order_acquire));
+}
+
+void Controller::destroy(Impl* newest) noexcept {
+  while (newest != nullptr) {
+    delete std::exchange(newest, newest->before);
+  }
 }
 
 void Controller::set_arm(Arm arm) {
@@ -116,11 +147,17 @@ void Controller::detach(const std::string& name) {
     }
     throw std::invalid_argument("controller: no object '" + name + "' is attached; attached: " + (names.empty() ? "none" : names));
   }
+  for (Held& one : held) {
+    std::erase(one.object.may_touch, name);
+    if (one.object.link == name) {
+      throw std::invalid_argument("controller: '" + one.object.name + "' is attached to '" + name + "'; detach it first");
+    }
+  }
   change(whole_, std::move(held));
 }
 
 std::vector<std::string> Controller::attached() const {
-  const std::lock_guard lock(changes_);
+  const std::lock_guard lock(setters_);
   std::vector<std::string> names;
   for (const Held& one : held_) {
     names.push_back(one.object.name);

@@ -69,14 +69,15 @@ void Controller::Impl::set_obstacles(Obstacles obstacles) {
 
 Controller::Controller(Arm arm, ControllerSettings settings)
     : settings_(std::move(settings)),
-      impl_(std::make_unique<Impl>(arm, settings_)),
+      command_(arm.num_coordinates()),
+      impl_(std::make_unique<Impl>(arm, settings_, command_)),
       newest_(impl_.get()),
       whole_(std::move(arm)),
       has_torque_(impl_->torque) {}
 
 Controller::~Controller() {
   delete next_.load();
-  delete retired_.load();
+  destroy(retired_.load());
 }
 
 Controller::Use::Use(Controller& controller) : controller_(&controller) {
@@ -118,7 +119,6 @@ const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<c
   return impl_->step(q, v, &mass_matrix, &bias);
 }
 
-const Command& Controller::command() const noexcept { return impl_->command; }
 const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacles(); }
 std::string Controller::explain() const { return impl_->explain(); }
 Arm Controller::arm() const {

@@ -30,7 +30,8 @@ std::vector<bool> unlimited_joints(const Robot& robot);
 /// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
 class Controller::Impl : private StepState {
  public:
-  Impl(Arm arm, ControllerSettings settings);
+  /// Writes its commands to `command`, of which it is the only writer while it steps.
+  Impl(Arm arm, ControllerSettings settings, Command& command);
   ~Impl();
 
   /// Takes over the orders of another one whose arm has the same joints; before the first step of this one.
@@ -48,6 +49,8 @@ class Controller::Impl : private StepState {
                       const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
   std::string explain() const;
   Eigen::VectorXd target() const;
+  /// Asks the threads to end, and does not wait.
+  void retire() noexcept { stopping_.store(true); }
   /// Measured in the last step; empty before the first. For one thread at a time.
   Eigen::VectorXd last_q() {
     const Eigen::VectorXd& q = measured_.get();
@@ -59,7 +62,8 @@ class Controller::Impl : private StepState {
   std::shared_ptr<const GeometricSystem> system;
   GeometricSystem::Workspace workspace;
   TorqueSolution solution;
-  Command command;
+  Command& command;
+  Impl* before = nullptr;  // of those that wait for another thread to destroy them
   std::unique_ptr<OnlinePlanner> guide;
   bool torque = false;
 

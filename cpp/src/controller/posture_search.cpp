@@ -47,7 +47,7 @@ class Descent {
     for (const PoseGoal& other : goal.others) {
       add(other);
     }
-    error_.resize(6 * static_cast<Eigen::Index>(frames_.size()));
+    error_.resize(6 * static_cast<Eigen::Index>(goals_.size()));
     jacobian_.resize(error_.size(), near.size());
   }
 
@@ -86,16 +86,16 @@ class Descent {
   }
 
  private:
-  void add(const PoseGoal& goal) { frames_.push_back({&goal, robot_.frame_index(goal.frame().name)}); }
+  void add(const PoseGoal& goal) { goals_.push_back(&goal); }
 
   /// Error and Jacobian of all frames, one below the other; the largest errors of them.
   void look(Posture& posture) {
-    for (std::size_t k = 0; k < frames_.size(); ++k) {
-      const auto& [goal, frame] = frames_[k];
+    for (std::size_t k = 0; k < goals_.size(); ++k) {
+      const PoseGoal* const goal = goals_[k];
       const auto row = 6 * static_cast<Eigen::Index>(k);
-      const Eigen::Isometry3d X = frame_pose(robot_, state_, frame);
+      const Eigen::Isometry3d X = frame_pose(state_, goal->frame());
       auto J = jacobian_.middleRows<6>(row);
-      J = frame_jacobian(robot_, state_, frame);
+      J = frame_jacobian(robot_, state_, goal->frame());
       error_.segment<3>(row) = goal->pose.translation() - X.translation();
       if (goal->settings.position_only) {
         J.bottomRows<3>().setZero();
@@ -112,7 +112,7 @@ class Descent {
   std::pair<Eigen::VectorXd, Eigen::VectorXd> interval_;
   KinematicState state_;
   Eigen::VectorXd rest_;
-  std::vector<std::pair<const PoseGoal*, int>> frames_;
+  std::vector<const PoseGoal*> goals_;
   Eigen::VectorXd error_;
   Eigen::MatrixXd jacobian_;
 };

@@ -258,7 +258,7 @@ void Controller::Impl::write_impedance() noexcept {
 void Controller::Impl::stop(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias,
                             ConstVectorRef q, ConstVectorRef v) noexcept {
   wanted_.setZero();
-  if (torque && mass_matrix != nullptr) {
+  if (torque && mass_matrix != nullptr && bias->size() == bias_.size() && bias->allFinite()) {
     command.program = torque_program_->solve(q, v, wanted_, *mass_matrix, *bias, nullptr, solution);
   } else if (torque) {
     command.program = torque_program_->solve(q, v, wanted_, mass_, bias_, nullptr, solution);

@@ -60,7 +60,10 @@ void KinematicState::update(const Robot& robot, ConstVectorRef q,
 }
 
 Eigen::Isometry3d frame_pose(const Robot& robot, const KinematicState& state, int frame) {
-  const Frame& f = robot.frames().at(static_cast<std::size_t>(frame));
+  return frame_pose(state, robot.frames().at(static_cast<std::size_t>(frame)));
+}
+
+Eigen::Isometry3d frame_pose(const KinematicState& state, const Frame& f) {
   if (f.joint < 0) {
     return f.X_JF;
   }
@@ -71,10 +74,13 @@ Eigen::Isometry3d frame_pose(const Robot& robot, const KinematicState& state, in
 }
 
 Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, int frame) {
+  return frame_jacobian(robot, state, robot.frames().at(static_cast<std::size_t>(frame)));
+}
+
+Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, const Frame& frame) {
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(6, robot.num_coordinates());
-  const Eigen::Vector3d p = frame_pose(robot, state, frame).translation();
-  for (int j = robot.frames().at(static_cast<std::size_t>(frame)).joint; j >= 0;
-       j = robot.joints()[static_cast<std::size_t>(j)].parent) {
+  const Eigen::Vector3d p = frame_pose(state, frame).translation();
+  for (int j = frame.joint; j >= 0; j = robot.joints()[static_cast<std::size_t>(j)].parent) {
     const SpatialMotion& screw = state.link(j).screw;
     const int column = robot.joints()[static_cast<std::size_t>(j)].coordinate;
     jacobian.col(column).head<3>() += screw.linear + screw.angular.cross(p);

@@ -217,3 +217,56 @@ BOOST_AUTO_TEST_CASE(what_is_wrong_is_named_and_nothing_changes) {
   BOOST_TEST(holds(what_is_said([&] { controller.set_arm(covered_arm(other)); }), "other limits"));
   BOOST_TEST(controller.attached() == std::vector<std::string>{"bar"});
 }
+
+BOOST_AUTO_TEST_CASE(the_command_is_the_same_object_through_every_change) {
+  Controller controller(covered_arm(test::arm_limits(nv)), synchronous(ControllerSettings::Output::acceleration));
+  const Command& command = controller.command();
+  Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
+  for (int k = 0; k < 5; ++k) {
+    k % 2 == 0 ? controller.attach(bar()) : controller.detach("bar");
+    BOOST_TEST(&controller.step(q, v) == &command);
+    BOOST_TEST(command.position == q);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_load_that_is_told_late_is_not_counted_twice) {
+  // The arm carries the bar before the controller is told of it: the observer has its weight.
+  const Arm bare = covered_arm(test::arm_limits(nv));
+  const Arm loaded = attach(bare, bar());
+  const RigidBodyDynamics dynamics = loaded.dynamics();
+  RigidBodyDynamics::Workspace w(dynamics);
+  Controller controller(bare, synchronous(ControllerSettings::Output::torque));
+  Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv), bias(nv);
+  Eigen::MatrixXd mass(nv, nv);
+  double moved = 0.0;
+  for (int k = 0; k < 3000; ++k) {
+    if (k == 2000) {
+      BOOST_TEST(controller.command().disturbance.norm() > 0.5);
+      controller.attach(bar());
+    }
+    const Command& command = controller.step(q, v);
+    KinematicState state(loaded.robot());
+    state.update(loaded.robot(), q, v);
+    dynamics.mass_matrix(state, w, mass);
+    dynamics.bias(state, w, bias);
+    v += 0.001 * mass.ldlt().solve(command.torque - bias);
+    q += 0.001 * v;
+    moved = k >= 2000 ? std::max(moved, v.cwiseAbs().maxCoeff()) : 0.0;
+  }
+  BOOST_TEST(controller.command().disturbance.norm() < 0.05);
+  BOOST_TEST(moved < 0.01);  // [rad/s]; counted twice it moves by some 0.1
+}
+
+BOOST_AUTO_TEST_CASE(an_object_that_others_name_can_be_let_go) {
+  Controller controller(covered_arm(test::arm_limits(nv)), synchronous(ControllerSettings::Output::acceleration));
+  controller.attach(bar());
+  Attachment lid = bar("lid");
+  lid.may_touch = {"bar"};
+  controller.attach(lid);
+  Attachment knob = bar("knob");
+  knob.link = "lid";
+  controller.attach(knob);
+  controller.detach("bar");
+  BOOST_TEST((controller.attached() == std::vector<std::string>{"lid", "knob"}));
+  BOOST_TEST(what_is_said([&] { controller.detach("lid"); }).find("'knob' is attached to 'lid'") != std::string::npos);
+}

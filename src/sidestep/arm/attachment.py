@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import trimesh
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
@@ -62,10 +63,11 @@ def attachment(
     if components < 1:
         raise ValueError(f"attach {name!r}: components is {components}, must be at least 1")
     cover, solid = _cover(name, geometry, components)
+    middle, moments = _of_even_density(solid, mass)
     if radius > 0.0:
         cover = _larger(cover, radius)
-    com = solid.mean(axis=0) if center_of_mass is None else np.asarray(center_of_mass, dtype=np.float64)
-    moments = _of_even_density(solid, mass) if inertia is None else np.asarray(inertia, dtype=np.float64)
+    com = middle if center_of_mass is None else np.asarray(center_of_mass, dtype=np.float64)
+    moments = moments if inertia is None else np.asarray(inertia, dtype=np.float64)
     return _core.Attachment(
         name,
         link=link,
@@ -78,11 +80,10 @@ def attachment(
 
 
 def _cover(name: str, geometry: Shape | ArrayLike, components: int) -> tuple[Ellipsoids, Array]:
-    """Its ellipsoids, and points (N, 3) that its mass is taken to be spread like."""
+    """Its ellipsoids, and the triangles (F, 3, 3) of its surface."""
     if isinstance(geometry, Sphere):
         ball = Ellipsoids(geometry.centre[None], geometry.radius * np.eye(3)[None])
-        corners = geometry.centre + np.sqrt(3.0 / 5.0) * geometry.radius * np.vstack([np.eye(3), -np.eye(3)])
-        return ball, corners
+        return ball, np.asarray(geometry.mesh().triangles, dtype=np.float64)
     if is_shape(geometry):
         mesh = geometry.mesh()
         triangles, outside = np.asarray(mesh.triangles, dtype=np.float64), 0.0
@@ -94,7 +95,7 @@ def _cover(name: str, geometry: Shape | ArrayLike, components: int) -> tuple[Ell
         raise ValueError(f"attach {name!r}: the geometry has no triangles, or some that are not finite")
     problem = LinkProblem(triangles, seed=0, effort=EFFORTS["draft"])
     cover = problem.finish(components).ellipsoids
-    return _larger(cover, outside) if outside > 0.0 else cover, triangles.reshape(-1, 3)
+    return _larger(cover, outside) if outside > 0.0 else cover, triangles
 
 
 def _hull(name: str, p: Array) -> Array:
@@ -121,8 +122,14 @@ def _larger(cover: Ellipsoids, margin: float) -> Ellipsoids:
     return cover.scaled(np.asarray(1.0 + margin / shortest, dtype=np.float64))
 
 
-def _of_even_density(points: Array, mass: float) -> Array:
-    """Moments (3, 3) of a mass spread like points about their mean."""
-    d = points - points.mean(axis=0)
-    second = mass * (d.T @ d) / len(d)
-    return np.asarray(np.trace(second) * np.eye(3) - second)
+def _of_even_density(triangles: Array, mass: float) -> tuple[Array, Array]:
+    """Centre of mass (3,) and moments (3, 3) about it of the solid in a surface, or in its hull where that is open."""
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    solid = trimesh.Trimesh(triangles.reshape(-1, 3), faces)  # which merges equal corners
+    if not solid.is_watertight or not solid.volume > 0.0:
+        solid = solid.convex_hull
+    volume = float(solid.volume)
+    return (
+        np.asarray(solid.center_mass, dtype=np.float64),
+        np.asarray(solid.moment_inertia, dtype=np.float64) * (mass / volume),
+    )

@@ -30,6 +30,10 @@ class DisturbanceObserver {
   void update(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::VectorXd& torque,
               const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix, const Eigen::VectorXd& bias) noexcept;
 
+  /// The model's bias has changed by `change` (nv), as by a payload that it is told of now: what d had of that, it has no more.
+  /// What was seen of rotors was seen with the other model, and is forgotten; those that were found stay.
+  void change_model(const Eigen::VectorXd& change) noexcept;
+
   const Eigen::VectorXd& disturbance() const noexcept { return disturbance_; }  ///< d (nv) [Nm | N]
   const Eigen::VectorXd& rotors() const noexcept { return rotors_; }            ///< J (nv) [kg m² | kg]
 

@@ -107,12 +107,15 @@ class Controller {
   const Command& step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
                       ConstVectorRef bias) noexcept;
 
-  /// Of the last step.
-  const Command& command() const noexcept;
+  /// Of the last step; the same object all the time.
+  const Command& command() const noexcept { return command_; }
   /// What the last step saw; its name_of(command().point) is the name of what is nearest. For the thread of `step`.
   const Obstacles& obstacles() const noexcept;
   /// One sentence: what the last command does and why, and what to do about it. For the thread of `step`; allocates.
   std::string explain() const;
+
+  int num_coordinates() const noexcept { return static_cast<int>(command_.position.size()); }
+  // References of what follows hold until the next change of the arm.
 
   /// With what is attached; from the step after a change on.
   Arm arm() const;
@@ -142,10 +145,13 @@ class Controller {
   };
   void change(const Arm& whole, std::vector<Held> held);
 
+  static void destroy(Impl* newest) noexcept;
+
   const ControllerSettings settings_;
+  Command command_;
   std::unique_ptr<Impl> impl_;             // of the thread of `step`
   std::atomic<Impl*> next_{nullptr};       // which it takes over in the next step
-  std::atomic<Impl*> retired_{nullptr};    // the one before, for another thread to destroy
+  std::atomic<Impl*> retired_{nullptr};    // those before, for another thread to destroy
   mutable std::mutex setters_;
   Impl* newest_;                           // of the two, which setters tell
   mutable std::mutex changes_;             // of what follows; held while a body is prepared

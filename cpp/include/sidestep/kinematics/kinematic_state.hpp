@@ -68,10 +68,12 @@ class KinematicState {
 
 /// Pose X_WF of a frame.
 Eigen::Isometry3d frame_pose(const Robot& robot, const KinematicState& state, int frame);
+Eigen::Isometry3d frame_pose(const KinematicState& state, const Frame& frame);
 
 /// Jacobian (6 × nv) of a frame: rows 0–2 the velocity of the frame's origin [m/s], rows 3–5 the angular
 /// velocity [rad/s], both expressed in the world.
 Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, int frame);
+Eigen::MatrixXd frame_jacobian(const Robot& robot, const KinematicState& state, const Frame& frame);
 
 /// J̇ v (6) of a frame, in the rows' order of `frame_jacobian`: its acceleration when q̈ = 0.
 Vector6d frame_bias_acceleration(const Robot& robot, const KinematicState& state, int frame);

@@ -82,6 +82,8 @@ class LookAhead {
   bool is_due(double period) const noexcept { return !(until_look_ > 0.5 * period); }
   /// Before another motion is pursued: what was found is forgotten.
   void reset() noexcept;
+  /// As if `pursue` had found a trajectory before. No allocation after the first time.
+  void resume(const AvoidanceTrajectory& trajectory) { found_ = pursued_ = trajectory; }
 
   /// Ends a look once it says so, by an Interruption: what was found before stays.
   void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
