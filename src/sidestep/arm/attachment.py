@@ -124,6 +124,8 @@ def _larger(cover: Ellipsoids, margin: float) -> Ellipsoids:
 
 def _of_even_density(triangles: Array, mass: float) -> tuple[Array, Array]:
     """Centre of mass (3,) and moments (3, 3) about it of the solid in a surface, or in its hull where that is open."""
+    if mass == 0.0:
+        return np.asarray(triangles.reshape(-1, 3).mean(axis=0)), np.zeros((3, 3))
     faces = np.arange(3 * len(triangles)).reshape(-1, 3)
     solid = trimesh.Trimesh(triangles.reshape(-1, 3), faces)  # which merges equal corners
     if not solid.is_watertight or not solid.volume > 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,7 +60,17 @@ def jerk_limited_optimum(
     smooth = smooth_timing(path, limits)
     fastest = topp_ra_timing(path, limits)
     guesses = [smooth] if fastest is None else [fastest.stretched(STRETCH), smooth]
-    nodes = (fastest or smooth).spread_nodes(path, intervals)
+    for ends in (True, False):  # with nodes close to both ends, or where Ipopt does not converge so, without
+        nodes = (fastest or smooth).spread_nodes(path, intervals, ends=ends)
+        if (found := _converged(path, limits, nodes, guesses)) is not None:
+            return found
+    return None
+
+
+def _converged(
+    path: ExecutedPath, limits: Limits, nodes: Array, guesses: Sequence[PathTiming]
+) -> JerkLimitedOptimum | None:
+    """The optimum at nodes (N + 1,) and at more of them, until limits hold between them; None without one."""
     iterations = 0
     for _ in range(REFINEMENTS + 1):
         found = next((f for f in (_solve(path, limits, nodes, guess) for guess in guesses) if f), None)

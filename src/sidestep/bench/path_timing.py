@@ -59,13 +59,15 @@ class PathTiming:
             self.sigma, self.v / factor, self.a / factor**2, self.u / factor**3, self.h * factor
         )
 
-    def spread_nodes(self, path: ExecutedPath, intervals: int) -> Array:
+    def spread_nodes(self, path: ExecutedPath, intervals: int, *, ends: bool = True) -> Array:
         """Shares of the path: dense where this timing is slow or the path turns, and at both ends; nowhere sparse."""
         first, second, _ = path.derivatives(self.sigma)
         turning = np.linalg.norm(second, axis=1) / np.maximum(np.linalg.norm(first, axis=1), 1e-9)
         turned = np.concatenate([[0.0], np.cumsum(np.diff(self.sigma) * 0.5 * (turning[1:] + turning[:-1]))])
         measure = 0.5 * self.times / self.duration + 0.2 * self.sigma + 0.3 * turned / max(turned[-1], 1e-9)
         found = np.interp(np.linspace(0.0, 1.0, intervals + 1), measure / measure[-1], self.sigma)
+        if not ends:
+            return np.asarray(found)
         first, last = found[1] * ENDS**3, 1.0 - (1.0 - found[-2]) * ENDS[::-1] ** 3  # σ goes with t³ at rest
         return np.concatenate([[0.0], first, found[1:-1], last, [1.0]])
 
