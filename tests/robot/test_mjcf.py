@@ -124,7 +124,7 @@ def test_content_decides_not_the_suffix(tmp_path: Path) -> None:
     assert Robot.from_urdf(tmp_path / "scene.mjcf", **LIMITS).num_coordinates == 4
     assert not is_mjcf(tmp_path / "missing.xml")
     assert not is_mjcf('<robot name="mujoco"/>')
-    with pytest.raises(ValueError, match="package_dirs and xacro_arguments are of URDF"):
+    with pytest.raises(ValueError, match="package_dirs, xacro_arguments and srdf are of URDF"):
         Robot.from_urdf(ARM, package_dirs=[tmp_path])
 
 
