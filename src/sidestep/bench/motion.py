@@ -20,6 +20,7 @@ from sidestep._core import (
 )
 from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot, tip_of
+from sidestep.robot.turns import ways_to
 from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation
 from sidestep.simulation.pose_target import PoseTarget
 
@@ -137,7 +138,7 @@ class ControllerMover:
             driver = ControllerDriver(controller, _Changing(problem))
             motion = under_torque(self.robot, driver, problem, settings, pose)
             return _told(motion, _planned(controller), controller, pose)
-        columns = Columns(problem, settings)
+        columns = Columns(self.robot, problem, settings)
         q, v = problem.start, np.zeros_like(problem.start)
         seen = _Changing(problem)
         planned = _planned(controller)
@@ -211,8 +212,8 @@ class _Changing:
 class Columns:
     """The rows of a motion as it is integrated, up to arrival."""
 
-    def __init__(self, problem: Problem, settings: MotionSettings) -> None:
-        self._goal, self._settings = problem.goal, settings
+    def __init__(self, robot: Robot, problem: Problem, settings: MotionSettings) -> None:
+        self._robot, self._goal, self._settings = robot, problem.goal, settings
         self._total = max(1, round(settings.duration / settings.period))
         self._changes = problem.changes
         self._rows: list[tuple[Array, Array, Array]] = []
@@ -230,8 +231,8 @@ class Columns:
 
     def near(self, q: Array) -> npt.NDArray[np.bool_]:
         """Which of the rows (T, nv) are at the goal configuration."""
-        found: npt.NDArray[np.bool_] = np.abs(q - self._goal).max(axis=1) < self._settings.tolerance
-        return found
+        away = ways_to(self._robot, q, self._goal)
+        return np.asarray(away.max(axis=1) < self._settings.tolerance)
 
     def add(self, q: Array, v: Array, a: Array, seconds: Array, near: npt.NDArray[np.bool_]) -> None:
         """Rows that came next, and which of them are at the goal."""

@@ -15,6 +15,7 @@ from sidestep.bench.way_out import WayOut, find_way_out
 from sidestep.distance import ExactClearance, SelfCollision
 from sidestep.distance.clearance import FINEST
 from sidestep.robot import Robot
+from sidestep.robot.turns import ways_to
 from sidestep.simulation.evaluation import excess_over
 
 Array = npt.NDArray[np.float64]
@@ -148,7 +149,7 @@ class Judge:
             arrived=motion.arrived,
             time_s=settings.period * (end - 1),
             steps=len(motion.step_seconds),
-            error_rad=float(np.abs(q[-1] - problem.goal).max()),
+            error_rad=float(ways_to(self.robot, q[-1], problem.goal).max()),
             straight_line_blocked=problem.straight_line_blocked,
             min_clearance_m=clearance,
             clearance_pair=pair,

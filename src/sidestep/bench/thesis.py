@@ -32,7 +32,7 @@ class SystemMover:
                 problem,
                 settings,
             )
-        columns = Columns(problem, settings)
+        columns = Columns(self.robot, problem, settings)
         q, v = problem.start, np.zeros_like(problem.start)
         while steps := columns.next_steps(CHUNK):
             part = rollout(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.distance.clearance import ExactClearance
+from sidestep.robot.turns import ways_to
 from sidestep.simulation.joint_words import in_words, largest_ways
 from sidestep.simulation.run import Run, SimulationRun
 
@@ -136,7 +137,7 @@ def evaluate(
             the minimum is smaller than this, it is measured again, finer, until it is clear whether the arm
             touched.
     """
-    error, distance = np.abs(run.q - run.goal).max(axis=1), np.zeros(len(run))
+    error, distance = ways_to(run.robot, run.q, run.goal).max(axis=1), np.zeros(len(run))
     if run.pose is not None:
         distance, error = np.array([run.pose.errors(q) for q in run.q]).T
     inside = (error < goal_tolerance) & (distance < POSE_TOLERANCE)
@@ -152,7 +153,7 @@ def evaluate(
     effort = run.robot.limits.effort
     left: tuple[float | None, float | None] = (None, None)
     if run.pose is None:
-        left = largest_ways(run.robot, run.q[-1] - run.goal)
+        left = largest_ways(run.robot, ways_to(run.robot, run.q[-1], run.goal))
     detour = largest_ways(run.robot, deviation)
     return Evaluation(
         reached=bool(inside[-1]),

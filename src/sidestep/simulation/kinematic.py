@@ -53,7 +53,7 @@ def run_kinematically(
     if not isinstance(goal, PoseTarget):
         goal = robot.check_configuration(goal, "goal")
     v = np.zeros_like(start) if start_velocity is None else real_array(start_velocity, "start_velocity")
-    watch = None if arrival is None else ArrivalWatch(goal, arrival)
+    watch = None if arrival is None else ArrivalWatch(goal, arrival, robot)
     steps = max(1, round(duration / timestep))
     columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
     arrived, done = False, 0

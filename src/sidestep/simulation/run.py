@@ -14,6 +14,7 @@ from sidestep.distance.scene import SceneObject
 from sidestep.obstacles import obstacles_from_shapes
 from sidestep.obstacles.scene import Seen
 from sidestep.robot import Robot
+from sidestep.robot.turns import ways_to
 from sidestep.simulation.pose_target import PoseTarget
 
 Array = npt.NDArray[np.float64]
@@ -122,6 +123,7 @@ class ArrivalWatch:
 
     goal: Array | PoseTarget
     rule: Arrival
+    robot: Robot
     since: float | None = field(default=None, init=False)
 
     def update(self, time: float, q: Array, v: Array) -> bool:
@@ -130,7 +132,7 @@ class ArrivalWatch:
             distance, angle = self.goal.errors(q)
             near = distance < self.rule.distance and angle < self.rule.position
         else:
-            near = bool(np.abs(q - self.goal).max() < self.rule.position)
+            near = bool(ways_to(self.robot, q, self.goal).max() < self.rule.position)
         near = near and bool(np.abs(v).max() < self.rule.speed)
         if not near:
             self.since = None

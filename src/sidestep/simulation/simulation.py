@@ -104,7 +104,7 @@ class Simulation:
             start,
             np.zeros_like(start) if start_velocity is None else real_array(start_velocity, "start_velocity"),
         )
-        watch = None if arrival is None else ArrivalWatch(goal, arrival)
+        watch = None if arrival is None else ArrivalWatch(goal, arrival, self.robot)
         steps = max(1, round(duration / self.timestep))
         rows: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         contacts: list[Contact] = []

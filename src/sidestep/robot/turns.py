@@ -1,0 +1,26 @@
+"""Joints that turn without limits: a configuration is the same a turn further."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sidestep import _core
+from sidestep.robot.link import Array
+
+
+def ways_to(robot: _core.Robot, q: Any, goal: Any) -> Array:
+    """|q - goal| of every joint (..., nv) [rad | m], to the nearest turn of joints that turn without limits.
+
+    Args:
+        robot: whose joints they are. q, goal: (..., nv), (nv,).
+    """
+    away = np.abs(np.asarray(q, dtype=np.float64) - goal)
+    free = np.isneginf(robot.limits.lower) & np.isposinf(robot.limits.upper)
+    for joint in robot.joints:
+        if joint.type != _core.JointType.revolute or abs(joint.multiplier) != 1.0:
+            free[joint.coordinate] = False
+    turn = 2.0 * np.pi
+    rest = np.mod(away, turn)
+    return np.asarray(np.where(free, np.minimum(rest, turn - rest), away))
