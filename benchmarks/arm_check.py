@@ -62,6 +62,11 @@ def cause_of(error: BaseException) -> str:
     return f"other: {type(error).__name__}"
 
 
+def told(error: BaseException) -> str:
+    """What an error says, without the folders of this machine that were searched."""
+    return re.sub(r"; searched in: [^;\n]*", "", str(error))
+
+
 def check(path: Path) -> dict[str, Any]:
     """Whether a file loads, what it is, and how far its frames are from those of MuJoCo or Pinocchio."""
     mjcf = is_mjcf(path)
@@ -74,7 +79,7 @@ def check(path: Path) -> dict[str, Any]:
             cause = cause_of(error)
             if path.suffix == ".xacro" and cause in ("no link", "link or joint that does not exist"):
                 cause = "xacro: a part that another file includes"
-            return {**row, "loads": False, "cause": cause, "message": str(error)}
+            return {**row, "loads": False, "cause": cause, "message": told(error)}
         chains, longest = chains_of(robot)
         row |= {
             "loads": True,
