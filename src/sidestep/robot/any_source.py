@@ -9,13 +9,14 @@ from typing import Any
 from sidestep.robot.catalogue import recipe
 from sidestep.robot.descriptions import described
 from sidestep.robot.model import Robot
+from sidestep.robot.source import is_text
 
 OF_NAMES = ("locked", "locked_beyond_limits")  # what `Robot.named` takes
 
 
 def is_name(source: str | Path) -> bool:
     """Whether this is the name of a robot, not a path or a text."""
-    if isinstance(source, str) and source.lstrip().startswith("<"):
+    if is_text(source):
         return False
     path = Path(source)
     return not (path.suffix or len(path.parts) != 1 or path.is_file())

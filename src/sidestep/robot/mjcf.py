@@ -24,7 +24,7 @@ from sidestep.robot.mjcf_joints import (
     name_of,
 )
 from sidestep.robot.pose import about_axis, from_quaternion, pose_at
-from sidestep.robot.source import read_xml
+from sidestep.robot.source import is_text, read_xml
 from sidestep.robot.urdf import Urdf, UrdfJoint, UrdfMimic
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
@@ -82,7 +82,7 @@ def warn_of_defaults(
 
 def is_mjcf(source: str | Path) -> bool:
     """Whether the root element of a file, or of XML text, is `<mujoco>`; False without such a file."""
-    if isinstance(source, str) and source.lstrip().startswith("<"):
+    if is_text(source):
         text = source
     elif Path(source).is_file():
         text = Path(source).read_bytes().decode("utf-8-sig", errors="replace")
@@ -94,7 +94,7 @@ def is_mjcf(source: str | Path) -> bool:
 
 def no_mjcf(source: str | Path) -> Exception:
     """The error for a source that is not MJCF."""
-    if isinstance(source, str) and source.lstrip().startswith("<"):
+    if is_text(source):
         return ValueError("the text is no MJCF: its root element must be <mujoco>")
     if Path(source).is_file():
         return ValueError(f"{source} is no MJCF: its root element must be <mujoco>")
@@ -111,7 +111,7 @@ def read_mjcf(source: str | Path) -> Mjcf:
     """
     import mujoco
 
-    text = isinstance(source, str) and source.lstrip().startswith("<")
+    text = is_text(source)
     label = "MJCF string" if text else str(Path(source).resolve())
     try:
         spec = mujoco.MjSpec.from_string(source) if text else _parsed(Path(source).resolve())

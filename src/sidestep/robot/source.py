@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TypeGuard
 
 from sidestep.robot.formats import macros_alone, other_root, refuse_content
 from sidestep.robot.packages import Packages
@@ -33,6 +34,11 @@ class Description:
     packages: Packages
 
 
+def is_text(source: str | Path) -> TypeGuard[str]:
+    """Whether a source is a description's text itself, not a path: it starts with `<`."""
+    return isinstance(source, str) and source.lstrip().startswith("<")
+
+
 def read_description(
     source: str | Path, *, package_dirs: Sequence[str | Path], xacro_arguments: Mapping[str, str] | None
 ) -> Description:
@@ -46,7 +52,7 @@ def read_description(
         if not directory.is_dir():
             raise FileNotFoundError(f"package_dirs: {directory} is not a folder")
     folder: Path | None = None
-    if isinstance(source, str) and source.lstrip().startswith("<"):
+    if is_text(source):
         label, text = "URDF string", source.lstrip()
     else:
         path = Path(source).resolve()

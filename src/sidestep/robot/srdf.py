@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from sidestep.robot.source import parse_xml, read_xml
+from sidestep.robot.source import is_text, parse_xml, read_xml
 
 Pair = tuple[str, str]
 
@@ -96,8 +96,7 @@ def read_extras(
     srdf: str | Path | None, urdf: str | Path, robot: str, joints: Sequence[str], links: Iterable[str]
 ) -> tuple[dict[str, NDArray[np.float64]], tuple[Pair, ...]]:
     """Postures and pairs that may touch, of an SRDF or the one beside a URDF (`srdf_beside`); none without one."""
-    is_text = isinstance(urdf, str) and urdf.lstrip().startswith("<")
-    file = srdf or (None if is_text else srdf_beside(Path(urdf), robot))
+    file = srdf or (None if is_text(urdf) else srdf_beside(Path(urdf), robot))
     if not file:
         return {}, ()
     postures = {name: np.array(values) for name, values in read_postures(file, joints).items()}
@@ -106,7 +105,7 @@ def read_extras(
 
 def _root(source: str | Path) -> tuple[Element, str]:
     """The root element of an SRDF, and what errors call it."""
-    if isinstance(source, str) and source.lstrip().startswith("<"):
+    if is_text(source):
         label, text = "SRDF string", source.lstrip()
     else:
         label = str(source)
