@@ -345,6 +345,8 @@ void bind_controller(nb::module_& m) {
                    "How often a path was looked for.")
       .def_prop_ro("has_torque", &Controller::has_torque, "Whether the commands hold torque.");
 
+  m.def("unlimited_joints", &unlimited_joints, nb::arg("robot"),
+        "(nv) Which coordinates turn without limits, so that a configuration is the same a turn further.");
   nb::class_<MotionRecord>(m, "MotionRecord", "A motion of a controller without physics: row k is what step k began with and gave.")
       .def_prop_ro("q", [](const MotionRecord& r) { return to_numpy_matrix(r.q); }, "(steps, nv).")
       .def_prop_ro("v", [](const MotionRecord& r) { return to_numpy_matrix(r.v); }, "(steps, nv).")

@@ -2979,6 +2979,11 @@ class Controller:
     def has_torque(self) -> bool:
         """Whether the commands hold torque."""
 
+def unlimited_joints(robot: Robot) -> list[bool]:
+    """
+    (nv) Which coordinates turn without limits, so that a configuration is the same a turn further.
+    """
+
 class MotionRecord:
     """
     A motion of a controller without physics: row k is what step k began with and gave.

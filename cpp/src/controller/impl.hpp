@@ -16,6 +16,7 @@
 #include "sidestep/control/acceleration_filter.hpp"
 #include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
+#include "sidestep/controller/motion.hpp"
 #include "sidestep/controller/posture_search.hpp"
 #include "sidestep/barrier/stopping_clearance.hpp"
 #include "sidestep/system/local_minimum_recovery.hpp"
@@ -23,9 +24,6 @@
 #include "step_state.hpp"
 
 namespace sidestep {
-
-/// Which coordinates turn without limits, so that a configuration is the same a turn further (nv).
-std::vector<bool> unlimited_joints(const Robot& robot);
 
 /// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
 class Controller::Impl : private StepState {
@@ -36,7 +34,8 @@ class Controller::Impl : private StepState {
 
   /// Takes over the orders of another one whose arm has the same joints; before the first step of this one.
   void take_orders_of(Impl& before);
-  /// Goes on where another one stopped, in its thread: goals are begun anew from where the arm is, other orders go on.
+  /// Goes on where another one stopped, in the thread of `step`: the target stays, a way to it is planned anew, and other orders
+  /// go on. No allocation.
   void go_on_from(Impl& before) noexcept;
 
   void set_goal(std::optional<Goal> goal);

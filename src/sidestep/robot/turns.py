@@ -17,10 +17,7 @@ def ways_to(robot: _core.Robot, q: Any, goal: Any) -> Array:
         robot: whose joints they are. q, goal: (..., nv), (nv,).
     """
     away = np.abs(np.asarray(q, dtype=np.float64) - goal)
-    free = np.isneginf(robot.limits.lower) & np.isposinf(robot.limits.upper)
-    for joint in robot.joints:
-        if joint.type != _core.JointType.revolute or abs(joint.multiplier) != 1.0:
-            free[joint.coordinate] = False
+    free = np.array(_core.unlimited_joints(robot))
     turn = 2.0 * np.pi
     rest = np.mod(away, turn)
     return np.asarray(np.where(free, np.minimum(rest, turn - rest), away))

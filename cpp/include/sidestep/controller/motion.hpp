@@ -8,6 +8,9 @@
 
 namespace sidestep {
 
+/// Which coordinates turn without limits, so that a configuration is the same a turn further (nv).
+std::vector<bool> unlimited_joints(const Robot& robot);
+
 /// A motion of a controller without physics: row k is what step k began with and gave.
 struct MotionRecord {
   Eigen::MatrixXd q, v, acceleration;  ///< (steps, nv)
