@@ -2014,10 +2014,11 @@ class Attachment:
     An object that a link holds, see `Controller.attach`; `sidestep.arm.attachment` makes one.
     """
 
-    def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = ()) -> None:
+    def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = (), rests_on: Sequence[str] = ()) -> None:
         """
         pose (4, 4) of the object in the frame of `link`; solid ellipsoids {centre + shape u : |u| <= 1} that hold all of it,
-        centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may touch.
+        centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may
+        touch; names of obstacles that it stands on until it is lifted.
         """
 
     @property
@@ -2038,6 +2039,9 @@ class Attachment:
 
     @property
     def may_touch(self) -> list[str]: ...
+
+    @property
+    def rests_on(self) -> list[str]: ...
 
 class BarrierSettings:
     """
@@ -2891,8 +2895,8 @@ class Controller:
         An object that a link holds from the next step on: attach("cup", Cylinder(0.04, 0.1), link="fr3_hand", pose=X,
         mass=0.3, may_touch=["fr3_leftfinger", "fr3_rightfinger"]), with the options of `sidestep.arm.attachment`; a
         shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and
-        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. Takes less than a second, in
-        which steps go on. Raises ValueError that names what is wrong; nothing changes then.
+        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=["table"] the same
+        holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.
         """
 
     def detach(self, name: str) -> None:

@@ -90,7 +90,7 @@ void Controller::set_goal(const Eigen::VectorXd& position) {
   tell([&](Impl& impl) { impl.set_goal(std::optional<Goal>(std::in_place, JointGoal(position))); });
 }
 void Controller::set_goal(Goal goal) {
-  tell([&](Impl& impl) { impl.set_goal(std::move(goal)); });
+  tell([&](Impl& impl) { impl.set_goal(goal); });
 }
 void Controller::set_velocity(const Eigen::VectorXd& v) {
   tell([&](Impl& impl) { impl.set_velocity(v); });
@@ -105,7 +105,7 @@ void Controller::clear_goal() {
   tell([](Impl& impl) { impl.set_goal(std::nullopt); });
 }
 void Controller::set_obstacles(Obstacles obstacles) {
-  tell([&](Impl& impl) { impl.set_obstacles(std::move(obstacles)); });
+  tell([&](Impl& impl) { impl.set_obstacles(obstacles); });
 }
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept {
@@ -123,7 +123,7 @@ const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacle
 std::string Controller::explain() const { return impl_->explain(); }
 Arm Controller::arm() const {
   const std::lock_guard lock(setters_);
-  return newest_->arm;
+  return newest().arm;
 }
 const ControllerSettings& Controller::settings() const noexcept { return settings_; }
 const std::vector<CoordinateLabel>& Controller::labels() const noexcept { return impl_->system->labels(); }
@@ -133,11 +133,11 @@ const TorqueSolution& Controller::solution() const noexcept { return impl_->solu
 Eigen::VectorXd Controller::target() const { return impl_->target(); }
 Plan Controller::last_plan() const {
   const std::lock_guard lock(setters_);
-  return newest_->guide ? newest_->guide->last_plan() : Plan{};
+  return newest().guide ? newest().guide->last_plan() : Plan{};
 }
 OnlinePlanner::Counts Controller::planner_counts() const {
   const std::lock_guard lock(setters_);
-  return newest_->guide ? newest_->guide->counts() : OnlinePlanner::Counts{};
+  return newest().guide ? newest().guide->counts() : OnlinePlanner::Counts{};
 }
 bool Controller::has_torque() const noexcept { return has_torque_; }
 
