@@ -90,7 +90,8 @@ class Robot(_core.Robot):
                 What hangs on the tip itself, and every other branch that moves, is dropped.
             locked: joints held at a value [rad | m]; joints that mimic them are held too, and may be named too.
                 Floating and planar joints at a pose (4, 4), or x, y, z [m], roll, pitch, yaw [rad]; where they
-                are written by default.
+                are written by default. Two numbers, a range: something else drives the joint, as a gripper's own
+                controller; what it moves is covered wherever it may be, and held in the middle of the range.
             locked_beyond_limits: accept values of `locked` outside the file's limits, as published data has.
             acceleration_limits: [rad/s^2 | m/s^2]; 10 by default (URDF has none).
             velocity_limits: [rad/s | m/s], in place of the file's; none where neither gives one.
