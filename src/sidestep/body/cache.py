@@ -61,7 +61,7 @@ class ContentStore:
             return None
         try:
             return parse(json.loads(self.path(key).read_text(encoding="utf-8")))
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
         except (ValueError, TypeError, LookupError, AttributeError, OSError) as error:
             warnings.warn(
