@@ -243,7 +243,9 @@ class Arm(_core.Arm):
         draft = how.draft and not (how.cache and arm_path(robot, allowed, label).exists())
 
         def make() -> _core.Arm:
-            return prepare(robot, allowed=allowed, source=label, draft=draft, progress=how.progress)
+            return prepare(
+                robot, allowed=allowed, source=label, draft=draft, cached=how.cache, progress=how.progress
+            )
 
         made = stored_or_made(arm_path(robot, allowed, label, draft), make) if how.cache else make()
         arm = cls(made, description=lambda: robot)

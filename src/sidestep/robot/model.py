@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -324,6 +325,20 @@ class Robot(_core.Robot):
     def random_configuration(self, rng: np.random.Generator) -> Array:
         """A configuration (nv,), uniform within the limits; within ±pi where a coordinate has none."""
         return rng.uniform(*self._finite_interval())
+
+    def random_configurations(self, count: int, *, seed: int = 0) -> Array:
+        """Configurations (count, nv) as `random_configuration` gives.
+
+        The values of a coordinate depend on the seed, its name and its limits alone: they stay when another joint is
+        added or dropped.
+        """
+        lower, upper = self._finite_interval()
+        shares = [
+            np.random.default_rng((seed, crc32(name.encode()))).random(count)
+            for name in self.coordinate_names
+        ]
+        values: Array = lower + (upper - lower) * np.stack(shares, axis=1)
+        return values
 
     def check_configuration(self, q: ArrayLike, name: str = "q") -> Array:
         """`q` as an array (nv,) after checking its shape, that it is finite, and the position limits.
