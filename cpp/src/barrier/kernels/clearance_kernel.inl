@@ -1,4 +1,4 @@
-// Included by one file per instruction set, after clearance_kernel.hpp and <immintrin.h> where there is one. Defines
+// Included by one file per instruction set, after clearance_kernel.hpp and intrinsics.hpp. Defines
 // measure, measure_points, begin, collect and sum_candidates in an anonymous namespace.
 
 namespace sidestep::kernels {
