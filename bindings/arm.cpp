@@ -162,7 +162,7 @@ void bind_arm(nb::module_& m) {
           [](const Arm& arm, const std::filesystem::path& path) { with_os_errors(path, [&] { arm.save(path); }); },
           nb::arg("path"), nb::sig("def save(self, path: str | os.PathLike[str]) -> None"),
           "Writes an .arm file in one piece. Raises OSError.")
-      .def_prop_ro("name", &Arm::name)
+      .def_prop_ro("name", &Arm::name, "The name of the robot.")
       .def_prop_ro("num_coordinates", &Arm::num_coordinates, "Number of joint coordinates nv.")
       // Copies: what Python keeps beside an arm must not keep the arm alive, or neither would ever be freed.
       .def_prop_ro("robot", &Arm::robot, nb::rv_policy::copy, "The kinematic tree, without meshes.")

@@ -137,8 +137,8 @@ void bind_command(nb::module_& m) {
       .value("stale", Activity::stale, "The obstacles are older than obstacle_timeout: the arm stops.");
 
   nb::class_<Command>(m, "Command", "What one step of a Controller gives; arrays are copies.")
-      .def_ro("status", &Command::status)
-      .def_ro("activity", &Command::activity)
+      .def_ro("status", &Command::status, "How safe the command is.")
+      .def_ro("activity", &Command::activity, "What the controller does.")
       .def_prop_ro("torque", [](const Command& c) { return to_numpy(c.torque); },
                    "(nv,) [Nm | N], gravity included; zero where the output is not torque.")
       .def_prop_ro("torque_without_gravity", [](const Command& c) { return to_numpy(c.torque_without_gravity); },
@@ -351,8 +351,8 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("q", [](const MotionRecord& r) { return to_numpy_matrix(r.q); }, "(steps, nv).")
       .def_prop_ro("v", [](const MotionRecord& r) { return to_numpy_matrix(r.v); }, "(steps, nv).")
       .def_prop_ro("acceleration", [](const MotionRecord& r) { return to_numpy_matrix(r.acceleration); }, "(steps, nv).")
-      .def_ro("statuses", &MotionRecord::statuses)
-      .def_ro("activities", &MotionRecord::activities)
+      .def_ro("statuses", &MotionRecord::statuses, "(steps,) How safe each command was.")
+      .def_ro("activities", &MotionRecord::activities, "(steps,) What the controller did.")
       .def_prop_ro("clearance", [](const MotionRecord& r) { return to_numpy(r.clearance); }, "(steps,) of the covering body [m].")
       .def_prop_ro("step_seconds", [](const MotionRecord& r) { return to_numpy(r.step_seconds); }, "(steps,) [s].")
       .def_prop_ro("last_q", [](const MotionRecord& r) { return to_numpy(r.last_q); }, "(nv,) after the last step.")

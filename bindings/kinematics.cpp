@@ -95,11 +95,11 @@ void bind_kinematics(nb::module_& m) {
       .def(nb::init<std::string, std::vector<Joint>, std::vector<Frame>, std::vector<std::string>, JointLimits>(),
            nb::arg("name"), nb::kw_only(), nb::arg("joints"), nb::arg("frames"), nb::arg("coordinate_names"),
            nb::arg("limits"))
-      .def_prop_ro("name", &Robot::name)
+      .def_prop_ro("name", &Robot::name, "What messages call the arm.")
       .def_prop_ro("num_coordinates", &Robot::num_coordinates, "Number of joint coordinates nv (= nq).")
-      .def_prop_ro("joints", [](const Robot& r) { return r.joints(); })
-      .def_prop_ro("frames", [](const Robot& r) { return r.frames(); })
-      .def_prop_ro("coordinate_names", [](const Robot& r) { return r.coordinate_names(); })
+      .def_prop_ro("joints", [](const Robot& r) { return r.joints(); }, "Every joint, parents first.")
+      .def_prop_ro("frames", [](const Robot& r) { return r.frames(); }, "Every frame, such as links.")
+      .def_prop_ro("coordinate_names", [](const Robot& r) { return r.coordinate_names(); }, "(nv,) Names of the joint coordinates.")
       .def_prop_ro(
           "coordinate_units",
           [](const Robot& r) {
@@ -110,7 +110,7 @@ void bind_kinematics(nb::module_& m) {
             return units;
           },
           "The unit of every coordinate: 'rad', or 'm' of a sliding joint.")
-      .def_prop_ro("limits", [](const Robot& r) { return r.limits(); })
+      .def_prop_ro("limits", [](const Robot& r) { return r.limits(); }, "Limits of the joint coordinates.")
       .def(
           "pose",
           [](const Robot& robot, const ArrayLike& q, const std::string& link) {

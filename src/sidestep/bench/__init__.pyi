@@ -14,6 +14,7 @@ from .motion_bench_maker import MotionBenchMakerProblem as MotionBenchMakerProbl
 from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_maker
 from .outcome import Judge as Judge
 from .outcome import Outcome as Outcome
+from .own_method import OwnMover as OwnMover
 from .parallel import default_jobs as default_jobs
 from .peers import PeerSettings as PeerSettings
 from .peers import run_peers as run_peers

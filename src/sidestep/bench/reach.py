@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ import numpy as np
 from sidestep._core import __version__
 from sidestep.bench.method import Method
 from sidestep.bench.methods import build_mover
-from sidestep.bench.motion import MotionSettings
+from sidestep.bench.motion import MotionSettings, Mover
 from sidestep.bench.outcome import Judge, Outcome, times_of
+from sidestep.bench.own_method import OwnMover
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
 from sidestep.bench.step_times import StepTimes
@@ -27,7 +29,7 @@ class BenchSettings:
 
     Attributes:
         problems: what is drawn. count: how many, from index 0.
-        method: how the arm is moved. motion: how problems are run.
+        method: how the arm is moved, or a Python file of `OwnMover`. motion: how problems are run.
         jobs: processes.
 
     Raises:
@@ -36,7 +38,7 @@ class BenchSettings:
 
     problems: ProblemSettings
     count: int = 100
-    method: Method = Method.controller
+    method: Method | Path = Method.controller
     motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
 
@@ -73,7 +75,7 @@ class BenchResult:
         broken = sorted({name for item in outcomes for name in item.limits})
         document: dict[str, Any] = {
             "robot": self.problems[0].robot,
-            "method": self.settings.method.value,
+            "method": method_name(self.settings.method),
             "torque": self.settings.motion.torque,
             "poses": self.settings.motion.poses,
             "problems": len(outcomes),
@@ -122,6 +124,15 @@ class BenchResult:
         return document
 
 
+def method_name(method: Method | Path) -> str:
+    """What reports call a method: a file by its name."""
+    return method.name if isinstance(method, Path) else method.value
+
+
+def _mover(method: Method | Path, robot: Robot) -> Mover:
+    return OwnMover.from_file(method, robot) if isinstance(method, Path) else build_mover(method, robot)
+
+
 def run_bench(
     settings: BenchSettings,
     *,
@@ -161,7 +172,7 @@ class _Worker:
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
-        self._mover = build_mover(settings.method, self._robot)
+        self._mover = _mover(settings.method, self._robot)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task

@@ -12,12 +12,13 @@ from sidestep.cli.bench_output import (
     DurationOption,
     FailuresOption,
     JobsOption,
-    MethodOption,
+    OwnMethodOption,
     PeriodOption,
     RobotOption,
     SeedOption,
     TorqueOption,
     figures_table,
+    method_or_file,
     with_bar,
 )
 from sidestep.cli.bench_scenes_command import dynamic, motion_bench_maker
@@ -41,7 +42,7 @@ def reach(
     obstacles: Annotated[int, typer.Option(min=0, help="Balls per problem.")] = 10,
     problems: Annotated[int, typer.Option(min=1, help="Number of problems.")] = 100,
     seed: SeedOption = 0,
-    method: MethodOption = Method.controller,
+    method: OwnMethodOption = Method.controller.value,
     moving: Annotated[
         float, typer.Option(min=0.0, metavar="SPEED", help="Balls drift at up to this speed [m/s].")
     ] = 0.0,
@@ -83,12 +84,12 @@ def reach(
             robot=robot if given is None else given[0].robot, obstacles=obstacles, seed=seed, moving=moving
         ),
         count=problems,
-        method=method,
+        method=method_or_file(method),
         motion=MotionSettings(period=period, duration=duration, torque=torque, poses=poses),
         jobs=jobs or default_jobs(),
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    title = f"{settings.problems.robot} {method.value}"
+    title = f"{settings.problems.robot} {method}"
     result = with_bar(terminal, title, lambda show: run_bench(settings, problems=given, progress=show))
     document = result.to_document(failures=failures)
     if export is not None:

@@ -167,8 +167,8 @@ class Robot(_core.Robot):
         Args:
             source: a path, or the XML text itself (starts with `<`).
             base_pose: pose (4, 4) of the file's world in the world, identity by default.
-            tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits, effort_limits, jerk_limits,
-                effort_rate_limits, name: as in `from_urdf`.
+            tip, name, locked, locked_beyond_limits: as in `from_urdf`.
+            acceleration_limits, velocity_limits, effort_limits, jerk_limits, effort_rate_limits: as there.
 
         Raises:
             FileNotFoundError: the file or one that it refers to is missing.
