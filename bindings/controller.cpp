@@ -374,8 +374,8 @@ void bind_controller(nb::module_& m) {
       nb::sig("def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, "
               "goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord"),
       "Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is\n"
-      "within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not\n"
-      "finite, less than one step, and a controller that is not synchronous.");
+      "within tolerance [rad], a sliding one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises\n"
+      "ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.");
 }
 
 }  // namespace sidestep::python

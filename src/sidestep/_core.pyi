@@ -99,6 +99,11 @@ class JointLimits:
     @property
     def effort_rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
+    rounding: Final[float] = ...
+    """
+    [rad | m] by which a measured or published configuration may be outside the position limits and is taken in as the nearest one within.
+    """
+
 class Robot:
     """The immutable kinematic model of an arm, in the core."""
 
@@ -3071,8 +3076,8 @@ class MotionRecord:
 def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord:
     """
     Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is
-    within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not
-    finite, less than one step, and a controller that is not synchronous.
+    within tolerance [rad], a sliding one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises
+    ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.
     """
 
 class RealTimeRun:

@@ -172,6 +172,8 @@ class Controller::Impl : private StepState {
   bool keeps_path() const noexcept { return pulls_ && trajectory_order() && trajectory_order()->behaviour == TrajectoryBehaviour::keep_path; }
   std::string explain_trajectory() const;
   std::string explain_input() const;
+  /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
+  std::string explain_target() const;
   void avoid() noexcept;
   using MassMatrix = const Eigen::Ref<const Eigen::MatrixXd>*;
   using Bias = const Eigen::Ref<const Eigen::VectorXd>*;
@@ -206,6 +208,8 @@ class Controller::Impl : private StepState {
   bool has_sub_goal() const noexcept { return followed_ != nullptr && followed_ != &reference_ && followed_ != goal_; }
   void keep_room() noexcept;
   bool has_goal() const noexcept { return goal_ != nullptr; }
+  /// The target is inside something, and the arm goes straight to it: it stops before.
+  bool stops_short() const noexcept { return target_blocked_ && (!guide || (path_reference_.arrives && followed_ == &reference_)); }
   const PoseGoal* pose_goal() const noexcept { return goal_ == nullptr ? nullptr : std::get_if<PoseGoal>(goal_); }
 
   // Of the worker; in `step` where synchronous.

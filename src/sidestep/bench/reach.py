@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from sidestep._core import __version__
+from sidestep.arm import Arm
 from sidestep.bench.method import Method
 from sidestep.bench.methods import build_mover
-from sidestep.bench.motion import MotionSettings, Mover
+from sidestep.bench.motion import ControllerMover, MotionSettings, Mover
 from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.own_method import OwnMover
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
@@ -21,6 +22,8 @@ from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProb
 from sidestep.bench.step_times import StepTimes
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
+from sidestep.robot.any_source import robot_from
+from sidestep.scenario.config import ABLATIONS
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,12 @@ class BenchSettings:
     """What is run.
 
     Attributes:
-        problems: what is drawn. count: how many, from index 0.
+        problems: what is drawn, and the robot. count: how many, from index 0.
         method: how the arm is moved, or a Python file of `OwnMover`. motion: how problems are run.
-        jobs: processes.
+        jobs: processes. draft: with the body that is prepared in seconds, see `Arm.load`; of the controller.
 
     Raises:
-        ValueError: count or jobs below 1.
+        ValueError: count or jobs below 1, or a draft for a method that has none.
     """
 
     problems: ProblemSettings
@@ -41,11 +44,14 @@ class BenchSettings:
     method: Method | Path = Method.controller
     motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
+    draft: bool = False
 
     def __post_init__(self) -> None:
         for name in ("count", "jobs"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}, must be at least 1")
+        if self.draft and not (isinstance(self.method, Method) and self.method.safe):
+            raise ValueError(f"draft is for the controller; the method is {self.method}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +71,9 @@ class BenchResult:
         """The figures for JSON; counts are numbers of problems, with `failures` also which and why.
 
         Collisions with a way out are those in which a search found one (`find_way_out`), where balls move.
-        Each problem is one of success, collision or self_collision (or both), stuck; limit_violations counts
-        problems in which a position, velocity, acceleration or torque limit was broken at any step.
+        Each problem is one of success, collision or self_collision (or both), stuck, under_way when its time was over;
+        limit_violations counts problems in which a position, velocity, acceleration, jerk or torque limit was broken at
+        any step.
         """
         outcomes = self.outcomes
         clearances = [item.min_clearance_m for item in outcomes if item.min_clearance_m is not None]
@@ -85,6 +92,7 @@ class BenchResult:
                 item.way_out is not None and item.way_out.found for item in outcomes
             ),
             "stuck": sum(item.stuck for item in outcomes),
+            "under_way": sum(item.late and item.under_way for item in outcomes),
             "self_collision": sum(item.self_collision for item in outcomes),
             "limit_violations": sum(bool(item.limits) for item in outcomes),
             "limits_broken": {
@@ -163,16 +171,26 @@ def run_bench(
     return BenchResult(settings, tuple(drawn[k] for k in order), tuple(outcomes[k] for k in order), times)
 
 
+def _prepared(settings: BenchSettings, name: str) -> tuple[Robot, Mover]:
+    """The robot, and what moves it."""
+    options = settings.problems.options
+    if not settings.draft:
+        robot = robot_from(name, options)
+        return robot, _mover(settings.method, robot)
+    arm = Arm.load(name, draft=True, **options)
+    assert isinstance(arm.robot, Robot)  # it comes from a description or a name
+    return arm.robot, ControllerMover(arm.robot, arm, dict.fromkeys(ABLATIONS[Method(settings.method)]))
+
+
 class _Worker:
     """What a process needs for any problem."""
 
     def __init__(self, settings: BenchSettings, robot_name: str) -> None:
         self.settings, self.robot_name = settings, robot_name
-        self._robot = Robot.named(robot_name)
+        self._robot, self._mover = _prepared(settings, robot_name)
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
-        self._mover = _mover(settings.method, self._robot)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task

@@ -33,7 +33,8 @@ SpacingOption: TypeAlias = Annotated[float, typer.Option(min=1e-4, help="Of the 
 PointRadiusOption: TypeAlias = Annotated[float, typer.Option(min=0.0, help="Of those points [m].")]
 DurationOption: TypeAlias = Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")]
 ToleranceOption: TypeAlias = Annotated[
-    float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
+    float,
+    typer.Option(min=1e-6, help="Arrived when every joint is this near [rad]; sliding joints a tenth [m]."),
 ]
 PeriodOption: TypeAlias = Annotated[float, typer.Option(min=1e-5, help="Control period [s].")]
 JobsOption: TypeAlias = Annotated[

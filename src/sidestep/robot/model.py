@@ -343,17 +343,20 @@ class Robot(_core.Robot):
     def check_configuration(self, q: ArrayLike, name: str = "q") -> Array:
         """`q` as an array (nv,) after checking its shape, that it is finite, and the position limits.
 
+        What is outside by a rounding error, at most `JointLimits.rounding`, is taken as it is: encoders and published
+        problems have it, and a controller moves inside.
+
         Raises:
             ValueError: names `name`, the joint, its value and the interval allowed.
         """
         array = _core.real_array(q, name)
         if array.shape != (self.num_coordinates,):
             raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
-        limits = self.limits
+        limits, rounding = self.limits, _core.JointLimits.rounding
         for joint, value, lower, upper in zip(
             self.coordinate_names, array, limits.lower, limits.upper, strict=True
         ):
-            if not (np.isfinite(value) and lower <= value <= upper):
+            if not (np.isfinite(value) and lower - rounding <= value <= upper + rounding):
                 turns = {item.coordinate for item in self.joints if item.type == _core.JointType.revolute}
                 hint = degrees_hint(array[sorted(turns)])
                 raise ValueError(f"{name}: joint {joint!r} is {value}, allowed: [{lower}, {upper}]{hint}")
