@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from sidestep._core import __version__
+from sidestep.bench.arm import load_robot
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_mover
+from sidestep.bench.methods import build_body, build_mover
 from sidestep.bench.motion import MotionSettings
 from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
 from sidestep.bench.step_times import StepTimes
 from sidestep.distance import SelfCollision
-from sidestep.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class BenchSettings:
     Attributes:
         problems: what is drawn. count: how many, from index 0.
         method: how the arm is moved. motion: how problems are run.
-        jobs: processes.
+        jobs: processes. draft: with a coarser body, which is made in seconds.
 
     Raises:
         ValueError: count or jobs below 1.
@@ -39,6 +39,7 @@ class BenchSettings:
     method: Method = Method.controller
     motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
+    draft: bool = False
 
     def __post_init__(self) -> None:
         for name in ("count", "jobs"):
@@ -111,6 +112,7 @@ class BenchResult:
                     if key not in ("torque", "poses")
                 },
             },
+            "draft": self.settings.draft,
             "jobs": self.settings.jobs,
             "cpu": cpu_name(),
             "version": __version__,
@@ -140,7 +142,7 @@ def run_bench(
     if progress is not None:
         progress(0, len(tasks), "preparing the robot")
     make = partial(_Worker, settings, robot)
-    worker = make()  # here first: bodies are made once, and the processes find them cached
+    worker = make(progress=progress)  # here first: bodies are made once, and the processes find them cached
     drawn, outcomes, times = [], [], StepTimes()
     for problem, outcome, steps in run_tasks(make, tasks, jobs=settings.jobs, worker=worker):
         drawn.append(problem)
@@ -155,13 +157,19 @@ def run_bench(
 class _Worker:
     """What a process needs for any problem."""
 
-    def __init__(self, settings: BenchSettings, robot_name: str) -> None:
+    def __init__(self, settings: BenchSettings, robot_name: str, *, progress: Progress | None = None) -> None:
         self.settings, self.robot_name = settings, robot_name
-        self._robot = Robot.named(robot_name)
+        self._robot = load_robot(robot_name)
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
-        self._mover = build_mover(settings.method, self._robot)
+
+        def show(link: str, done: int, in_all: int) -> None:
+            if progress is not None:
+                progress(0, settings.count, f"preparing {link} ({done} of {in_all})")
+
+        body = build_body(settings.method, self._robot, draft=settings.draft, progress=show)
+        self._mover = build_mover(settings.method, self._robot, body)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task

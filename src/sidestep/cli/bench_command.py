@@ -14,7 +14,6 @@ from sidestep.cli.bench_output import (
     JobsOption,
     MethodOption,
     PeriodOption,
-    RobotOption,
     SeedOption,
     TorqueOption,
     figures_table,
@@ -37,7 +36,9 @@ app.command("realtime")(realtime)
 
 @app.command("reach")
 def reach(
-    robot: RobotOption = "fr3",
+    robot: Annotated[
+        str, typer.Option(help="A name from `sidestep robots`, or a URDF, xacro or MJCF file.")
+    ] = "fr3",
     obstacles: Annotated[int, typer.Option(min=0, help="Balls per problem.")] = 10,
     problems: Annotated[int, typer.Option(min=1, help="Number of problems.")] = 100,
     seed: SeedOption = 0,
@@ -57,6 +58,9 @@ def reach(
         Path | None, typer.Option(help="Run the problems of this file, written by --export.")
     ] = None,
     export: Annotated[Path | None, typer.Option(help="Write the problems to this file (JSON).")] = None,
+    draft: Annotated[
+        bool, typer.Option("--draft", help="With a body that is made in seconds, with larger ellipsoids.")
+    ] = False,
     failures: FailuresOption = False,
     json: JsonOption = None,
     quiet: QuietOption = False,
@@ -86,9 +90,10 @@ def reach(
         method=method,
         motion=MotionSettings(period=period, duration=duration, torque=torque, poses=poses),
         jobs=jobs or default_jobs(),
+        draft=draft,
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    title = f"{settings.problems.robot} {method.value}"
+    title = f"{Path(settings.problems.robot).name} {method.value}"
     result = with_bar(terminal, title, lambda show: run_bench(settings, problems=given, progress=show))
     document = result.to_document(failures=failures)
     if export is not None:
