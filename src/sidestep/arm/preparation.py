@@ -13,7 +13,7 @@ import numpy as np
 from sidestep import _core
 from sidestep.arm.link_pairs import DRAFT, FULL, tables_and_pairs
 from sidestep.body import Body
-from sidestep.body.cover import CoverProgress
+from sidestep.body.cover import CoverProgress, CoverSettings
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 
@@ -43,7 +43,8 @@ def prepare(
         body: a covering body of it; `Body.cover(robot)` by default.
         allowed: pairs of links that may touch, in either order: they get no clearance.
         source: what the provenance calls the description; the robot's name by default.
-        draft: with fewer ellipsoids, which are larger, and tables and pairs by fewer samples.
+        draft: with fewer ellipsoids, which are larger, and tables and pairs by fewer samples; so it is with a body that
+            is a draft.
         cached: whether parts are taken from shipped arms and the user's cache, and kept there.
         progress: called as progress(stage, item, done, in_all).
 
@@ -63,6 +64,7 @@ def prepare(
         raise ValueError(
             "the body does not cover its links (it has no levels); Body.cover(robot) makes one that does"
         )
+    draft = draft or (isinstance(body.settings, CoverSettings) and body.settings.effort == "draft")
     check = SelfCollision(robot)
     tables, pairs = tables_and_pairs(
         robot,

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from sidestep._core import __version__
-from sidestep.arm import Arm
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_mover
-from sidestep.bench.motion import ControllerMover, MotionSettings, Mover
+from sidestep.bench.methods import build_body, build_mover
+from sidestep.bench.motion import MotionSettings, Mover
 from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.own_method import OwnMover
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
@@ -23,7 +22,6 @@ from sidestep.bench.step_times import StepTimes
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 from sidestep.robot.any_source import robot_from
-from sidestep.scenario.config import ABLATIONS
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class BenchSettings:
     Attributes:
         problems: what is drawn, and the robot. count: how many, from index 0.
         method: how the arm is moved, or a Python file of `OwnMover`. motion: how problems are run.
-        jobs: processes. draft: with the body that is prepared in seconds, see `Arm.load`; of the controller.
+        jobs: processes. draft: with a coarser body, which is made in seconds; of the controller.
 
     Raises:
         ValueError: count or jobs below 1, or a draft for a method that has none.
@@ -121,6 +119,7 @@ class BenchResult:
                     if key not in ("torque", "poses")
                 },
             },
+            "draft": self.settings.draft,
             "jobs": self.settings.jobs,
             "cpu": cpu_name(),
             "version": __version__,
@@ -135,10 +134,6 @@ class BenchResult:
 def method_name(method: Method | Path) -> str:
     """What reports call a method: a file by its name."""
     return method.name if isinstance(method, Path) else method.value
-
-
-def _mover(method: Method | Path, robot: Robot) -> Mover:
-    return OwnMover.from_file(method, robot) if isinstance(method, Path) else build_mover(method, robot)
 
 
 def run_bench(
@@ -159,7 +154,7 @@ def run_bench(
     if progress is not None:
         progress(0, len(tasks), "preparing the robot")
     make = partial(_Worker, settings, robot)
-    worker = make()  # here first: bodies are made once, and the processes find them cached
+    worker = make(progress=progress)  # here first: bodies are made once, and the processes find them cached
     drawn, outcomes, times = [], [], StepTimes()
     for problem, outcome, steps in run_tasks(make, tasks, jobs=settings.jobs, worker=worker):
         drawn.append(problem)
@@ -171,23 +166,26 @@ def run_bench(
     return BenchResult(settings, tuple(drawn[k] for k in order), tuple(outcomes[k] for k in order), times)
 
 
-def _prepared(settings: BenchSettings, name: str) -> tuple[Robot, Mover]:
+def _prepared(settings: BenchSettings, name: str, progress: Progress | None) -> tuple[Robot, Mover]:
     """The robot, and what moves it."""
-    options = settings.problems.options
-    if not settings.draft:
-        robot = robot_from(name, options)
-        return robot, _mover(settings.method, robot)
-    arm = Arm.load(name, draft=True, **options)
-    assert isinstance(arm.robot, Robot)  # it comes from a description or a name
-    return arm.robot, ControllerMover(arm.robot, arm, dict.fromkeys(ABLATIONS[Method(settings.method)]))
+    robot = robot_from(name, settings.problems.options)
+    if isinstance(settings.method, Path):
+        return robot, OwnMover.from_file(settings.method, robot)
+
+    def show(link: str, done: int, in_all: int) -> None:
+        if progress is not None:
+            progress(0, settings.count, f"preparing {link} ({done} of {in_all})")
+
+    body = build_body(settings.method, robot, draft=settings.draft, progress=show)
+    return robot, build_mover(settings.method, robot, body)
 
 
 class _Worker:
     """What a process needs for any problem."""
 
-    def __init__(self, settings: BenchSettings, robot_name: str) -> None:
+    def __init__(self, settings: BenchSettings, robot_name: str, *, progress: Progress | None = None) -> None:
         self.settings, self.robot_name = settings, robot_name
-        self._robot, self._mover = _prepared(settings, robot_name)
+        self._robot, self._mover = _prepared(settings, robot_name, progress)
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)

@@ -130,7 +130,7 @@ def reach(
         draft=draft,
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    title = f"{settings.problems.robot} {method}"
+    title = f"{Path(settings.problems.robot).name} {method}"
     result = with_bar(terminal, title, lambda show: run_bench(settings, problems=given, progress=show))
     document = result.to_document(failures=failures)
     if export is not None:
