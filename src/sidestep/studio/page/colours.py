@@ -26,7 +26,7 @@ def batched(colour: Rgb) -> Rgb:
 
 
 OBSTACLE = palette.VERMILLION
-FURNITURE = "#EBC4A4"  # of an obstacle that is large: it would drown everything else
+FURNITURE = palette.FURNITURE  # of an obstacle that is large: it would drown everything else
 LARGE = 0.25  # [m] radius of a ball that holds it
 GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
