@@ -189,13 +189,15 @@ def reach(robot: Robot) -> float:
     return max(LEAST_REACH, *(float(np.linalg.norm(place)) for place in places))
 
 
-def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:
-    """What each link looks like, in its frame, together at most `MOST_TRIANGLES`."""
-    return merged_meshes({link.name: link.visuals or link.collisions for link in robot.links})
+def link_meshes(robot: Robot, most: int = MOST_TRIANGLES) -> dict[str, trimesh.Trimesh]:
+    """What each link looks like, in its frame, together at most `most` triangles."""
+    return merged_meshes({link.name: link.visuals or link.collisions for link in robot.links}, most)
 
 
-def merged_meshes(geometries: Mapping[str, Sequence[Geometry]]) -> dict[str, trimesh.Trimesh]:
-    """The shapes of each link as one mesh in its frame, all together at most `MOST_TRIANGLES`."""
+def merged_meshes(
+    geometries: Mapping[str, Sequence[Geometry]], most: int = MOST_TRIANGLES
+) -> dict[str, trimesh.Trimesh]:
+    """The shapes of each link as one mesh in its frame, all together at most `most` triangles."""
     whole: dict[str, trimesh.Trimesh] = {}
     for link, shapes in geometries.items():
         parts = [shape.mesh() for shape in shapes]
@@ -203,11 +205,9 @@ def merged_meshes(geometries: Mapping[str, Sequence[Geometry]]) -> dict[str, tri
             merged: Any = trimesh.util.concatenate([trimesh.Trimesh(s.vertices, s.faces) for s in parts])
             whole[link] = merged
     meshes, cell = whole, FIRST_CELL
-    while (count := sum(len(mesh.faces) for mesh in meshes.values())) > MOST_TRIANGLES:
+    while (count := sum(len(mesh.faces) for mesh in meshes.values())) > most:
         if meshes is not whole:
-            cell *= max(
-                1.1, np.sqrt(count / MOST_TRIANGLES)
-            )  # triangles are as many as there are cells on a surface
+            cell *= max(1.1, np.sqrt(count / most))  # triangles are as many as there are cells on a surface
         meshes = {name: simplified(mesh, cell) for name, mesh in whole.items()}
     return {name: trimesh.graph.smooth_shade(mesh, angle=SHARP) for name, mesh in meshes.items()}
 
