@@ -42,7 +42,7 @@ struct Measured {
     const Singles across = larger((1.0f + 2.0f * measure_error) * squared_speed - towards * towards, Singles{});
     const Singles growth = distance * apart * (0.5f - measure_error) * rough_inverse(radius) +
                            (1.0f + measure_error) * horizon * smaller(towards, Singles{});
-    room = (apart > 0.0f) & (growth > 0.0f)
+    room = ((apart > 0.0f) & (growth > 0.0f))
                ? apart - horizon * (towards + more) - (0.25f + measure_error) * horizon * horizon * across * rough_inverse(growth)
                : all(-__builtin_inff());
   }
