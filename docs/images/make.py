@@ -4,6 +4,7 @@ demo, studio, animation; in figures.py those of concepts and theory; in table.py
 the studio need Chromium and `pip install 'sidestep[headless]'`; without a graphics card the animation takes minutes.
 """
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -47,6 +48,7 @@ FIGURES = (
 )
 
 if __name__ == "__main__":
+    os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo draws without a display; or osmesa
     import figures
     import table
 

@@ -1,17 +1,14 @@
 """The README's first picture: the controller moves round a table while a ball chases the hand, by torque in MuJoCo.
 
-MuJoCo draws it too, without a display: MUJOCO_GL=egl (or osmesa). `python docs/images/make.py table` takes minutes,
-and prints contacts and the least clearance of the exact meshes.
+MuJoCo draws it too. `python docs/images/make.py table` takes minutes, and prints contacts and the least clearance of
+the exact meshes.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-
-os.environ.setdefault("MUJOCO_GL", "egl")
 
 import mujoco
 import numpy as np
@@ -31,6 +28,7 @@ RADIUS = 0.06  # [m] of the ball
 REST = np.array([0.35, -0.75, 0.75])  # where the ball begins and ends [m]
 HOME = np.array([-0.7, -0.2, 0.0, -2.2, 0.0, 2.0, 0.785])  # start and end of the arm [rad]
 PLACES = (0.55, 0.27, 0.34), (0.72, -0.32, 0.44), (0.38, 0.42, 0.42)  # of the hand's tip, pointing down [m]
+FLOOR = 0.62, 0.68, 0.74, 1.0  # its colour: the arm is white
 DOWN = np.diag([1.0, -1.0, -1.0])  # of the hand
 CHANGES = 0.0, 1.7, 2.9, 3.8  # [s] at which the next goal is told
 CHASE_ENDS = 3.5  # [s] from when on the ball goes back
@@ -114,7 +112,9 @@ def dress(built: Any) -> None:
         if kind == "object":
             model.geom_rgba[geom] = colour(paint[name])
     model.vis.global_.offwidth, model.vis.global_.offheight = SIZE
-    model.geom_size[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "floor")][:2] = 0.0  # without an end
+    floor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "floor")
+    model.geom_size[floor][:2] = 0.0  # without an end
+    model.geom_rgba[floor] = FLOOR
     model.vis.headlight.ambient[:] = 0.45
     model.vis.headlight.diffuse[:] = 0.45
     model.vis.quality.shadowsize = 4096
