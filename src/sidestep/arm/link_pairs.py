@@ -42,7 +42,8 @@ class PairEffort:
 
     Attributes:
         samples: random configurations, of which the gaps between ellipsoids are taken.
-        ways: from samples in which they touch to others, on which the contact is looked for.
+        ways: from samples in which they touch to others, on which the contact is looked for; half of them from those
+            with the widest gaps.
         tables: of the pairs that have them.
     """
 
@@ -255,7 +256,9 @@ class _Samples:
         if not len(touching) or not len(apart):
             return -np.inf  # nothing touches, or everything
         pair, ways, draw = self._pairs[k], self._effort.ways, np.random.default_rng(1)
-        starts, ends = draw.choice(touching, ways), draw.choice(apart, ways)
+        deep = touching[np.argsort(-gap[touching], kind="stable")][: ways // 2]  # which have the widest gaps
+        starts = np.concatenate([deep, draw.choice(touching, ways - len(deep))])
+        ends = draw.choice(apart, ways)
         gaps = _gaps(self._robot, self._body, [pair])
         travel = self._travel(pair)
         largest = -np.inf
