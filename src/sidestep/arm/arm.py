@@ -84,9 +84,10 @@ class Arm(_core.Arm):
             source: a name of `sidestep.robots()`, the path of an `.arm` file, or a URDF, xacro or MJCF file
                 (or its text); or a name of the packages `robot_descriptions` or `mujoco_menagerie`, where those are
                 installed.
-            package_dirs, base_pose, tip, locked, locked_beyond_limits, acceleration_limits, velocity_limits,
-                effort_limits, jerk_limits, effort_rate_limits, name, xacro_arguments, srdf: of a description, as in
-                `Robot.from_urdf`; of a name `locked` and `locked_beyond_limits` alone, as in `Robot.named`.
+            package_dirs, base_pose, tip, name: of a description, as in `Robot.from_urdf`; so are the rest up to `srdf`.
+            locked, locked_beyond_limits: as there; of a name as in `Robot.named`, which takes these two alone.
+            acceleration_limits, velocity_limits, effort_limits, jerk_limits, effort_rate_limits: as there.
+            xacro_arguments, srdf: as there.
             allowed: pairs of links that may touch, beside those of the description: they get no clearance.
             draft: prepare in seconds what serves until the fine body is there, see `Refinement`: proven to cover the
                 arm like the fine one, with fewer ellipsoids, which are larger, so that the arm keeps farther off. Where

@@ -19,6 +19,7 @@ from sidestep.robot import Robot
 
 Pair: TypeAlias = tuple[str, str]
 Progress: TypeAlias = Callable[[str, str, int, int], None]
+"""Called as progress(stage, item, done, in_all) while an arm is prepared, see `Arm.load`."""
 """Called as progress(stage, item, done, in_all): "cover" and a link, "tables" or "pairs" and a pair of links."""
 
 # Of the largest eigenvalue of the mass matrix: below it a coordinate moves no mass. A gripper's smallest is 1e-7 of it.

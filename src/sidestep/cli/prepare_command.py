@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from sidestep.cli.limit_options import EffortLimitOption, VelocityLimitOption, by_joint
+from sidestep.cli.limit_options import (
+    AccelerationLimitOption,
+    EffortLimitOption,
+    JerkLimitOption,
+    LockedOption,
+    VelocityLimitOption,
+    by_joint,
+)
 from sidestep.cli.output import QuietOption, console
 
 
@@ -18,8 +25,11 @@ def prepare(
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
     tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    locked: LockedOption = None,
     effort_limit: EffortLimitOption = None,
     velocity_limit: VelocityLimitOption = None,
+    acceleration_limit: AccelerationLimitOption = None,
+    jerk_limit: JerkLimitOption = None,
     draft: Annotated[
         bool, typer.Option(help="In seconds: a body that covers the arm as surely, with larger ellipsoids.")
     ] = False,
@@ -54,8 +64,11 @@ def prepare(
     options = {
         "package_dirs": package_dir,
         "tip": tip,
+        "locked": by_joint(locked, "--locked"),
         "effort_limits": by_joint(effort_limit, "--effort-limit"),
         "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
+        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
+        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
     }
     given = {name: value for name, value in options.items() if value}
     arm = Arm.load(source, draft=draft, cache=cache, progress=show, **given)  # type: ignore[arg-type]

@@ -41,6 +41,8 @@ def fingerprint_of(robot: _core.Robot, links: Sequence[Link]) -> str:
         )
         for geometry in link.geometries:
             add(geometry.kind, geometry.placement, geometry.size, geometry.scale)
+            if geometry.sweeps:
+                add(*geometry.sweeps)
             if geometry.path is not None:
                 add(hashlib.sha256(geometry.path.read_bytes()).hexdigest())
     return digest.hexdigest()
