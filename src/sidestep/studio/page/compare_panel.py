@@ -41,6 +41,11 @@ class ComparePanel:
         self._comparison: Comparison | None = None
         self._ghost: ArmView | None = None
 
+    @property
+    def running(self) -> Comparison | None:
+        """The comparison that runs."""
+        return self._comparison
+
     def send(self, command: m.Command) -> None:
         """What the loop is told, the other one is told as well."""
         if isinstance(command, m.Load):
