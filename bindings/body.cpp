@@ -120,17 +120,17 @@ void bind_body(nb::module_& m) {
           nb::arg("levels") = nb::none(),
           "links (K,): frame of each component; weights (K,), sum 1 per link; means (K, 3) [m];\n"
           "covariances (K, 3, 3) [m^2]; levels (K,) of a calibrated body. Raises ValueError that names the component at fault.")
-      .def_prop_ro("num_components", &Body::num_components)
-      .def_prop_ro("links", [](const Body& b) { return b.links; })
-      .def_prop_ro("weights", [](const Body& b) { return to_numpy(b.weights); })
-      .def_prop_ro("means", [](const Body& b) { return to_numpy_points(b.means); })
+      .def_prop_ro("num_components", &Body::num_components, "Number of Gaussians or ellipsoids K.")
+      .def_prop_ro("links", [](const Body& b) { return b.links; }, "(K,) The link that carries each.")
+      .def_prop_ro("weights", [](const Body& b) { return to_numpy(b.weights); }, "(K,) Weights; of a link they add up to 1.")
+      .def_prop_ro("means", [](const Body& b) { return to_numpy_points(b.means); }, "(K, 3) [m] in the frame of the link.")
       .def_prop_ro(
           "levels",
           [](const Body& b) -> std::optional<NumpyArray> {
             return b.levels.size() ? std::optional(to_numpy(b.levels)) : std::nullopt;
           },
           "Levels (K,) of the covering ellipsoids, or None if the body is not calibrated.")
-      .def_prop_ro("covariances", [](const Body& b) { return to_numpy_matrices(b.covariances); });
+      .def_prop_ro("covariances", [](const Body& b) { return to_numpy_matrices(b.covariances); }, "(K, 3, 3) [m^2] in the frame of the link.");
   bind_cover_refinement(m);
 }
 

@@ -59,11 +59,11 @@ void bind_quadratic_program(nb::module_& m) {
       .def("__str__", [](QuadraticProgramStatus status) { return name(status); });
 
   nb::class_<QuadraticSolution>(m, "QuadraticSolution", "What one solve of a QuadraticProgram gives.")
-      .def_ro("status", &QuadraticSolution::status)
+      .def_ro("status", &QuadraticSolution::status, "How the solver ended.")
       .def_prop_ro("x", [](const QuadraticSolution& s) { return to_numpy(s.x); }, "The minimiser (n,).")
       .def_prop_ro("multipliers", [](const QuadraticSolution& s) { return to_numpy(s.multipliers); },
                    "(n + m,): of the bounds, then of the rows; positive at an upper, negative at a lower limit.")
-      .def_ro("iterations", &QuadraticSolution::iterations)
+      .def_ro("iterations", &QuadraticSolution::iterations, "Constraints that were added or dropped.")
       .def_ro("residual", &QuadraticSolution::residual,
               "Largest relative violation of the optimality conditions; NaN unless solved.")
       .def_ro("seconds", &QuadraticSolution::seconds, "What the solver took [s], without the copies in and out.");
@@ -95,8 +95,8 @@ void bind_quadratic_program(nb::module_& m) {
             new (self) QuadraticProgram(num_variables, num_rows);
           },
           nb::arg("num_variables"), nb::arg("num_rows") = 0)
-      .def_prop_ro("num_variables", &QuadraticProgram::num_variables)
-      .def_prop_ro("num_rows", &QuadraticProgram::num_rows)
+      .def_prop_ro("num_variables", &QuadraticProgram::num_variables, "Number of variables n.")
+      .def_prop_ro("num_rows", &QuadraticProgram::num_rows, "Number of rows m beside the bounds.")
       .def(
           "solve",
           [](QuadraticProgram& qp, const ArrayLike& H, const ArrayLike& g, const ArrayLike& lower, const ArrayLike& upper, const ArrayLike& A,
@@ -266,8 +266,8 @@ void bind_torque_controller(nb::module_& m) {
       .def_ro("multiplier", &SafetyRow::multiplier, "What the row costs the task, >= 0; the largest one dominates.");
 
   nb::class_<TorqueSolution>(m, "TorqueSolution", "What one control step gives.")
-      .def_ro("status", &TorqueSolution::status)
-      .def_ro("fault", &TorqueSolution::fault)
+      .def_ro("status", &TorqueSolution::status, "How the control step ended.")
+      .def_ro("fault", &TorqueSolution::fault, "Which input is unusable.")
       .def_prop_ro("torque", [](const TorqueSolution& s) { return to_numpy(s.torque); },
                    "(nv,) [Nm | N], within the effort limits, always finite.")
       .def_prop_ro("acceleration", [](const TorqueSolution& s) { return to_numpy(s.acceleration); },
@@ -375,7 +375,7 @@ void bind_torque_controller(nb::module_& m) {
           "bias (nv,) [Nm | N] (Coriolis, centrifugal and gravity), clearances at (q, v), which a Step has. With the last\n"
           "period's acceleration (nv,) [/s^2] or torque (nv,) [Nm | N], jerk or torque rate keep their limits. Returns a\n"
           "TorqueSolution; values that are not finite give a fallback status and a damped stop. Raises ValueError on wrong shapes.")
-      .def_prop_ro("num_coordinates", &TorqueController::num_coordinates)
+      .def_prop_ro("num_coordinates", &TorqueController::num_coordinates, "Number of joint coordinates nv.")
       .def_prop_ro("program", [](const TorqueController& c) { return without_unbounded_rows(c.program()); }, program_doc)
       .def("count", &TorqueController::count, nb::arg("status"), "Number of solves that ended with this status.");
 }
@@ -417,8 +417,8 @@ void bind_acceleration_filter(nb::module_& m) {
                   "-> TorqueSolution"),
           "q (nv,) [rad | m], v (nv,) [/s], wanted acceleration (nv,) [/s^2], clearances at (q, v), which a Step has.\n"
           "Returns a TorqueSolution, of which `acceleration` is the result. Raises ValueError on wrong shapes.")
-      .def_prop_ro("period", &AccelerationFilter::period)
-      .def_prop_ro("num_coordinates", &AccelerationFilter::num_coordinates)
+      .def_prop_ro("period", &AccelerationFilter::period, "[s] between two calls.")
+      .def_prop_ro("num_coordinates", &AccelerationFilter::num_coordinates, "Number of joint coordinates nv.")
       .def_prop_ro("program", [](const AccelerationFilter& f) { return without_unbounded_rows(f.program()); }, program_doc)
       .def("count", &AccelerationFilter::count, nb::arg("status"), "Number of calls that ended with this status.");
 }

@@ -89,17 +89,20 @@ void bind_kinematics(nb::module_& m) {
       .def_prop_ro("acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); })
       .def_prop_ro("effort", [](const JointLimits& l) { return to_numpy(l.effort); })
       .def_prop_ro("jerk", [](const JointLimits& l) { return to_numpy(l.jerk); })
-      .def_prop_ro("effort_rate", [](const JointLimits& l) { return to_numpy(l.effort_rate); });
+      .def_prop_ro("effort_rate", [](const JointLimits& l) { return to_numpy(l.effort_rate); })
+      .def_prop_ro_static("rounding", [](nb::handle) { return JointLimits::rounding; },
+                          "[rad | m] by which a measured or published configuration may be outside the position limits and is "
+                          "taken in as the nearest one within.");
 
   nb::class_<Robot>(m, "Robot", "The immutable kinematic model of an arm, in the core.")
       .def(nb::init<std::string, std::vector<Joint>, std::vector<Frame>, std::vector<std::string>, JointLimits>(),
            nb::arg("name"), nb::kw_only(), nb::arg("joints"), nb::arg("frames"), nb::arg("coordinate_names"),
            nb::arg("limits"))
-      .def_prop_ro("name", &Robot::name)
+      .def_prop_ro("name", &Robot::name, "What messages call the arm.")
       .def_prop_ro("num_coordinates", &Robot::num_coordinates, "Number of joint coordinates nv (= nq).")
-      .def_prop_ro("joints", [](const Robot& r) { return r.joints(); })
-      .def_prop_ro("frames", [](const Robot& r) { return r.frames(); })
-      .def_prop_ro("coordinate_names", [](const Robot& r) { return r.coordinate_names(); })
+      .def_prop_ro("joints", [](const Robot& r) { return r.joints(); }, "Every joint, parents first.")
+      .def_prop_ro("frames", [](const Robot& r) { return r.frames(); }, "Every frame, such as links.")
+      .def_prop_ro("coordinate_names", [](const Robot& r) { return r.coordinate_names(); }, "(nv,) Names of the joint coordinates.")
       .def_prop_ro(
           "coordinate_units",
           [](const Robot& r) {
@@ -110,7 +113,7 @@ void bind_kinematics(nb::module_& m) {
             return units;
           },
           "The unit of every coordinate: 'rad', or 'm' of a sliding joint.")
-      .def_prop_ro("limits", [](const Robot& r) { return r.limits(); })
+      .def_prop_ro("limits", [](const Robot& r) { return r.limits(); }, "Limits of the joint coordinates.")
       .def(
           "pose",
           [](const Robot& robot, const ArrayLike& q, const std::string& link) {

@@ -41,8 +41,8 @@ void bind_obstacles(nb::module_& m) {
       .def_static("none", &Obstacles::none, "A workspace that is known to be free.")
       .def("__len__", &Obstacles::size)
       .def_prop_ro("points", [](const Obstacles& o) { return to_numpy_points(o.points()); })
-      .def_prop_ro("radii", [](const Obstacles& o) { return to_numpy(o.radii()); })
-      .def_prop_ro("velocities", [](const Obstacles& o) { return to_numpy_points(o.velocities()); })
+      .def_prop_ro("radii", [](const Obstacles& o) { return to_numpy(o.radii()); }, "(N,) [m].")
+      .def_prop_ro("velocities", [](const Obstacles& o) { return to_numpy_points(o.velocities()); }, "(N, 3) [m/s] in the world.")
       .def_prop_ro("groups",
                    [](const Obstacles& o) {
                      std::vector<std::pair<std::optional<std::string>, Eigen::Index>> groups;

@@ -62,7 +62,7 @@ void bind_plan(nb::module_& m) {
   nb::class_<Obstruction>(m, "Obstruction",
                           "What is in the way at an end of a motion: link, the other link of a pair, or which obstacle\n"
                           "point (-1: none), and depth [m], how far the covering ellipsoids reach into it.")
-      .def_prop_ro("kind", [](const Obstruction& o) { return o.label.kind; })
+      .def_prop_ro("kind", [](const Obstruction& o) { return o.label.kind; }, "Whether an obstacle, a plane or another link is in the way.")
       .def_prop_ro("link", [](const Obstruction& o) { return o.label.name; })
       .def_prop_ro("other", [](const Obstruction& o) { return o.label.other; })
       .def_ro("point", &Obstruction::point)
@@ -70,14 +70,14 @@ void bind_plan(nb::module_& m) {
       .def("__str__", [](const Obstruction& o) { return describe(o); });
 
   nb::class_<Plan>(m, "Plan", "A path, or why there is none.")
-      .def_ro("status", &Plan::status)
+      .def_ro("status", &Plan::status, "Whether a path was found, or why not.")
       .def_prop_ro("path", [](const Plan& p) { return to_numpy_matrix(p.path.transpose()); },
                    "(W, nv) waypoints from start to goal, straight between them; empty unless found.")
       .def_prop_ro("length", [](const Plan& p) { return length(p.path); }, "Sum of |dq| [rad | m].")
       .def_ro("margin", &Plan::margin, "[m] that the path keeps, but for its ends.")
       .def_ro("obstruction", &Plan::obstruction, "What is in the way at a start or goal in collision.")
       .def_ro("nodes", &Plan::nodes, "Of both trees.")
-      .def_ro("iterations", &Plan::iterations)
+      .def_ro("iterations", &Plan::iterations, "Samples that the search drew.")
       .def_ro("checks", &Plan::checks, "The work, see max_checks of PlannerSettings; improvement included.")
       .def_ro("search_seconds", &Plan::search_seconds, "[s] until a path was found, or given up.")
       .def_ro("improvement_seconds", &Plan::improvement_seconds,
@@ -108,7 +108,7 @@ void bind_guide(nb::module_& m) {
 
   nb::class_<PlannerReference>(m, "PlannerReference",
                                "The current reference of an OnlinePlanner, and what the motion is about.")
-      .def_ro("status", &PlannerReference::status)
+      .def_ro("status", &PlannerReference::status, "What the motion is about.")
       .def_prop_ro("goal", [](const PlannerReference& g) { const OnlinePlanner::Reference& a = g.reference;
                      return JointGoal(a.position, a.velocity, a.acceleration); },
                    "The reference, as a goal for a GeometricSystem.")

@@ -36,7 +36,7 @@ void bind_switches(nb::module_& m) {
             new (self) DistanceSwitch{as_vector(thresholds, "thresholds"), slope};
           },
           nb::arg("thresholds"), nb::arg("slope"))
-      .def_prop_ro("thresholds", [](const DistanceSwitch& s) { return to_numpy(s.thresholds); })
+      .def_prop_ro("thresholds", [](const DistanceSwitch& s) { return to_numpy(s.thresholds); }, "(nv,) [m], one for each joint.")
       .def_ro("slope", &DistanceSwitch::slope);
 }
 
@@ -56,7 +56,7 @@ void bind_diagnosis(nb::module_& m) {
       .value("plane", CoordinateLabel::Kind::plane, "A link against a plane.")
       .value("joint_limit", CoordinateLabel::Kind::joint_limit, "A joint against a position limit.");
   nb::class_<CoordinateLabel>(m, "CoordinateLabel", "What one coordinate of an embedding is about.")
-      .def_ro("kind", &CoordinateLabel::kind)
+      .def_ro("kind", &CoordinateLabel::kind, "What the coordinate measures.")
       .def_ro("name", &CoordinateLabel::name, "Of the link, or of the joint for a limit; empty for a potential.")
       .def_ro("other", &CoordinateLabel::other, "The second link of a pair; 'lower' or 'upper' for a joint limit.");
   using E = Explanation;
@@ -64,7 +64,7 @@ void bind_diagnosis(nb::module_& m) {
                 "Why a motion is what it is, from one step. Stuck: |v| < 0.02 rad/s short of the goal, and the metric lets\n"
                 "less than 5 % of the goal's pull through (or there is none): a local minimum. The coordinate named is the\n"
                 "one with the largest share in what is held back.")
-      .def_prop_ro("state", [](const E& e) { return e.diagnosis.state; })
+      .def_prop_ro("state", [](const E& e) { return e.diagnosis.state; }, "What the motion of the step is about.")
       .def_prop_ro("coordinate", [](const E& e) { return e.diagnosis.coordinate; }, "The dominating one; -1: none.")
       .def_prop_ro("kind", [](const E& e) { return e.label.kind; }, "Of the dominating coordinate.")
       .def_prop_ro("name", [](const E& e) { return e.label.name; }, "Its link, or joint for a limit; empty: none.")
@@ -117,7 +117,7 @@ void bind_step(nb::module_& m) {
 
   bind_diagnosis(m);
   nb::class_<Step>(m, "Step", "The result of one step; arrays are copies.")
-      .def_ro("status", &Step::status)
+      .def_ro("status", &Step::status, "How the step ended.")
       .def_prop_ro("acceleration", [](const Step& s) { return to_numpy(s.result.acceleration); }, "a (nv,) [rad/s^2].")
       .def_prop_ro("harmonic", [](const Step& s) { return to_numpy(s.result.harmonic); }, "h (nv,) [rad/s^2].")
       .def_prop_ro("geodesic", [](const Step& s) { return to_numpy(s.result.geodesic); }, "g (nv,) [rad/s^2].")
@@ -198,7 +198,7 @@ void bind_dynamical_system(nb::module_& m) {
                   "damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', "
                   "switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch "
                   "| None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: PenetrationRecovery | None = None) -> None"))
-      .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates)
+      .def_prop_ro("num_embedding_coordinates", &GeometricSystem::num_embedding_coordinates, "Number of coordinates m.")
       .def_prop_ro("labels", [](const GeometricSystem& s) { return s.labels(); },
                    "What every embedding coordinate is about, as CoordinateLabel.")
       .def_prop_ro("stiffness", [](const GeometricSystem& s) { return to_numpy_matrix(s.settings().stiffness); })

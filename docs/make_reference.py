@@ -1,6 +1,7 @@
-"""Writes docs/reference.md from the public names and the first sentence of each docstring.
+"""Writes what the pages of docs/reference take from the code: names, settings, the command line.
 
-Run it after adding or renaming a public name; a test fails while the page differs from what this would write.
+Run it after you add or rename a public name, a setting or an option: `python docs/make_reference.py`. A test fails
+while the pages differ from what this would write.
 """
 
 from __future__ import annotations
@@ -8,27 +9,54 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
+from enum import Enum
 from pathlib import Path
 from types import ModuleType
+from typing import Any, get_type_hints
+
+import typer
 
 import sidestep
+from sidestep.cli import app
 from sidestep.controller import controller_settings_fields
 
-PAGE = Path(__file__).parent / "reference.md"
-# The rooms of the package, each importing only those before it.
-ROOMS = ("robot", "obstacles", "body", "distance", "system", "control", "planning", "controller", "thesis")
-ROOMS += ("simulation", "scenario", "bench")
-INTRODUCTION = """# Reference
+FOLDER = Path(__file__).parent / "reference"
+# The parts of the package, each importing only those before it.
+PARTS = (
+    "robot",
+    "obstacles",
+    "body",
+    "distance",
+    "arm",
+    "system",
+    "control",
+    "planning",
+    "controller",
+    "thesis",
+)
+PARTS += ("simulation", "scenario", "bench", "studio")
+NAMES = """# Python
 
-What `sidestep` itself has is enough to move an arm. Its rooms hold the rest: `from sidestep.planning import Plan`.
-`python docs/make_reference.py` writes this page. `help(sidestep.NAME)` has arguments, shapes, units, frames and errors.
+The names of `sidestep` itself are enough to move an arm. Its parts hold the rest: `from sidestep.planning import Plan`.
+The site has a page for each part, with arguments, shapes, units, frames and errors; so has `help(sidestep.NAME)`.
+`python docs/make_reference.py` writes this page.
 """
-SETTINGS = """
-## Settings of the controller
+SETTINGS = """# Settings
 
-The tree of `ControllerSettings`; units are those of turning joints, for sliding ones rad is m. `planner`, `look_ahead`
-and `local_minimum` may be None (in scenario files null), which leaves the part out. A setting without unit has "-".
+The tree of `ControllerSettings`. Set one by its name:
+`ss.ControllerSettings(barriers=BarrierSettings(activation=0.15))`, with `BarrierSettings` from `sidestep.controller`.
+Scenario files use the same names. A value out of range is refused by name.
 
+Units are those of turning joints; for sliding joints rad is m. A setting without unit has "-". `planner`, `look_ahead`
+and `local_minimum` may be None (in scenario files null), which leaves the part out. `speed_limits` is off by default.
+[Tuning](../how-to/tuning.md) says what to turn first.
+`python docs/make_reference.py` writes this page from what the core states.
+
+"""
+COMMANDS = """# Command line
+
+Every command has `--help`. Exit codes: 0 on success, 1 when a run fails, 2 on bad input, with one line on stderr.
+`--json -` prints figures to stdout and everything else to stderr. `python docs/make_reference.py` writes this page.
 """
 
 
@@ -62,19 +90,67 @@ def table(module: str, names: list[str]) -> list[str]:
     return [f"\n## `{module}`\n", "| name | what it is |\n|---|---|", *rows]
 
 
-def page() -> str:
-    """The whole page."""
-    parts = [
-        INTRODUCTION,
-        *table("sidestep", [name for name in sidestep.__all__ if not name.startswith("__")]),
-    ]
-    parts.append(SETTINGS + "\n".join(settings_table()))
-    for room in ROOMS:
-        name = f"sidestep.{room}"
-        members = set(importlib.import_module(name).__all__) - set(sidestep.__all__)
-        parts += table(name, sorted(members))
-    return "\n".join(parts) + "\n"
+def public_names() -> dict[str, list[str]]:
+    """The public names of `sidestep` and of each part that `sidestep` itself does not have."""
+    names = {"sidestep": sorted(name for name in sidestep.__all__ if not name.startswith("__"))}
+    for part in PARTS:
+        module = f"sidestep.{part}"
+        names[module] = sorted(set(importlib.import_module(module).__all__) - set(sidestep.__all__))
+    return names
+
+
+def value_word(parameter: Any, hints: dict[str, Any]) -> str:
+    """What to write for the value of an argument or option: the choices where there are some, else its name."""
+    hint = hints.get(parameter.name)
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return "|".join(str(item.value) for item in hint)
+    return str(parameter.metavar or parameter.name.upper().replace("_", "-"))
+
+
+def option_row(parameter: Any, hints: dict[str, Any]) -> str:
+    """One argument or option of a command, as a row of a table."""
+    if parameter.param_type_name == "argument":
+        name = value_word(parameter, hints)
+    else:
+        name = ", ".join([*parameter.opts, *parameter.secondary_opts])
+        if not parameter.is_flag:
+            name += f" {value_word(parameter, hints)}"
+    default = parameter.default
+    if default is None or default is False or default in ("", ()) or callable(default):
+        shown = "required" if parameter.required else ""
+    else:
+        shown = "on" if default is True else f"`{getattr(default, 'value', default)}`"
+    says = " ".join((getattr(parameter, "help", None) or "").split())
+    cells = (f"`{name}`", says, shown)
+    return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
+
+
+def command_parts(name: str, command: Any) -> list[str]:
+    """A heading, the text and the options of a command, and those of its own commands."""
+    help_text = inspect.cleandoc(command.help or "")
+    parts = [f"\n## `{name}`\n", help_text]
+    hints = get_type_hints(command.callback) if command.callback else {}
+    rows = [option_row(item, hints) for item in command.params if not getattr(item, "hidden", False)]
+    if rows:
+        parts.append("\n| argument or option | what it does | default |\n|---|---|---|\n" + "\n".join(rows))
+    for word, inner in sorted(getattr(command, "commands", {}).items()):
+        parts += command_parts(f"{name} {word}", inner)
+    return parts
+
+
+def pages() -> dict[Path, str]:
+    """The text of each page."""
+    names = [part for module, names in public_names().items() for part in table(module, names)]
+    return {
+        FOLDER / "python.md": "\n".join([NAMES, *names]) + "\n",
+        FOLDER / "settings.md": SETTINGS + "\n".join(settings_table()) + "\n",
+        FOLDER / "command-line.md": "\n".join(
+            [COMMANDS, *command_parts("sidestep", typer.main.get_command(app))]
+        )
+        + "\n",
+    }
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")

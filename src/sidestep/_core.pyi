@@ -99,33 +99,43 @@ class JointLimits:
     @property
     def effort_rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
+    rounding: Final[float] = ...
+    """
+    [rad | m] by which a measured or published configuration may be outside the position limits and is taken in as the nearest one within.
+    """
+
 class Robot:
     """The immutable kinematic model of an arm, in the core."""
 
     def __init__(self, name: str, *, joints: Sequence[Joint], frames: Sequence[Frame], coordinate_names: Sequence[str], limits: JointLimits) -> None: ...
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """What messages call the arm."""
 
     @property
     def num_coordinates(self) -> int:
         """Number of joint coordinates nv (= nq)."""
 
     @property
-    def joints(self) -> list[Joint]: ...
+    def joints(self) -> list[Joint]:
+        """Every joint, parents first."""
 
     @property
-    def frames(self) -> list[Frame]: ...
+    def frames(self) -> list[Frame]:
+        """Every frame, such as links."""
 
     @property
-    def coordinate_names(self) -> list[str]: ...
+    def coordinate_names(self) -> list[str]:
+        """(nv,) Names of the joint coordinates."""
 
     @property
     def coordinate_units(self) -> list[str]:
         """The unit of every coordinate: 'rad', or 'm' of a sliding joint."""
 
     @property
-    def limits(self) -> JointLimits: ...
+    def limits(self) -> JointLimits:
+        """Limits of the joint coordinates."""
 
     def pose(self, q: numpy.typing.ArrayLike, link: str) -> numpy.typing.NDArray[numpy.float64]:
         """Pose (4, 4) of a link frame in the world at q (nv,)."""
@@ -151,16 +161,20 @@ class Body:
         """
 
     @property
-    def num_components(self) -> int: ...
+    def num_components(self) -> int:
+        """Number of Gaussians or ellipsoids K."""
 
     @property
-    def links(self) -> list[str]: ...
+    def links(self) -> list[str]:
+        """(K,) The link that carries each."""
 
     @property
-    def weights(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    def weights(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(K,) Weights; of a link they add up to 1."""
 
     @property
-    def means(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    def means(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(K, 3) [m] in the frame of the link."""
 
     @property
     def levels(self) -> numpy.typing.NDArray[numpy.float64] | None:
@@ -169,7 +183,8 @@ class Body:
         """
 
     @property
-    def covariances(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    def covariances(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(K, 3, 3) [m^2] in the frame of the link."""
 
 def refine_cover(*, origin: numpy.typing.ArrayLike, spacing: float, values: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike, multipliers: numpy.typing.ArrayLike, directions: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: numpy.typing.ArrayLike, steps: int, first_rate: float, last_rate: float, stiffness: float, multiplier_steps: int, margin: float, unit: float, area: float, slimness: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
@@ -205,10 +220,12 @@ class Obstacles:
     def points(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
     @property
-    def radii(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    def radii(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(N,) [m]."""
 
     @property
-    def velocities(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    def velocities(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(N, 3) [m/s] in the world."""
 
     @property
     def groups(self) -> list[tuple[str | None, int]]:
@@ -501,7 +518,8 @@ class DistanceSwitch:
     def __init__(self, thresholds: numpy.typing.ArrayLike, slope: float) -> None: ...
 
     @property
-    def thresholds(self) -> numpy.typing.NDArray[numpy.float64]: ...
+    def thresholds(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(nv,) [m], one for each joint."""
 
     @property
     def slope(self) -> float: ...
@@ -636,7 +654,8 @@ class CoordinateLabel:
     """What one coordinate of an embedding is about."""
 
     @property
-    def kind(self) -> CoordinateKind: ...
+    def kind(self) -> CoordinateKind:
+        """What the coordinate measures."""
 
     @property
     def name(self) -> str:
@@ -654,7 +673,8 @@ class Diagnosis:
     """
 
     @property
-    def state(self) -> MotionState: ...
+    def state(self) -> MotionState:
+        """What the motion of the step is about."""
 
     @property
     def coordinate(self) -> int:
@@ -740,7 +760,8 @@ class Step:
     """The result of one step; arrays are copies."""
 
     @property
-    def status(self) -> StepStatus: ...
+    def status(self) -> StepStatus:
+        """How the step ended."""
 
     @property
     def acceleration(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -820,7 +841,8 @@ class GeometricSystem:
     def __init__(self, embeddings: Sequence[Embedding], *, stiffness: numpy.typing.ArrayLike = 0.5, damping: numpy.typing.ArrayLike = 1.5, damping_form: DampingForm | str = 'plain', switch: Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch | None = None, robot: Robot | None = None, pull_form: PullForm | str = 'metric', recovery: PenetrationRecovery | None = None) -> None: ...
 
     @property
-    def num_embedding_coordinates(self) -> int: ...
+    def num_embedding_coordinates(self) -> int:
+        """Number of coordinates m."""
 
     @property
     def labels(self) -> list[CoordinateLabel]:
@@ -1044,7 +1066,8 @@ class QuadraticSolution:
     """What one solve of a QuadraticProgram gives."""
 
     @property
-    def status(self) -> QuadraticProgramStatus: ...
+    def status(self) -> QuadraticProgramStatus:
+        """How the solver ended."""
 
     @property
     def x(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1057,7 +1080,8 @@ class QuadraticSolution:
         """
 
     @property
-    def iterations(self) -> int: ...
+    def iterations(self) -> int:
+        """Constraints that were added or dropped."""
 
     @property
     def residual(self) -> float:
@@ -1113,10 +1137,12 @@ class QuadraticProgram:
     def __init__(self, num_variables: int, num_rows: int = 0) -> None: ...
 
     @property
-    def num_variables(self) -> int: ...
+    def num_variables(self) -> int:
+        """Number of variables n."""
 
     @property
-    def num_rows(self) -> int: ...
+    def num_rows(self) -> int:
+        """Number of rows m beside the bounds."""
 
     def solve(self, H: numpy.typing.ArrayLike, g: numpy.typing.ArrayLike, *, lower: numpy.typing.ArrayLike | None = None, upper: numpy.typing.ArrayLike | None = None, A: numpy.typing.ArrayLike | None = None, row_lower: numpy.typing.ArrayLike | None = None, row_upper: numpy.typing.ArrayLike | None = None) -> QuadraticSolution:
         """
@@ -1331,10 +1357,12 @@ class TorqueSolution:
     """What one control step gives."""
 
     @property
-    def status(self) -> TorqueStatus: ...
+    def status(self) -> TorqueStatus:
+        """How the control step ended."""
 
     @property
-    def fault(self) -> TorqueFault: ...
+    def fault(self) -> TorqueFault:
+        """Which input is unusable."""
 
     @property
     def torque(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1412,7 +1440,8 @@ class TorqueController:
         """
 
     @property
-    def num_coordinates(self) -> int: ...
+    def num_coordinates(self) -> int:
+        """Number of joint coordinates nv."""
 
     @property
     def program(self) -> QuadraticProgramData:
@@ -1444,10 +1473,12 @@ class AccelerationFilter:
         """
 
     @property
-    def period(self) -> float: ...
+    def period(self) -> float:
+        """[s] between two calls."""
 
     @property
-    def num_coordinates(self) -> int: ...
+    def num_coordinates(self) -> int:
+        """Number of joint coordinates nv."""
 
     @property
     def program(self) -> QuadraticProgramData:
@@ -1501,7 +1532,8 @@ class Obstruction:
     """
 
     @property
-    def kind(self) -> CoordinateKind: ...
+    def kind(self) -> CoordinateKind:
+        """Whether an obstacle, a plane or another link is in the way."""
 
     @property
     def link(self) -> str: ...
@@ -1521,7 +1553,8 @@ class Plan:
     """A path, or why there is none."""
 
     @property
-    def status(self) -> PlanStatus: ...
+    def status(self) -> PlanStatus:
+        """Whether a path was found, or why not."""
 
     @property
     def path(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1546,7 +1579,8 @@ class Plan:
         """Of both trees."""
 
     @property
-    def iterations(self) -> int: ...
+    def iterations(self) -> int:
+        """Samples that the search drew."""
 
     @property
     def checks(self) -> int:
@@ -1711,7 +1745,8 @@ class PlannerReference:
     """
 
     @property
-    def status(self) -> OnlinePlannerStatus: ...
+    def status(self) -> OnlinePlannerStatus:
+        """What the motion is about."""
 
     @property
     def goal(self) -> JointGoal:
@@ -1949,7 +1984,8 @@ class Arm:
         """Writes an .arm file in one piece. Raises OSError."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The name of the robot."""
 
     @property
     def num_coordinates(self) -> int:
@@ -2014,10 +2050,11 @@ class Attachment:
     An object that a link holds, see `Controller.attach`; `sidestep.arm.attachment` makes one.
     """
 
-    def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = ()) -> None:
+    def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = (), rests_on: Sequence[str] = ()) -> None:
         """
         pose (4, 4) of the object in the frame of `link`; solid ellipsoids {centre + shape u : |u| <= 1} that hold all of it,
-        centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may touch.
+        centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may
+        touch; names of obstacles that it stands on until it is lifted.
         """
 
     @property
@@ -2038,6 +2075,9 @@ class Attachment:
 
     @property
     def may_touch(self) -> list[str]: ...
+
+    @property
+    def rests_on(self) -> list[str]: ...
 
 class BarrierSettings:
     """
@@ -2724,10 +2764,12 @@ class Command:
     """What one step of a Controller gives; arrays are copies."""
 
     @property
-    def status(self) -> SafetyStatus: ...
+    def status(self) -> SafetyStatus:
+        """How safe the command is."""
 
     @property
-    def activity(self) -> Activity: ...
+    def activity(self) -> Activity:
+        """What the controller does."""
 
     @property
     def torque(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -2891,8 +2933,8 @@ class Controller:
         An object that a link holds from the next step on: attach("cup", Cylinder(0.04, 0.1), link="fr3_hand", pose=X,
         mass=0.3, may_touch=["fr3_leftfinger", "fr3_rightfinger"]), with the options of `sidestep.arm.attachment`; a
         shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and
-        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. Takes less than a second, in
-        which steps go on. Raises ValueError that names what is wrong; nothing changes then.
+        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=["table"] the same
+        holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.
         """
 
     def detach(self, name: str) -> None:
@@ -3002,10 +3044,12 @@ class MotionRecord:
         """(steps, nv)."""
 
     @property
-    def statuses(self) -> list[SafetyStatus]: ...
+    def statuses(self) -> list[SafetyStatus]:
+        """(steps,) How safe each command was."""
 
     @property
-    def activities(self) -> list[Activity]: ...
+    def activities(self) -> list[Activity]:
+        """(steps,) What the controller did."""
 
     @property
     def clearance(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -3032,8 +3076,8 @@ class MotionRecord:
 def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord:
     """
     Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is
-    within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not
-    finite, less than one step, and a controller that is not synchronous.
+    within tolerance [rad], a sliding one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises
+    ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.
     """
 
 class RealTimeRun:

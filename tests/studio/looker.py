@@ -27,7 +27,7 @@ NO_CHROMIUM = pytest.mark.skipif(
 )
 # Marks of tests in the browser, each of which begins as `at_the_start` says.
 ON_THE_PAGE = [NO_CHROMIUM, pytest.mark.usefixtures("at_the_start")]
-DOCUMENT = Path(__file__).parents[2] / "docs" / "studio.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "how-to" / "studio.md"
 PATIENCE = 120.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
 PASSIVE = "Unable to preventDefault inside passive event listener"  # the browser's own note on viser's lists
 WINDOW = Window(1080, 560)

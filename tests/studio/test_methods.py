@@ -57,7 +57,7 @@ def every_parameter() -> dict[str, Parameter]:
 )
 def test_every_number_of_a_scenario_file_can_be_set(kind: type, place: str) -> None:
     parts = {"switch", "joint_limits"}  # with numbers of their own
-    constant = {"seed"}  # as docs/studio.md says
+    constant = {"seed"}  # as docs/how-to/studio.md says
     for field in dataclasses.fields(kind):
         if field.name not in parts | constant:
             assert f"{place}.{field.name}" in every_parameter()
@@ -68,7 +68,7 @@ def test_every_setting_of_the_controller_can_be_set() -> None:
     stated = {
         f"controller.{field['name']}": field
         for field in controller_settings_fields()
-        if str(field["name"]).partition(".")[0] not in ADDED  # as docs/studio.md says
+        if str(field["name"]).partition(".")[0] not in ADDED  # as docs/how-to/studio.md says
     }
     found = {name: p for name, p in every_parameter().items() if name.startswith("controller.")}
     assert set(found) == set(stated) - {f"controller.{name}" for name in constant}

@@ -14,6 +14,7 @@ from .motion_bench_maker import MotionBenchMakerProblem as MotionBenchMakerProbl
 from .motion_bench_maker import read_motion_bench_maker as read_motion_bench_maker
 from .outcome import Judge as Judge
 from .outcome import Outcome as Outcome
+from .own_method import OwnMover as OwnMover
 from .parallel import default_jobs as default_jobs
 from .peers import PeerSettings as PeerSettings
 from .peers import run_peers as run_peers
@@ -24,7 +25,6 @@ from .problem_file import write_problems as write_problems
 from .problems import ProblemGenerator as ProblemGenerator
 from .problems import ProblemSettings as ProblemSettings
 from .problems import ReachProblem as ReachProblem
-from .problems import Workspace as Workspace
 from .quadratic_programs import QuadraticProgramSettings as QuadraticProgramSettings
 from .quadratic_programs import run_quadratic_programs as run_quadratic_programs
 from .reach import BenchResult as BenchResult
@@ -39,3 +39,5 @@ from .scenes import run_scenes as run_scenes
 from .step import StepSettings as StepSettings
 from .step import compare_steps as compare_steps
 from .step import run_step_bench as run_step_bench
+from .workspace import SweptSpace as SweptSpace
+from .workspace import Workspace as Workspace

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 import typer
 
 from sidestep.bench.method import Method
+from sidestep.cli.output import lines_without_terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,6 +20,13 @@ Result = TypeVar("Result")
 RobotOption: TypeAlias = Annotated[str, typer.Option(help="A name from `sidestep robots`.")]
 SeedOption: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of all that is random.")]
 MethodOption: TypeAlias = Annotated[Method, typer.Option(help="How the arm is moved.")]
+OwnMethodOption: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME|FILE",
+        help=f"How the arm is moved: {', '.join(Method)}, or a Python file that defines method(robot, problem).",
+    ),
+]
 TorqueOption: TypeAlias = Annotated[
     bool, typer.Option("--torque", help="Under torque control in MuJoCo, not integrated.")
 ]
@@ -25,7 +34,8 @@ SpacingOption: TypeAlias = Annotated[float, typer.Option(min=1e-4, help="Of the 
 PointRadiusOption: TypeAlias = Annotated[float, typer.Option(min=0.0, help="Of those points [m].")]
 DurationOption: TypeAlias = Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")]
 ToleranceOption: TypeAlias = Annotated[
-    float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
+    float,
+    typer.Option(min=1e-6, help="Arrived when every joint is this near [rad]; sliding joints a tenth [m]."),
 ]
 PeriodOption: TypeAlias = Annotated[float, typer.Option(min=1e-5, help="Control period [s].")]
 JobsOption: TypeAlias = Annotated[
@@ -37,10 +47,26 @@ FailuresOption: TypeAlias = Annotated[
 RowSecondsOption: TypeAlias = Annotated[float, typer.Option(min=0.001, help="Longest time per row [s].")]
 
 
+def method_or_file(text: str) -> Method | Path:
+    """A method by its name, or the path of a Python file.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    if text in list(Method):
+        return Method(text)
+    if text.endswith(".py"):
+        return Path(text)
+    raise ValueError(f"--method is {text!r}; allowed: {', '.join(Method)}, or a Python file (.py)")
+
+
 def with_bar(
     terminal: Console, title: str, run: Callable[[Callable[[int, int, str], None]], Result]
 ) -> Result:
-    """What `run` returns; it is given a function to call with how many are done, of all, and a word."""
+    """What `run` returns; it is given a function to call with how many are done, of all, and a word.
+
+    Where the output is no terminal, the words are lines, one a second at most.
+    """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     bar = Progress(
@@ -52,11 +78,13 @@ def with_bar(
         console=terminal,
         transient=True,
     )
+    told = lines_without_terminal(terminal)
     with bar:
         task = bar.add_task(title, total=None, last="")
 
         def show(done: int, in_all: int, last: str) -> None:
             bar.update(task, completed=done, total=in_all, last=last)
+            told(f"{title}: {done} of {in_all}, {last}")
 
         return run(show)
 

@@ -85,6 +85,7 @@ class Sphere:
         return self.pose[:3, 3].copy()
 
     def sample(self, spacing: float) -> Points:
+        """Points (N, 3) [m] on the surface, in the world; every surface point is within `spacing` of one."""
         return moved(covering.sphere(self.radius, spacing), self.pose)
 
     def balls(self, excess: float = EXCESS) -> Balls:
@@ -126,12 +127,15 @@ class Box:
         _set_motion(self, owner)
 
     def sample(self, spacing: float) -> Points:
+        """Points (N, 3) [m] on the surface, in the world; every surface point is within `spacing` of one."""
         return moved(covering.box(self.size, spacing), self.pose)
 
     def balls(self, excess: float = EXCESS) -> Balls:
+        """Centres (N, 3) and radii (N,) [m] of balls that hold the surface, see `Shape.balls`."""
         return _moved_balls(_box_balls(tuple(self.size), excess), self.pose)
 
     def mesh(self) -> trimesh.Trimesh:
+        """The surface as triangles in the world [m]."""
         return _placed(trimesh.creation.box(extents=self.size), self.pose)
 
 
@@ -162,9 +166,11 @@ class Cylinder:
         _set_motion(self, owner)
 
     def sample(self, spacing: float) -> Points:
+        """Points (N, 3) [m] on the surface, in the world; every surface point is within `spacing` of one."""
         return moved(covering.cylinder(self.radius, self.length, spacing), self.pose)
 
     def balls(self, excess: float = EXCESS) -> Balls:
+        """Centres (N, 3) and radii (N,) [m] of balls that hold the surface, see `Shape.balls`."""
         return _moved_balls(_cylinder_balls(self.radius, self.length, excess), self.pose)
 
     def mesh(self) -> trimesh.Trimesh:
@@ -200,6 +206,7 @@ class Capsule:
         _set_motion(self, owner)
 
     def sample(self, spacing: float) -> Points:
+        """Points (N, 3) [m] on the surface, in the world; every surface point is within `spacing` of one."""
         return moved(covering.capsule(self.radius, self.length, spacing), self.pose)
 
     def balls(self, excess: float = EXCESS) -> Balls:
@@ -304,6 +311,7 @@ class MeshShape:
         _set_motion(self, owner)
 
     def sample(self, spacing: float) -> Points:
+        """Points (N, 3) [m] on the surface, in the world; every surface point is within `spacing` of one."""
         return covering.triangles(self.mesh(), spacing)
 
     def balls(self, excess: float = EXCESS) -> Balls:

@@ -88,7 +88,11 @@ def draft_arm(scenario: Scenario, progress: Progress | None = None) -> Arm:
 
 def fit_arguments(choice: BodyConfig) -> dict[str, Any]:
     """The arguments of `Body.fit` for a body of a scenario file."""
-    return {name: value for name, value in dataclasses.asdict(choice).items() if name != "ellipsoids"}
+    return {
+        name: value
+        for name, value in dataclasses.asdict(choice).items()
+        if name not in ("ellipsoids", "draft")
+    }
 
 
 def settings_of(written: Scenario, *, synchronous: bool = False) -> ControllerSettings:

@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def test_the_documentation_is_the_list():
-    assert (ROOT / "docs" / "errata.md").read_text(encoding="utf-8") == markdown()
+    assert (ROOT / "docs" / "results" / "errata.md").read_text(encoding="utf-8") == markdown()
 
 
 def test_every_erratum_names_a_test_that_exists():

@@ -1,6 +1,6 @@
 """The errata of the thesis's text: what is wrong, what is right, and the test that shows it.
 
-`python -m sidestep.thesis.reproduce.errata > docs/errata.md` writes the page of the documentation.
+`python -m sidestep.thesis.reproduce.errata > docs/results/errata.md` writes the page of the documentation.
 """
 
 from __future__ import annotations
@@ -254,7 +254,7 @@ def errata(_: Settings) -> Iterator[Item]:
 
 
 def markdown() -> str:
-    """The page docs/errata.md."""
+    """The page docs/results/errata.md."""
     lines = [
         "# Errata of the thesis",
         "",

@@ -1,0 +1,106 @@
+"""Python in the pages runs as it stands, prints what stands below it, and commands in them exist."""
+
+import contextlib
+import io
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from sidestep.cli import app
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md"]
+# A block that needs hardware or a browser stands below a comment that says so: <!-- not run: needs a robot -->
+BLOCK = re.compile(
+    r"(?:^<!-- not run: (?P<reason>.+?) -->\n+)?^```python\n(?P<code>.*?)^```$(?:\n+```text\n(?P<output>.*?)^```$)?",
+    re.MULTILINE | re.DOTALL,
+)
+LONGEST = 15  # lines of a block, without empty ones
+
+
+def blocks(page: Path) -> list[re.Match[str]]:
+    return list(BLOCK.finditer(page.read_text(encoding="utf-8")))
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+RUN = [page for page in PAGES if any(not item["reason"] for item in blocks(page))]
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", RUN, ids=name_of)
+def test_examples_run(page: Path, tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for file in (DOCS / "files").iterdir():
+        shutil.copy(file, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(cache))
+    names: dict[str, Any] = {}
+    for block in blocks(page):
+        if block["reason"]:
+            continue
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile(block["code"], name_of(page), "exec"), names)
+        assert printed.getvalue() == (block["output"] or "")
+
+
+def test_every_how_to_has_short_code() -> None:
+    pages = sorted((DOCS / "how-to").glob("*.md"))
+    assert len(pages) >= 13
+    for page in pages:
+        found = blocks(page)
+        assert found, page.name
+        for block in found:
+            lines = [line for line in block["code"].splitlines() if line.strip()]
+            assert len(lines) <= LONGEST, f"{page.name}: {len(lines)} lines"
+
+
+def test_cpp_in_the_pages_is_that_of_the_examples() -> None:
+    found = 0
+    for page in PAGES:
+        for code in re.findall(
+            r"^```cpp\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
+        ):
+            first, _, rest = code.partition("\n")
+            assert first.startswith("// examples/cpp/"), page.name
+            assert rest in (ROOT / first.removeprefix("// ")).read_text(encoding="utf-8"), page.name
+            found += 1
+    assert found > 0
+
+
+COMMANDS: Any = typer.main.get_command(app)
+
+
+def command_named(words: list[str]) -> tuple[Any, list[str]]:
+    """The command that some words lead to, and the words that are left."""
+    command = COMMANDS
+    while words and words[0] in getattr(command, "commands", {}):
+        command, words = command.commands[words[0]], words[1:]
+    return command, words
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_commands_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"^```(?!sh\b)\w+\n.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    for line in re.findall(r"(?:^|`|&& |\$\()sidestep ([a-z][^`\n)]*)", text, re.MULTILINE):
+        words = line.split(" && ")[0].split()
+        command, left = command_named(words)
+        if words[0] not in COMMANDS.commands:
+            pytest.fail(f"there is no command: sidestep {line}")
+        known = {option for item in command.params for option in (*item.opts, *item.secondary_opts)}
+        known |= {"--help", "-h", "--version", "--cmake-dir"}
+        used = [word.split("=")[0].rstrip(",.;") for word in left if word.startswith("-") and word != "-"]
+        assert [option for option in used if option not in known] == [], line
