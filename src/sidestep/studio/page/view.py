@@ -270,7 +270,7 @@ class View:
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
         least = f" (least so far {1e3 * self.least_clearance:.0f} mm)"
         state = f"{touch} · {snapshot.time:.1f} s · {speed}"
-        coarse = ["the body is coarse; a finer one is on its way"] if snapshot.draft else []
+        coarse = [f"coarse body; the finer one: {html.escape(snapshot.refining)}"] if snapshot.draft else []
         facts = [*self._nearest_facts(snapshot.things, least), state, *status, *coarse]
         self._tell(now, begun(snapshot.words), facts, snapshot.events)
 
