@@ -339,6 +339,7 @@ class View:
         self._show_goal()
 
     def _remove_robot(self) -> None:
+        self.compare.stop()
         self.surface.clear()
         for part in (self._body, self.arm, self.marks, self.why, self.goal):
             if part is not None:
