@@ -235,5 +235,9 @@ def test_the_other_method_has_the_obstacles_that_there_are(make_session: object,
     before = session.snapshot().things
     small, crate = ball("ball", np.array([0.9, 0.0, 0.0]), 0.01), box("crate", np.ones(3), np.full(3, 0.1))
     assert changes(before, before) == []
-    assert changes(before, (small, crate)) == [m.ReplaceObstacle(small), m.AddObstacle(crate)]
+    assert changes(before, (small, crate)) == [
+        m.RemoveObstacle("ball"),
+        m.AddObstacle(small),
+        m.AddObstacle(crate),
+    ]
     assert changes(before, ()) == [m.RemoveObstacle("ball")]

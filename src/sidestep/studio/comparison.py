@@ -55,16 +55,8 @@ class Tally:
 
 def changes(before: Sequence[SceneObstacle], now: Sequence[SceneObstacle]) -> list[m.Command]:
     """The commands that make obstacles those that there are now."""
-    known = {thing.name: thing for thing in before}
-    commands: list[m.Command] = [
-        m.RemoveObstacle(name) for name in known.keys() - {thing.name for thing in now}
-    ]
-    for thing in now:
-        if thing.name not in known:
-            commands.append(m.AddObstacle(thing))
-        elif thing != known[thing.name]:
-            commands.append(m.ReplaceObstacle(thing))
-    return commands
+    gone: list[m.Command] = [m.RemoveObstacle(thing.name) for thing in before if thing not in now]
+    return [*gone, *(m.AddObstacle(thing) for thing in now if thing not in before)]
 
 
 class Comparison:
