@@ -194,7 +194,8 @@ void bind_arm(nb::module_& m) {
       .def(
           "__init__",
           [](Attachment* self, const std::string& name, const std::string& link, const ArrayLike& pose, const ArrayLike& centres,
-             nb::sequence shapes, const Inertial& inertial, const std::vector<std::string>& may_touch) {
+             nb::sequence shapes, const Inertial& inertial, const std::vector<std::string>& may_touch,
+             const std::vector<std::string>& rests_on) {
             SolidEllipsoids cover;
             const Eigen::MatrixXd middles = as_matrix(centres, "centres", static_cast<Eigen::Index>(nb::len(shapes)), 3);
             for (Eigen::Index k = 0; k < middles.rows(); ++k) {
@@ -204,20 +205,23 @@ void bind_arm(nb::module_& m) {
             const Eigen::MatrixXd X = as_matrix(pose, "pose", 4, 4);
             Eigen::Isometry3d X_LA;
             X_LA.matrix() = X;
-            new (self) Attachment{name, link, X_LA, std::move(cover), inertial, may_touch};
+            new (self) Attachment{name, link, X_LA, std::move(cover), inertial, may_touch, rests_on};
           },
           nb::arg("name"), nb::kw_only(), nb::arg("link"), nb::arg("pose"), nb::arg("centres"), nb::arg("shapes"), nb::arg("inertial"),
-          nb::arg("may_touch") = std::vector<std::string>{},
+          nb::arg("may_touch") = std::vector<std::string>{}, nb::arg("rests_on") = std::vector<std::string>{},
           nb::sig("def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, "
-                  "shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = ()) -> None"),
+                  "shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = (), "
+                  "rests_on: Sequence[str] = ()) -> None"),
           "pose (4, 4) of the object in the frame of `link`; solid ellipsoids {centre + shape u : |u| <= 1} that hold all of it,\n"
-          "centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may touch.")
+          "centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may\n"
+          "touch; names of obstacles that it stands on until it is lifted.")
       .def_ro("name", &Attachment::name)
       .def_ro("link", &Attachment::link)
       .def_prop_ro("pose", [](const Attachment& a) { return to_numpy_matrix(a.X_LA.matrix()); }, "(4, 4) in the link's frame.")
       .def_prop_ro("num_ellipsoids", [](const Attachment& a) { return a.cover.size(); })
       .def_ro("inertial", &Attachment::inertial)
-      .def_ro("may_touch", &Attachment::may_touch);
+      .def_ro("may_touch", &Attachment::may_touch)
+      .def_ro("rests_on", &Attachment::rests_on);
 }
 
 }  // namespace sidestep::python

@@ -280,8 +280,8 @@ void bind_controller(nb::module_& m) {
           "An object that a link holds from the next step on: attach(\"cup\", Cylinder(0.04, 0.1), link=\"fr3_hand\", pose=X,\n"
           "mass=0.3, may_touch=[\"fr3_leftfinger\", \"fr3_rightfinger\"]), with the options of `sidestep.arm.attachment`; a\n"
           "shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and\n"
-          "its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. Takes less than a second, in\n"
-          "which steps go on. Raises ValueError that names what is wrong; nothing changes then.")
+          "its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=[\"table\"] the same\n"
+          "holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.")
       .def(
           "detach",
           [](Controller& self, const std::string& name) {
@@ -374,8 +374,8 @@ void bind_controller(nb::module_& m) {
       nb::sig("def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, "
               "goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord"),
       "Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is\n"
-      "within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not\n"
-      "finite, less than one step, and a controller that is not synchronous.");
+      "within tolerance [rad], a sliding one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises\n"
+      "ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.");
 }
 
 }  // namespace sidestep::python

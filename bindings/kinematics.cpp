@@ -89,7 +89,10 @@ void bind_kinematics(nb::module_& m) {
       .def_prop_ro("acceleration", [](const JointLimits& l) { return to_numpy(l.acceleration); })
       .def_prop_ro("effort", [](const JointLimits& l) { return to_numpy(l.effort); })
       .def_prop_ro("jerk", [](const JointLimits& l) { return to_numpy(l.jerk); })
-      .def_prop_ro("effort_rate", [](const JointLimits& l) { return to_numpy(l.effort_rate); });
+      .def_prop_ro("effort_rate", [](const JointLimits& l) { return to_numpy(l.effort_rate); })
+      .def_prop_ro_static("rounding", [](nb::handle) { return JointLimits::rounding; },
+                          "[rad | m] by which a measured or published configuration may be outside the position limits and is "
+                          "taken in as the nearest one within.");
 
   nb::class_<Robot>(m, "Robot", "The immutable kinematic model of an arm, in the core.")
       .def(nb::init<std::string, std::vector<Joint>, std::vector<Frame>, std::vector<std::string>, JointLimits>(),

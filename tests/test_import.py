@@ -117,6 +117,17 @@ def test_the_version_is_that_of_the_project_file() -> None:
     assert sidestep.__version__ == PROJECT["version"]
 
 
+def test_changelog_and_citation_are_of_this_version() -> None:
+    root = Path(__file__).parents[1]
+    changes, citation = (
+        (root / name).read_text(encoding="utf-8") for name in ("CHANGELOG.md", "CITATION.cff")
+    )
+    newest = re.search(r"^## (\S+) \((\d{4}-\d\d-\d\d)\)$", changes, re.MULTILINE)
+    assert newest is not None
+    assert newest[1] == PROJECT["version"]
+    assert f"\nversion: {newest[1]}\ndate-released: {newest[2]}\n" in citation
+
+
 @pytest.mark.parametrize("shipped", [False, True])
 def test_a_running_controller_loads_numpy_and_the_core(arm_file: Path, shipped: bool) -> None:
     code = """

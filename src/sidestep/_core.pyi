@@ -99,6 +99,11 @@ class JointLimits:
     @property
     def effort_rate(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
+    rounding: Final[float] = ...
+    """
+    [rad | m] by which a measured or published configuration may be outside the position limits and is taken in as the nearest one within.
+    """
+
 class Robot:
     """The immutable kinematic model of an arm, in the core."""
 
@@ -2045,10 +2050,11 @@ class Attachment:
     An object that a link holds, see `Controller.attach`; `sidestep.arm.attachment` makes one.
     """
 
-    def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = ()) -> None:
+    def __init__(self, name: str, *, link: str, pose: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: Sequence[numpy.typing.ArrayLike], inertial: Inertial, may_touch: Sequence[str] = (), rests_on: Sequence[str] = ()) -> None:
         """
         pose (4, 4) of the object in the frame of `link`; solid ellipsoids {centre + shape u : |u| <= 1} that hold all of it,
-        centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may touch.
+        centres (K, 3) and shapes (K, 3, 3) [m]; `inertial` in the object's frame; links that it may
+        touch; names of obstacles that it stands on until it is lifted.
         """
 
     @property
@@ -2069,6 +2075,9 @@ class Attachment:
 
     @property
     def may_touch(self) -> list[str]: ...
+
+    @property
+    def rests_on(self) -> list[str]: ...
 
 class BarrierSettings:
     """
@@ -2924,8 +2933,8 @@ class Controller:
         An object that a link holds from the next step on: attach("cup", Cylinder(0.04, 0.1), link="fr3_hand", pose=X,
         mass=0.3, may_touch=["fr3_leftfinger", "fr3_rightfinger"]), with the options of `sidestep.arm.attachment`; a
         shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and
-        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. Takes less than a second, in
-        which steps go on. Raises ValueError that names what is wrong; nothing changes then.
+        its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=["table"] the same
+        holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.
         """
 
     def detach(self, name: str) -> None:
@@ -3067,8 +3076,8 @@ class MotionRecord:
 def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord:
     """
     Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is
-    within tolerance [rad | m] of goal (nv,), if given. Releases the GIL. Raises ValueError on sizes, states that are not
-    finite, less than one step, and a controller that is not synchronous.
+    within tolerance [rad], a sliding one within a tenth of it [m], of goal (nv,), if given. Releases the GIL. Raises
+    ValueError on sizes, states that are not finite, less than one step, and a controller that is not synchronous.
     """
 
 class RealTimeRun:

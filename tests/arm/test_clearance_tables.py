@@ -10,7 +10,7 @@ import pytest
 from sidestep import Body, Obstacles, Robot
 from sidestep._core import BarrierSettings, CoordinateKind
 from sidestep.arm import shipped_arms
-from sidestep.arm.clearance_tables import clearance_tables, stored_at
+from sidestep.arm.clearance_tables import clearance_tables
 from sidestep.arm.link_pairs import barrier_pairs
 from sidestep.bench.methods import barrier_system
 from sidestep.body import cache
@@ -54,11 +54,14 @@ def test_a_table_is_near_the_distance_and_not_above() -> None:
 
 
 @pytest.mark.usefixtures("_nothing_stored")
-def test_a_file_that_cannot_be_read_is_made_again() -> None:
+def test_a_file_that_cannot_be_read_is_made_again(tmp_path: Path) -> None:
     robot = Robot.named("planar3")
     clearance_tables(robot)
-    stored_at(robot).write_bytes(b"PK no zip at all")
-    with pytest.warns(RuntimeWarning, match="clearance tables are unreadable and are made again"):
+    (path,) = (tmp_path / "tables").iterdir()
+    path.write_bytes(b"PK no JSON at all")
+    with pytest.warns(
+        RuntimeWarning, match="clearance table of a pair in the cache is unreadable and is made again"
+    ):
         again = clearance_tables(robot)
     assert len(again.tables) == 1
     assert clearance_tables(robot).pairs == again.pairs

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from sidestep import Body, Obstacles, Robot
-from sidestep.arm.link_pairs import NEAR, barrier_pairs, stored_at
+from sidestep.arm.link_pairs import NEAR, barrier_pairs
 from sidestep.distance import SelfCollision
 from sidestep.system import SelfCollisionBarrier
 
 
 @pytest.fixture(autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(Path(tmp_path_factory.getbasetemp()) / "bodies"))
+def cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path))
+    return tmp_path
 
 
 def test_links_that_touch_have_no_clearance_left() -> None:
@@ -68,15 +69,16 @@ def test_a_contact_moves_the_clearance_by_as_much() -> None:
         SelfCollisionBarrier(robot, body, [("link1", "link3", float("nan"))])
 
 
-def test_pairs_are_kept_and_made_again_where_they_cannot_be_read() -> None:
+def test_pairs_are_kept_and_made_again_where_they_cannot_be_read(cache_folder: Path) -> None:
     robot = Robot.named("planar3")
     body = Body.cover(robot, components=4)
     pairs = barrier_pairs(robot, body)
-    path = stored_at(robot, body)
-    path.write_text('[["link1", "link3", -0.25]]')
+    (path,) = (cache_folder / "pairs").iterdir()
+    path.write_text('{"contact": -0.25}')
     assert barrier_pairs(robot, body) == (("link1", "link3", -0.25),)  # it is read
     path.write_text("[[")
-    with pytest.warns(RuntimeWarning, match="are unreadable and are made again"):
+    with pytest.warns(RuntimeWarning, match="is unreadable and is made again"):
         assert barrier_pairs(robot, body) == pairs
     assert barrier_pairs(robot, body) == pairs  # and written again
-    assert stored_at(robot, Body.cover(robot, components=5)) != path
+    barrier_pairs(robot, Body.cover(robot, components=5))
+    assert len(list((cache_folder / "pairs").iterdir())) == 2

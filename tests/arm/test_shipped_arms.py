@@ -16,7 +16,7 @@ from sidestep.arm import clearance_tables, shipped_arms
 from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_overshoot import overshoot
-from sidestep.body.cover_problem import CERTIFICATE_TOLERANCE
+from sidestep.body.cover_problem import FINE
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.body.cover_surface import LinkSurface
 from sidestep.cli import app
@@ -68,7 +68,7 @@ def test_it_is_taken_for_its_robot_and_holds_every_link(name: str) -> None:
         surface = LinkSurface(np.asarray(mesh.triangles))
         ellipsoids = Ellipsoids(body.means[ks], np.linalg.cholesky(shapes))
         # Proven again on every triangle, of what the file holds.
-        assert certify(surface.triangles, ellipsoids, tolerance=CERTIFICATE_TOLERANCE * surface.size).complete
+        assert certify(surface.triangles, ellipsoids, tolerance=FINE.piece * surface.size).complete
     assert len(shipped_arms.shipped_file(name).read_bytes()) < 1_000_000  # type: ignore[union-attr]
 
 
@@ -149,7 +149,6 @@ def test_tables_and_pairs_of_other_limits_are_not_taken(tmp_path: Path) -> None:
         ("link1", "link3")
     ]
     assert clearance_tables.clearance_tables(narrow).apart == (("link1", "link3"),)
-    assert clearance_tables.stored_at(narrow) != clearance_tables.stored_at(wide)
     body = ss.Body.cover(narrow)
     assert shipped_arms.has_body(ss.Arm.load("planar3"), body)
     assert tables_and_pairs(narrow, body) == ((), ())

@@ -80,6 +80,44 @@ def test_limits_are_named(generator: ProblemGenerator, judge: Judge) -> None:
     assert outcome.limits == {"velocity": pytest.approx(0.25)}
 
 
+@pytest.mark.parametrize(
+    ("outside", "excess"),
+    [
+        ([5e-4, 3e-4, 1e-4, 0.0, -0.1], None),  # a rounding error at the start, and in
+        ([5e-4, 3e-4, 4e-4, 0.0, -0.1], 1e-4),  # out again
+        ([5e-4, 0.0, -0.1, 2e-4, 0.0], 2e-4),
+        ([2e-3, 1e-3, 0.0, -0.1, -0.1], 2e-3),  # more than rounding
+    ],
+)
+def test_a_start_a_rounding_error_outside_its_limits_is_no_violation_while_it_comes_in(
+    outside: list[float], excess: float | None, generator: ProblemGenerator, judge: Judge
+) -> None:
+    problem = planted((3.0, 0.0, 0.0), 0.05, generator)
+    motion = swept(problem, samples=len(outside))
+    motion.q[:, 0] = generator.robot.limits.upper[0] + np.array(outside)
+    limits = judge.judge(problem, motion, SETTINGS).limits
+    assert limits == ({} if excess is None else {"position": pytest.approx(excess)})
+
+
+@pytest.mark.parametrize(
+    ("speed", "under_way"),
+    [(0.3, True), (0.02, True), (0.0004, False), (-0.2, False)],  # [rad/s] at the end, towards the goal
+)
+def test_a_motion_that_comes_nearer_is_not_stuck(
+    speed: float, under_way: bool, generator: ProblemGenerator, judge: Judge
+) -> None:
+    problem = planted((3.0, 0.0, 0.0), 0.05, generator)
+    left = 0.1 + speed * np.linspace(2.0, 0.0, 2001)  # [rad]
+    motion = dataclasses.replace(swept(problem, samples=2001), arrived=False)
+    motion.q[:] = problem.goal
+    motion.q[:, 0] -= left
+    outcome = judge.judge(problem, motion, SETTINGS)
+    assert (outcome.under_way, outcome.stuck) == (under_way, not under_way)
+    assert outcome.reasons() == [
+        f"{'under way' if under_way else 'stuck'}: 0.10 rad from the goal after 2.0 s"
+    ]
+
+
 def test_a_state_that_is_not_finite_ends_the_motion(generator: ProblemGenerator, judge: Judge) -> None:
     problem = planted((3.0, 0.0, 0.0), 0.05, generator)
     motion = dataclasses.replace(swept(problem, samples=50), arrived=False)

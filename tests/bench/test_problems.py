@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from sidestep import ExactClearance, Robot
-from sidestep.bench import ProblemGenerator, ProblemSettings, Workspace
+from sidestep.bench import ProblemGenerator, ProblemSettings, SweptSpace, Workspace
 from sidestep.bench.problems import balls
+from sidestep.cli import app
 
 FIRST_START = [1.57542325, -0.92977345, 2.18413562, -2.87282081, -0.91987494, 1.14147015, -0.29954301]
 FIRST_CENTER = [-0.16886332, 0.81862161, 0.4740888]
@@ -100,3 +104,79 @@ def test_the_shoulder_of_the_fr3_is_on_its_first_axis(fr3: ProblemGenerator) -> 
 def test_bad_settings_are_refused_by_name(change: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(change))):
         ProblemSettings(**change)  # type: ignore[arg-type]
+
+
+RAIL = """<robot name="cart"><link name="floor"/>
+<link name="cart"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+<link name="upper"><collision><origin xyz="0 0 0.25"/>
+  <geometry><box size="0.05 0.05 0.4"/></geometry></collision></link>
+<link name="fore"><collision><origin xyz="0 0 0.15"/><geometry><box size="0.05 0.05 0.3"/></geometry></collision></link>
+<joint name="rail" type="prismatic"><parent link="floor"/><child link="cart"/><axis xyz="1 0 0"/>
+  <limit lower="-2" upper="2" velocity="0.5" effort="100"/></joint>
+<joint name="turn" type="continuous"><parent link="cart"/><child link="upper"/><axis xyz="0 1 0"/>
+  <limit velocity="2" effort="50"/></joint>
+<joint name="bend" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0 0 0.5"/><axis xyz="1 0 0"/>
+  <limit lower="-2" upper="2" velocity="2" effort="50"/></joint></robot>"""
+
+
+@pytest.fixture
+def rail(tmp_path: Path) -> str:
+    file = tmp_path / "rail.urdf"
+    file.write_text(RAIL)
+    return str(file)
+
+
+def test_balls_of_an_arm_on_a_rail_are_where_its_links_get_to(rail: str) -> None:
+    generator = ProblemGenerator(ProblemSettings(robot=rail, obstacles=4, seed=2))
+    space = generator.workspace
+    assert isinstance(space, SweptSpace)
+    # 0.5 m to the second joint, 0.3 m of link beyond it; 1 cm: the farthest of 2000 configurations
+    assert space.reach == pytest.approx(np.hypot(0.8, 0.025), abs=0.01)
+    # All along the rail, and beyond its ends by less than the arm is long and a cell.
+    low, high = space.cells.min(axis=0), space.cells.max(axis=0) + space.edge
+    assert -2.0 - space.reach - space.edge < low[0] < -2.5
+    assert 2.5 < high[0] < 2.0 + space.reach + space.edge
+    assert len(space.directions) == 3
+    points = np.array([space.sample(np.random.default_rng(k)) for k in range(200)])
+    assert np.ptp(points[:, 0]) > 4.0
+    assert np.all(
+        np.linalg.norm(points - np.clip(points, [-2, 0, 0], [2, 0, 0]), axis=1) < space.reach + 2 * space.edge
+    )
+    for index in range(4):
+        problem = generator.problem(index)
+        assert np.all((problem.radii >= 0.05 * space.reach) & (problem.radii <= 0.1 * space.reach))
+        exact = ExactClearance(generator.robot, balls(problem.centers, problem.radii))
+        for q in (problem.start, problem.goal):
+            assert exact.distance(q).distance >= 0.03 * space.reach
+        assert (
+            abs(problem.goal[1] - problem.start[1]) <= np.pi
+        )  # the nearest turn of the joint without limits
+
+
+@pytest.mark.slow
+def test_an_arm_of_a_file_is_run_by_the_command(rail: str, tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    command = [
+        "bench",
+        "reach",
+        "--robot",
+        rail,
+        "--locked",
+        "bend=0.5",
+        "--draft",
+        "--obstacles",
+        "2",
+        "--problems",
+        "2",
+    ]
+    command += ["--acceleration-limit", "rail=5", "--jobs", "1", "--json", str(out)]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    figures = json.loads(out.read_text())
+    assert figures["problems"] == figures["success"] == 2
+    assert (
+        figures["limit_violations"] == figures["collision"] == figures["stuck"] == figures["under_way"] == 0
+    )
+    refused = CliRunner().invoke(app, ["bench", "reach", "--robot", "fr3", "--tip", "fr3_link4"])
+    assert isinstance(refused.exception, ValueError)
+    assert "tip cannot be given for robot 'fr3'" in str(refused.exception)

@@ -105,3 +105,32 @@ def test_what_is_wrong_is_named():
     with pytest.raises(ValueError, match="a name and a geometry"):
         controller.attach("cup")
     assert controller.attached == []
+
+
+@pytest.mark.parametrize("rests_on", ["table", "*"])
+def test_a_cup_that_stands_on_a_table_may_stay_there_until_it_is_lifted(rests_on):
+    arm, robot = ss.Arm.load("fr3"), ss.Robot.named("fr3")
+    X = robot.pose(Q, "fr3_hand_tcp")
+    upright, below = np.eye(4), np.eye(4)
+    upright[:3, 3] = X[:3, 3]
+    below[:3, 3] = X[:3, 3] - [0.0, 0.0, 0.06 + 0.02]
+    controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
+    controller.set_obstacles([Box((0.6, 0.8, 0.04), below, name="table")])
+    controller.step(Q, np.zeros(7))
+    cup = Cylinder(0.035, 0.12)
+    options = {
+        "link": "fr3_hand",
+        "pose": np.linalg.inv(robot.pose(Q, "fr3_hand")) @ upright,
+        "may_touch": FINGERS,
+    }
+    controller.attach("cup", cup, rests_on=rests_on, **options)
+    still = ss.integrate(controller, Q, np.zeros(7), steps=1000)
+    assert np.abs(still.q - Q).max() < 1e-3
+    assert min(still.clearance) > 0.005
+    X[2, 3] += 0.15
+    controller.set_goal(ss.PoseGoal(arm.robot, "fr3_hand_tcp", X))
+    up = ss.integrate(controller, still.q[-1], still.v[-1], steps=4000)
+    assert min(up.clearance) > 0.0
+    assert robot.pose(up.q[-1], "fr3_hand_tcp")[2, 3] == pytest.approx(X[2, 3], abs=2e-3)
+    with pytest.raises(ValueError, match="rests on 'tabel', which is no obstacle; there are: 'table'"):
+        controller.attach("other", cup, rests_on="tabel", **options)

@@ -86,6 +86,105 @@ def test_a_goal_that_is_refused_leaves_the_one_before(robot: ss.Robot, arm: ss.A
     assert controller.step(robot.neutral, np.zeros(7)).activity == ss.Activity.arrived
 
 
+@pytest.mark.parametrize("output", ["acceleration", "position", "torque"])
+@pytest.mark.parametrize("excess", [1e-6, 1e-3])
+def test_a_start_a_rounding_error_outside_its_limits_is_taken_in(
+    robot: ss.Robot, arm: ss.Arm, output: str, excess: float
+) -> None:
+    """Behind a wall, so that the planner searches."""
+    q = robot.neutral.copy()
+    q[3], q[5] = robot.limits.upper[3] + excess, robot.limits.lower[5] - excess
+    goal = robot.neutral + np.array([1.5, 0.2, 0.0, 0.3, 0.0, 0.2, 0.0])
+    controller = ss.Controller(arm, settings(output=output))
+    hand = robot.pose(q + 0.5 * (goal - q), "fr3_hand")[:3, 3]
+    wall = [hand + np.array([0.0, 0.0, z]) for z in (-0.2, -0.1, 0.0, 0.1, 0.2)]
+    controller.set_obstacles(ss.Obstacles(wall, [0.05] * 5))
+    controller.set_goal(goal)
+    motion = ss.integrate(controller, q, np.zeros(7), steps=8000, goal=goal, tolerance=0.01)
+    assert motion.arrived
+    assert controller.plan.status == _core.PlanStatus.found
+    outside = np.maximum(motion.q - robot.limits.upper, robot.limits.lower - motion.q).max(axis=1)
+    # It comes in at once and for good; a torque takes a moment to turn it, by less than a micrometre of a 1 m arm.
+    assert (np.diff(outside[outside > 0.0]) < 1e-6).all()
+    assert (outside[100:] <= 0.0).all()
+    assert ss.SafetyStatus.stopping not in motion.statuses
+
+
+def test_goals_and_trajectories_a_rounding_error_outside_end_at_the_limit(
+    robot: ss.Robot, arm: ss.Arm
+) -> None:
+    start, goal = robot.neutral.copy(), robot.neutral.copy()
+    start[3] = robot.limits.upper[3] - 0.1
+    goal[3] = robot.limits.upper[3] + 9e-4
+    controller = ss.Controller(arm, settings())
+    controller.set_goal(goal)
+    motion = ss.integrate(controller, start, np.zeros(7), steps=4000)
+    assert controller.target[3] == robot.limits.upper[3]
+    assert motion.activities[-1] == ss.Activity.arrived
+    controller.set_trajectory(np.array([start, goal]), [0.0, 1.0])
+    with pytest.raises(ValueError, match="joint 'fr3_joint4' is"):
+        controller.set_goal(goal + 2e-4)
+    with pytest.raises(ValueError, match="joint 'fr3_joint4' of sample 0 is"):
+        controller.set_trajectory(np.array([goal + 2e-4, start]), [0.0, 1.0])
+
+
+@pytest.mark.parametrize("planner", [True, False])
+@pytest.mark.parametrize(
+    "goal",
+    [
+        [-1.41897612, -3.09546332, 0.91512722],  # less deep than what the planner allows at ends
+        [-1.8764439, 3.0660147, 1.62216081],
+    ],
+)
+def test_a_goal_in_self_collision_is_said_to_be_so(goal: list[float], planner: bool) -> None:
+    arm = ss.Arm.load("planar3")
+    controller = ss.Controller(arm, settings() if planner else settings(planner=None))
+    controller.set_goal(goal)
+    motion = ss.integrate(controller, arm.neutral, np.zeros(3), steps=6000)
+    assert motion.activities[-1] == ss.Activity.blocked
+    assert ss.SafetyStatus.clearance_lost not in motion.statuses
+    said = r"at the goal links 'link1' and 'link3' touch, \d+ mm deep; set another goal, or allow the two to touch"
+    assert re.search(said, controller.explain())
+
+
+@pytest.mark.parametrize("planner", [True, False])
+def test_a_pose_that_has_no_posture_without_self_collision_is_said_to_be_so(planner: bool) -> None:
+    """The tip of three equal links at their base: an equilateral triangle, which ends where it begins."""
+    arm = ss.Arm.load("planar3")
+    pose = np.eye(4)
+    pose[2, 3] = ss.Robot.named("planar3").pose(arm.neutral, "tip")[2, 3]
+    controller = ss.Controller(arm, settings() if planner else settings(planner=None))
+    controller.set_goal(ss.PoseGoal(arm.robot, "tip", pose, position_only=True))
+    motion = ss.integrate(controller, arm.neutral, np.zeros(3), steps=4000)
+    assert motion.activities[-1] == ss.Activity.blocked
+    said = (
+        r"no posture without self-collision was found for the pose: at the last one links 'link1' and 'link3' touch, "
+        r"\d+ mm deep"
+    )
+    assert re.search(said, controller.explain())
+
+
+RAIL = """<robot name="rail"><link name="base"/>
+<link name="cart"><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+<link name="arm"><collision><origin xyz="0.3 0 0"/><geometry><box size="0.4 0.05 0.05"/></geometry></collision></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="0 1 0"/>
+  <limit lower="-1" upper="1" velocity="0.015" effort="100"/></joint>
+<joint name="turn" type="revolute"><parent link="cart"/><child link="arm"/><axis xyz="0 0 1"/>
+  <limit lower="-2" upper="2" velocity="2" effort="100"/></joint></robot>"""
+
+
+def test_a_rail_at_its_velocity_limit_is_not_stuck() -> None:
+    arm = ss.Arm.load(RAIL, draft=True, cache=False)
+    controller = ss.Controller(arm, settings(period=0.002))
+    controller.set_goal([0.1, 0.0])
+    controller.set_obstacles(ss.Obstacles([[0.9, 0.6, 0.0]], [0.05]))
+    motion = ss.integrate(controller, [-0.05, 0.0], np.zeros(2), steps=8000, goal=[0.1, 0.0], tolerance=0.01)
+    assert motion.arrived
+    assert abs(motion.last_q[0] - 0.1) < 0.001  # [m] a tenth of the tolerance of a joint that turns
+    assert controller.searches == 0  # nothing is in the way: no other way is looked for
+    assert ss.Activity.blocked not in motion.activities
+
+
 def test_an_unusable_state_gives_a_stop(robot: ss.Robot, arm: ss.Arm) -> None:
     controller = ss.Controller(arm, settings())
     command = controller.step(np.full(7, np.nan), np.zeros(7))

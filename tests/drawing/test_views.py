@@ -10,7 +10,9 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from sidestep import Robot, SceneObject
 from sidestep.drawing import ArmViews, draw_arm
-from sidestep.drawing.views import fit_view, is_planar
+from sidestep.drawing.arm import direction
+from sidestep.drawing.views import SIDES, fit_view, is_planar
+from sidestep.robot.pose import pose_at
 
 MOTION = np.linspace([0.0, 0.0], [1.0, 0.5], 11)
 BALL = SceneObject.ball("ball", [0.6, 0.5, 0.0], radius=0.1)
@@ -95,3 +97,36 @@ def test_near_triangles_hide_far_ones() -> None:
         drawn.remove()
     assert seen[0][0] - seen[0][2] > 60  # the ball hides the arm
     assert seen[1][0] <= seen[1][2]  # the arm, a bluish grey, hides the ball
+
+
+def test_a_large_solid_hides_what_is_inside_and_below() -> None:
+    arm = Robot.named("z1")
+    q = np.stack([arm.neutral, arm.neutral])
+    table = SceneObject("table", "box", size=(1.2, 0.8, 0.3), pose=pose_at([0.2, 1.0, 0.2]))
+    inside = SceneObject.ball("inside", [0.2, 1.0, 0.2], radius=0.1)
+    below = SceneObject.ball("below", [0.2, 1.0, -0.2], radius=0.1)
+    views = ArmViews(arm, q, goal=q[-1], objects=[table, inside, below], size=(300, 300))
+    assert (
+        len(_obstacle_pixels(views.picture(0)[:, 300:])) == 0
+    )  # from above: the table is pale, the balls are not
+    bare = ArmViews(arm, q, goal=q[-1], objects=[inside, below], size=(300, 300))
+    assert len(_obstacle_pixels(bare.picture(0)[:, 300:])) > 100
+
+
+def test_the_goal_is_a_ghost_until_the_arm_is_there() -> None:
+    arm = Robot.named("planar2")
+    views = ArmViews(arm, MOTION, goal=MOTION[-1], size=(300, 300))
+    start, end = (views.picture(k).astype(int) for k in (0, 10))
+    ghost = lambda p: ((p[..., 2] - p[..., 0] > 25) & (p[..., 0] > 150)).sum()  # noqa: E731  a pale blue
+    assert ghost(start) > 300
+    assert ghost(end) < 0.2 * ghost(start)
+
+
+def test_the_side_is_one_from_which_the_arm_is_seen() -> None:
+    arm = Robot.named("z1")
+    q = np.stack([arm.neutral, arm.neutral])
+    towards = direction(*SIDES[0])
+    wall = SceneObject("wall", "box", size=(0.02, 2.0, 2.0), pose=pose_at(0.8 * towards * [1.0, 0.0, 0.0]))
+    assert ArmViews(arm, q, goal=q[-1], size=(200, 200)).views[0] == SIDES[0]
+    side = ArmViews(arm, q, goal=q[-1], objects=[wall], size=(200, 200)).views[0]
+    assert direction(*side)[0] < 0.0  # from the other side of the wall

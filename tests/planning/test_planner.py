@@ -45,6 +45,20 @@ def test_a_path_is_free_everywhere_and_the_same_again(
     assert plan.length >= np.linalg.norm(goal - start) - 1e-12  # rounding
 
 
+def test_ends_a_rounding_error_outside_the_limits_are_taken_in(robot: ss.Robot, planner: PathPlanner) -> None:
+    within = np.array([robot.limits.upper[0], -1.0, 0.0])
+    wall = ss.Obstacles([[0.0, y, 0.0] for y in np.linspace(0.7, 1.4, 8)], 0.02)
+    for excess, status in ((9e-4, PlanStatus.found), (1.1e-3, PlanStatus.invalid)):
+        outside = within + np.array([excess, 0.0, 0.0])
+        plan = planner.plan(outside, [0.2, 0.5, 0.0], wall)
+        assert plan.status == status
+        back = planner.plan([0.2, 0.5, 0.0], outside, wall)
+        assert back.status == status
+        if status == PlanStatus.found:
+            np.testing.assert_array_equal(plan.path[0], within)
+            np.testing.assert_array_equal(back.path[-1], within)
+
+
 def test_ends_in_collision_are_named(robot: ss.Robot, planner: PathPlanner) -> None:
     goal, start = np.zeros(3), np.array([1.5, 0.0, 0.0])
     point = ss.Obstacles([[1.25, 0.0, 0.0]], 0.05)  # in the middle of link3 at the goal

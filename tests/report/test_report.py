@@ -132,7 +132,7 @@ def test_of_many_barriers_the_most_active_are_drawn_by_name(result: ScenarioResu
         *(f"link{k} - obstacles" for k in (8, 7, 6, 5, 4)),
     ]
     np.testing.assert_array_equal(axes.lines[2].get_ydata(), values[:, 15])
-    assert axes.get_title() == "Barriers, the 6 most active of 10"
+    assert axes.get_title() == "What bent the motion: barriers by part, the 6 most active of 10"
     at_rest = replace(barriers, run=replace(result.run, values=np.zeros_like(values)))
     assert psi_figure(at_rest) is None  # none was ever active: there is nothing to see
     plain = psi_figure(result)
@@ -154,6 +154,17 @@ def test_a_method_without_a_switch_shows_no_switch(result: ScenarioResult) -> No
 def test_the_columns_of_the_embedding_have_names(result: ScenarioResult) -> None:
     assert result.embedding_names == ("collision density",)
     assert "psi 1 collision density [-]" in csv_columns(result)
+    values = np.column_stack([result.run.time, 2.0 * result.run.time, -result.run.time])
+    barriers = replace(
+        result,
+        run=replace(result.run, values=values),
+        embedding_names=("link1 - obstacles", "link1 - obstacles", "link1 - link3"),
+        scenario=replace(result.scenario, method="barrier"),
+    )
+    columns = csv_columns(barriers)
+    np.testing.assert_array_equal(columns["barrier link1 - obstacles [-]"], values[:, 1])  # the larger of two
+    np.testing.assert_array_equal(columns["barrier link1 - link3 [-]"], values[:, 2])
+    assert not [name for name in columns if name.startswith("psi")]
 
 
 def test_the_summary_says_what_is_seen_and_how_much_torque_was_used(result: ScenarioResult) -> None:

@@ -57,6 +57,10 @@ def test_configurations_inside_the_limits(name: str) -> None:
 def test_check_configuration() -> None:
     robot = Robot.named("planar2")
     np.testing.assert_array_equal(robot.check_configuration([1, 2]), [1.0, 2.0])
+    just_outside = robot.limits.upper + 0.9e-3  # as encoders and published problems have
+    np.testing.assert_array_equal(robot.check_configuration(just_outside), just_outside)
+    with pytest.raises(ValueError, match=re.escape("q: joint 'joint1' is 3.14")):
+        robot.check_configuration(robot.limits.upper + 1.1e-3)
     with pytest.raises(ValueError, match=re.escape("goal has shape (3,), expected (2,)")):
         robot.check_configuration([1, 2, 3], "goal")
     with pytest.raises(ValueError, match=re.escape("goal: joint 'joint2' is 4.0, allowed: [-3.14")):

@@ -52,6 +52,17 @@ def test_the_free_motion_arrives_when_the_solution_in_closed_form_does(mode: str
         assert document["contacts"] is document["max_torque_ratio"] is document["max_tracking_error"] is None
 
 
+@pytest.mark.parametrize("mode", ["kinematic", "torque"])
+@pytest.mark.parametrize("method", ["custom", "controller"])
+def test_a_start_a_rounding_error_outside_its_limits_runs_and_breaks_none(mode: str, method: str) -> None:
+    text = FREE.format(mode=mode, period=0.002).replace("body: {components: 1}", f"method: {method}")
+    document = run_scenario(Scenario.from_text(text.replace("[0, 0.5]", "[3.1420, 0.5]"))).to_document()
+    assert document["reached"] is True
+    assert document["limits"]["position"] == 0
+    if mode == "kinematic":  # the weak motor of joint 2 cannot hold it while joint 1 comes in
+        assert document["success"] is True
+
+
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "second_order", "runge_kutta_4"])
 def test_every_integrator_can_be_chosen(integrator: str) -> None:
     text = FREE.format(mode="kinematic", period=0.01).replace(

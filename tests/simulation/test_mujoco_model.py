@@ -55,7 +55,8 @@ def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
 def test_position_limits_are_in_radians_and_enforced() -> None:
     built = build_model(Robot.named("fr3_arm"))
     limits = Robot.named("fr3_arm").limits
-    np.testing.assert_allclose(built.model.jnt_range, np.column_stack([limits.lower, limits.upper]))
+    stops = np.column_stack([limits.lower - 1e-3, limits.upper + 1e-3])
+    np.testing.assert_allclose(built.model.jnt_range, stops)
     assert built.model.jnt_limited.all()
     np.testing.assert_allclose(built.model.actuator_ctrlrange[:, 1], limits.effort)
     assert not built.model.dof_damping.any()

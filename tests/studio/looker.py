@@ -31,6 +31,7 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "how-to" / "studio.md"
 PATIENCE = 120.0  # [s] at most for anything: a busy machine without a graphics card draws a frame in seconds
 PASSIVE = "Unable to preventDefault inside passive event listener"  # the browser's own note on viser's lists
 WINDOW = Window(1080, 560)
+ADVANCED = ("Method", "Show", "Scenario")  # tabs inside of the tab of this name
 PANELS = PLOT_WIDTH + 10, MAIN_WIDTH + 10  # [px] at the sides of a scene
 
 
@@ -66,6 +67,9 @@ class Looker:
         return box
 
     def tab(self, name: str) -> None:
+        """Chooses a tab; those inside of Advanced after that one."""
+        if name in ADVANCED:
+            self.tab("Advanced")
         found = self.page.locator(f'[role=tab][title="{name}"]').first
 
         def chosen() -> bool:

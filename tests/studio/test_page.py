@@ -54,7 +54,7 @@ def test_the_axes_of_the_plots_can_be_read(studio: Studio, looker: Looker) -> No
 
     def can_be_read() -> bool:
         found = looker.page.evaluate(axes)
-        full = [most for _, most in found[2:4]]  # of speed and torque, within their limits
+        full = [most for _, most in found[1:3]]  # of speed and torque, within their limits
         return full == [100.0, 100.0] and all(own and "0" in own and len(own) > 1 for own, _ in found)
 
     until(can_be_read, "zero and one label more at each")

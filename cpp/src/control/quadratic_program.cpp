@@ -34,6 +34,12 @@ bool in_use(const QuadraticProgramData& data, int row) noexcept {
   return data.row_lower[row] != -infinity || data.row_upper[row] != infinity;
 }
 
+/// √(a² + b²) of two that are not both zero, as std::hypot, of which the GNU library has a version that older ones lack.
+double length_of(double a, double b) noexcept {
+  const double large = std::max(std::abs(a), std::abs(b)), ratio = std::min(std::abs(a), std::abs(b)) / large;
+  return large * std::sqrt(1.0 + ratio * ratio);
+}
+
 }  // namespace
 
 const char* name(QuadraticProgramStatus status) noexcept {
@@ -232,7 +238,7 @@ void QuadraticProgram::add(const Active& active, double multiplier) noexcept {
     if (d_[j] == 0.0) {
       continue;
     }
-    const double length = std::hypot(d_[j - 1], d_[j]);
+    const double length = length_of(d_[j - 1], d_[j]);
     const double c = d_[j - 1] / length, s = d_[j] / length;
     d_[j - 1] = length;
     d_[j] = 0.0;
@@ -259,7 +265,7 @@ void QuadraticProgram::drop(int position) noexcept {
   }
   --num_active_;
   for (int j = position; j < num_active_; ++j) {
-    const double length = std::hypot(R_(j, j), R_(j + 1, j));
+    const double length = length_of(R_(j, j), R_(j + 1, j));
     const double c = R_(j, j) / length, s = R_(j + 1, j) / length;
     for (int k = j; k < num_active_; ++k) {
       const double top = R_(j, k), bottom = R_(j + 1, k);

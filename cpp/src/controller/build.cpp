@@ -278,7 +278,20 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
   }
 }
 
+void Controller::Impl::let_rest(const std::vector<RestingObject>& objects) {
+  for (const RestingObject& one : objects) {
+    std::size_t i = 0;
+    for (std::size_t k = 0; k < system->labels().size(); ++k) {
+      const CoordinateLabel& label = system->labels()[k];
+      if (label.kind == CoordinateLabel::Kind::obstacle && label.name == one.object.name) {
+        resting_.push_back({static_cast<Eigen::Index>(k), one.given[i++] + lifted_room});
+      }
+    }
+  }
+}
+
 Controller::Impl::~Impl() {
+  delete lifted.load();
   stopping_.store(true);
   wake_.release();
   if (thread_.joinable()) {

@@ -74,11 +74,20 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
   clock_.blocker = {};
 }
 
+bool Controller::Impl::is_lifted() const noexcept {
+  const auto is_free = [this](const Resting& one) {
+    return workspace.clearances.least[one.coordinate] >= one.clearance &&
+           (!apart_ || arm_workspace_.clearances.least[one.coordinate] >= one.clearance);
+  };
+  return known_before_ && std::all_of(resting_.begin(), resting_.end(), is_free);
+}
+
 void Controller::take_over() noexcept {
-  if (next_.load(std::memory_order_relaxed) == nullptr) {
-    return;
+  Impl* next = next_.load(std::memory_order_relaxed) == nullptr ? nullptr : next_.exchange(nullptr, std::memory_order_acquire);
+  if (next == nullptr && impl_->lifted.load(std::memory_order_relaxed) != nullptr && impl_->is_lifted()) {
+    next = impl_->lifted.exchange(nullptr, std::memory_order_acq_rel);
   }
-  if (Impl* const next = next_.exchange(nullptr, std::memory_order_acquire)) {
+  if (next != nullptr) {
     next->go_on_from(*impl_);
     Impl* const last = impl_.release();
     impl_.reset(next);
@@ -90,15 +99,29 @@ void Controller::take_over() noexcept {
 }
 
 void Controller::change(const Arm& whole, std::vector<Held> held) {
-  Arm arm = whole;
+  Arm arm = whole, lifted_arm = whole;
+  std::vector<RestingObject> at_rest;
   for (const Held& one : held) {
-    arm = sidestep::attach(arm, one.object, one.q);
+    arm = sidestep::attach(arm, one.resting ? one.resting->object : one.object, one.q);
+    lifted_arm = sidestep::attach(lifted_arm, one.object, one.q);
+    if (one.resting) {
+      at_rest.push_back(*one.resting);
+    }
   }
   auto fresh = std::make_unique<Impl>(std::move(arm), settings_, command_);
+  if (!at_rest.empty()) {
+    fresh->let_rest(at_rest);
+    fresh->lifted = new Impl(std::move(lifted_arm), settings_, command_);
+  }
   std::unique_ptr<Impl> passed_over;  // ends after the lock
   {
     const std::lock_guard lock(setters_);
-    fresh->take_orders_of(*newest_);
+    Impl& last = newest();
+    fresh->take_orders_of(last);
+    lifted_ = fresh->lifted;
+    if (lifted_ != nullptr) {
+      lifted_->take_orders_of(last);
+    }
     passed_over.reset(next_.exchange(nullptr));
     newest_ = fresh.get();
     next_.store(fresh.release(), std::memory_order_release);
@@ -106,6 +129,16 @@ void Controller::change(const Arm& whole, std::vector<Held> held) {
     held_ = std::move(held);
   }
   destroy(retired_.exchange(nullptr, std::memory_order_acquire));
+}
+
+Controller::Impl& Controller::newest() const noexcept {
+  return lifted_ != nullptr && newest_->lifted.load() == nullptr ? *lifted_ : *newest_;
+}
+
+void Controller::forget_lifted() noexcept {
+  if (lifted_ != nullptr && newest_->lifted.load() == nullptr) {
+    std::for_each(held_.begin(), held_.end(), [](Held& one) { one.resting.reset(); });
+  }
 }
 
 void Controller::destroy(Impl* newest) noexcept {
@@ -116,6 +149,7 @@ void Controller::destroy(Impl* newest) noexcept {
 
 void Controller::set_arm(Arm arm) {
   const std::lock_guard lock(changes_);
+  forget_lifted();
   const Robot &now = whole_.robot(), &then = arm.robot();
   if (!now.same_joints(then) || now.coordinate_names() != then.coordinate_names()) {
     throw std::invalid_argument("controller: arm '" + arm.name() + "' has other joints than '" + whole_.name() + "'; make a controller for it");
@@ -131,14 +165,28 @@ void Controller::set_arm(Arm arm) {
 
 void Controller::attach(const Attachment& object) {
   const std::lock_guard lock(changes_);
+  forget_lifted();
   std::vector<Held> held = held_;
-  held.push_back({object, {}});
-  tell([&](Impl& impl) { held.back().q = impl.last_q(); });
+  Held& last = held.emplace_back(Held{object, {}, {}});
+  std::optional<Obstacles> around;
+  {
+    const std::lock_guard orders(setters_);
+    last.q = newest().last_q();
+    around = newest().newest_obstacles();
+  }
+  if (!object.rests_on.empty()) {
+    if (last.q.size() == 0) {
+      throw std::invalid_argument("attach '" + object.name + "': it rests on obstacles, but where the arm is nobody has said; step once before");
+    }
+    sidestep::attach(whole_, object);  // for what is wrong with it
+    last.resting = resting(whole_.robot(), object, last.q, *around, settings_.safety.margin + attached_room);
+  }
   change(whole_, std::move(held));
 }
 
 void Controller::detach(const std::string& name) {
   const std::lock_guard lock(changes_);
+  forget_lifted();
   std::vector<Held> held = held_;
   if (std::erase_if(held, [&](const Held& one) { return one.object.name == name; }) == 0) {
     std::string names;

@@ -11,7 +11,6 @@
 namespace sidestep {
 namespace {
 
-constexpr double limit_rounding = 1e-9;  // [rad | m] of a goal at a limit
 constexpr double pose_position_share = 2.0, pose_rotation_share = 0.5;  // of the stiffness, per m² and per rad²
 
 }  // namespace
@@ -19,6 +18,14 @@ constexpr double pose_position_share = 2.0, pose_rotation_share = 0.5;  // of th
 void Controller::Impl::set_goal(std::optional<Goal> goal) {
   if (goal) {
     const Robot& robot = arm.robot();
+    const JointLimits& limits = robot.limits();
+    if (auto* joint = std::get_if<JointGoal>(&*goal);
+        joint != nullptr && joint->position.size() == robot.num_coordinates() && joint->position.allFinite()) {
+      const Eigen::VectorXd within = limits.nearest_within(joint->position);
+      if ((joint->position - within).cwiseAbs().maxCoeff() <= JointLimits::rounding) {
+        joint->position = within;
+      }
+    }
     const GoalFault fault = check(*goal, robot);
     if (fault == GoalFault::invalid) {
       throw std::invalid_argument("controller: the goal must be finite, of " + std::to_string(robot.num_coordinates()) +
@@ -27,24 +34,21 @@ void Controller::Impl::set_goal(std::optional<Goal> goal) {
     if (fault == GoalFault::outside_limits) {
       const Eigen::VectorXd& position = std::get<JointGoal>(*goal).position;
       for (Eigen::Index j = 0; j < position.size(); ++j) {
-        const double lower = robot.limits().lower[j], upper = robot.limits().upper[j];
-        if (position[j] < lower - limit_rounding || position[j] > upper + limit_rounding) {
+        const double lower = limits.lower[j], upper = limits.upper[j];
+        if (position[j] < lower - JointLimits::rounding || position[j] > upper + JointLimits::rounding) {
           throw std::invalid_argument("controller: goal: joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] +
                                       "' is " + std::to_string(position[j]) + ", allowed: " + std::to_string(lower) + " to " +
                                       std::to_string(upper));
         }
       }
     }
-    if (auto* joint = std::get_if<JointGoal>(&*goal)) {
-      joint->position = joint->position.cwiseMax(robot.limits().lower).cwiseMin(robot.limits().upper);
-    } else {
-      const auto set_stiffness = [&](PoseGoal& pose) {
-        pose.settings.position_stiffness = pose_position_share * settings.barriers.stiffness;
-        pose.settings.orientation_stiffness = pose_rotation_share * settings.barriers.stiffness;
+    if (auto* pose = std::get_if<PoseGoal>(&*goal)) {
+      const auto set_stiffness = [&](PoseGoal& one) {
+        one.settings.position_stiffness = pose_position_share * settings.barriers.stiffness;
+        one.settings.orientation_stiffness = pose_rotation_share * settings.barriers.stiffness;
       };
-      PoseGoal& pose = std::get<PoseGoal>(*goal);
-      set_stiffness(pose);
-      std::for_each(pose.others.begin(), pose.others.end(), set_stiffness);
+      set_stiffness(*pose);
+      std::for_each(pose->others.begin(), pose->others.end(), set_stiffness);
     }
   }
   put(goal ? Order(std::move(*goal)) : Order());
@@ -90,7 +94,7 @@ void Controller::set_goal(const Eigen::VectorXd& position) {
   tell([&](Impl& impl) { impl.set_goal(std::optional<Goal>(std::in_place, JointGoal(position))); });
 }
 void Controller::set_goal(Goal goal) {
-  tell([&](Impl& impl) { impl.set_goal(std::move(goal)); });
+  tell([&](Impl& impl) { impl.set_goal(goal); });
 }
 void Controller::set_velocity(const Eigen::VectorXd& v) {
   tell([&](Impl& impl) { impl.set_velocity(v); });
@@ -105,7 +109,7 @@ void Controller::clear_goal() {
   tell([](Impl& impl) { impl.set_goal(std::nullopt); });
 }
 void Controller::set_obstacles(Obstacles obstacles) {
-  tell([&](Impl& impl) { impl.set_obstacles(std::move(obstacles)); });
+  tell([&](Impl& impl) { impl.set_obstacles(obstacles); });
 }
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept {
@@ -123,7 +127,7 @@ const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacle
 std::string Controller::explain() const { return impl_->explain(); }
 Arm Controller::arm() const {
   const std::lock_guard lock(setters_);
-  return newest_->arm;
+  return newest().arm;
 }
 const ControllerSettings& Controller::settings() const noexcept { return settings_; }
 const std::vector<CoordinateLabel>& Controller::labels() const noexcept { return impl_->system->labels(); }
@@ -133,11 +137,11 @@ const TorqueSolution& Controller::solution() const noexcept { return impl_->solu
 Eigen::VectorXd Controller::target() const { return impl_->target(); }
 Plan Controller::last_plan() const {
   const std::lock_guard lock(setters_);
-  return newest_->guide ? newest_->guide->last_plan() : Plan{};
+  return newest().guide ? newest().guide->last_plan() : Plan{};
 }
 OnlinePlanner::Counts Controller::planner_counts() const {
   const std::lock_guard lock(setters_);
-  return newest_->guide ? newest_->guide->counts() : OnlinePlanner::Counts{};
+  return newest().guide ? newest().guide->counts() : OnlinePlanner::Counts{};
 }
 bool Controller::has_torque() const noexcept { return has_torque_; }
 

@@ -35,6 +35,41 @@ std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
 
 Eigen::VectorXd Controller::Impl::target() const { return has_target_ ? Eigen::VectorXd(target_ - turns_) : Eigen::VectorXd(); }
 
+std::string Controller::Impl::explain_target() const {
+  if (!has_target_ || moves_) {
+    return {};
+  }
+  PlannerSettings exact;
+  exact.allowance = exact.pair_allowance = 0.0;
+  exact.max_nodes = 2;  // it searches for nothing
+  std::shared_ptr<const Obstacles> shown;
+  bool touches_itself;
+  {
+    const std::lock_guard lock(mutex_);
+    shown = shown_obstacles_;
+    touches_itself = shown_posture_ && shown_posture_->touches_itself;
+  }
+  Obstacles around = *shown;
+  around.advance(obstacle_age_);
+  Obstruction obstruction;
+  RrtConnect ends(body_, exact);
+  if (touches_itself && ends.obstructed(target_, Obstacles::none(), obstruction)) {  // no obstacle that goes away frees the goal
+    return "no posture without self-collision was found for the pose: at the last one " + describe(obstruction) +
+           "; others are looked for";
+  }
+  if (!ends.obstructed(target_, around, obstruction)) {
+    if (guide_status_ != OnlinePlannerStatus::goal_in_collision) {
+      return {};
+    }
+    obstruction = guide->last_plan().obstruction;
+  }
+  const bool own = obstruction.label.kind == CoordinateLabel::Kind::self;
+  return "at the goal " + describe(obstruction) +
+         (!own          ? "; it goes on when that is free"
+          : pose_goal() ? "; another posture is looked for"
+                        : "; set another goal, or allow the two to touch");
+}
+
 std::string Controller::Impl::explain_input() const {
   std::string words = trajectory_order() ? "follows a trajectory" : "moves at the velocity that it is told";
   if (command.bound_by >= 0) {
@@ -97,25 +132,15 @@ std::string Controller::Impl::explain() const {
               "° away; ";
     }
   }
-  if (guide_status_ == OnlinePlannerStatus::goal_in_collision || guide_status_ == OnlinePlannerStatus::start_in_collision) {
-    const Plan plan = guide->last_plan();
-    const std::string where = guide_status_ == OnlinePlannerStatus::goal_in_collision ? "at the goal " : "where the arm is, ";
-    return text + where + describe(plan.obstruction) + "; it goes on when that is free";
+  if (guide_status_ == OnlinePlannerStatus::start_in_collision) {
+    return text + "where the arm is, " + describe(guide->last_plan().obstruction) + "; it goes on when that is free";
   }
-  if (!guide && target_blocked_) {
-    PlannerSettings exact;
-    exact.allowance = exact.pair_allowance = 0.0;
-    Obstruction obstruction;
-    std::shared_ptr<const Obstacles> shown;
-    {
-      const std::lock_guard lock(mutex_);
-      shown = shown_obstacles_;
-    }
-    Obstacles around = *shown;
-    around.advance(obstacle_age_);
-    if (RrtConnect(body_, exact).obstructed(target_, around, obstruction)) {
-      return text + "at the goal " + describe(obstruction) + "; it goes on when that is free";
-    }
+  const std::string at_target = explain_target();
+  if (guide_status_ == OnlinePlannerStatus::goal_in_collision || stops_short()) {
+    return text + at_target;
+  }
+  if (!at_target.empty()) {
+    text += at_target + "; ";
   }
   if (guide_status_ == OnlinePlannerStatus::no_path) {
     text += "no path was found yet; it is looked for again; ";

@@ -25,6 +25,8 @@
 
 namespace sidestep {
 
+constexpr double lifted_room = 0.005;  // [m] from which on what rested is lifted
+
 /// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
 class Controller::Impl : private StepState {
  public:
@@ -46,8 +48,16 @@ class Controller::Impl : private StepState {
   const Obstacles& obstacles() const noexcept { return obstacle_orders_.current().obstacles; }
   const Command& step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
                       const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
+  /// As they were set last. For any thread.
+  Obstacles newest_obstacles() const {
+    const std::lock_guard lock(mutex_);
+    return *shown_obstacles_;
+  }
   std::string explain() const;
   Eigen::VectorXd target() const;
+  /// Makes objects keep off obstacles that they rest on only as far as they do now.
+  void let_rest(const std::vector<RestingObject>& objects);
+  bool is_lifted() const noexcept;
   /// Asks the threads to end, and does not wait.
   void retire() noexcept { stopping_.store(true); }
   /// Measured in the last step; empty before the first. For one thread at a time.
@@ -63,6 +73,7 @@ class Controller::Impl : private StepState {
   TorqueSolution solution;
   Command& command;
   Impl* before = nullptr;  // of those that wait for another thread to destroy them
+  std::atomic<Impl*> lifted{nullptr};  // to go on with once what rests is lifted; its own until then
   std::unique_ptr<OnlinePlanner> guide;
   bool torque = false;
 
@@ -161,6 +172,8 @@ class Controller::Impl : private StepState {
   bool keeps_path() const noexcept { return pulls_ && trajectory_order() && trajectory_order()->behaviour == TrajectoryBehaviour::keep_path; }
   std::string explain_trajectory() const;
   std::string explain_input() const;
+  /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
+  std::string explain_target() const;
   void avoid() noexcept;
   using MassMatrix = const Eigen::Ref<const Eigen::MatrixXd>*;
   using Bias = const Eigen::Ref<const Eigen::VectorXd>*;
@@ -195,6 +208,8 @@ class Controller::Impl : private StepState {
   bool has_sub_goal() const noexcept { return followed_ != nullptr && followed_ != &reference_ && followed_ != goal_; }
   void keep_room() noexcept;
   bool has_goal() const noexcept { return goal_ != nullptr; }
+  /// The target is inside something, and the arm goes straight to it: it stops before.
+  bool stops_short() const noexcept { return target_blocked_ && (!guide || (path_reference_.arrives && followed_ == &reference_)); }
   const PoseGoal* pose_goal() const noexcept { return goal_ == nullptr ? nullptr : std::get_if<PoseGoal>(goal_); }
 
   // Of the worker; in `step` where synchronous.
@@ -246,6 +261,11 @@ class Controller::Impl : private StepState {
   Eigen::SelfAdjointEigenSolver<Small> modes_;  // of an impedance
   std::vector<bool> is_sliding_, is_unlimited_;
   std::vector<Eigen::Index> metric_coordinates_;  // of obstacles, planes and links: clearances in metres
+  struct Resting {
+    Eigen::Index coordinate;
+    double clearance;  // from which on its whole ellipsoid is free [m]
+  };
+  std::vector<Resting> resting_;
   Goal* goal_ = nullptr;          // in the current order
   OnlinePlanner::Reference path_reference_;
   OnlinePlannerStatus guide_status_ = OnlinePlannerStatus::idle;
@@ -279,6 +299,9 @@ template <class Action>
 void Controller::tell(Action&& action) {
   const std::lock_guard lock(setters_);
   action(*newest_);
+  if (lifted_ != nullptr) {
+    action(*lifted_);
+  }
 }
 
 template <class Action>

@@ -12,7 +12,6 @@
 namespace sidestep {
 namespace {
 
-constexpr double sample_rounding = 1e-9;     // [rad | m] of a sample at a limit
 constexpr double shortest_station = 0.005;  // [s] between rates
 constexpr double most_stations = 20000.0;
 constexpr double standing = 1e-9;           // [rad/s | m/s]
@@ -33,7 +32,7 @@ void check_samples(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::Ve
     }
     for (int j = 0; j < nv; ++j) {
       const double lower = robot.limits().lower[j], upper = robot.limits().upper[j];
-      if (!(q(j, k) >= lower - sample_rounding && q(j, k) <= upper + sample_rounding && std::isfinite(q(j, k)))) {
+      if (!(q(j, k) >= lower - JointLimits::rounding && q(j, k) <= upper + JointLimits::rounding && std::isfinite(q(j, k)))) {
         refuse_trajectory("joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] + "' of sample " + std::to_string(k) + " is " +
                std::to_string(q(j, k)) + ", allowed: " + std::to_string(lower) + " to " + std::to_string(upper));
       }

@@ -17,6 +17,7 @@ namespace {
 
 // Rows are kept in memory: 10 million of 7 joints take 2 GB.
 constexpr int most_steps = 10'000'000;
+constexpr double sliding_tolerance = 0.1;  // of that of turning joints [m/rad], as ArrivalSettings have it
 
 void check(const Eigen::VectorXd& value, const char* name, Eigen::Index nv) {
   if (value.size() != nv || !value.allFinite()) {
@@ -45,12 +46,18 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
   const double period = controller.settings().period;
   MotionRecord record{Eigen::MatrixXd(steps, nv), Eigen::MatrixXd(steps, nv), Eigen::MatrixXd(steps, nv), {}, {},
                       Eigen::VectorXd(steps),     Eigen::VectorXd(steps),     q,                          v};
-  const std::vector<bool> unlimited = unlimited_joints(controller.arm().robot());
+  const Robot robot = controller.arm().robot();
+  const std::vector<bool> unlimited = unlimited_joints(robot);
+  std::vector<bool> slides(unlimited.size());
+  for (std::size_t j = 0; j < slides.size(); ++j) {
+    slides[j] = robot.slides(static_cast<int>(j));
+  }
   const auto away = [&](const Eigen::VectorXd& at) {  // of the goal; a turn more or less is the same place
     double largest = 0.0;
     for (Eigen::Index j = 0; j < nv; ++j) {
       const double error = at[j] - goal[j];
-      largest = std::max(largest, std::abs(unlimited[static_cast<std::size_t>(j)] ? std::remainder(error, 2.0 * std::numbers::pi) : error));
+      const double way = std::abs(unlimited[static_cast<std::size_t>(j)] ? std::remainder(error, 2.0 * std::numbers::pi) : error);
+      largest = std::max(largest, slides[static_cast<std::size_t>(j)] ? way / sliding_tolerance : way);
     }
     return largest;
   };

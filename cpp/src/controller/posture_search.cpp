@@ -37,7 +37,9 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> finite_interval(const Robot& robot, 
   return {lower, upper};
 }
 
-double size_of(const Posture& posture) noexcept { return std::hypot(posture.position_error, posture.rotation_error); }
+double size_of(const Posture& posture) noexcept {
+  return std::sqrt(posture.position_error * posture.position_error + posture.rotation_error * posture.rotation_error);
+}
 
 class Descent {
  public:

@@ -41,7 +41,7 @@ void Controller::Impl::begin_goal() noexcept {
 
 void Controller::Impl::next_posture(const PoseGoal& pose) noexcept {
   guide_status_ = OnlinePlannerStatus::idle;
-  has_target_ = target_blocked_ = false;
+  has_target_ = target_blocked_ = rests_ = false;
   if (settings.synchronous) {
     guarded([&] { take_posture(search_posture(pose, q_, obstacles(), posture_attempt_, goal_number_)); });
   } else {
@@ -93,8 +93,8 @@ void Controller::Impl::choose_reference() noexcept {
       }
     }
     // A posture that no way leads to: another one.
-    const bool fails = guide ? guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision
-                             : target_blocked_;
+    const bool fails = guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision ||
+                       (stops_short() && (!guide || rests_));
     if (has_target_ && fails && time_ >= next_posture_) {
       if (++posture_attempt_ % most_posture_attempts == 0) {
         next_posture_ = time_ + posture_pause;

@@ -8,6 +8,11 @@
 #include "impl.hpp"
 
 namespace sidestep {
+namespace {
+
+constexpr double sliding_speed = 0.1;  // of the speed that counts as rest, of joints that slide [m/rad]
+
+}  // namespace
 
 const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
                                       const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
@@ -83,7 +88,7 @@ void Controller::Impl::take_orders() noexcept {
     begins_input_ = goal_ == nullptr && order.order.index() != 0;
     goal_number_ = order.number;
     has_target_ = posture_found_ = false;
-    target_blocked_ = false;
+    target_blocked_ = rests_ = false;
     posture_attempt_ = 0;
     moves_ = goal_ != nullptr && is_moving(*goal_);
     guide_status_ = OnlinePlannerStatus::idle;
@@ -231,11 +236,15 @@ Activity Controller::Impl::judge_activity() noexcept {
   if (!has_target_) {
     return Activity::waiting;
   }
-  const bool at_rest = arm_v_.cwiseAbs().maxCoeff() < settings.arrival.speed;
+  rests_ = true;
+  for (Eigen::Index j = 0; j < arm_v_.size(); ++j) {  // a joint may slide no faster than that
+    const double share = is_sliding_[static_cast<std::size_t>(j)] ? sliding_speed : 1.0;
+    rests_ = rests_ && std::abs(arm_v_[j]) < share * settings.arrival.speed;
+  }
   const bool out_of_reach = !posture_found_;
   const bool no_way = guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision ||
-                      (!guide && target_blocked_);
-  return at_rest && (no_way || out_of_reach) ? Activity::blocked : Activity::moving;
+                      stops_short();
+  return rests_ && (no_way || out_of_reach) ? Activity::blocked : Activity::moving;
 }
 
 void Controller::Impl::write_snapshot() noexcept {

@@ -34,6 +34,7 @@ struct StepState {
   double time_ = 0.0, next_look_ = 0.0, next_posture_ = 0.0, obstacle_age_ = 0.0;
   bool begins_goal_ = false, wakes_worker_ = false;
   bool known_before_ = false, disturbed_ = false, target_blocked_ = false;
+  bool rests_ = false;            // short of a goal that it was on the way to
   std::uint64_t goal_number_ = 0, obstacle_number_ = 0, posture_attempt_ = 0, tick_ = 0;
   bool has_target_ = false, posture_found_ = false, moves_ = false;
   Eigen::VectorXd target_;        // a configuration that the arm is led to

@@ -175,7 +175,8 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     measured_ = answer.path_number;
     progress_.reset();
   }
-  if (progress_.update(time, std::exp(away))) {  // it goes with what is left, however long the way
+  const double progress = ours && answer.status == PlanStatus::found ? answer.progress : usual_progress;
+  if (progress_.update_way(time, away, progress)) {
     ++stops_;
     progress_.reset();
   }

@@ -11,6 +11,7 @@ namespace {
 constexpr double widening = 1.5;  // the margin grows by this factor each time the arm was stuck
 constexpr int widenings = 4;      // and begins anew after so many
 constexpr double shorter = 0.9;   // a straight way is shorter than the rest of a path by this factor to let go of it
+constexpr double progress_share = 0.5;  // of the way that a route makes within the patience, that the arm must make
 constexpr double back = 0.05;     // between places behind the reference where an arm may find back to its path [rad]
 
 }  // namespace
@@ -249,6 +250,8 @@ void OnlinePlanner::answer(const State& state, PlanStatus status) {
   answer.path_number = path_number_;
   if (status == PlanStatus::found) {
     answer.route = route_;
+    // A joint that slides at 1 cm/s, or a narrow place, is no reason to look for another way.
+    answer.progress = std::min(usual_progress, progress_share * route_->motion.slowest(settings_.patience));
     const std::lock_guard lock(mutex_);
     shown_route_ = route_;
     shown_route_number_ = route_number_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -178,6 +179,15 @@ Eigen::VectorXd excess(const PathTiming& timing, const PathLimits& limits) {
 }
 
 }  // namespace
+
+double PathTiming::slowest(double duration) const noexcept {
+  const auto span = static_cast<Eigen::Index>(std::ceil(duration / period));
+  double least = std::numeric_limits<double>::infinity();
+  for (Eigen::Index k = 0; k + span < station.size(); ++k) {
+    least = std::min(least, station[k + span] - station[k]);
+  }
+  return least;
+}
 
 PathTiming time_path(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest,
                      const Eigen::VectorXd& share, const PathLimits& limits, double begin) {

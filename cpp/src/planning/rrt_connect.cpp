@@ -16,7 +16,6 @@ namespace sidestep {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
-constexpr double limit_rounding = 1e-9;  // [rad | m] by which a start or goal may be outside its limits
 constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
 constexpr double local = 0.3;            // of the samples are around a node: narrow places are near others
 constexpr double around_node = 2.4;      // how far each joint of such a sample may be from the node's [rad | m]
@@ -143,17 +142,18 @@ Plan RrtConnect::plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
   return plan;
 }
 
-Plan RrtConnect::find(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
-                      std::uint64_t seed) {
+Plan RrtConnect::find(const Eigen::VectorXd& from, const Eigen::VectorXd& to, const Obstacles& obstacles, std::uint64_t seed) {
   const double begin = seconds();
   Plan plan;
   const JointLimits& limits = body_->robot().limits();
-  for (const Eigen::VectorXd* q : {&start, &goal}) {
-    if (q->size() != body_->robot().num_coordinates() || !q->allFinite() ||
-        ((*q - limits.lower).array() < -limit_rounding).any() || ((limits.upper - *q).array() < -limit_rounding).any()) {
-      return plan;
-    }
+  const auto usable = [&](const Eigen::VectorXd& q) {
+    return q.size() == body_->robot().num_coordinates() && q.allFinite() &&
+           (q - limits.nearest_within(q)).cwiseAbs().maxCoeff() <= JointLimits::rounding;
+  };
+  if (!usable(from) || !usable(to)) {
+    return plan;
   }
+  const Eigen::VectorXd start = limits.nearest_within(from), goal = limits.nearest_within(to);
   if (obstructed(start, obstacles, plan.obstruction)) {
     plan.status = PlanStatus::start_in_collision;
     return plan;

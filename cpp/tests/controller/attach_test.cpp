@@ -271,3 +271,57 @@ BOOST_AUTO_TEST_CASE(an_object_that_others_name_can_be_let_go) {
   BOOST_TEST((controller.attached() == std::vector<std::string>{"lid", "knob"}));
   BOOST_TEST(what_is_said([&] { controller.detach("lid"); }).find("'knob' is attached to 'lid'") != std::string::npos);
 }
+
+BOOST_AUTO_TEST_CASE(what_stands_on_something_may_until_it_is_lifted) {
+  const Arm arm = covered_arm(test::arm_limits(nv));
+  for (const bool one_thread : {true, false}) {
+    ControllerSettings settings = synchronous(ControllerSettings::Output::acceleration);
+    settings.synchronous = one_thread;
+    Controller controller(arm, settings);
+    Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
+    const Eigen::VectorXd start = q;
+    Attachment object = bar();
+    object.rests_on = {"ball"};
+    BOOST_TEST(what_is_said([&] { controller.attach(object); }).find("step once before") != std::string::npos);
+    const Eigen::Isometry3d X_WA = [&] {
+      const Arm larger = attach(arm, bar());
+      return frame_pose(larger.robot(), test::state_at(larger.robot(), q), larger.robot().frame_index("bar"));
+    }();
+    // 8 mm inside the end of the bar.
+    const Obstacles ball = test::ball(X_WA * Eigen::Vector3d(0.0, 0.0, 0.242 + 0.05), 0.05).named({"ball"}, {1});
+    controller.set_obstacles(ball);
+    controller.step(q, v);
+    object.rests_on = {"table"};
+    BOOST_TEST(what_is_said([&] { controller.attach(object); }).find("there are: 'ball'") != std::string::npos);
+    object.rests_on = {"ball"};
+    controller.set_obstacles(test::ball(X_WA * Eigen::Vector3d(0.0, 0.0, 0.22 + 0.05), 0.05).named({"ball"}, {1}));
+    controller.step(q, v);
+    BOOST_TEST(what_is_said([&] { controller.attach(object); }).find(" mm deep in 'ball'") != std::string::npos);
+    controller.set_obstacles(ball);
+    controller.step(q, v);
+    controller.attach(object);
+    const auto run = [&](int steps) {
+      double least = 1.0;
+      for (int k = 0; k < steps; ++k) {
+        const Command& command = controller.step(q, v);
+        least = std::min(least, command.clearance);
+        move(command, q, v);
+      }
+      return least;
+    };
+    BOOST_TEST(run(500) > 0.005);  // nothing is lost
+    BOOST_TEST((q - start).cwiseAbs().maxCoeff() < 1e-3);
+    BOOST_TEST(controller.arm().body().covariances.back()(2, 2) < 0.98 * attach(arm, object).body().covariances.back()(2, 2));
+    // Away and back: the whole bar keeps off.
+    controller.set_goal(Eigen::VectorXd::Constant(nv, -0.2));
+    BOOST_TEST(run(4000) > 0.0);
+    BOOST_TEST((q.array() + 0.2).abs().maxCoeff() < 0.02);
+    BOOST_TEST(controller.arm().content_hash() == attach(arm, object).content_hash());
+    controller.set_goal(start);
+    BOOST_TEST(run(4000) > 0.0);
+    BOOST_TEST((q - start).cwiseAbs().maxCoeff() > 0.005);
+    controller.detach("bar");
+    run(4000);
+    BOOST_TEST((q - start).cwiseAbs().maxCoeff() < 1e-3);
+  }
+}

@@ -94,8 +94,9 @@ class Arm(_core.Arm):
                 the user's cache has the fine arm, it is taken.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
                 "tables" or "pairs", the item a link or a pair of links.
-            cache: whether a prepared arm is read from and written to the user's cache (SIDESTEP_CACHE_DIR overrides its
-                place).
+            cache: whether what is prepared is read from and written to the user's cache (SIDESTEP_CACHE_DIR overrides
+                its place): the arm, and the cover of each link, the table and the contact of each pair of links, which
+                other arms share.
 
         Raises:
             FileNotFoundError: there is no such file, or a named robot's package is not installed.
@@ -149,7 +150,8 @@ class Arm(_core.Arm):
 
         Args:
             robot: with geometry.
-            body: a covering body of it; `Body.cover(robot)` by default.
+            body: a covering body of it; `Body.cover(robot)` by default. With a draft, `Body.cover(robot,
+                effort="draft")`, tables and pairs are those of a draft too.
             allowed: pairs of links that may touch: they get no clearance.
             progress: as in `load`.
 
@@ -244,7 +246,9 @@ class Arm(_core.Arm):
         draft = how.draft and not (how.cache and arm_path(robot, allowed, label).exists())
 
         def make() -> _core.Arm:
-            return prepare(robot, allowed=allowed, source=label, draft=draft, progress=how.progress)
+            return prepare(
+                robot, allowed=allowed, source=label, draft=draft, cached=how.cache, progress=how.progress
+            )
 
         made = stored_or_made(arm_path(robot, allowed, label, draft), make) if how.cache else make()
         arm = cls(made, description=lambda: robot)

@@ -35,6 +35,7 @@ def attachment(
     center_of_mass: ArrayLike | None = None,
     inertia: ArrayLike | None = None,
     may_touch: Sequence[str] = (),
+    rests_on: str | Sequence[str] = (),
     components: int = COMPONENTS,
 ) -> _core.Attachment:
     """An object for `Controller.attach`: takes a few tenths of a second.
@@ -49,6 +50,8 @@ def attachment(
         mass: [kg]; 0: unknown. center_of_mass: (3,) [m] in the object's frame; the middle of its hull by default.
         inertia: (3, 3) [kg m^2] about the centre of mass; of a solid of even density by default.
         may_touch: links that get no clearance from it, as the fingers that hold it.
+        rests_on: names of obstacles that it stands on, or "*" for whatever it stands on. Until its whole cover is
+            5 mm off all obstacles it may stay as near to them as it is. Its cover may be 20 mm deep in them at most.
         components: ellipsoids of it at most.
 
     Raises:
@@ -76,6 +79,7 @@ def attachment(
         shapes=list(cover.shapes),
         inertial=_core.Inertial(mass, com, moments),
         may_touch=list(may_touch),
+        rests_on=[rests_on] if isinstance(rests_on, str) else list(rests_on),
     )
 
 

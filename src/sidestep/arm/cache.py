@@ -26,11 +26,9 @@ def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str, draf
             digest.update((item.tobytes() if isinstance(item, np.ndarray) else repr(item).encode()) + b"\n")
 
     add(FORMAT_VERSION, source, robot.name, sorted(sorted(pair) for pair in allowed))
-    add(
-        body_cache.cache_path(robot, CoverSettings(effort="draft" if draft else "fine")).name,
-        clearance_tables.stored_at(robot).name,
-    )
-    pairs = link_pairs
+    add(body_cache.cache_path(robot, CoverSettings(effort="draft" if draft else "fine")).name)
+    pairs, tables = link_pairs, clearance_tables
+    add(tables.ALGORITHM_VERSION, tables.BEYOND, tables.NEAR, pairs.ALGORITHM_VERSION, pairs.MOST_LOST)
     add(pairs.FEW, pairs.TOUCHING, pairs.NEAR, pairs.SHARE, pairs.DRAFT if draft else pairs.FULL)
     limits = robot.limits
     add(limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.effort)
@@ -45,7 +43,7 @@ def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str, draf
         inertials = ()
     for inertial in inertials:
         add(inertial.mass, inertial.com, inertial.inertia)
-    return body_cache.cache_directory().parent / "arms" / f"{digest.hexdigest()}.arm"
+    return body_cache.cache_root() / "arms" / f"{digest.hexdigest()}.arm"
 
 
 def stored_or_made(path: Path, make: Callable[[], _core.Arm]) -> _core.Arm:

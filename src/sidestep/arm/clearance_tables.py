@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
-import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,8 +12,8 @@ from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from sidestep._core import ClearanceTable, JointType
 from sidestep.arm import shipped_arms
+from sidestep.arm.pair_content import PairContent
 from sidestep.body import cache
-from sidestep.body.file import write_bytes
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 
@@ -27,6 +23,7 @@ Pair: TypeAlias = tuple[str, str]
 Progress: TypeAlias = Callable[[str, int, int], None]
 
 ALGORITHM_VERSION = 1
+FOLDER = "tables"  # of the user's cache
 BEYOND = 2  # control points beyond a limit: with one a spline ends at the limit
 NEAR = 0.03  # [m] clearance below which the error is measured
 STEP = 1e-6  # [m] control points are multiples of it, rounded down: far below the error of a table
@@ -75,6 +72,8 @@ def clearance_tables(
     *,
     effort: TableEffort = FULL,
     only: Sequence[Pair] | None = None,
+    check: SelfCollision | None = None,
+    cached: bool = True,
     progress: Progress | None = None,
 ) -> ClearanceTables:
     """Measures the distance of the exact meshes of pairs with two coordinates between, over these.
@@ -88,35 +87,56 @@ def clearance_tables(
     A pair whose distance at every point exceeds what it can lose halfway to the next, by the lever arms of the joints,
     touches nowhere. A coordinate needs limits, unless it turns all its joints at its own rate.
 
-    That takes seconds a pair, so the tables are kept beside the bodies in the user's cache; a robot with kinematics,
-    meshes and position limits of one whose arm comes with Sidestep takes them from there. Warns about an entry that
-    cannot be read or written.
+    That takes seconds a pair, so each is kept in the user's cache, by its joints, limits and meshes: of an arm with
+    another gripper only the pairs of that are measured. A robot with kinematics, meshes and position limits of one
+    whose arm comes with Sidestep takes them from there. Warns about an entry that cannot be read or written.
 
     Args:
-        robot: with collision meshes. effort: how densely they are measured. only: of these pairs, which are not kept.
-        progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
+        robot: with collision meshes. effort: how densely they are measured. only: of these pairs.
+        check: of the robot, where it is at hand. cached: whether the user's cache is read and written.
+        progress: called as progress("link, link", done, in_all) for each pair that the cache does not answer.
     """
-    shipped = shipped_arms.with_clearances_of(robot)
+    shipped = shipped_arms.with_clearances_of(robot) if cached else None
+    check = check or SelfCollision(robot)
+    found = [pair for pair in _pairs_of_two(robot, check, effort) if only is None or pair.links in only]
     if shipped is not None:
         measured = {(table.first, table.second) for table in shipped.tables}
-        found = (pair for pair, _, _ in _pairs_of_two(robot, SelfCollision(robot), effort))
-        return ClearanceTables(tuple(shipped.tables), tuple(pair for pair in found if pair not in measured))
-    if only is not None:
-        return _measure(robot, effort, progress, only)
-    return cache.stored_or_made(
-        stored_at(robot, effort),
-        _read,
-        lambda: _measure(robot, effort, progress),
-        _write,
-        ("clearance tables are unreadable and are made again", "the clearance tables are not cached"),
+        return ClearanceTables(
+            tuple(shipped.tables), tuple(pair.links for pair in found if pair.links not in measured)
+        )
+    store = cache.ContentStore(FOLDER, "the clearance table of a pair", enabled=cached)
+    content = PairContent(robot)
+    keys = {pair.links: content.key(*pair.links, _settings(robot, pair, effort)) for pair in found}
+    known: dict[Pair, ClearanceTable | None] = {}
+    missing: list[_PairOfTwo] = []
+    for pair in found:
+        stored = store.get(keys[pair.links], pair.from_document)
+        if stored is None:
+            missing.append(pair)
+        else:
+            known[pair.links] = stored.table
+    for done, pair in enumerate(missing):
+        if progress is not None:
+            progress(", ".join(pair.links), done, len(missing))
+        made = known[pair.links] = _measure(robot, check, pair, effort)
+        store.put(keys[pair.links], _document(made))
+    tables = [known[pair.links] for pair in found]
+    return ClearanceTables(
+        tuple(table for table in tables if table is not None),
+        tuple(pair.links for pair in found if known[pair.links] is None),
     )
 
 
-def stored_at(robot: Robot, effort: TableEffort = FULL) -> Path:
-    """The file of the tables of a robot; its name is a hash of what they are made from."""
-    ends = robot.limits.lower.tolist(), robot.limits.upper.tolist()  # which the fingerprint leaves out
-    numbers = (robot.name, robot.fingerprint, *ends, ALGORITHM_VERSION, BEYOND, NEAR, effort)
-    return cache.cache_directory() / f"tables-{hashlib.sha256(repr(numbers).encode()).hexdigest()}.npz"
+def _settings(robot: Robot, pair: _PairOfTwo, effort: TableEffort) -> tuple[object, ...]:
+    axes = [robot.coordinate_names[coordinate] for coordinate in pair.between]
+    return "table", ALGORITHM_VERSION, BEYOND, NEAR, STEP, effort, axes
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """What the cache knows of a pair: its table, or None where it touches nowhere."""
+
+    table: ClearanceTable | None
 
 
 @dataclass(frozen=True)
@@ -153,52 +173,64 @@ class _Axis:
         return slice(None) if self.periodic else slice(BEYOND, self.count - BEYOND)
 
 
+@dataclass(frozen=True)
+class _PairOfTwo:
+    """Two links with two coordinates between, in the order of the robot, and where their control points are."""
+
+    links: Pair
+    between: tuple[int, ...]
+    axes: tuple[_Axis, _Axis]
+
+    def from_document(self, document: dict[str, Any]) -> _Stored:
+        """The entry of the cache, for the coordinates of this robot."""
+        if document["control"] is None:
+            return _Stored(None)
+        control = STEP * np.array(document["control"], dtype=np.float64)
+        if control.shape != tuple(axis.count for axis in self.axes):
+            raise ValueError(f"the control points have shape {control.shape}")
+        return _Stored(_spline(self.links, self.axes, control))
+
+
+def _document(table: ClearanceTable | None) -> dict[str, Any]:
+    """Control points as whole numbers of `STEP`."""
+    if table is None:
+        return {"control": None}
+    return {"control": np.rint(np.asarray(table.control) / STEP).astype(np.int64).tolist()}
+
+
 def _measure(
-    robot: Robot,
-    effort: TableEffort,
-    progress: Progress | None = None,
-    only: Sequence[Pair] | None = None,
-) -> ClearanceTables:
-    check = SelfCollision(robot)
-    tables: list[ClearanceTable] = []
-    apart: list[Pair] = []
-    found = [entry for entry in _pairs_of_two(robot, check, effort) if only is None or entry[0] in only]
-    for done, (pair, between, axes) in enumerate(found):
-        if progress is not None:
-            progress(", ".join(pair), done, len(found))
-        q = robot.neutral.copy()
+    robot: Robot, check: SelfCollision, pair: _PairOfTwo, effort: TableEffort
+) -> ClearanceTable | None:
+    """The table of a pair, or None where it touches nowhere."""
+    q, axes = robot.neutral.copy(), pair.axes
 
-        def distance(
-            x: float, y: float, q: Array = q, pair: Pair = pair, between: tuple[int, ...] = between
-        ) -> float:
-            q[list(between)] = x, y
-            return check.distance_between(q, *pair)
+    def distance(x: float, y: float) -> float:
+        q[list(pair.between)] = x, y
+        return check.distance_between(q, *pair.links)
 
-        grid = np.array([[distance(x, y) for y in axes[1].points] for x in axes[0].points])
-        travel = check.travel_between(*pair)
-        # Halfway to the next points.
-        least = grid - sum(0.5 * axis.spacing * travel[axis.coordinate] for axis in axes)
-        if least[axes[0].inside, axes[1].inside].min() > 0.0:
-            apart.append(pair)
-        else:
-            tables.append(_table(pair, axes, _continued(grid, axes), distance, _near(least, axes), effort))
-    return ClearanceTables(tuple(tables), tuple(apart))
+    grid = np.array([[distance(x, y) for y in axes[1].points] for x in axes[0].points])
+    travel = check.travel_between(*pair.links)
+    # Halfway to the next points.
+    least = grid - sum(0.5 * axis.spacing * travel[axis.coordinate] for axis in axes)
+    if least[axes[0].inside, axes[1].inside].min() > 0.0:
+        return None
+    return _table(pair.links, axes, _continued(grid, axes), distance, _near(least, axes), effort)
 
 
-def _pairs_of_two(
-    robot: Robot, check: SelfCollision, effort: TableEffort
-) -> list[tuple[Pair, tuple[int, ...], list[_Axis]]]:
+def _pairs_of_two(robot: Robot, check: SelfCollision, effort: TableEffort) -> list[_PairOfTwo]:
     """The pairs of links with two coordinates between that have control points."""
-    found: list[tuple[Pair, tuple[int, ...], list[_Axis]]] = []
-    for pair in check.pairs:
-        between = check.coordinates_between(*pair)
+    found: list[_PairOfTwo] = []
+    for links in check.pairs:
+        between = check.coordinates_between(*links)
+        if len(between) != 2:
+            continue
         axes = [axis for c in between if (axis := _Axis.of(robot, c, effort.spacing)) is not None]
-        if len(between) == 2 and len(axes) == 2:
-            found.append((pair, between, axes))
+        if len(axes) == 2:
+            found.append(_PairOfTwo(links, between, (axes[0], axes[1])))
     return found
 
 
-def _continued(grid: Array, axes: list[_Axis]) -> Array:
+def _continued(grid: Array, axes: Sequence[_Axis]) -> Array:
     """The distances (n, m) with those of links that overlap, 0, replaced by what lies as far on inside."""
     ways = [(axis.count if axis.periodic else 0,) * 2 for axis in axes]
     wide = np.pad(np.pad(grid, (ways[0], (0, 0)), mode="wrap"), ((0, 0), ways[1]), mode="wrap")
@@ -226,7 +258,7 @@ def _steepest(values: Array, axis: int, step: float) -> Array:
 
 def _table(
     pair: Pair,
-    axes: list[_Axis],
+    axes: Sequence[_Axis],
     control: Array,
     distance: Callable[[float, float], float],
     near: Mask,
@@ -254,7 +286,7 @@ def _table(
     return _spline(pair, axes, STEP * np.floor((control - left) / STEP))
 
 
-def _near(least: Array, axes: list[_Axis]) -> Mask:
+def _near(least: Array, axes: Sequence[_Axis]) -> Mask:
     """Which cells, named by their first corner, are within the limits and may hold a distance below `NEAR`."""
     close = least < NEAR
     for k, axis in enumerate(axes):
@@ -266,7 +298,7 @@ def _near(least: Array, axes: list[_Axis]) -> Mask:
     return close
 
 
-def _spline(pair: Pair, axes: list[_Axis], control: Array) -> ClearanceTable:
+def _spline(pair: Pair, axes: Sequence[_Axis], control: Array) -> ClearanceTable:
     return ClearanceTable(
         *pair,
         coordinates=(axes[0].coordinate, axes[1].coordinate),
@@ -274,39 +306,4 @@ def _spline(pair: Pair, axes: list[_Axis], control: Array) -> ClearanceTable:
         spacing=(axes[0].spacing, axes[1].spacing),
         periodic=(axes[0].periodic, axes[1].periodic),
         control=control,
-    )
-
-
-def _write(path: Path, tables: ClearanceTables) -> None:
-    """As arrays of their own for every table, of whole numbers of `STEP`."""
-    arrays: dict[str, npt.NDArray[np.generic]] = {"apart": np.array(tables.apart, dtype=str).reshape(-1, 2)}
-    for k, table in enumerate(tables.tables):
-        arrays[f"pair{k}"] = np.array((table.first, table.second))
-        arrays[f"coordinates{k}"] = np.array(table.coordinates)
-        arrays[f"axes{k}"] = np.array([table.begin, table.spacing, table.periodic], dtype=float)
-        arrays[f"control{k}"] = np.rint(table.control / STEP).astype(np.int32)
-    content = io.BytesIO()
-    np.savez_compressed(content, **arrays)  # type: ignore[arg-type]
-    write_bytes(path, content.getvalue())
-
-
-def _read(path: Path) -> ClearanceTables:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            count = sum(name.startswith("pair") for name in stored)
-            tables = tuple(_stored_table(stored, k) for k in range(count))
-            return ClearanceTables(tables, tuple((a, b) for a, b in stored["apart"].tolist()))
-    except (KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise ValueError(f"not a file of clearance tables: {error!r}") from error
-
-
-def _stored_table(stored: Mapping[str, npt.NDArray[Any]], k: int) -> ClearanceTable:
-    begin, spacing, periodic = stored[f"axes{k}"].tolist()
-    return ClearanceTable(
-        *stored[f"pair{k}"].tolist(),
-        coordinates=stored[f"coordinates{k}"].tolist(),
-        begin=begin,
-        spacing=spacing,
-        periodic=[bool(turn) for turn in periodic],
-        control=STEP * stored[f"control{k}"],
     )

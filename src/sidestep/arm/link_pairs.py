@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
+import itertools
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,20 +15,24 @@ from sidestep._core import ClearanceTable, Obstacles, SelfCollisionBarrier
 from sidestep.arm import clearance_tables as tables_room
 from sidestep.arm import shipped_arms
 from sidestep.arm.clearance_tables import Progress, TableEffort, clearance_tables
+from sidestep.arm.pair_content import PairContent
 from sidestep.body import Body, cache
-from sidestep.body.file import write_text
 from sidestep.distance import SelfCollision
+from sidestep.distance.travel import travel_per_joint
 from sidestep.robot import Robot
 
 Array: TypeAlias = npt.NDArray[np.float64]
 LinkPair: TypeAlias = tuple[str, str, float]
 _Measured: TypeAlias = tuple[str, str, float | None]  # None: ellipsoids are no measure
 
+ALGORITHM_VERSION = 2
+FOLDER = "pairs"  # of the user's cache
 FEW = 3  # coordinates between two links of which so many samples are dense enough to calibrate a contact
 TOUCHING = 20  # samples in which they touch that are needed for it
 NEAR = 0.002  # distance of meshes that counts as touching [m]
 MOST_LOST = 0.3  # of samples that lose their clearance without touching: above, ellipsoids are no measure
 CHECKS = 100  # configurations by which a coarse table is judged
+HALVINGS = 14  # of a way from touching to apart: to 1/16,000 of it
 SHARE = 0.95  # of samples in which the meshes are apart that the ellipsoids must be: otherwise they are no measure
 
 
@@ -54,7 +56,13 @@ DRAFT = PairEffort(samples=600, ways=60, tables=tables_room.DRAFT)
 
 
 def barrier_pairs(
-    robot: Robot, body: Body, *, effort: PairEffort = FULL, progress: Progress | None = None
+    robot: Robot,
+    body: Body,
+    *,
+    effort: PairEffort = FULL,
+    check: SelfCollision | None = None,
+    cached: bool = True,
+    progress: Progress | None = None,
 ) -> tuple[LinkPair, ...]:
     """The pairs of links that may touch, with the gap at which they do: (first, second, contact).
 
@@ -66,22 +74,18 @@ def barrier_pairs(
     least as near as they touch. Where 30 % are still below, ellipsoids are no measure: such pairs are left out, with a
     warning if they have no table. Those that touch nowhere (`clearance_tables`) are left out too.
 
-    That takes seconds, so the pairs are kept beside the bodies in the user's cache. Warns about an entry that cannot be
-    read or written.
+    That takes seconds, so each pair is kept in the user's cache, by its joints, limits, meshes and ellipsoids: of an
+    arm with another gripper only the pairs of that are measured. Warns about an entry that cannot be read or written.
 
     Args:
         robot: with collision meshes. body: a covering body of it. effort: how long they are looked for.
-        progress: called as progress("link, link", done, in_all) for each pair; not called when the cache answers.
+        check: of the robot, where it is at hand. cached: whether the user's cache is read and written.
+        progress: called as progress("link, link", done, in_all) for each pair that the cache does not answer.
     """
-    stored = cache.stored_or_made(
-        stored_at(robot, body, effort),
-        _read_pairs,
-        lambda: _find_pairs(robot, body, effort, progress),
-        lambda file, pairs: write_text(file, json.dumps(pairs, indent=1) + "\n"),
-        ("pairs of links are unreadable and are made again", "the pairs of links are not cached"),
-    )
-    exact = clearance_tables(robot, effort=effort.tables)
-    return _kept(robot, [pair for pair in stored if pair[:2] not in exact.apart], exact.pairs)
+    check = check or SelfCollision(robot)
+    measured = _find_pairs(robot, body, effort, check, cached, progress)
+    exact = clearance_tables(robot, effort=effort.tables, check=check, cached=cached)
+    return _kept(robot, [pair for pair in measured if pair[:2] not in exact.apart], exact.pairs)
 
 
 def tables_and_pairs(
@@ -89,6 +93,8 @@ def tables_and_pairs(
     body: Body,
     *,
     effort: PairEffort = FULL,
+    check: SelfCollision | None = None,
+    cached: bool = True,
     progress: Progress | None = None,
     pair_progress: Progress | None = None,
 ) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
@@ -98,29 +104,41 @@ def tables_and_pairs(
 
     Args:
         robot: with collision meshes. body: a covering body of it. effort: how long they are looked for.
+        check: of the robot, where it is at hand. cached: whether shipped arms and the user's cache are used.
         progress: of the tables, as in `clearance_tables`. pair_progress: of the other pairs, as in `barrier_pairs`.
     """
-    shipped = shipped_arms.with_clearances_of(robot)
+    shipped = shipped_arms.with_clearances_of(robot) if cached else None
     if shipped is not None and shipped_arms.has_body(shipped, body):
         return tuple(shipped.tables), tuple(shipped.pairs)
+    check = check or SelfCollision(robot)
     if effort is DRAFT:
-        return _draft(robot, body, progress, pair_progress)
-    exact = clearance_tables(robot, effort=effort.tables, progress=progress)
-    pairs = barrier_pairs(robot, body, effort=effort, progress=pair_progress)
+        return _draft(robot, body, check, cached, progress, pair_progress)
+    exact = clearance_tables(robot, effort=effort.tables, check=check, cached=cached, progress=progress)
+    pairs = barrier_pairs(robot, body, effort=effort, check=check, cached=cached, progress=pair_progress)
     return exact.tables, tuple(pair for pair in pairs if pair[:2] not in exact.pairs)
 
 
 def _draft(
-    robot: Robot, body: Body, progress: Progress | None, pair_progress: Progress | None
+    robot: Robot,
+    body: Body,
+    check: SelfCollision,
+    cached: bool,
+    progress: Progress | None,
+    pair_progress: Progress | None,
 ) -> tuple[tuple[ClearanceTable, ...], tuple[LinkPair, ...]]:
     """Covers wherever they measure well enough, as tables take longer; tables of the other pairs that can have one."""
-    measured = _find_pairs(robot, body, DRAFT, pair_progress)
+    measured = _find_pairs(robot, body, DRAFT, check, cached, pair_progress)
     left = [(first, second) for first, second, contact in measured if contact is None]
-    coarse = clearance_tables(robot, effort=DRAFT.tables, only=left, progress=progress)
-    check = SelfCollision(robot) if coarse.tables else None
-    good = tuple(table for table in coarse.tables if check is not None and _tells_apart(table, check, robot))
+
+    def tables_of(pairs: Sequence[tuple[str, str]], effort: TableEffort) -> tables_room.ClearanceTables:
+        return clearance_tables(
+            robot, effort=effort, only=pairs, check=check, cached=cached, progress=progress
+        )
+
+    coarse = tables_of(left, DRAFT.tables)
+    good = tuple(table for table in coarse.tables if _tells_apart(table, check, robot))
     poor = [(table.first, table.second) for table in coarse.tables if table not in good]
-    fine = clearance_tables(robot, effort=FULL.tables, only=poor, progress=progress)
+    fine = tables_of(poor, FULL.tables)
     tables = good + fine.tables
     exact = [*((table.first, table.second) for table in tables), *coarse.apart, *fine.apart]
     return tables, _kept(robot, measured, exact)
@@ -152,80 +170,130 @@ def _tells_apart(table: ClearanceTable, check: SelfCollision, robot: Robot) -> b
     return below <= (1.0 - SHARE) * (CHECKS - touches)
 
 
-def _read_pairs(path: Path) -> tuple[_Measured, ...]:
-    return tuple(
-        (str(a), str(b), None if contact is None else float(contact))
-        for a, b, contact in json.loads(path.read_text())
-    )
-
-
-def stored_at(robot: Robot, body: Body, effort: PairEffort = FULL) -> Path:
-    """The file of the pairs of a body; its name is a hash of what they are made from."""
-    ends = robot.limits.lower.tolist(), robot.limits.upper.tolist()  # which the fingerprint leaves out
-    numbers = (robot.name, robot.fingerprint, *ends, body.links, FEW, TOUCHING, NEAR, SHARE, effort)
-    key = hashlib.sha256(repr(numbers).encode())
-    for array in (body.means, np.array(body.covariances), body.levels):
-        key.update(np.ascontiguousarray(array).tobytes())
-    return cache.cache_directory() / f"pairs-{key.hexdigest()}.json"
-
-
 def _find_pairs(
-    robot: Robot, body: Body, effort: PairEffort, progress: Progress | None
+    robot: Robot,
+    body: Body,
+    effort: PairEffort,
+    check: SelfCollision,
+    cached: bool,
+    progress: Progress | None,
 ) -> tuple[_Measured, ...]:
-    check = SelfCollision(robot)
     pairs = [pair for pair in check.pairs if set(body.links).issuperset(pair)]
-    if not pairs:
-        return ()
-    barrier = SelfCollisionBarrier(robot, body, pairs)
-    rng, rest = np.random.default_rng(0), np.zeros(robot.num_coordinates)
+    store = cache.ContentStore(FOLDER, "the contact of a pair", enabled=cached)
+    content = PairContent(robot, body)
+    settings = ("contact", ALGORITHM_VERSION, FEW, TOUCHING, NEAR, MOST_LOST, SHARE, HALVINGS, effort)
+    keys = {pair: content.key(*pair, settings) for pair in pairs}
+    known = {pair: stored for pair in pairs if (stored := store.get(keys[pair], _contact)) is not None}
+    missing = [pair for pair in pairs if pair not in known]
+    if missing:
+        samples = _Samples(robot, body, missing, effort, check)
+        for k, pair in enumerate(missing):
+            if progress is not None:
+                progress(", ".join(pair), k, len(missing))
+            known[pair] = (samples.contact(k),)
+            store.put(keys[pair], {"contact": known[pair][0]})
+    return tuple((*pair, known[pair][0]) for pair in pairs)
 
-    def gaps(q: Array) -> Array:
-        return barrier.evaluate(q, rest, Obstacles.none()).clearances
 
-    configurations = np.array([robot.random_configuration(rng) for _ in range(effort.samples)])
-    found = np.array([gaps(q) for q in configurations])
-    result: list[_Measured] = []
-    for k, pair in enumerate(pairs):
-        if progress is not None:
-            progress(", ".join(pair), k, len(pairs))
-        few = len(check.coordinates_between(*pair)) <= FEW
-        looked = slice(0, effort.samples if few else effort.samples // 10)
+def _contact(document: dict[str, Any]) -> tuple[float | None]:
+    contact = document["contact"]
+    return (None if contact is None else float(contact),)
+
+
+class _Samples:
+    """Gaps between the ellipsoids of pairs at random configurations, and what they tell of contacts.
+
+    What is found of a pair depends on its joints, limits, surfaces and ellipsoids alone, not on the rest of the robot.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        body: Body,
+        pairs: Sequence[tuple[str, str]],
+        effort: PairEffort,
+        check: SelfCollision,
+    ) -> None:
+        self._robot, self._body, self._pairs = robot, body, pairs
+        self._effort, self._check = effort, check
+        self._configurations = robot.random_configurations(effort.samples)
+        gaps = _gaps(robot, body, pairs)
+        self._found = np.array([gaps(q) for q in self._configurations])
+
+    def contact(self, k: int) -> float | None:
+        """The gap at which pair k touches; None where ellipsoids are no measure."""
+        check, pair, samples = self._check, self._pairs[k], self._effort.samples
+        coordinates = check.coordinates_between(*pair)
+        few = len(coordinates) <= FEW
+        gap = self._found[: samples if few else samples // 10, k]
         # Ellipsoids cover links: those of links that touch overlap.
-        overlap = np.flatnonzero(found[looked, k] < 0.0)
-        touch = np.array([check.within(configurations[i], *pair, NEAR) for i in overlap], dtype=bool)
-        touching, gap = overlap[touch], found[looked, k]
-        measured = -np.inf  # the largest gap at which they touch
-        often = few and touch.sum() >= TOUCHING
-        if touch.any() and not touch.all():
-            draw = rng if often else np.random.default_rng((1, k))
-            apart = np.setdiff1d(np.arange(looked.stop), touching)
-            ends = zip(draw.choice(touching, effort.ways), draw.choice(apart, effort.ways), strict=True)
-            first = [_first_touch(check, pair, configurations[i], configurations[j]) for i, j in ends]
-            measured = min(0.0, max(float(gaps(q)[k]) for q in first))
-        contact = measured if often else 0.0
+        overlap = np.flatnonzero(gap < 0.0)
+        touch = np.array([check.within(self._configurations[i], *pair, NEAR) for i in overlap], dtype=bool)
+        touching = overlap[touch]
 
-        def below(at: float, gap: Array = gap, touching: npt.NDArray[np.intp] = touching) -> float:
+        def below(at: float) -> float:
             """The share of the samples that lose their clearance though the links do not touch."""
             lost = gap < at
             lost[touching] = False
             return float(lost.mean())
 
+        often = few and touch.sum() >= TOUCHING
+        if not often and below(0.0) <= 1.0 - SHARE:
+            return 0.0
+        measured = self._largest_gap(k, touching, gap)
+        contact = measured if often else 0.0
         if below(contact) > 1.0 - SHARE:
-            if len(check.coordinates_between(*pair)) == 2:  # a table tells more
-                result.append((*pair, None))
-                continue
+            if len(coordinates) == 2:  # a table tells more
+                return None
             # As near as they were seen not to touch, and not as near as they touch.
             contact = min(0.0, max(measured, float(np.quantile(np.delete(gap, touching), 1.0 - SHARE))))
-        result.append((*pair, contact if below(contact) <= MOST_LOST else None))
-    return tuple(result)
+        return contact if below(contact) <= MOST_LOST else None
+
+    def _largest_gap(self, k: int, touching: npt.NDArray[np.intp], gap: Array) -> float:
+        """The largest gap [m] at which the links touch, at most 0, on ways to configurations in which they do not."""
+        apart = np.setdiff1d(np.arange(len(gap)), touching)
+        if not len(touching) or not len(apart):
+            return -np.inf  # nothing touches, or everything
+        pair, ways, draw = self._pairs[k], self._effort.ways, np.random.default_rng(1)
+        starts, ends = draw.choice(touching, ways), draw.choice(apart, ways)
+        gaps = _gaps(self._robot, self._body, [pair])
+        travel = self._travel(pair)
+        largest = -np.inf
+        for way in np.argsort(-gap[starts], kind="stable"):  # the most promising first
+            inside, outside = self._configurations[starts[way]], self._configurations[ends[way]]
+            at = float(gap[starts[way]])
+            for _ in range(HALVINGS):
+                # What the gap cannot exceed from here to the other end.
+                if largest >= 0.0 or at + travel @ np.abs(outside - inside) <= largest:
+                    break
+                middle = 0.5 * (inside + outside)
+                between = float(gaps(middle)[0])
+                if between <= NEAR and self._check.within(middle, *pair, NEAR):
+                    inside, at = middle, between
+                else:
+                    outside = middle
+            largest = max(largest, at)
+        return min(0.0, largest)
+
+    def _travel(self, pair: tuple[str, str]) -> Array:
+        """How far points of the ellipsoids of two links can come towards each other per unit of each joint (nv,)."""
+        owner, travel = np.asarray(self._body.links), np.zeros(self._robot.num_coordinates)
+        levels = self._body.levels
+        assert levels is not None
+        between = np.zeros(self._robot.num_coordinates, dtype=bool)
+        between[list(self._check.coordinates_between(*pair))] = True
+        for link in pair:
+            own = owner == link
+            variances = np.diagonal(np.asarray(self._body.covariances)[own], axis1=1, axis2=2)
+            reach = np.sqrt(variances * np.asarray(levels)[own, None])
+            signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+            corners = np.asarray(self._body.means)[own, None] + reach[:, None] * signs
+            travel += travel_per_joint(self._robot, link, corners.reshape(-1, 3))
+        return np.where(between, travel, 0.0)
 
 
-def _first_touch(check: SelfCollision, pair: tuple[str, str], touching: Array, apart: Array) -> Array:
-    """A configuration between the two at which the pair is just within `NEAR`, by halving."""
-    for _ in range(14):  # to 1/16,000 of the way
-        middle = 0.5 * (touching + apart)
-        if check.within(middle, *pair, NEAR):
-            touching = middle
-        else:
-            apart = middle
-    return touching
+def _gaps(robot: Robot, body: Body, pairs: Sequence[tuple[str, str]]) -> Callable[[Array], Array]:
+    """The gaps (P,) [m] between the ellipsoids of pairs at a configuration (nv,)."""
+    barrier = SelfCollisionBarrier(robot, body, list(pairs))
+    rest, nothing = np.zeros(robot.num_coordinates), Obstacles.none()
+    return lambda q: np.array(barrier.evaluate(q, rest, nothing).clearances)

@@ -13,7 +13,7 @@ import numpy as np
 from sidestep import _core
 from sidestep.arm.link_pairs import DRAFT, FULL, tables_and_pairs
 from sidestep.body import Body
-from sidestep.body.cover import CoverProgress
+from sidestep.body.cover import CoverProgress, CoverSettings
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 
@@ -33,6 +33,7 @@ def prepare(
     allowed: Sequence[Pair] = (),
     source: str = "",
     draft: bool = False,
+    cached: bool = True,
     progress: Progress | None = None,
 ) -> _core.Arm:
     """Everything that is made once for a robot. Minutes, a draft seconds, unless the user's cache has the parts.
@@ -42,7 +43,9 @@ def prepare(
         body: a covering body of it; `Body.cover(robot)` by default.
         allowed: pairs of links that may touch, in either order: they get no clearance.
         source: what the provenance calls the description; the robot's name by default.
-        draft: with fewer ellipsoids, which are larger, and tables and pairs by fewer samples.
+        draft: with fewer ellipsoids, which are larger, and tables and pairs by fewer samples; so it is with a body that
+            is a draft.
+        cached: whether parts are taken from shipped arms and the user's cache, and kept there.
         progress: called as progress(stage, item, done, in_all).
 
     Raises:
@@ -52,21 +55,27 @@ def prepare(
         for link in pair:
             robot.link(link)
     if body is None:
-        body = Body.cover(robot, effort="draft" if draft else "fine", progress=_of_stage("cover", progress))
+        body = Body.cover(
+            robot, effort="draft" if draft else "fine", cache=cached, progress=_of_stage("cover", progress)
+        )
     elif body.fingerprint and body.fingerprint != robot.fingerprint:
         raise ValueError(f"the body was made for robot {body.robot_name!r}, not for {robot.name!r} as it is")
     elif body.levels is None:
         raise ValueError(
             "the body does not cover its links (it has no levels); Body.cover(robot) makes one that does"
         )
+    draft = draft or (isinstance(body.settings, CoverSettings) and body.settings.effort == "draft")
+    check = SelfCollision(robot)
     tables, pairs = tables_and_pairs(
         robot,
         body,
         effort=DRAFT if draft else FULL,
+        check=check,
+        cached=cached,
         progress=_of_stage("tables", progress),
         pair_progress=_of_stage("pairs", progress),
     )
-    _warn_of_touching(robot)
+    _warn_of_touching(check)
     may_touch = {frozenset(pair) for pair in allowed}
     return _core.Arm(
         robot=robot,
@@ -97,12 +106,12 @@ def prepare(
     )
 
 
-def _warn_of_touching(robot: Robot) -> None:
-    found = [pair for pair, reason in SelfCollision(robot).left_out.items() if reason == "always"]
+def _warn_of_touching(check: SelfCollision) -> None:
+    found = [pair for pair, reason in check.left_out.items() if reason == "always"]
     if found:
         words = ", ".join(f"{first!r} and {second!r}" for first, second in found)
         warnings.warn(
-            f"robot {robot.name!r}: these links overlap wherever they are, and may touch: {words}",
+            f"robot {check.robot.name!r}: these links overlap wherever they are, and may touch: {words}",
             RuntimeWarning,
             stacklevel=5,
         )

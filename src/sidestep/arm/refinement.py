@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import multiprocessing
+import tempfile
 import threading
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from sidestep import _core
 from sidestep._core import Controller
 from sidestep.arm.arm import Arm
+
+if TYPE_CHECKING:  # imported where they are needed
+    from multiprocessing.connection import Connection
+
+    from sidestep.arm.preparation import Progress
 
 
 class Refinement:
     """Prepares the fine body of a draft in a process of its own, and hands it to controllers when it is done.
 
-    Controllers go on: each takes the fine body over between two steps. It is in the user's cache from then on.
+    Controllers go on: each takes the fine body over between two steps. It is in the user's cache from then on, if that
+    can be written.
 
         arm = ss.Arm.load("arm.urdf", draft=True)
         controller = ss.Controller(arm)
@@ -25,10 +33,12 @@ class Refinement:
     Args:
         arm: of `Arm.load(..., draft=True)`; one that is fine already is done at once.
         controllers: of this arm, that are to have the fine body.
+        progress: called, by a thread, as progress(stage, item, done, in_all), see `Arm.load`.
     """
 
-    def __init__(self, arm: Arm, *controllers: Controller) -> None:
+    def __init__(self, arm: Arm, *controllers: Controller, progress: Progress | None = None) -> None:
         self._controllers = controllers
+        self._progress = progress
         self._arm = arm
         self._error: str | None = None
         self._done = threading.Event()
@@ -38,10 +48,11 @@ class Refinement:
             return
         source, options = arm._request
         context = multiprocessing.get_context("spawn")
-        messages = context.SimpleQueue()
-        self._process = context.Process(target=_prepare, args=(source, options, messages), daemon=True)
+        messages, sending = context.Pipe(duplex=False)
+        self._process = context.Process(target=_prepare, args=(source, options, sending), daemon=True)
         self._process.start()
-        self._thread = threading.Thread(target=self._hand_over, args=(source, options, messages), daemon=True)
+        sending.close()  # so that the pipe ends with the process
+        self._thread = threading.Thread(target=self._hand_over, args=(messages,), daemon=True)
         self._thread.start()
 
     @property
@@ -76,31 +87,48 @@ class Refinement:
             self._process.terminate()
         self._done.wait()
 
-    def _hand_over(self, source: str | Path, options: Mapping[str, Any], messages: Any) -> None:
+    def _hand_over(self, messages: Connection[Any, Any]) -> None:
         assert self._process is not None
         try:
-            self._process.join()
-            failure = messages.get() if not messages.empty() else "its process ended"
-            if failure:
-                raise RuntimeError(self._error or failure)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the draft's reading said them
-                fine = Arm.load(source, **options)
+            fine = Arm(self._received(messages), description=self._arm._description)
             for controller in self._controllers:
                 controller.set_arm(fine)
             self._arm = fine
         except Exception as error:  # told by `wait`: a thread has nobody else to tell
-            self._error = str(error)
+            self._error = self._error or str(error)
         finally:
             self._done.set()
+            self._process.join()
+
+    def _received(self, messages: Connection[Any, Any]) -> _core.Arm:
+        """The arm that the process prepares."""
+        while True:
+            try:
+                message = messages.recv()
+            except (EOFError, OSError):
+                raise RuntimeError("its process ended") from None
+            if isinstance(message, str):
+                raise RuntimeError(message)
+            if isinstance(message, bytes):
+                with tempfile.TemporaryDirectory() as folder:
+                    file = Path(folder) / "fine.arm"
+                    file.write_bytes(message)
+                    return _core.Arm.read(file)
+            if self._progress is not None:
+                self._progress(*message)
 
 
-def _prepare(source: str | Path, options: Mapping[str, Any], messages: Any) -> None:
-    """Of the process: puts the arm into the user's cache; tells what failed, or nothing."""
+def _prepare(source: str | Path, options: Mapping[str, Any], messages: Connection[Any, Any]) -> None:
+    """Of the process: sends how far it is, then the arm as a file has it, or what failed."""
+
+    def progress(*told: object) -> None:
+        messages.send(told)
+
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            Arm.load(source, **options)
-        messages.put("")
+        with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+            warnings.simplefilter("ignore")  # the draft's reading said them
+            file = Path(folder) / "fine.arm"
+            Arm.load(source, **options, progress=progress).save(file)
+            messages.send(file.read_bytes())
     except Exception as error:
-        messages.put(f"{type(error).__name__}: {error}")
+        messages.send(f"{type(error).__name__}: {error}")

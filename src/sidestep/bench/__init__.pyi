@@ -25,7 +25,6 @@ from .problem_file import write_problems as write_problems
 from .problems import ProblemGenerator as ProblemGenerator
 from .problems import ProblemSettings as ProblemSettings
 from .problems import ReachProblem as ReachProblem
-from .problems import Workspace as Workspace
 from .quadratic_programs import QuadraticProgramSettings as QuadraticProgramSettings
 from .quadratic_programs import run_quadratic_programs as run_quadratic_programs
 from .reach import BenchResult as BenchResult
@@ -40,3 +39,5 @@ from .scenes import run_scenes as run_scenes
 from .step import StepSettings as StepSettings
 from .step import compare_steps as compare_steps
 from .step import run_step_bench as run_step_bench
+from .workspace import SweptSpace as SweptSpace
+from .workspace import Workspace as Workspace

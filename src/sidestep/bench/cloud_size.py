@@ -13,9 +13,9 @@ import numpy.typing as npt
 import sidestep
 from sidestep._core import BarrierSettings, GeometricSystem, Obstacles, instruction_set, rollout
 from sidestep.bench.methods import barrier_system
-from sidestep.bench.problems import Workspace
 from sidestep.bench.step import clear_place, cpu_model
 from sidestep.bench.step_times import StepTimes
+from sidestep.bench.workspace import Workspace
 from sidestep.body import Body
 from sidestep.robot import Robot
 

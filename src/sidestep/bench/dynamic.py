@@ -17,9 +17,10 @@ from sidestep.bench.methods import build_body
 from sidestep.bench.motion_bench_maker import MotionBenchMakerProblem
 from sidestep.bench.parallel import Progress
 from sidestep.bench.problem import Problem
-from sidestep.bench.problems import ProblemGenerator, ProblemSettings, Workspace
+from sidestep.bench.problems import ProblemGenerator, ProblemSettings
 from sidestep.bench.scenes import SceneOutcome, SceneResult, SceneSettings, collect, judged
 from sidestep.bench.step_times import StepTimes
+from sidestep.bench.workspace import Workspace
 from sidestep.distance import SceneObject
 from sidestep.robot import Robot
 from sidestep.robot.pose import moved
@@ -210,6 +211,7 @@ class _Worker:
         self._arms = Arms(settings.robot, settings.method, body)
         self._arm = Arm.of(robot, settings.method, body)
         self._generator = ProblemGenerator(random, robot=robot, self_collision=self._arm.self_collision)
+        self._workspace = Workspace.of(robot)
 
     def run(self, task: tuple[Kind, int | MotionBenchMakerProblem]) -> tuple[SceneOutcome, StepTimes]:
         kind, source = task
@@ -222,7 +224,7 @@ class _Worker:
         else:
             arm, name = self._arms.of(source), source.set
             base, _ = arm.problem(source, spacing=settings.spacing, point_radius=settings.point_radius)
-            problem = with_ball(base, kind, arm, self._generator.workspace, seed=self.random.seed)
+            problem = with_ball(base, kind, arm, self._workspace, seed=self.random.seed)
         return judged(arm, problem, settings, set=f"{name} {kind.value}", arrives=kind is not Kind.blocked)
 
     def _random_problem(self, kind: Kind, index: int) -> DynamicProblem:
@@ -231,7 +233,7 @@ class _Worker:
         for number in range(index, index + REPLACEMENTS * REPLACED_BY, REPLACED_BY):
             base = generator.problem(number)
             try:
-                return with_ball(base, kind, self._arm, generator.workspace, seed=self.random.seed)
+                return with_ball(base, kind, self._arm, self._workspace, seed=self.random.seed)
             except ValueError as error:
                 unfit = error
         raise unfit

@@ -8,15 +8,18 @@ from sidestep.bench.method import Method
 from sidestep.bench.motion import ControllerMover, Mover
 from sidestep.bench.thesis import SystemMover
 from sidestep.body import Body
+from sidestep.body.cover import CoverProgress
 from sidestep.robot import Robot
 from sidestep.scenario.config import ABLATIONS
 from sidestep.thesis import ThesisNumbers, thesis_system
 
 
-def build_body(method: Method, robot: Robot) -> Body:
-    """The body that a method needs, from the user's cache or made now."""
+def build_body(
+    method: Method, robot: Robot, *, draft: bool = False, progress: CoverProgress | None = None
+) -> Body:
+    """The body that a method needs, from the user's cache or made now; draft: where it covers, coarser, in seconds."""
     if method.safe:
-        return Body.cover(robot)
+        return Body.cover(robot, effort="draft" if draft else "fine", progress=progress)
     return Body.fit(robot, components=ThesisNumbers().components)
 
 

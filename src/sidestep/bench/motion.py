@@ -20,6 +20,7 @@ from sidestep._core import (
 )
 from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot, tip_of
+from sidestep.robot.tolerance import tolerances
 from sidestep.robot.turns import ways_to
 from sidestep.simulation import Arrival, ControllerDriver, Drive, Driver, Simulation
 from sidestep.simulation.pose_target import PoseTarget
@@ -37,7 +38,7 @@ class MotionSettings:
 
     Attributes:
         period: control period [s]. duration: after it the arm has not arrived [s].
-        tolerance: it has arrived once every joint is this close to the goal [rad | m].
+        tolerance: it has arrived once every joint is this close to the goal [rad], see `tolerances` of sliding joints.
         torque: under torque control in MuJoCo, with the real masses, instead of integrated.
         poses: the goal is the pose that the tip (`tip_of`) has at the goal configuration, in any posture: within
             `POSE_TOLERANCE`, in place of the tolerance.
@@ -214,6 +215,7 @@ class Columns:
 
     def __init__(self, robot: Robot, problem: Problem, settings: MotionSettings) -> None:
         self._robot, self._goal, self._settings = robot, problem.goal, settings
+        self._tolerances = tolerances(robot, settings.tolerance)
         self._total = max(1, round(settings.duration / settings.period))
         self._changes = problem.changes
         self._rows: list[tuple[Array, Array, Array]] = []
@@ -232,7 +234,7 @@ class Columns:
     def near(self, q: Array) -> npt.NDArray[np.bool_]:
         """Which of the rows (T, nv) are at the goal configuration."""
         away = ways_to(self._robot, q, self._goal)
-        return np.asarray(away.max(axis=1) < self._settings.tolerance)
+        return np.asarray((away < self._tolerances).all(axis=1))
 
     def add(self, q: Array, v: Array, a: Array, seconds: Array, near: npt.NDArray[np.bool_]) -> None:
         """Rows that came next, and which of them are at the goal."""

@@ -16,10 +16,12 @@ from sidestep.distance import ExactClearance, SelfCollision
 from sidestep.distance.clearance import FINEST
 from sidestep.robot import Robot
 from sidestep.robot.turns import ways_to
-from sidestep.simulation.evaluation import excess_over
+from sidestep.simulation.evaluation import excess_over, outside_of
 
 Array = npt.NDArray[np.float64]
 
+LATELY = 1.0  # [s] at the end, in which a motion that is under way comes nearer
+NEARER = 0.2, 0.05  # by this share of the velocity limit, or of what was left
 TOLERANCE = 1e-3  # [m] of minimum clearances: the true one is at most this much smaller than the one reported
 
 
@@ -40,6 +42,7 @@ class Outcome:
         diverged: the state was not finite any more; the motion ends there.
         way_out: of a collision of a safe method with what moves, see `find_way_out`; None elsewhere.
         pose_error: at the end, where the goal was a pose: [m] and [rad].
+        under_way: it did not arrive, and still came nearer when the time was over.
     """
 
     index: int
@@ -58,6 +61,7 @@ class Outcome:
     diverged: bool
     way_out: WayOut | None = None
     pose_error: tuple[float, float] | None = None
+    under_way: bool = False
 
     @property
     def collision(self) -> bool:
@@ -76,7 +80,12 @@ class Outcome:
 
     @property
     def stuck(self) -> bool:
-        """It touched nothing and did not arrive."""
+        """It touched nothing, did not arrive, and comes no nearer."""
+        return self.late and not self.under_way
+
+    @property
+    def late(self) -> bool:
+        """It touched nothing and did not arrive in time."""
         return not self.arrived and not self.collision and not self.self_collision
 
     def reasons(self, *, arrives: bool = True) -> list[str]:
@@ -96,12 +105,12 @@ class Outcome:
             found.append(f"self-collision: {self.self_pair}")
         if not arrives and self.arrived:
             found.append("it arrived at a goal that is blocked")
-        if arrives and self.stuck:
+        if arrives and self.late:
             away = f"{self.error_rad:.2f} rad from the goal"
             if self.pose_error is not None:
                 distance, angle = self.pose_error
                 away = f"{1e3 * distance:.1f} mm and {math.degrees(angle):.1f}° from the pose"
-            found.append(f"stuck: {away} after {self.time_s:.1f} s")
+            found.append(f"{'under way' if self.under_way else 'stuck'}: {away} after {self.time_s:.1f} s")
         found += [f"{name} limit exceeded by {value:.3g}" for name, value in self.limits.items()]
         return found
 
@@ -161,7 +170,19 @@ class Judge:
             diverged=end < len(motion.q),
             way_out=way_out,
             pose_error=motion.pose_error,
+            under_way=not motion.arrived
+            and end == len(motion.q)
+            and self._under_way(q, problem.goal, settings.period),
         )
+
+    def _under_way(self, q: Array, goal: Array, period: float) -> bool:
+        """Whether the joint that is farthest, in time at its velocity limit, came nearer at the end of q (T, nv)."""
+        before = q[max(0, len(q) - 1 - round(LATELY / period))]
+        velocity = self.robot.limits.velocity
+        speed = np.where(np.isfinite(velocity), velocity, 1.0)
+        left = [float((ways_to(self.robot, at, goal) / speed).max()) for at in (before, q[-1])]
+        span = min(LATELY, (len(q) - 1) * period)
+        return left[0] - left[1] > min(NEARER[0] * span, NEARER[1] * left[0])
 
     def _find_way_out(
         self, problem: Problem, motion: Motion, touched: str, when: float, period: float
@@ -183,7 +204,7 @@ class Judge:
         limits = self.robot.limits
         q = motion.q[:end]
         beyond = {
-            "position": excess_over(np.maximum(limits.lower - q, q - limits.upper), np.zeros(1)),
+            "position": excess_over(outside_of(q, limits), np.zeros(1)),
             "velocity": excess_over(np.abs(motion.v[:end]), limits.velocity),
             "acceleration": excess_over(np.abs(motion.a[:end]), limits.acceleration),
         }

@@ -2,79 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import coal
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Obstacles
+from sidestep._core import Obstacles, unlimited_joints
+from sidestep.bench.workspace import Space, SweptSpace, Workspace
 from sidestep.distance import ExactClearance, SceneObject, SelfCollision
 from sidestep.robot import Robot
+from sidestep.robot.any_source import is_name, robot_from
+from sidestep.robot.catalogue import RECIPES
 from sidestep.robot.mesh import mesh_model
 
 Array = npt.NDArray[np.float64]
 
-RADII = (0.05, 0.10)  # [m] of the balls
-SHELL = (0.35, 1.0)  # of the reach, between which ball centres lie
+RADII = (0.05, 0.10)  # [m] of the balls; of an arm from a file, of its reach
 BASE_CLEARANCE = 0.02  # [m] of a ball from what does not move: nearer, it would be in the mounting
 CLEARANCE = 0.03  # [m] of start and goal from every ball, exact
 TRIES = 50  # configurations drawn for one set of balls before new balls are drawn
 SETS = 1000  # sets of balls drawn before the settings are called impossible
-REACH_SAMPLES = 2000  # configurations from which the reach is measured
-LENGTH_DECIMALS = 3  # reach and shoulder are rounded to 1 mm, so that every machine computes the same
 TOLERANCE = 1e-3  # [m] of the minimum over a straight line
-
-
-@dataclass(frozen=True)
-class Workspace:
-    """Where the tip of an arm gets to: a shell around the shoulder.
-
-    Attributes:
-        shoulder: (3,) [m] the point of the first joint's axis from which the farthest tip is nearest.
-        reach: [m] distance of that farthest tip.
-        directions: (dim, 3) orthonormal; 3 rows, or 2 for an arm that moves in a plane.
-    """
-
-    shoulder: Array
-    reach: float
-    directions: Array
-
-    @classmethod
-    def of(cls, robot: Robot) -> Workspace:
-        """Measures where the far end of the last link with geometry gets to, on random configurations (seed 0)."""
-        rng = np.random.default_rng(0)
-        meshes = [(link.name, robot.collision_mesh(link.name)) for link in robot.links]
-        tip, vertices = [(name, mesh.vertices) for name, mesh in meshes if mesh is not None][-1]
-        away = np.linalg.norm(vertices, axis=1)
-        end = np.append(vertices[away > away.max() - 10.0**-LENGTH_DECIMALS].mean(axis=0), 1.0)
-        poses = [robot.pose(robot.random_configuration(rng), tip) for _ in range(REACH_SAMPLES)]
-        tips = np.array([(X @ end)[:3] for X in poses])
-        joint = robot.joints[0]
-        axis = joint.placement[:3, :3] @ joint.axis
-        origin = joint.placement[:3, 3]
-        along = (tips - origin) @ axis
-        away2 = np.sum((tips - origin) ** 2, axis=1) - along**2
-        heights = np.linspace(along.min(), along.max(), 1001)
-        farthest = np.sqrt((away2 + (along - heights[:, None]) ** 2).max(axis=1))
-        best = int(farthest.argmin())
-        shoulder = np.round(origin + heights[best] * axis, LENGTH_DECIMALS) + 0.0
-        return cls(shoulder, round(float(farthest[best]), LENGTH_DECIMALS), _directions(tips))
-
-    def sample(self, rng: np.random.Generator) -> Array:
-        """A point (3,), uniform in the volume (or area) of the shell."""
-        dim = len(self.directions)
-        inner, outer = (share * self.reach for share in SHELL)
-        distance = rng.uniform(inner**dim, outer**dim) ** (1.0 / dim)
-        point: Array = self.shoulder + distance * self.direction(rng)
-        return point
-
-    def direction(self, rng: np.random.Generator) -> Array:
-        """A uniform unit vector (3,) in which the arm can move."""
-        coefficients = rng.normal(size=len(self.directions))
-        unit: Array = (coefficients / np.linalg.norm(coefficients)) @ self.directions
-        return unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +34,7 @@ class ReachProblem:
     """One problem: get from start to goal among balls.
 
     Attributes:
-        robot: name for `Robot.named`.
+        robot: name for `Robot.named`, or a description's path.
         seed, index: of which the problem was made.
         start, goal: (nv,) [rad | m].
         centers: (N, 3) [m] of the balls at time 0, world; velocities: (N, 3) [m/s], constant; radii: (N,) [m].
@@ -126,7 +78,7 @@ class ProblemSettings:
     """What problems are drawn.
 
     Attributes:
-        robot: name for `Robot.named`.
+        robot: name for `Robot.named`, or a description's path. options: of `Robot.from_urdf` for it, such as `tip`.
         obstacles: number of balls. seed: of all. moving: largest speed of a ball [m/s].
 
     Raises:
@@ -137,6 +89,7 @@ class ProblemSettings:
     obstacles: int = 10
     seed: int = 0
     moving: float = 0.0
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.obstacles < 0:
@@ -156,9 +109,13 @@ class ProblemGenerator:
     uniform directions and uniform speeds up to `moving`, from a stream of their own: the same problem stands
     still and drifts. There is no floor.
 
+    An arm that is no named one has its balls in the space that its links sweep (see `SweptSpace`), of 5-10 % of its
+    reach, and clearances in proportion where that is below 1 m. The goal of a joint that turns freely is the turn
+    nearest to the start.
+
     Args:
         settings: what to draw.
-        robot: the robot of that name, if it is loaded already; self_collision: likewise.
+        robot: the robot, if it is loaded already. self_collision: likewise.
     """
 
     def __init__(
@@ -169,9 +126,14 @@ class ProblemGenerator:
         self_collision: SelfCollision | None = None,
     ) -> None:
         self.settings = settings
-        self.robot = robot or Robot.named(settings.robot)
+        self.robot = robot or robot_from(settings.robot, settings.options)
         self.self_collision = self_collision or SelfCollision(self.robot)
-        self.workspace = Workspace.of(self.robot)
+        # Published results stand on the problems of the named robots.
+        self._named = is_name(settings.robot) and settings.robot in {recipe.name for recipe in RECIPES}
+        self.workspace: Space = Workspace.of(self.robot) if self._named else SweptSpace.of(self.robot)
+        reach = self.workspace.reach
+        self._size = 1.0 if self._named else reach  # of the balls
+        self._scale = 1.0 if self._named else min(1.0, reach)  # of clearances
         self._clearance = ExactClearance(self.robot, ())
         moves = {frame.name: frame.joint >= 0 for frame in self.robot.frames}
         meshes = [
@@ -197,13 +159,15 @@ class ProblemGenerator:
                 break
         else:
             raise ValueError(
-                f"no start and goal with {100 * CLEARANCE:.0f} cm clearance found among {SETS} sets of "
+                f"no start and goal with {100 * self._scale * CLEARANCE:.2g} cm clearance found among {SETS} sets of "
                 f"{settings.obstacles} obstacles for {settings.robot!r}: ask for fewer obstacles"
             )
         drift = np.random.default_rng((settings.seed, index, 1))
         velocities = np.array(
             [drift.uniform(0.0, settings.moving) * self.workspace.direction(drift) for _ in centers]
         ).reshape(-1, 3)
+        if not self._named:
+            ends = ends[0], self._nearest_turn(ends[1], ends[0])
         line = clearance.decided_minimum(np.array(ends), tolerance=TOLERANCE)
         return ReachProblem(
             robot=settings.robot,
@@ -221,11 +185,16 @@ class ProblemGenerator:
         centers: list[Array] = []
         radii: list[float] = []
         while len(centers) < self.settings.obstacles:
-            center, radius = self.workspace.sample(rng), rng.uniform(*RADII)
-            if self._from_base(center) >= radius + BASE_CLEARANCE:
+            center, radius = self.workspace.sample(rng), self._size * rng.uniform(*RADII)
+            if self._from_base(center) >= radius + self._scale * BASE_CLEARANCE:
                 centers.append(center)
                 radii.append(radius)
         return np.array(centers).reshape(-1, 3), np.array(radii)
+
+    def _nearest_turn(self, q: Array, other: Array) -> Array:
+        turn = 2.0 * np.pi
+        free = np.array(unlimited_joints(self.robot))
+        return np.asarray(np.where(free, q + turn * np.round((other - q) / turn), q))
 
     def _from_base(self, point: Array) -> float:
         at, ball = coal.Transform3s(np.eye(3), point), coal.Sphere(1e-9)
@@ -241,23 +210,13 @@ class ProblemGenerator:
         found: list[Array] = []
         for _ in range(TRIES):
             q = self.robot.random_configuration(rng)
-            if clearance.distance(q).distance >= CLEARANCE and not self.self_collision.touching(q):
+            if clearance.distance(q).distance >= self._scale * CLEARANCE and not self.self_collision.touching(
+                q
+            ):
                 found.append(q)
                 if len(found) == 2:
                     return found[0], found[1]
         return None
-
-
-def _directions(points: Array) -> Array:
-    """An orthonormal basis (2 or 3, 3) of the directions in which points (N, 3) [m] spread, the same anywhere."""
-    _, spread, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
-    if spread[2] > 1e-6 * spread[0]:
-        return np.eye(3)
-    normal = np.round(axes[2], 6) + 0.0  # rounded: the basis must not depend on the machine's last digits
-    first = np.eye(3)[int(np.abs(normal).argmin())]
-    first = first - (first @ normal) * normal
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(normal * np.sign(normal[np.abs(normal).argmax()]), first)])
 
 
 def balls(centers: Array, radii: Array, velocities: Array | None = None) -> tuple[SceneObject, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from sidestep._core import __version__
 from sidestep.bench.method import Method
-from sidestep.bench.methods import build_mover
+from sidestep.bench.methods import build_body, build_mover
 from sidestep.bench.motion import MotionSettings, Mover
 from sidestep.bench.outcome import Judge, Outcome, times_of
 from sidestep.bench.own_method import OwnMover
@@ -21,6 +21,7 @@ from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProb
 from sidestep.bench.step_times import StepTimes
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
+from sidestep.robot.any_source import robot_from
 
 
 @dataclass(frozen=True)
@@ -28,12 +29,12 @@ class BenchSettings:
     """What is run.
 
     Attributes:
-        problems: what is drawn. count: how many, from index 0.
+        problems: what is drawn, and the robot. count: how many, from index 0.
         method: how the arm is moved, or a Python file of `OwnMover`. motion: how problems are run.
-        jobs: processes.
+        jobs: processes. draft: with a coarser body, which is made in seconds; of the controller.
 
     Raises:
-        ValueError: count or jobs below 1.
+        ValueError: count or jobs below 1, or a draft for a method that has none.
     """
 
     problems: ProblemSettings
@@ -41,11 +42,14 @@ class BenchSettings:
     method: Method | Path = Method.controller
     motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
+    draft: bool = False
 
     def __post_init__(self) -> None:
         for name in ("count", "jobs"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}, must be at least 1")
+        if self.draft and not (isinstance(self.method, Method) and self.method.safe):
+            raise ValueError(f"draft is for the controller; the method is {self.method}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +69,9 @@ class BenchResult:
         """The figures for JSON; counts are numbers of problems, with `failures` also which and why.
 
         Collisions with a way out are those in which a search found one (`find_way_out`), where balls move.
-        Each problem is one of success, collision or self_collision (or both), stuck; limit_violations counts
-        problems in which a position, velocity, acceleration or torque limit was broken at any step.
+        Each problem is one of success, collision or self_collision (or both), stuck, under_way when its time was over;
+        limit_violations counts problems in which a position, velocity, acceleration, jerk or torque limit was broken at
+        any step.
         """
         outcomes = self.outcomes
         clearances = [item.min_clearance_m for item in outcomes if item.min_clearance_m is not None]
@@ -85,6 +90,7 @@ class BenchResult:
                 item.way_out is not None and item.way_out.found for item in outcomes
             ),
             "stuck": sum(item.stuck for item in outcomes),
+            "under_way": sum(item.late and item.under_way for item in outcomes),
             "self_collision": sum(item.self_collision for item in outcomes),
             "limit_violations": sum(bool(item.limits) for item in outcomes),
             "limits_broken": {
@@ -113,6 +119,7 @@ class BenchResult:
                     if key not in ("torque", "poses")
                 },
             },
+            "draft": self.settings.draft,
             "jobs": self.settings.jobs,
             "cpu": cpu_name(),
             "version": __version__,
@@ -127,10 +134,6 @@ class BenchResult:
 def method_name(method: Method | Path) -> str:
     """What reports call a method: a file by its name."""
     return method.name if isinstance(method, Path) else method.value
-
-
-def _mover(method: Method | Path, robot: Robot) -> Mover:
-    return OwnMover.from_file(method, robot) if isinstance(method, Path) else build_mover(method, robot)
 
 
 def run_bench(
@@ -151,7 +154,7 @@ def run_bench(
     if progress is not None:
         progress(0, len(tasks), "preparing the robot")
     make = partial(_Worker, settings, robot)
-    worker = make()  # here first: bodies are made once, and the processes find them cached
+    worker = make(progress=progress)  # here first: bodies are made once, and the processes find them cached
     drawn, outcomes, times = [], [], StepTimes()
     for problem, outcome, steps in run_tasks(make, tasks, jobs=settings.jobs, worker=worker):
         drawn.append(problem)
@@ -163,16 +166,29 @@ def run_bench(
     return BenchResult(settings, tuple(drawn[k] for k in order), tuple(outcomes[k] for k in order), times)
 
 
+def _prepared(settings: BenchSettings, name: str, progress: Progress | None) -> tuple[Robot, Mover]:
+    """The robot, and what moves it."""
+    robot = robot_from(name, settings.problems.options)
+    if isinstance(settings.method, Path):
+        return robot, OwnMover.from_file(settings.method, robot)
+
+    def show(link: str, done: int, in_all: int) -> None:
+        if progress is not None:
+            progress(0, settings.count, f"preparing {link} ({done} of {in_all})")
+
+    body = build_body(settings.method, robot, draft=settings.draft, progress=show)
+    return robot, build_mover(settings.method, robot, body)
+
+
 class _Worker:
     """What a process needs for any problem."""
 
-    def __init__(self, settings: BenchSettings, robot_name: str) -> None:
+    def __init__(self, settings: BenchSettings, robot_name: str, *, progress: Progress | None = None) -> None:
         self.settings, self.robot_name = settings, robot_name
-        self._robot = Robot.named(robot_name)
+        self._robot, self._mover = _prepared(settings, robot_name, progress)
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
-        self._mover = _mover(settings.method, self._robot)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task

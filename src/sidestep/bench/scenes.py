@@ -97,7 +97,7 @@ class SceneOutcome:
         first_path_s: until the first path; planning_s: until it was improved; None where none is planned.
         first_motion_s: until the first command.
         num_points: that the controller saw at first. unknown_joints: held joints that the robot does not have.
-        tolerance: of arriving [rad | m]. arrives: it should arrive; False where the goal stays blocked.
+        tolerance: of arriving [rad], see `tolerances`. arrives: it should arrive; False where the goal stays blocked.
         ended: what the guide said at the end; empty without a guide.
         time_ratio: see `ratio_to_optimum`; None where it was not asked for or there is none.
         jerk_time_ratio: see `ratio_to_jerk_limited_optimum`; None where it was not asked for, NaN where none is found.

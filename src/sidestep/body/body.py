@@ -196,7 +196,7 @@ class Body(_core.Body):
                 body_file.LinkContents(
                     fit, mixture.weights, mixture.means, mixture.covariances, levels, cover
                 )
-                for fit, mixture, levels, cover in cover_mixtures(robot, settings, progress)
+                for fit, mixture, levels, cover in cover_mixtures(robot, settings, progress, cached=cache)
             ),
             cache=cache,
         )

@@ -13,17 +13,20 @@ from scipy.special import logsumexp
 
 from sidestep.body.cover_certificate import complete
 from sidestep.body.cover_overshoot import interior_coverage, overshoot, union_volume
-from sidestep.body.cover_problem import CERTIFICATE_TOLERANCE, EFFORTS, EffortName, LinkProblem, TradeOff
+from sidestep.body.cover_problem import EFFORTS, EffortName, LinkProblem, TradeOff
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.body.cover_surface import Array
 from sidestep.body.fitting import LinkFit, assess, mahalanobis_squared
 from sidestep.body.mixture import Mixture
-from sidestep.body.sampling import check_components, link_seed, links_with_geometry, sample_link
+from sidestep.body.sampling import check_components, links_with_geometry, sample_link
 
 if TYPE_CHECKING:
+    import trimesh
+
+    from sidestep.body.cover_store import CoverStore
     from sidestep.robot import Robot
 
-ALGORITHM_VERSION = 4  # part of the cache's key: a cover of another algorithm is made again
+ALGORITHM_VERSION = 5  # part of the cache's key: a cover of another algorithm is made again
 MAX_COMPONENTS = 80
 FIXED_ALLOWANCE = 2.0  # in the mean, its square beyond MAX_AIM, of links that only self-collision sees
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
@@ -117,57 +120,95 @@ class LinkCover:
 
 
 def cover_links(
-    robot: Robot, settings: CoverSettings, progress: CoverProgress | None = None
+    robot: Robot,
+    settings: CoverSettings,
+    progress: CoverProgress | None = None,
+    *,
+    cached: bool = False,
 ) -> tuple[tuple[LinkCover, Ellipsoids], ...]:
     """Covers all links with geometry; shares the ellipsoids so that the worst link is as good as possible.
+
+    The cover of a link depends on its surface, on the settings, and on whether it moves: of another robot with the same
+    link it is taken from the user's cache.
 
     Raises:
         ValueError: if the settings do not suit the robot.
     """
+    from sidestep.body.cover_store import CoverStore
+
     settings.validate(robot)
+    moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
+    store = CoverStore(settings, enabled=cached)
     twins: dict[tuple[bytes, float], LinkProblem] = {}
     problems: dict[str, LinkProblem] = {}
-    moves = {frame.name: frame.joint >= 0 for frame in robot.frames}
     for link in links_with_geometry(robot):
-        triangles = _triangles(robot, link)
         allowance = 1.0 if moves[link] else FIXED_ALLOWANCE
+        known = store.read(link, _mesh(robot, link), allowance)
+        triangles = _triangles(robot, link)
         key = (np.unique(triangles.reshape(-1, 3).round(9), axis=0).tobytes(), allowance)
         if key not in twins:  # fingers are often equal
-            seed = link_seed(link, seed=settings.seed)
-            effort = EFFORTS[settings.effort]
-            twins[key] = LinkProblem(triangles, seed=seed, allowance=allowance, effort=effort)
+            twins[key] = LinkProblem(
+                triangles,
+                seed=settings.seed,
+                allowance=allowance,
+                effort=EFFORTS[settings.effort],
+                known=known.trials,
+            )
         problems[link] = twins[key]
-    numbers = _numbers(problems, settings, progress)
+    # Most of the work is NumPy's and the core's.
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as threads:
+        try:
+            numbers = _numbers(problems, settings, threads, progress)
+            return _finished(robot, problems, numbers, store, threads, progress)
+        except BaseException:
+            threads.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _finished(
+    robot: Robot,
+    problems: Mapping[str, LinkProblem],
+    numbers: Mapping[str, int],
+    store: CoverStore,
+    threads: ThreadPoolExecutor,
+    progress: CoverProgress | None,
+) -> tuple[tuple[LinkCover, Ellipsoids], ...]:
+    """The covers with these numbers, each kept as soon as it is made."""
     total = sum(numbers.values())
     alike: dict[int, list[str]] = {}  # links that share a problem, one after the other
     for link, problem in problems.items():
         alike.setdefault(id(problem), []).append(link)
 
-    def assess_alike(links: list[str]) -> list[tuple[LinkCover, Ellipsoids]]:
-        return [_assess(robot, link, problems[link], numbers[link]) for link in links]
+    def cover_alike(links: list[str]) -> list[tuple[LinkCover, Ellipsoids]]:
+        return [store.stored_or_made(link, problems[link], numbers[link], made(link)) for link in links]
+
+    def made(link: str) -> Callable[[], tuple[LinkCover, Ellipsoids]]:
+        return lambda: _assess(robot, link, problems[link], numbers[link])
 
     found: dict[str, tuple[LinkCover, Ellipsoids]] = {}
-    with ThreadPoolExecutor(
-        max_workers=os.cpu_count()
-    ) as threads:  # most of the work is NumPy's and the core's
-        for covers in as_completed([threads.submit(assess_alike, links) for links in alike.values()]):
-            for cover, ellipsoids in covers.result():
-                found[cover.link] = cover, ellipsoids
-                if progress is not None:
-                    done = sum(each.num_components for each, _ in found.values())
-                    progress(cover.link, total + done, 2 * total)
+    for covers in as_completed([threads.submit(cover_alike, links) for links in alike.values()]):
+        for cover, ellipsoids in covers.result():
+            found[cover.link] = cover, ellipsoids
+            if progress is not None:
+                done = sum(each.num_components for each, _ in found.values())
+                progress(cover.link, total + done, 2 * total)
     return tuple(found[link] for link in problems)
 
 
-def _triangles(robot: Robot, link: str) -> Array:
+def _mesh(robot: Robot, link: str) -> trimesh.Trimesh:
     mesh = robot.collision_mesh(link)
     assert mesh is not None  # only links with geometry are asked for
-    return np.asarray(mesh.triangles, dtype=np.float64)
+    return mesh
+
+
+def _triangles(robot: Robot, link: str) -> Array:
+    return np.asarray(_mesh(robot, link).triangles, dtype=np.float64)
 
 
 def _numbers(
     problems: Mapping[str, LinkProblem],
     settings: CoverSettings,
+    threads: ThreadPoolExecutor,
     progress: CoverProgress | None,
 ) -> dict[str, int]:
     asked = settings.components
@@ -177,24 +218,29 @@ def _numbers(
         asked = {**dict.fromkeys(problems, DRAFT_COMPONENTS), **(asked or {})}
     best = {link: 1 if asked is None else asked.get(link, 1) for link in problems}
     shared = [link for link in problems if asked is None or link not in asked]
+
+    def looked_at(wanted: Mapping[str, Sequence[int]]) -> None:
+        """Solves what is compared next, several links at once."""
+        tries = {(id(problems[link]), number): link for link in wanted for number in wanted[link]}
+        tries = {key: link for key, link in tries.items() if key[1] not in problems[link].trials}
+        solving = {threads.submit(problems[link].excess, key[1]): link for key, link in tries.items()}
+        for solved in as_completed(solving):
+            solved.result()
+            if progress is not None:
+                progress(solving[solved], sum(best.values()), 2 * settings.max_components)
+
     while shared:
         spare = settings.max_components - sum(best.values())
+        looked_at({link: [best[link]] for link in shared})
+        poor = {link: excess for link in shared if (excess := problems[link].excess(best[link])) > 1.0}
+        following = {link: _following(best[link], spare, problems[link].effort.most) for link in poor}
+        looked_at(following)
         gains: list[tuple[float, str, int]] = []
-        for link in shared:
-            problem = problems[link]
-            now = problem.excess(best[link])
-            if now <= 1.0:
-                continue
-            following = best[link]
-            for _ in range(LOOKAHEAD):
-                following = max(following + 1, round(GROWTH * following))
-                if following - best[link] > spare or following > problem.effort.most:
-                    break
-                if progress is not None:
-                    progress(link, sum(best.values()), 2 * settings.max_components)
-                gain = now**2 - problem.excess(following) ** 2
+        for link, now in poor.items():
+            for number in following[link]:
+                gain = now**2 - problems[link].excess(number) ** 2
                 if gain > 0.0:
-                    gains.append((gain / (following - best[link]), link, following))
+                    gains.append((gain / (number - best[link]), link, number))
         if not gains:
             break
         _, link, number = max(gains)
@@ -202,25 +248,39 @@ def _numbers(
     return best
 
 
+def _following(number: int, spare: int, most: int) -> list[int]:
+    """The larger numbers of ellipsoids that a link is tried with next."""
+    found: list[int] = []
+    following = number
+    for _ in range(LOOKAHEAD):
+        following = max(following + 1, round(GROWTH * following))
+        if following - number > spare or following > most:
+            break
+        found.append(following)
+    return found
+
+
 def _assess(robot: Robot, link: str, problem: LinkProblem, number: int) -> tuple[LinkCover, Ellipsoids]:
     surface = problem.surface
-    triangles = _triangles(robot, link)
-    tolerance = CERTIFICATE_TOLERANCE * surface.size
+    triangles, mesh = _triangles(robot, link), _mesh(robot, link)
     solution = problem.finish(number)
-    ellipsoids, certificate = complete(
-        triangles, solution.ellipsoids, tolerance=tolerance, points=triangles.reshape(-1, 3)
-    )
+    ellipsoids, coverage = solution.ellipsoids, 1.0
+    if not np.array_equal(triangles, problem.triangles):  # of a twin, which is equal but for rounding
+        tolerance = problem.effort.piece * surface.size
+        ellipsoids, certificate = complete(
+            triangles, ellipsoids, tolerance=tolerance, points=triangles.reshape(-1, 3)
+        )
+        if not certificate.complete:
+            coverage = min(1.0, certificate.covered_area / certificate.total_area)
     directions = problem.effort.final_directions
     measured = overshoot(surface, ellipsoids, directions=directions) if directions else solution.measured
-    mesh = robot.collision_mesh(link)
-    assert mesh is not None
     closed = bool(mesh.is_watertight)
     volume = abs(float(mesh.volume if closed else mesh.convex_hull.volume))
     axes = np.linalg.svd(ellipsoids.shapes, compute_uv=False)
     cover = LinkCover(
         link=link,
         num_components=number,
-        coverage=1.0 if certificate.complete else min(1.0, certificate.covered_area / certificate.total_area),
+        coverage=coverage,
         mean_overshoot=measured.mean,
         max_overshoot=measured.maximum,
         volume_ratio=union_volume(
@@ -236,11 +296,15 @@ def _assess(robot: Robot, link: str, problem: LinkProblem, number: int) -> tuple
 
 
 def cover_mixtures(
-    robot: Robot, settings: CoverSettings, progress: CoverProgress | None = None
+    robot: Robot,
+    settings: CoverSettings,
+    progress: CoverProgress | None = None,
+    *,
+    cached: bool = False,
 ) -> tuple[tuple[LinkFit, Mixture, Array, LinkCover], ...]:
     """The covers of all links as mixtures of solid ellipsoids, with the levels of their boundaries (K,)."""
     results = []
-    for cover, ellipsoids in cover_links(robot, settings, progress):
+    for cover, ellipsoids in cover_links(robot, settings, progress, cached=cached):
         volumes = np.abs(np.linalg.det(ellipsoids.shapes))
         covariances = ellipsoids.shapes @ ellipsoids.shapes.transpose(0, 2, 1) / SOLID_LEVEL
         fit, mixture = density_fit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,8 +46,9 @@ def certify(triangles: Array, ellipsoids: Ellipsoids, *, tolerance: float) -> Ce
     while len(todo):
         batch, todo = todo[:BATCH], todo[BATCH:]
         pieces += len(batch)
-        inside = (ellipsoids.radii(batch.reshape(-1, 3)) <= 1.0).reshape(len(batch), 3, -1)
-        proven = np.any(np.all(inside, axis=1), axis=1)
+        radii = ellipsoids.squared_radii(batch.reshape(-1, 3)).reshape(len(ellipsoids), len(batch), 3)
+        a, b, c = (radii[:, :, corner] <= 1.0 for corner in range(3))
+        proven = (a & b & c).any(axis=0)
         covered += float(_areas(batch[proven]).sum())
         batch = batch[~proven]
         edges = np.linalg.norm(batch[:, [1, 2, 0]] - batch, axis=2)
@@ -81,16 +83,17 @@ def complete(
 def grow(ellipsoids: Ellipsoids, pieces: Array) -> Ellipsoids:
     """Grows ellipsoids until each piece (P, corners, 3) lies in one of them."""
     count = len(ellipsoids)
-    radii = ellipsoids.radii(pieces.reshape(-1, 3)).reshape(len(pieces), -1, count).max(axis=1)
-    radii = radii[(radii > 1.0).all(axis=1)]
-    growth = (radii - 1.0) * np.cbrt(np.abs(np.linalg.det(ellipsoids.shapes)))
-    radii = radii[growth.min(axis=1).argsort()[::-1]]
+    corners = ellipsoids.squared_radii(pieces.reshape(-1, 3)).reshape(count, len(pieces), -1)
+    farthest = functools.reduce(np.maximum, np.moveaxis(corners, 2, 0))
+    radii = np.sqrt(farthest[:, (farthest > 1.0).all(axis=0)])
+    sizes = np.cbrt(np.abs(np.linalg.det(ellipsoids.shapes)))
+    growth = (radii - 1.0) * sizes[:, None]
+    radii = radii[:, growth.min(axis=0).argsort()[::-1]]
     factors = np.ones(count)
-    while len(radii):  # worst first: what the growth of one ellipsoid covers needs no growth of another
-        growth = (radii[0] - factors) * np.cbrt(np.abs(np.linalg.det(ellipsoids.shapes)))
-        k = int(growth.argmin())
-        factors[k] = radii[0, k] * (1.0 + 1e-9)
-        radii = radii[(radii > factors).all(axis=1)]
+    while radii.size:  # worst first: what the growth of one ellipsoid covers needs no growth of another
+        k = int(((radii[:, 0] - factors) * sizes).argmin())
+        factors[k] = radii[k, 0] * (1.0 + 1e-9)
+        radii = radii[:, (radii > factors[:, None]).all(axis=0)]
     return ellipsoids.scaled(factors)
 
 

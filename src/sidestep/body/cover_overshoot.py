@@ -42,9 +42,9 @@ def overshoot(surface: LinkSurface, ellipsoids: Ellipsoids, *, directions: int =
     boundary, areas = ellipsoids.boundary(sphere_directions(directions))
     free = np.empty(areas.shape, dtype=bool)
     for k, points in enumerate(boundary):  # one after another: the radii of all of them are many
-        radii = ellipsoids.radii(points)
-        radii[:, k] = np.inf
-        free[k] = (radii > 1.0).all(axis=1)
+        radii = ellipsoids.squared_radii(points)
+        radii[k] = np.inf
+        free[k] = (radii > 1.0).all(axis=0)
     points, areas = boundary[free], areas[free]
     distances = surface.overshoot(points)
     outside = distances > 0.0
@@ -56,11 +56,11 @@ def union_volume(ellipsoids: Ellipsoids, rng: np.random.Generator, count: int) -
     reach = np.sqrt(np.square(ellipsoids.shapes).sum(axis=2))
     low, high = (ellipsoids.centres - reach).min(axis=0), (ellipsoids.centres + reach).max(axis=0)
     points = rng.uniform(low, high, size=(count, 3))
-    inside = (ellipsoids.radii(points) <= 1.0).any(axis=1)
+    inside = (ellipsoids.squared_radii(points) <= 1.0).any(axis=0)
     return float((high - low).prod() * inside.mean())
 
 
 def interior_coverage(surface: LinkSurface, ellipsoids: Ellipsoids) -> float:
     """Share of the link's inner nodes of the distance field that lie in an ellipsoid; 1 without such nodes."""
     nodes = surface.field.nodes[surface.field.values.reshape(-1) < 0.0]
-    return float((ellipsoids.radii(nodes) <= 1.0).any(axis=1).mean()) if len(nodes) else 1.0
+    return float((ellipsoids.squared_radii(nodes) <= 1.0).any(axis=0).mean()) if len(nodes) else 1.0

@@ -23,11 +23,17 @@ class Ellipsoids:
 
     def radii(self, points: Array) -> Array:
         """|shape^-1 (y - centre)|, (N, K): 1 on the boundary, below 1 inside."""
+        return np.asarray(np.sqrt(self.squared_radii(points)).T)
+
+    def squared_radii(self, points: Array) -> Array:
+        """Their squares, (K, N)."""
         inverse = np.linalg.inv(self.shapes)
-        flat = inverse.reshape(-1, 3) @ points.T - np.einsum("kij,kj->ki", inverse, self.centres).reshape(
-            -1, 1
-        )
-        return np.asarray(np.sqrt(np.square(flat.reshape(-1, 3, len(points))).sum(axis=1)).T)
+        offsets = np.einsum("kij,kj->ki", inverse, self.centres).reshape(-1, 1)
+        flat = inverse.reshape(-1, 3) @ points.T
+        flat -= offsets
+        flat *= flat
+        x, y, z = (flat[axis::3] for axis in range(3))
+        return np.asarray(x + y + z)
 
     def scaled(self, factors: Array) -> Ellipsoids:
         return Ellipsoids(self.centres, self.shapes * factors[:, None, None])

@@ -183,7 +183,7 @@ class LinkSurface:
 
     def points(self, number: int) -> Array:
         """About `number` points (N, 3) spread evenly over the surface, the corners of its triangles among them."""
-        return _distinct(bisect_to_size(self.triangles, float(np.sqrt(2.0 * self.area / number))))
+        return distinct_corners(bisect_to_size(self.triangles, float(np.sqrt(2.0 * self.area / number))))
 
     def sample(self, count: int, rng: np.random.Generator) -> Array:
         """Points (count, 3) uniform on the surface."""
@@ -204,7 +204,7 @@ class LinkSurface:
         origin = low - margin - 0.5 * spacing
         field = DistanceField(origin, spacing, np.zeros(tuple(shape)))
         inside = _inside_nodes(self.triangles, origin, spacing, shape)
-        marks = np.concatenate([self.pieces.mean(axis=1), _distinct(self.pieces)])
+        marks = np.concatenate([self.pieces.mean(axis=1), distinct_corners(self.pieces)])
         free = np.ones(tuple(shape), dtype=bool)
         free[tuple(np.rint((marks - origin) / spacing).astype(np.intp).T)] = False
         cells = distance_transform_edt(free)
@@ -248,7 +248,7 @@ def _winding_along_rays(triangles: Array, shape: NDArray[np.intp]) -> NDArray[np
     return np.asarray(np.cumsum(winding[:, :, ::-1], axis=2)[:, :, ::-1][:, :, 1:])
 
 
-def _distinct(triangles: Array) -> Array:
+def distinct_corners(triangles: Array) -> Array:
     """Corners (N, 3) of triangles, those within a millionth of the whole's extent taken for one."""
     corners = triangles.reshape(-1, 3)
     low = corners.min(axis=0)

@@ -14,7 +14,6 @@ from sidestep.cli.bench_output import (
     JobsOption,
     OwnMethodOption,
     PeriodOption,
-    RobotOption,
     SeedOption,
     TorqueOption,
     figures_table,
@@ -23,6 +22,14 @@ from sidestep.cli.bench_output import (
 )
 from sidestep.cli.bench_scenes_command import dynamic, motion_bench_maker
 from sidestep.cli.bench_step_command import compare, peers, points, qp, realtime, step
+from sidestep.cli.limit_options import (
+    AccelerationLimitOption,
+    EffortLimitOption,
+    JerkLimitOption,
+    LockedOption,
+    VelocityLimitOption,
+    by_joint,
+)
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
 app = typer.Typer(help="Benchmarks on random and on published problems.", no_args_is_help=True)
@@ -38,7 +45,25 @@ app.command("realtime")(realtime)
 
 @app.command("reach")
 def reach(
-    robot: RobotOption = "fr3",
+    robot: Annotated[
+        str,
+        typer.Option(
+            help="A name from `sidestep robots`, robot_descriptions or mujoco_menagerie, or a URDF, xacro or MJCF file."
+        ),
+    ] = "fr3",
+    package_dir: Annotated[
+        list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
+    ] = None,
+    tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    locked: LockedOption = None,
+    effort_limit: EffortLimitOption = None,
+    velocity_limit: VelocityLimitOption = None,
+    acceleration_limit: AccelerationLimitOption = None,
+    jerk_limit: JerkLimitOption = None,
+    draft: Annotated[
+        bool,
+        typer.Option("--draft", help="With the body that is prepared in seconds, see `sidestep prepare`."),
+    ] = False,
     obstacles: Annotated[int, typer.Option(min=0, help="Balls per problem.")] = 10,
     problems: Annotated[int, typer.Option(min=1, help="Number of problems.")] = 100,
     seed: SeedOption = 0,
@@ -64,6 +89,8 @@ def reach(
 ) -> None:
     """Random reach problems: balls of 5-10 cm radius in the reachable shell, a random start, a random goal.
 
+    Of a robot from a file the balls have 5-10 % of its reach, and are where its links get to, along rails as well.
+
     Collisions are judged on exact meshes between samples, until arrival or the end of the time. The same seed
     gives the same problems and outcomes, with any number of processes. Exit code: 0 when nothing was touched
     and no limit broken, 1 when not, 2 on bad input.
@@ -78,18 +105,32 @@ def reach(
         write_problems,
     )
 
+    options = {
+        "package_dirs": package_dir,
+        "tip": tip,
+        "locked": by_joint(locked, "--locked"),
+        "effort_limits": by_joint(effort_limit, "--effort-limit"),
+        "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
+        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
+        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
+    }
     given = None if problems_file is None else read_problems(problems_file)
     settings = BenchSettings(
         problems=ProblemSettings(
-            robot=robot if given is None else given[0].robot, obstacles=obstacles, seed=seed, moving=moving
+            robot=robot if given is None else given[0].robot,
+            obstacles=obstacles,
+            seed=seed,
+            moving=moving,
+            options={name: value for name, value in options.items() if value},
         ),
         count=problems,
         method=method_or_file(method),
         motion=MotionSettings(period=period, duration=duration, torque=torque, poses=poses),
         jobs=jobs or default_jobs(),
+        draft=draft,
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")
-    title = f"{settings.problems.robot} {method}"
+    title = f"{Path(settings.problems.robot).name} {method}"
     result = with_bar(terminal, title, lambda show: run_bench(settings, problems=given, progress=show))
     document = result.to_document(failures=failures)
     if export is not None:
@@ -108,7 +149,7 @@ def _table(document: dict[str, Any]) -> object:
     table = figures_table("", "", show_header=False)
     table.columns[0].no_wrap = False
     count = document["problems"]
-    for key in ("success", "collision", "self_collision", "stuck", "limit_violations"):
+    for key in ("success", "collision", "self_collision", "stuck", "under_way", "limit_violations"):
         share = f"{100.0 * document[key] / count:.1f} %"
         table.add_row(key.replace("_", " "), f"{document[key]} of {count}  ({share})")
     for name, found in document["limits_broken"].items():

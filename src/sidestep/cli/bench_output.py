@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 import typer
 
 from sidestep.bench.method import Method
+from sidestep.cli.output import lines_without_terminal
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,7 +34,8 @@ SpacingOption: TypeAlias = Annotated[float, typer.Option(min=1e-4, help="Of the 
 PointRadiusOption: TypeAlias = Annotated[float, typer.Option(min=0.0, help="Of those points [m].")]
 DurationOption: TypeAlias = Annotated[float, typer.Option(min=0.01, help="Longest time per problem [s].")]
 ToleranceOption: TypeAlias = Annotated[
-    float, typer.Option(min=1e-6, help="Arrived when every joint is this near [rad or m].")
+    float,
+    typer.Option(min=1e-6, help="Arrived when every joint is this near [rad]; sliding joints a tenth [m]."),
 ]
 PeriodOption: TypeAlias = Annotated[float, typer.Option(min=1e-5, help="Control period [s].")]
 JobsOption: TypeAlias = Annotated[
@@ -61,7 +63,10 @@ def method_or_file(text: str) -> Method | Path:
 def with_bar(
     terminal: Console, title: str, run: Callable[[Callable[[int, int, str], None]], Result]
 ) -> Result:
-    """What `run` returns; it is given a function to call with how many are done, of all, and a word."""
+    """What `run` returns; it is given a function to call with how many are done, of all, and a word.
+
+    Where the output is no terminal, the words are lines, one a second at most.
+    """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     bar = Progress(
@@ -73,11 +78,13 @@ def with_bar(
         console=terminal,
         transient=True,
     )
+    told = lines_without_terminal(terminal)
     with bar:
         task = bar.add_task(title, total=None, last="")
 
         def show(done: int, in_all: int, last: str) -> None:
             bar.update(task, completed=done, total=in_all, last=last)
+            told(f"{title}: {done} of {in_all}, {last}")
 
         return run(show)
 

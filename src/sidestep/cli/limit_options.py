@@ -1,4 +1,4 @@
-"""Limits of joints on the command line: JOINT=VALUE."""
+"""Joints on the command line, JOINT=VALUE: their limits, and where they are held."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from typing import Annotated, TypeAlias
 
 import typer
 
+LockedOption: TypeAlias = Annotated[
+    list[str] | None, typer.Option(help="JOINT=VALUE [rad or m], held there; of a file; may be repeated.")
+]
 EffortLimitOption: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(help="JOINT=VALUE [Nm or N], in place of the file's; of a file; may be repeated."),
@@ -13,6 +16,16 @@ EffortLimitOption: TypeAlias = Annotated[
 VelocityLimitOption: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(help="JOINT=VALUE [rad/s or m/s], in place of the file's; of a file; may be repeated."),
+]
+AccelerationLimitOption: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(help="JOINT=VALUE [rad/s² or m/s²], in place of 10; of a file; may be repeated."),
+]
+JerkLimitOption: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="JOINT=VALUE [rad/s³ or m/s³], in place of 100/s times the acceleration; of a file; may be repeated."
+    ),
 ]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+import time as clock
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -11,6 +13,9 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+
+LINE_EVERY = 1.0  # [s] between two lines of progress where the output is no terminal
 
 
 def _writable(target: str | None) -> str | None:
@@ -34,6 +39,19 @@ def console(*, quiet: bool = False, to_stderr: bool = False) -> Console:
     from rich.console import Console
 
     return Console(quiet=quiet, stderr=to_stderr)
+
+
+def lines_without_terminal(terminal: Console) -> Callable[[str], None]:
+    """Prints what it is told as a line, now and then; nothing at a terminal, where bars show it."""
+    last = float("-inf")
+
+    def tell(line: str) -> None:
+        nonlocal last
+        if not terminal.is_terminal and clock.monotonic() - last >= LINE_EVERY:
+            terminal.print(line, highlight=False, markup=False, soft_wrap=True)
+            last = clock.monotonic()
+
+    return tell
 
 
 def write_json(document: dict[str, Any] | list[Any], target: str) -> None:

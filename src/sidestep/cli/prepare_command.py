@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from sidestep.cli.limit_options import EffortLimitOption, VelocityLimitOption, by_joint
+from sidestep.cli.limit_options import (
+    AccelerationLimitOption,
+    EffortLimitOption,
+    JerkLimitOption,
+    LockedOption,
+    VelocityLimitOption,
+    by_joint,
+)
 from sidestep.cli.output import QuietOption, console
 
 
@@ -18,17 +25,30 @@ def prepare(
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
     tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    locked: LockedOption = None,
     effort_limit: EffortLimitOption = None,
     velocity_limit: VelocityLimitOption = None,
+    acceleration_limit: AccelerationLimitOption = None,
+    jerk_limit: JerkLimitOption = None,
     draft: Annotated[
         bool, typer.Option(help="In seconds: a body that covers the arm as surely, with larger ellipsoids.")
     ] = False,
+    cache: Annotated[
+        bool,
+        typer.Option(
+            "--cache/--no-cache", help="Take what is prepared already, and keep what is prepared now."
+        ),
+    ] = True,
     quiet: QuietOption = False,
 ) -> None:
     """Prepare an arm once: what a `Controller` needs, in one file that C++ reads alone.
 
     Covers every link, measures clearance tables and finds pairs of links that may touch: minutes for a new robot, with
-    --draft seconds, moments where the user's cache has it. Exit code: 0 when the file is written, 2 on bad input.
+    --draft seconds, moments where the user's cache has it. The cache is the folder that SIDESTEP_CACHE_DIR names, or
+    `sidestep` in the user's cache directory (~/.cache/sidestep on Linux). It has covers by link and measures by pair of
+    links, which other arms share, and may be deleted at any time.
+
+    Exit code: 0 when the file is written, 2 on bad input.
     """
     if out.suffix.lower() != ".arm":
         raise ValueError(f"--out is {out}; an arm file ends with .arm")
@@ -44,10 +64,13 @@ def prepare(
     options = {
         "package_dirs": package_dir,
         "tip": tip,
+        "locked": by_joint(locked, "--locked"),
         "effort_limits": by_joint(effort_limit, "--effort-limit"),
         "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
+        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
+        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
     }
     given = {name: value for name, value in options.items() if value}
-    arm = Arm.load(source, draft=draft, progress=show, **given)  # type: ignore[arg-type]
+    arm = Arm.load(source, draft=draft, cache=cache, progress=show, **given)  # type: ignore[arg-type]
     arm.save(out)
     terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)

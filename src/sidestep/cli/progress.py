@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from sidestep.cli.output import lines_without_terminal
 from sidestep.distance import ExactClearance
 from sidestep.scenario.runner import run_scenario
 from sidestep.simulation.joint_words import in_words, largest_ways
@@ -35,13 +36,15 @@ def run_with_progress(scenario: Scenario, terminal: Console) -> ScenarioResult:
         console=terminal,
         transient=True,
     )
+    told = lines_without_terminal(terminal)
     with bar:
         fit = bar.add_task("body", total=None, facts="")
         task = bar.add_task("run", total=scenario.simulation.duration, facts="", visible=False)
         follower: _Follower | None = None
 
-        def on_fit(link: str, done: int, total: int) -> None:
-            bar.update(fit, completed=done, total=total, facts=f"fitting {link}")
+        def on_fit(item: str, done: int, total: int) -> None:
+            bar.update(fit, completed=done, total=total, facts=item)
+            told(f"preparing {item} ({done} of {total})")
 
         def on_start(parts: Assembly) -> None:
             nonlocal follower

@@ -98,6 +98,13 @@ def run(
         float | None,
         typer.Option(min=1e-3, max=600.0, help="Longest simulated time [s], instead of the scenario's."),
     ] = None,
+    draft: Annotated[
+        bool,
+        typer.Option(
+            "--draft",
+            help="Of an arm that is not prepared, a body in seconds, with larger ellipsoids; as body.draft.",
+        ),
+    ] = False,
     json: JsonOption = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Write the report folder.")] = True,
     quiet: QuietOption = False,
@@ -116,6 +123,10 @@ def run(
         simulation = dataclasses.replace(simulation, duration=duration)
     if method is not None:
         chosen = dataclasses.replace(chosen, method=method.value)
+    if draft:
+        if chosen.method == "custom":
+            raise ValueError("--draft goes with the controller; the method custom has no covering body")
+        chosen = dataclasses.replace(chosen, body=dataclasses.replace(chosen.body, draft=True))
     system = chosen.system
     if switch is not None:
         system = dataclasses.replace(system, switch=parse_switch(switch))

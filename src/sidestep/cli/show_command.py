@@ -8,7 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
-from sidestep.cli.limit_options import EffortLimitOption, VelocityLimitOption, by_joint
+from sidestep.cli.limit_options import (
+    AccelerationLimitOption,
+    EffortLimitOption,
+    JerkLimitOption,
+    LockedOption,
+    VelocityLimitOption,
+    by_joint,
+)
 from sidestep.cli.output import JsonOption, console, write_json
 
 
@@ -25,11 +32,11 @@ def show(
         list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
     ] = None,
     tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
-    locked: Annotated[
-        list[str] | None, typer.Option(help="JOINT=VALUE [rad or m], held there; may be repeated.")
-    ] = None,
+    locked: LockedOption = None,
     effort_limit: EffortLimitOption = None,
     velocity_limit: VelocityLimitOption = None,
+    acceleration_limit: AccelerationLimitOption = None,
+    jerk_limit: JerkLimitOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Where to listen; 0: any that is free.")] = 8891,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser.")] = True,
     json: JsonOption = None,
@@ -47,6 +54,8 @@ def show(
         "locked": by_joint(locked, "--locked"),
         "effort_limits": by_joint(effort_limit, "--effort-limit"),
         "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
+        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
+        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
     }
     reading = read(source, {name: value for name, value in options.items() if value})
     if json is not None:

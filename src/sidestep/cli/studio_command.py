@@ -106,12 +106,21 @@ def studio(
             window=window,
         )
         return
-    open_studio(chosen, method=method, ellipsoids=ellipsoids, host=host, port=port, browser=browser)
+    open_studio(
+        chosen,
+        to_and_fro=scenario is None,
+        method=method,
+        ellipsoids=ellipsoids,
+        host=host,
+        port=port,
+        browser=browser,
+    )
 
 
 def open_studio(
     scenario: Scenario,
     *,
+    to_and_fro: bool = False,
     method: str = "controller",
     ellipsoids: int | None = None,
     host: str = "127.0.0.1",
@@ -122,7 +131,9 @@ def open_studio(
     from sidestep.studio.studio import Studio
 
     terminal = console()
-    with Studio(scenario, method=method, host=host, port=port, ellipsoids=ellipsoids) as running:
+    with Studio(
+        scenario, to_and_fro=to_and_fro, method=method, host=host, port=port, ellipsoids=ellipsoids
+    ) as running:
         terminal.print(f"Studio: {running.address}   (Ctrl-C ends it)", highlight=False, soft_wrap=True)
         with open_browser(running.address) if browser else nullcontext():
             _wait(running)

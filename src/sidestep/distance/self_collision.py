@@ -223,15 +223,30 @@ class SelfCollision:
         return np.array(rows).reshape(-1, self.robot.num_coordinates)
 
     def _leave_out_what_always_touches(self, samples: int, rng: np.random.Generator) -> None:
-        touches = np.zeros(len(self._pairs))
         placed = [self._poses(self.robot.random_configuration(rng)) for _ in range(samples)]
-        for poses in placed:
-            touches += [self._touch(pair, poses) for pair in self._pairs]
-        for pair, count in zip(self._pairs, touches, strict=True):
+        apart = self._balls_apart_at(placed)
+        for k, pair in enumerate(self._pairs):
+            near = np.flatnonzero(apart[:, k] <= 0.0)
+            if 2 * len(near) < samples:
+                continue  # far apart in most of them
+            count = sum(self._touch(pair, placed[i]) for i in near)
             overlap = 2 * count >= samples and all(self._touch(pair, poses, margin=SEAM) for poses in placed)
             if count >= ALWAYS * samples or overlap:
                 self.left_out[self._name(pair)] = "always"
         self._pairs = [pair for pair in self._pairs if self._name(pair) not in self.left_out]
+
+    def _balls_apart_at(self, placed: list[dict[int, Array]]) -> Array:
+        """(samples, pairs) `_balls_apart` of every pair at each of those."""
+        if not self._pairs or not placed:
+            return np.empty((len(placed), len(self._pairs)))
+        poses = np.array([[pose[index] for index in range(len(self._names))] for pose in placed])
+        centers = np.einsum("snij,nj->sni", poses[..., :3, :3], np.array(self._centers)) + poses[..., :3, 3]
+        first, second = np.array([(pair.first, pair.second) for pair in self._pairs]).T
+        radii = np.array(self._radii)
+        apart: Array = (
+            np.linalg.norm(centers[:, first] - centers[:, second], axis=2) - radii[first] - radii[second]
+        )
+        return apart
 
     def _find(self, first: str, second: str) -> _PairOfLinks:
         for a, b in ((first, second), (second, first)):

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from sidestep._core import JointType
-from sidestep.drawing.arm import Array, Solid, arm_triangles, draw_arm, show_arm, solid_triangles
+from sidestep.drawing.arm import Array, Solid, arm_triangles, direction, draw_arm, show_arm, solid_triangles
 from sidestep.drawing.palette import BLUE, GREEN
 from sidestep.robot import Robot
 from sidestep.robot.pose import moved, pose_matrix
@@ -20,9 +20,12 @@ from sidestep.robot.pose import moved, pose_matrix
 DPI = 100
 FILLED = 0.94  # share of a picture that what must be seen fills
 SAMPLES_TO_FIT = 40  # configurations of the motion that must be in the picture
+SAMPLES_TO_SEE = 12  # configurations of the motion that are to be seen from the side
 TRACE_POINTS = 400  # of the line that the tip draws
+THERE = 0.02  # [rad | m] from the goal the ghost is left out
 GRID = 0.2  # [m] of the ground
-SIDE = (22.0, -35.0)  # elevation and azimuth [deg]
+SIDES = tuple((22.0, azimuth) for azimuth in (-35.0, -145.0, 35.0, 145.0))  # elevation and azimuth [deg]
+BETTER = 0.05  # share of hidden points by which another side than the first has to be better
 ABOVE = (90.0, -90.0)  # x to the right, y up
 
 
@@ -32,7 +35,7 @@ class ArmViews:
     Args:
         robot: the arm.
         q: (T, nv) the motion.
-        goal: (nv,); its tip position is marked by a cross, or goal_point (3,) [m].
+        goal: (nv,), drawn as a ghost; its tip position is marked by a cross, or goal_point (3,) [m].
         objects: the solids around; object_poses: (T, num_objects, 7), or None: where they stand.
         size: width and height of one view [pixel].
     """
@@ -52,15 +55,16 @@ class ArmViews:
         self._traced = np.unique(np.linspace(0, len(q) - 1, TRACE_POINTS).round().astype(int))
         trace = np.array([robot.pose(q[k], tip)[:3, 3] for k in self._traced])
         goal_tip = np.asarray(robot.pose(goal, tip)[:3, 3] if goal_point is None else goal_point)
+        self._ghost = np.asarray(goal, dtype=float)
         self._robot, self._q, self._objects, self._poses = robot, q, objects, object_poses
         seen = np.concatenate([trace, goal_tip[None], self._reached(goal)])
         planar = is_planar(robot)
-        self.views = (ABOVE,) if planar else (SIDE, ABOVE)
+        self.views = (ABOVE,) if planar else (self._clear_side(), ABOVE)
         self._drawn = [
-            _View(angles, seen, trace, goal_tip, ground=angles is SIDE, size=size) for angles in self.views
+            _View(angles, seen, trace, goal_tip, ground=angles != ABOVE, size=size) for angles in self.views
         ]
         for view in self._drawn:
-            view.arm = draw_arm(view.ax, robot, q[0])
+            view.arm = draw_arm(view.ax, robot, q[0], ghost=self._ghost)
             view.arm.set_zorder(2)
 
     def picture(self, sample: int) -> npt.NDArray[np.uint8]:
@@ -68,9 +72,25 @@ class ArmViews:
         poses = None if self._poses is None else self._poses[sample]
         images = []
         for view in self._drawn:
-            show_arm(view.arm, self._robot, self._q[sample], objects=self._objects, object_poses=poses)
+            q = self._q[sample]
+            ghost = None if np.allclose(q, self._ghost, atol=THERE) else self._ghost
+            show_arm(view.arm, self._robot, q, objects=self._objects, object_poses=poses, ghost=ghost)
             images.append(view.image(int(np.searchsorted(self._traced, sample, side="right"))))
         return np.hstack(images)
+
+    def _clear_side(self) -> tuple[float, float]:
+        """The side from which solids hide least of the moving frames; the first one where it does as well."""
+        samples = np.unique(np.linspace(0, len(self._q) - 1, SAMPLES_TO_SEE).astype(int))
+        frames = [frame.name for frame in self._robot.frames if frame.joint >= 0]
+        points = np.array([self._robot.pose(self._q[k], name)[:3, 3] for k in samples for name in frames])
+        solids = [np.zeros((0, 3, 3))]
+        for i, item in enumerate(self._objects):
+            pose = item.pose if self._poses is None else pose_matrix(self._poses[0, i])
+            solids.append(moved(np.array(item.surface().triangles, dtype=float), pose))
+        triangles = np.concatenate(solids)
+        hidden = [float(_hidden(points, triangles, direction(*side)).mean()) for side in SIDES]
+        best = int(np.argmin(hidden))
+        return SIDES[best] if hidden[best] < hidden[0] - BETTER else SIDES[0]
 
     def _reached(self, goal: Array) -> Array:
         """Points (N, 3) that the arm and the solids reach, world [m]; the solids at start, middle and end."""
@@ -155,6 +175,25 @@ def fit_view(ax: Any, points: Array, *, size: tuple[int, int]) -> None:
     off = show(zoom).mean(axis=0) - [0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)]
     middle = middle + (off / scale) @ axes[:2]
     show(zoom)
+
+
+def _hidden(points: Array, triangles: Array, towards: Array) -> npt.NDArray[np.bool_]:
+    """Which points (N, 3) have a triangle (F, 3, 3) between them and a viewer in a direction (3,) far away.
+
+    Source: Möller and Trumbore (1997).
+    """
+    edge1, edge2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    across = np.cross(towards, edge2)
+    volume = (edge1 * across).sum(axis=1)
+    inverse = 1.0 / np.where(np.abs(volume) < 1e-12, np.inf, volume)
+    found = np.zeros(len(points), dtype=bool)
+    for k, point in enumerate(points):
+        offset = point - triangles[:, 0]
+        u = (offset * across).sum(axis=1) * inverse
+        normal = np.cross(offset, edge1)
+        v, along = normal @ towards * inverse, (edge2 * normal).sum(axis=1) * inverse
+        found[k] = bool(((inverse != 0.0) & (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (along > 0.0)).any())
+    return found
 
 
 def is_planar(robot: Robot) -> bool:

@@ -142,9 +142,11 @@ def psi_figure(result: ScenarioResult) -> Figure | None:
             if len(shown) < len(active)
             else "all that were active"
         )
-        title = f"Barriers, {most}"
+        title = f"What bent the motion: barriers by part, {most}"
     density = written and list(curves) == ["collision density"]
-    figure, axes = _single(title, "collision density ψ [1/m³]" if density else "ψ [-]")
+    figure, axes = _single(
+        title, "collision density ψ [1/m³]" if density else "ψ [-]" if written else "strength [-]"
+    )
     _lines(axes, result.run.time, np.column_stack([curves[name] for name in shown]), shown)
     return figure
 

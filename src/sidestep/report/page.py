@@ -29,7 +29,7 @@ _CAPTIONS = {
     "acceleration.png": "Joint accelerations: wanted by the dynamical system, achieved by the arm",
     "torque.png": "Joint torques",
     "switch.png": "Switch weights",
-    "psi.png": "Barriers over time",
+    "psi.png": "What bent the motion: barriers that were active, by part of the arm and what it kept off",
 }
 
 

@@ -70,11 +70,19 @@ def csv_columns(result: ScenarioResult) -> dict[str, Array]:
         add("torque", run.torque, "", effort=True)
     for index in range(run.switch.shape[1] if result.switched else 0):
         columns[f"switch {index + 1} [-]"] = run.switch[:, index]
-    for index, name in enumerate(result.embedding_names):
-        columns[f"psi {index + 1} {name} [-]"] = run.values[:, index]
+    columns |= embedding_columns(result)
     if len(result.clearance):
         columns["clearance [m]"] = np.interp(run.time, result.clearance_time, result.clearance)
     for index, item in enumerate(run.objects):
         for axis, name in enumerate("xyz"):
             columns[f"{item.name} {name} [m]"] = run.object_poses[:, index, axis]
     return columns
+
+
+def embedding_columns(result: ScenarioResult) -> dict[str, Array]:
+    """Psi by name: of the method custom every coordinate, of the others the largest of the barriers with one name."""
+    names, values = result.embedding_names, result.run.values
+    if result.scenario.method == "custom":
+        return {f"psi {index + 1} {name} [-]": values[:, index] for index, name in enumerate(names)}
+    every = np.array(names, dtype=str)
+    return {f"barrier {name} [-]": values[:, every == name].max(axis=1) for name in dict.fromkeys(names)}

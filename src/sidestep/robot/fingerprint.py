@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sidestep import _core
 from sidestep.robot.link import Link
+
+if TYPE_CHECKING:
+    import trimesh
 
 _HASH_DECIMALS = 9  # lengths [m] and angles are hashed to 1e-9: below any mesh's accuracy, above rounding
 
@@ -37,6 +41,15 @@ def fingerprint_of(robot: _core.Robot, links: Sequence[Link]) -> str:
         )
         for geometry in link.geometries:
             add(geometry.kind, geometry.placement, geometry.size, geometry.scale)
+            if geometry.sweeps:
+                add(*geometry.sweeps)
             if geometry.path is not None:
                 add(hashlib.sha256(geometry.path.read_bytes()).hexdigest())
+    return digest.hexdigest()
+
+
+def surface_hash(mesh: trimesh.Trimesh) -> str:
+    """Hash (64 hex digits) of the triangles of a mesh, bit for bit, wherever they were read from."""
+    digest = hashlib.sha256(np.ascontiguousarray(mesh.vertices, dtype=np.float64).tobytes())
+    digest.update(np.ascontiguousarray(mesh.faces, dtype=np.int64).tobytes())
     return digest.hexdigest()

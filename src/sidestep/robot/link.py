@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,8 @@ class Geometry:
             caps; sphere: (radius,); mesh: (). [m]
         path: the mesh file, None for a primitive.
         scale: factor per axis (3,) on the file's vertices, before `placement`.
+        sweeps: of a part that something else drives: sets of poses (K, 4, 4) in the link frame. Between those of a set
+            it may be anywhere: the convex hull of the shape at all of them stands for it. None: it is at rest.
     """
 
     kind: GeometryKind
@@ -56,6 +58,7 @@ class Geometry:
     size: tuple[float, ...] = ()
     path: Path | None = None
     scale: Array = field(default_factory=lambda: np.ones(3))
+    sweeps: tuple[Array, ...] = ()
 
     def mesh(self) -> trimesh.Trimesh:
         """The shape as triangles in the link frame [m]; loaded once, copy it before you change it.
@@ -85,6 +88,13 @@ class Geometry:
         else:
             mesh = trimesh.creation.icosphere(radius=self.size[0], subdivisions=_SUBDIVISIONS)
         mesh.apply_transform(self.placement)
+        if self.sweeps:
+            corners = np.asarray(mesh.convex_hull.vertices)
+            hulls = [
+                trimesh.convex.convex_hull((corners @ X[:, :3, :3].mT + X[:, None, :3, 3]).reshape(-1, 3))
+                for X in self.sweeps
+            ]
+            mesh = cast("trimesh.Trimesh", trimesh.util.concatenate(hulls))
         return mesh
 
 
@@ -108,6 +118,7 @@ class Link:
             (a.kind, a.size, a.path) == (b.kind, b.size, b.path)
             and np.array_equal(a.placement, b.placement)
             and np.array_equal(a.scale, b.scale)
+            and np.array_equal(np.array(a.sweeps), np.array(b.sweeps))
             for a, b in zip(self.geometries, other.geometries, strict=True)
         )
 

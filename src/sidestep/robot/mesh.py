@@ -64,12 +64,8 @@ def mesh_model(mesh: trimesh.Trimesh) -> coal.BVHModelOBBRSS:
     import coal
 
     model = coal.BVHModelOBBRSS()
-    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for vertex in np.asarray(mesh.vertices, dtype=float):
-        vertices.append(vertex)
-    for a, b, c in np.asarray(mesh.faces).tolist():
-        triangles.append(coal.Triangle(a, b, c))
-    model.beginModel(len(triangles), len(vertices))
-    model.addSubModel(vertices, triangles)
+    model.beginModel(len(mesh.faces), len(mesh.vertices))
+    model.addVertices(np.asarray(mesh.vertices, dtype=float))
+    model.addTriangles(np.asarray(mesh.faces, dtype=np.int64))
     model.endModel()
     return model

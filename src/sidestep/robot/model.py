@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,7 +91,8 @@ class Robot(_core.Robot):
                 What hangs on the tip itself, and every other branch that moves, is dropped.
             locked: joints held at a value [rad | m]; joints that mimic them are held too, and may be named too.
                 Floating and planar joints at a pose (4, 4), or x, y, z [m], roll, pitch, yaw [rad]; where they
-                are written by default.
+                are written by default. Two numbers, a range: something else drives the joint, as a gripper's own
+                controller; what it moves is covered wherever it may be, and held in the middle of the range.
             locked_beyond_limits: accept values of `locked` outside the file's limits, as published data has.
             acceleration_limits: [rad/s^2 | m/s^2]; 10 by default (URDF has none).
             velocity_limits: [rad/s | m/s], in place of the file's; none where neither gives one.
@@ -324,8 +326,25 @@ class Robot(_core.Robot):
         """A configuration (nv,), uniform within the limits; within ±pi where a coordinate has none."""
         return rng.uniform(*self._finite_interval())
 
+    def random_configurations(self, count: int, *, seed: int = 0) -> Array:
+        """Configurations (count, nv) as `random_configuration` gives.
+
+        The values of a coordinate depend on the seed, its name and its limits alone: they stay when another joint is
+        added or dropped.
+        """
+        lower, upper = self._finite_interval()
+        shares = [
+            np.random.default_rng((seed, crc32(name.encode()))).random(count)
+            for name in self.coordinate_names
+        ]
+        values: Array = lower + (upper - lower) * np.stack(shares, axis=1)
+        return values
+
     def check_configuration(self, q: ArrayLike, name: str = "q") -> Array:
         """`q` as an array (nv,) after checking its shape, that it is finite, and the position limits.
+
+        What is outside by a rounding error, at most `JointLimits.rounding`, is taken as it is: encoders and published
+        problems have it, and a controller moves inside.
 
         Raises:
             ValueError: names `name`, the joint, its value and the interval allowed.
@@ -333,11 +352,11 @@ class Robot(_core.Robot):
         array = _core.real_array(q, name)
         if array.shape != (self.num_coordinates,):
             raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
-        limits = self.limits
+        limits, rounding = self.limits, _core.JointLimits.rounding
         for joint, value, lower, upper in zip(
             self.coordinate_names, array, limits.lower, limits.upper, strict=True
         ):
-            if not (np.isfinite(value) and lower <= value <= upper):
+            if not (np.isfinite(value) and lower - rounding <= value <= upper + rounding):
                 turns = {item.coordinate for item in self.joints if item.type == _core.JointType.revolute}
                 hint = degrees_hint(array[sorted(turns)])
                 raise ValueError(f"{name}: joint {joint!r} is {value}, allowed: [{lower}, {upper}]{hint}")

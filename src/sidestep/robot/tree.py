@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from sidestep._core import Frame, Joint, JointLimits, JointType, real_array
 from sidestep.robot.degrees import DEGREES_HINT, degrees_hint, looks_like_degrees
+from sidestep.robot.drives import Drive, drives_of, joint_motion, swept_links
 from sidestep.robot.limits import LimitValues, limits_of, position_bounds, stands_still
 from sidestep.robot.link import Array, Link
 from sidestep.robot.plausibility import check_meshes
-from sidestep.robot.pose import about_axis, checked_pose, from_roll_pitch_yaw, pose_at
+from sidestep.robot.pose import checked_pose, from_roll_pitch_yaw, pose_at
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
 CORE_TOLERANCE = 1e-9  # on R Rᵀ - 1, the core's own
@@ -39,15 +40,6 @@ class KinematicTree:
     held: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class _Drive:
-    """What a moving joint follows: multiplier * position of `source` + offset; `offset` alone without one."""
-
-    source: str | None
-    multiplier: float
-    offset: float
-
-
 def build_tree(
     urdf: Urdf,
     *,
@@ -62,13 +54,14 @@ def build_tree(
     effort_rate_limits: LimitValues | None,
 ) -> KinematicTree:
     """Folds `urdf` into moving joints and frames; see `Robot.from_urdf` for the arguments and the rules."""
-    poses, values = _poses_and_values(urdf, locked or {})
-    locks = _checked_locks(urdf, values, beyond_limits=locked_beyond_limits)
+    poses, values, ranges = _poses_and_values(urdf, locked or {})
+    locks = _checked_locks(urdf, values, ranges, beyond_limits=locked_beyond_limits)
     still = [
         joint for joint in urdf.joints.values() if joint.moves and joint.mimic is None and stands_still(joint)
     ]
     still = [joint for joint in still if joint.name not in locks]
-    drives = _drives(urdf, locks | {joint.name: position_bounds(joint)[0] for joint in still})
+    locks |= {joint.name: position_bounds(joint)[0] for joint in still}
+    drives = drives_of(urdf, locks)
     _check_followers(urdf, values, drives)
     kept = _kept_joints(urdf, drives, tip)
     for joint in kept:
@@ -96,7 +89,7 @@ def build_tree(
             continue
         drive = drives[joint.name]
         if drive.source is None:
-            placed[joint.child] = (parent, X_PJ @ _motion(joint, drive.offset))
+            placed[joint.child] = (parent, X_PJ @ joint_motion(joint, drive.offset))
             continue
         if drive.source not in coordinates:
             raise ValueError(
@@ -127,7 +120,8 @@ def build_tree(
         jerk=jerk_limits,
         effort_rate=effort_rate_limits,
     )
-    links = tuple(urdf.links[link] for link in placed)
+    driven = swept_links(urdf, kept, locks, ranges, poses)
+    links = tuple(driven.get(link, urdf.links[link]) for link in placed)
     check_meshes(links, joints, urdf.remarks)
     frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
     return KinematicTree(
@@ -142,16 +136,28 @@ def build_tree(
 
 def _poses_and_values(
     urdf: Urdf, locked: Mapping[str, ArrayLike]
-) -> tuple[dict[str, Array], dict[str, float]]:
-    """Of `locked`, the poses of joints with several coordinates, and the positions of the others."""
+) -> tuple[dict[str, Array], dict[str, float], dict[str, tuple[float, float]]]:
+    """Of `locked`, the poses of joints with several coordinates, the positions of the others, and their ranges.
+
+    A joint with a range is held in its middle.
+    """
     poses: dict[str, Array] = {}
     values: dict[str, float] = {}
+    ranges: dict[str, tuple[float, float]] = {}
     for name, value in locked.items():
         joint = urdf.joints.get(name)
         if joint is None or not joint.free:
             number = real_array(value, f"locked: {name!r}")
+            if number.shape == (2,):
+                lower, upper = (float(bound) for bound in number)
+                if not lower < upper:
+                    raise ValueError(f"locked: {name!r} = [{lower}, {upper}], must be a range that ascends")
+                ranges[name], values[name] = (lower, upper), 0.5 * (lower + upper)
+                continue
             if number.shape != ():
-                raise ValueError(f"locked: {name!r} has shape {number.shape}, must be one number")
+                raise ValueError(
+                    f"locked: {name!r} has shape {number.shape}, must be one number, or two: a range"
+                )
             values[name] = value if isinstance(value, int | float) else float(number)
             continue
         array = real_array(value, f"locked: {name!r}")
@@ -163,10 +169,12 @@ def _poses_and_values(
                 "roll, pitch, yaw [rad]"
             )
         poses[name] = checked_pose(array, f"locked: {name!r}")
-    return poses, values
+    return poses, values, ranges
 
 
-def _checked_locks(urdf: Urdf, locked: Mapping[str, float], *, beyond_limits: bool) -> dict[str, float]:
+def _checked_locks(
+    urdf: Urdf, locked: Mapping[str, float], ranges: Mapping[str, tuple[float, float]], *, beyond_limits: bool
+) -> dict[str, float]:
     """The locks of joints that follow no other, after checking that they exist and may stand there."""
     locks = {}
     for name, value in locked.items():
@@ -177,9 +185,13 @@ def _checked_locks(urdf: Urdf, locked: Mapping[str, float], *, beyond_limits: bo
                 f"locked: joint {name!r} {kind}; joints that can be locked: {', '.join(_lockable(urdf))}"
             )
         lower, upper = position_bounds(joint)
-        if not math.isfinite(value) or not (beyond_limits or lower <= value <= upper):
+        least, most = ranges.get(name, (value, value))
+        if not math.isfinite(most - least) or not (beyond_limits or lower <= least <= most <= upper):
             hint = "" if joint.type == "prismatic" else degrees_hint([value])
-            raise ValueError(f"locked: {name!r} = {value} is outside its limits [{lower}, {upper}]{hint}")
+            told = f"[{least}, {most}]" if name in ranges else value
+            raise ValueError(f"locked: {name!r} = {told} is outside its limits [{lower}, {upper}]{hint}")
+        if name in ranges and joint.mimic is not None:
+            raise ValueError(f"locked: {name!r} mimics another joint; give the range of that one")
         if joint.type != "prismatic" and looks_like_degrees(value):
             warnings.warn(f"locked: {name!r} = {value:g} {DEGREES_HINT}", RuntimeWarning, stacklevel=5)
         if joint.mimic is None:
@@ -187,7 +199,7 @@ def _checked_locks(urdf: Urdf, locked: Mapping[str, float], *, beyond_limits: bo
     return locks
 
 
-def _check_followers(urdf: Urdf, locked: Mapping[str, float], drives: dict[str, _Drive]) -> None:
+def _check_followers(urdf: Urdf, locked: Mapping[str, float], drives: dict[str, Drive]) -> None:
     """A mimic joint may be named with the one that it follows, at the place where it then is."""
     for name, value in locked.items():
         if drives[name].source is not None:
@@ -207,36 +219,11 @@ def _lockable(urdf: Urdf) -> list[str]:
     ]
 
 
-def _held(drives: dict[str, _Drive], joint: UrdfJoint) -> bool:
+def _held(drives: dict[str, Drive], joint: UrdfJoint) -> bool:
     return drives[joint.name].source is None
 
 
-def _drives(urdf: Urdf, locks: dict[str, float]) -> dict[str, _Drive]:
-    """Follows every mimic chain to its end: a joint with its own coordinate, or a locked one."""
-    drives: dict[str, _Drive] = {}
-    for joint in urdf.joints.values():
-        if not joint.moves:
-            continue
-        multiplier, offset, current, seen = 1.0, 0.0, joint, [joint.name]
-        while current.mimic is not None:
-            offset += multiplier * current.mimic.offset
-            multiplier *= current.mimic.multiplier
-            current = urdf.joints[current.mimic.joint]
-            if current.name in seen:
-                raise ValueError(
-                    f"{urdf.label}: mimic joints form a loop: {' -> '.join([*seen, current.name])}"
-                )
-            seen.append(current.name)
-        if not current.moves:
-            raise ValueError(f"{urdf.label}: joint {joint.name!r} mimics {current.name!r}, which is fixed")
-        if current.name in locks:
-            drives[joint.name] = _Drive(None, 0.0, multiplier * locks[current.name] + offset)
-        else:
-            drives[joint.name] = _Drive(current.name, multiplier, offset)
-    return drives
-
-
-def _kept_joints(urdf: Urdf, drives: dict[str, _Drive], tip: str | None) -> list[UrdfJoint]:
+def _kept_joints(urdf: Urdf, drives: dict[str, Drive], tip: str | None) -> list[UrdfJoint]:
     """The joints that stay, depth first (Pinocchio needs every subtree contiguous), siblings in file order.
 
     With a tip: the way from the root to it, and what hangs rigidly (fixed or locked joints only) on a link of
@@ -267,9 +254,3 @@ def _kept_joints(urdf: Urdf, drives: dict[str, _Drive], tip: str | None) -> list
             kept.append(joint)
             open_joints.extend(children[joint.child][::-1])
     return kept
-
-
-def _motion(joint: UrdfJoint, value: float) -> Array:
-    if joint.type == "prismatic":
-        return pose_at(value * joint.axis)
-    return pose_at(np.zeros(3), about_axis(joint.axis, value))

@@ -16,6 +16,7 @@ import trimesh
 from sidestep import Body, Controller, Robot
 from sidestep._core import JointType, Obstacles, real_array
 from sidestep.arm import Arm
+from sidestep.body.cover_problem import EffortName
 from sidestep.distance import SceneObject
 from sidestep.distance.scene import Kind, check_scene
 from sidestep.obstacles.shapes import EXTENT
@@ -84,7 +85,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
 
     Args:
         scenario: what to build.
-        progress: told of the fit of the body, see `Body.fit`.
+        progress: told of the fit of the body, see `Body.fit`, and of the pairs of links that are measured.
 
     Raises:
         ScenarioError: a number of values that does not fit the robot, a start or goal outside the limits, an
@@ -123,7 +124,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         mover, integrator = _at("system", scenario, system), scenario.simulation.integrator
         driver = SystemDriver(mover, posture.q, seen, program, integrator=integrator)
     else:
-        arm = _at("body", scenario, partial(Arm.from_robot, robot, body))
+        arm = _at("body", scenario, partial(Arm.from_robot, robot, body, progress=_of_pairs(progress)))
         mover = _at("method", scenario, partial(Controller, arm, settings))
         mover.set_goal(posture.q if pose is None else pose.goal)
         driver = ControllerDriver(mover, seen)
@@ -295,7 +296,8 @@ def _mesh(path: Path, scale: float) -> trimesh.Trimesh:
 def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
     choice = scenario.body
     if scenario.method != "custom":
-        return Body.cover(robot, components=choice.ellipsoids, progress=progress)
+        effort: EffortName = "draft" if choice.draft else "fine"
+        return Body.cover(robot, components=choice.ellipsoids, effort=effort, progress=progress)
     return Body.fit(
         robot,
         components=choice.components,
@@ -303,6 +305,12 @@ def _fit(scenario: Scenario, robot: Robot, progress: Progress | None) -> Body:
         seed=choice.seed,
         progress=progress,
     )
+
+
+def _of_pairs(progress: Progress | None) -> Callable[[str, str, int, int], None] | None:
+    if progress is None:
+        return None
+    return lambda stage, pair, done, in_all: progress(f"{stage}: {pair}", done, in_all)
 
 
 def _si(values: tuple[float, ...], unit: str, robot: Robot, name: str) -> Array:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from sidestep._core import Obstacles, __version__
 from sidestep.body import Body
+from sidestep.robot.tolerance import SLIDING
 from sidestep.scenario.scenario import Scenario
 from sidestep.simulation import Evaluation, Run
 
@@ -71,7 +72,7 @@ class ScenarioResult:
             "success": self.success,
             **self.evaluation.to_dict(),
             "tolerance_rad": choice.tolerance if turning else None,
-            "tolerance_m": choice.tolerance if sliding else None,
+            "tolerance_m": SLIDING * choice.tolerance if sliding else None,
             "period_s": choice.period,
             "wall_time_s": self.wall_time,
             "stop": self.stop,

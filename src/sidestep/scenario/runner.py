@@ -37,7 +37,7 @@ def run_scenario(
         scenario: what to run.
         on_step: called with time [s] and q (nv,) after every control step.
         on_start: called with the parts of the run before the first step.
-        fit_progress: told of the fit of the body, see `Body.fit`.
+        fit_progress: told of the preparation of the arm, see `assemble`.
 
     Raises:
         ScenarioError: the scenario asks for something impossible, see `assemble`.

@@ -76,13 +76,14 @@ class PoseConfig:
 class BodyConfig:
     """How the Gaussian mixtures of the links are fitted; of the controller, how many ellipsoids cover each link.
 
-    ellipsoids: left out: as many as it takes.
+    ellipsoids: left out: as many as it takes. draft: of the controller, a coarser body in seconds.
     """
 
     components: int | Literal["aic", "bic"] | dict[str, int] = 4
     covariance: Literal["spherical", "diagonal", "full"] = "full"
     seed: int = 0
     ellipsoids: int | None = None
+    draft: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sidestep._core import Obstacles
+from sidestep.robot.tolerance import SLIDING
 from sidestep.scenario.config import OPTIONAL, left_out
 from sidestep.scenario.result import ScenarioResult, tolerance_units
 from sidestep.scenario.scenario import Scenario
@@ -104,7 +105,7 @@ def _physics(run: SimulationRun) -> list[tuple[str, str, str]]:
 def _allowed(result: ScenarioResult) -> str:
     tolerance = result.scenario.simulation.tolerance
     turning, sliding = tolerance_units(result.run)
-    bound = in_words(tolerance if turning else None, tolerance if sliding else None)
+    bound = in_words(tolerance if turning else None, SLIDING * tolerance if sliding else None)
     if result.run.pose is None:
         return f"error under {bound} at the end"
     return f"within {1e3 * POSE_TOLERANCE:g} mm and {bound} at the end"

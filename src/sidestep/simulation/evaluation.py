@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sidestep._core import JointLimits
 from sidestep.distance.clearance import ExactClearance
+from sidestep.robot.tolerance import tolerances
 from sidestep.robot.turns import ways_to
 from sidestep.simulation.joint_words import in_words, largest_ways
 from sidestep.simulation.run import Run, SimulationRun
 
 Array = npt.NDArray[np.float64]
 
-GOAL_TOLERANCE = 0.05  # [rad | m] the project's definition of arriving
+GOAL_TOLERANCE = 0.05  # [rad] the project's definition of arriving
 POSE_TOLERANCE = 0.01  # [m] the same of the frame of a pose goal, whose angle has the tolerance of joints
 MOVED = (
     1e-4  # [m] a free object that nothing touches floats still to rounding; a tenth of a millimetre is a push
@@ -26,7 +28,7 @@ LIMIT_SLACK = 1e-6  # relative (absolute below 1): the quadratic program's own t
 
 @dataclass(frozen=True)
 class LimitViolations:
-    """Number of samples at which any joint is beyond its limit, and by how much at worst.
+    """Number of samples at which any joint is beyond its limit, see `outside_of`, and by how much at worst.
 
     The excess is in the limit's own unit ([rad], [rad/s], [rad/s^2], [Nm]; metres for sliding joints), 0 when
     every sample is inside. Torque is None where there was none.
@@ -52,7 +54,7 @@ class Evaluation:
     """The figures of a run. Fields that a run without physics does not have are None.
 
     Attributes:
-        reached: criterion 1: the largest joint error at the end is under the tolerance; of a pose goal the angle
+        reached: criterion 1: every joint's error at the end is under its tolerance; of a pose goal the angle
             under the tolerance and the distance under 1 cm.
         position_error_rad, position_error_m: that of the turning and of the sliding joints, None for a pose goal or
             without such a joint.
@@ -132,15 +134,19 @@ def evaluate(
 
     Args:
         run: of `Simulation.run` or `run_kinematically`.
-        goal_tolerance: largest joint error [rad | m], or angle of a pose [rad], that counts as reached.
+        goal_tolerance: largest joint error [rad], see `tolerances` of sliding joints, or angle of a pose [rad], that
+            counts as reached.
         clearance_tolerance: accuracy [m] of the minimum clearance, see `ExactClearance.minimum_over`; where
             the minimum is smaller than this, it is measured again, finer, until it is clear whether the arm
             touched.
     """
-    error, distance = ways_to(run.robot, run.q, run.goal).max(axis=1), np.zeros(len(run))
-    if run.pose is not None:
+    error, distance = np.zeros(len(run)), np.zeros(len(run))
+    if run.pose is None:
+        away = ways_to(run.robot, run.q, run.goal)
+        inside = np.asarray((away < tolerances(run.robot, goal_tolerance)).all(axis=1))
+    else:
         distance, error = np.array([run.pose.errors(q) for q in run.q]).T
-    inside = (error < goal_tolerance) & (distance < POSE_TOLERANCE)
+        inside = np.asarray((error < goal_tolerance) & (distance < POSE_TOLERANCE))
     deviation = np.abs(run.q - _on_segment(run.q, run.start, run.goal)).max(axis=0)
     physics = run if isinstance(run, SimulationRun) else None
     pair, minimum, when, worst = None, None, None, None
@@ -240,7 +246,7 @@ def _rms(run: SimulationRun | None, a: str, b: str) -> float | None:
 
 def _violations(run: Run) -> LimitViolations:
     limits = run.robot.limits
-    position = excess_over(np.maximum(limits.lower - run.q, run.q - limits.upper), np.zeros(1))
+    position = excess_over(outside_of(run.q, limits), np.zeros(1))
     velocity = excess_over(np.abs(run.v), limits.velocity)
     acceleration = excess_over(np.abs(run.achieved), limits.acceleration)
     torque = excess_over(np.abs(run.torque), limits.effort) if isinstance(run, SimulationRun) else None
@@ -254,6 +260,17 @@ def _violations(run: Run) -> LimitViolations:
         worst_acceleration=acceleration[1],
         worst_torque=None if torque is None else torque[1],
     )
+
+
+def outside_of(q: Array, limits: JointLimits) -> Array:
+    """How far q (T, nv) is outside the position limits, but for a start a rounding error outside until it has come in.
+
+    What such a start (see `JointLimits.rounding`) leaves of its excess is no violation, as long as it only shrinks.
+    """
+    outside = np.maximum(np.maximum(limits.lower - q, q - limits.upper), 0.0)
+    taken_in = np.where(outside[0] <= JointLimits.rounding, outside[0], 0.0)
+    excess: Array = outside - np.minimum(np.minimum.accumulate(outside, axis=0), taken_in)
+    return excess
 
 
 def excess_over(values: Array, limit: Array) -> tuple[int, float]:

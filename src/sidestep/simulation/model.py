@@ -10,13 +10,15 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from sidestep._core import JointType
+from sidestep._core import JointLimits, JointType
 from sidestep.distance.convex_parts import convex_parts
 from sidestep.distance.scene import Scene, SceneObject, check_scene
 from sidestep.robot import Robot
 from sidestep.robot.pose import pose_at, pose_vector
 
 Array = npt.NDArray[np.float64]
+
+STOPS = JointLimits.rounding  # [rad | m] of a joint beyond its position limits
 
 # Contact masks: two geoms touch when one's type meets the other's affinity. Arm and scene meet; the arm does
 # not meet itself (neighbouring hulls overlap by construction); objects meet the floor, not each other (a
@@ -193,7 +195,9 @@ def _add_robot(
         hinge = (
             mujoco.mjtJoint.mjJNT_HINGE if joint.type == JointType.revolute else mujoco.mjtJoint.mjJNT_SLIDE
         )
-        ends = joint.multiplier * np.array([limits.lower[joint.coordinate], limits.upper[joint.coordinate]])
+        # Stops are a rounding error beyond the limits: what starts there is not thrown back.
+        low, high = limits.lower[joint.coordinate] - STOPS, limits.upper[joint.coordinate] + STOPS
+        ends = joint.multiplier * np.array([low, high])
         limited = bool(np.all(np.isfinite(ends)))
         body.add_joint(
             name=joint.name,

@@ -14,6 +14,7 @@ from sidestep.distance.scene import SceneObject
 from sidestep.obstacles import obstacles_from_shapes
 from sidestep.obstacles.scene import Seen
 from sidestep.robot import Robot
+from sidestep.robot.tolerance import tolerances
 from sidestep.robot.turns import ways_to
 from sidestep.simulation.pose_target import PoseTarget
 
@@ -26,7 +27,8 @@ class Arrival:
     """When a run counts as arrived and may stop.
 
     Attributes:
-        position: largest joint error [rad | m]; of a pose goal the angle [rad]. distance: of a pose goal [m].
+        position: largest joint error [rad], see `tolerances` of sliding joints; of a pose goal the angle [rad].
+        distance: of a pose goal [m].
         speed: largest joint speed [rad/s | m/s].
         hold: for how long both must hold [s].
     """
@@ -132,7 +134,8 @@ class ArrivalWatch:
             distance, angle = self.goal.errors(q)
             near = distance < self.rule.distance and angle < self.rule.position
         else:
-            near = bool(ways_to(self.robot, q, self.goal).max() < self.rule.position)
+            limits = tolerances(self.robot, self.rule.position)
+            near = bool((ways_to(self.robot, q, self.goal) < limits).all())
         near = near and bool(np.abs(v).max() < self.rule.speed)
         if not near:
             self.since = None

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from sidestep.scenario import Scenario
 from sidestep.simulation.pose_target import IkSolution
 from sidestep.studio.parameters import Numbers
+from sidestep.studio.reason import Reason
 from sidestep.studio.scene_obstacle import SceneObstacle
 
 Array = npt.NDArray[np.float64]
@@ -37,6 +38,13 @@ class SetPoseGoal:
 @dataclass(frozen=True)
 class AddObstacle:
     """A new obstacle."""
+
+    thing: SceneObstacle
+
+
+@dataclass(frozen=True)
+class ReplaceObstacle:
+    """The obstacle of the same name becomes this one, where it is now."""
 
     thing: SceneObstacle
 
@@ -103,10 +111,21 @@ class Restart:
 
 @dataclass(frozen=True)
 class Load:
-    """Another scenario, perhaps with another robot, and the method to go on with; None: the one that is on."""
+    """Another scenario, perhaps with another robot, and the method to go on with; None: the one that is on.
+
+    goals: configurations (nv,) that are visited in turn, see `VisitGoals`.
+    """
 
     scenario: Scenario
     method: str | None = None
+    goals: tuple[Array, ...] = ()
+
+
+@dataclass(frozen=True)
+class VisitGoals:
+    """Goes to one configuration (nv,) after the other, round and round; none: stays with the goal there is."""
+
+    goals: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
@@ -125,6 +144,7 @@ Command: TypeAlias = (
     SetJointGoal
     | SetPoseGoal
     | AddObstacle
+    | ReplaceObstacle
     | RemoveObstacle
     | DragObstacle
     | ThrowObstacle
@@ -134,6 +154,7 @@ Command: TypeAlias = (
     | SetRecording
     | Restart
     | Load
+    | VisitGoals
     | Seen
     | Drawn
 )
@@ -170,7 +191,11 @@ class Snapshot:
         things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s];
             courses: by what they move.
         method: its name; numbers: its parameters by method and name.
-        words, status, nearest, values, metric, activations: see `Account`; status is empty before the first step.
+        draft: the body is coarse, and a finer one is on its way.
+        visited: the configurations that are visited in turn; none where the arm stays with its goal.
+        words, status, activity, nearest, values, metric, activations, reason: see `Account`; status is empty before
+            the first step.
+        events: what happened last, oldest first: simulated time [s] and words.
         torque_share, speed_share: largest of a joint over its limit.
         contacts: links that touch, each "link - obstacle"; touched: steps with contact since the start.
         timing: of the steps. rows: of a recording since the last snapshot.
@@ -186,6 +211,8 @@ class Snapshot:
     goal_pose: Array | None
     posture: IkSolution | None
     goal_written: bool
+    draft: bool
+    visited: tuple[Array, ...]
     tip: str
     things: tuple[SceneObstacle, ...]
     poses: Array
@@ -195,10 +222,13 @@ class Snapshot:
     numbers: dict[str, Numbers]
     words: str
     status: str
+    activity: str
     nearest: tuple[str, float]
     values: Array
     metric: Array
     activations: Array
+    reason: Reason
+    events: tuple[tuple[float, str], ...]
     torque_share: float
     speed_share: float
     contacts: tuple[str, ...]

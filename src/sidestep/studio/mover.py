@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,11 +12,15 @@ import numpy.typing as npt
 from sidestep._core import Controller, ControllerSettings, GeometricSystem, Obstacles, PoseGoal
 from sidestep.arm import Arm
 from sidestep.robot import Robot
+from sidestep.simulation.joint_words import in_words, largest_ways
 from sidestep.simulation.pose_target import IkSolution, PoseTarget
 from sidestep.simulation.run import status_name
+from sidestep.studio.reason import Moment, Reason, binding, reason_of
 
 Array = npt.NDArray[np.float64]
 
+ON_THE_PATH = re.compile(r"(arriving|on the way), [^;,]* from the goal")
+NEAR_GOAL = 0.05  # [rad | m] in every joint counts as arriving
 STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
 ASIDE = 1e-4  # [m] farther from where its velocity has brought it, an obstacle is told anew
 
@@ -25,17 +30,20 @@ class Account:
     """What a mover says of its last step.
 
     Attributes:
-        words: what the arm does. status: of the command.
+        words: what the arm does. status: of the command. activity: what the command is about, "" of other methods.
         nearest: (name of link or "", clearance [m] that is measured; inf where none is).
         values: psi (m,). metric: (nv, nv). activations: (m,) clearances at which barriers begin; empty without any.
+        reason: what draws the arm, and what holds it back.
     """
 
     words: str
     status: str = ""
+    activity: str = ""
     nearest: tuple[str, float] = ("", float("inf"))
     values: Array = field(default_factory=lambda: np.zeros(0))
     metric: Array = field(default_factory=lambda: np.zeros((0, 0)))
     activations: Array = field(default_factory=lambda: np.zeros(0))
+    reason: Reason = field(default_factory=Reason)
 
 
 class ControllerMover:
@@ -53,6 +61,12 @@ class ControllerMover:
         self._controller = Controller(arm, settings)
         self._told: Obstacles | None = None
         self._said: Controller | None = None  # took the last step
+        self._seen, self._q = Obstacles.none(), np.array(robot.neutral)  # of that step
+
+    def set_arm(self, arm: Arm) -> None:
+        """Another body for the same joints, as a finer one; the controller goes on."""
+        self._arm = arm
+        self._controller.set_arm(arm)
 
     def set_goal(self, pose: Array | None, q: Array, *, thorough: bool) -> None:
         """Goes to q (nv,), or to a pose (4, 4) by a posture that is looked for near q."""
@@ -72,7 +86,7 @@ class ControllerMover:
         if self._told is None or not alike(self._told, obstacles):
             self._controller.set_obstacles(obstacles)
             self._told = obstacles
-        self._said = self._controller
+        self._said, self._seen, self._q = self._controller, obstacles, q
         return self._controller.step(q, v, mass_matrix, bias).torque
 
     def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
@@ -84,6 +98,7 @@ class ControllerMover:
         self._said.set_goal(self._goal)
         self._said.set_obstacles(obstacles)
         self._said.step(q, v)
+        self._seen, self._q = obstacles, q
 
     @property
     def posture(self) -> IkSolution | None:
@@ -112,14 +127,31 @@ class ControllerMover:
             return None
         command, step = self._said.command, self._said.geometric_step
         link = "" if command.coordinate < 0 else self._said.labels[command.coordinate].name
+        words = self._said.explain()
+        if command.on_path and self._said.target is not None:
+            # On a path the sentence counts from the place on it that the arm is led to, which is never far.
+            way = self._said.target - self._q
+            left = in_words(*largest_ways(self._robot, way), radians=".2f", millimetres=".0f")
+            stage = "arriving" if np.abs(way).max() < NEAR_GOAL else "on the way"
+            words = ON_THE_PATH.sub(f"{stage}, {left} from the goal", words)
         return Account(
-            self._said.explain(),
+            words,
             f"{status_name(command.status)}, {status_name(command.activity)}",
+            status_name(command.activity),
             (link, command.clearance),
             step.values,
             step.metric,
             self._said.activations,
+            reason_of(self._said, self._seen, self._q),
         )
+
+    def moment(self) -> Moment | None:
+        """What events are told of, of the last step; None before one."""
+        if self._said is None:
+            return None
+        command = self._said.command
+        link, obstacle, _ = binding(self._said, self._seen)
+        return Moment(command.activity, command.avoiding, self._said.searches, link, obstacle)
 
 
 def alike(told: Obstacles, seen: Obstacles) -> bool:

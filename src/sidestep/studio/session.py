@@ -8,13 +8,14 @@ from __future__ import annotations
 import re
 import time as clock
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Obstacles, real_array
+from sidestep.arm import Arm, Refinement
 from sidestep.body import Body
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
@@ -22,17 +23,22 @@ from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS, check_numbers, method_named
-from sidestep.studio.mover import STILL, Account
+from sidestep.studio.mover import NEAR_GOAL, STILL, Account, ControllerMover
 from sidestep.studio.parameters import Method, Numbers
+from sidestep.studio.reason import Events
 from sidestep.studio.scene_obstacle import check_names, things_of
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
-from sidestep.studio.systems import Mover, Recipe, build_mover, numbers_of, recipe_of
+from sidestep.studio.systems import Covering, Mover, Recipe, build_mover, numbers_of, recipe_of
 from sidestep.studio.tip import at_tip
 
 Array = npt.NDArray[np.float64]
 Prepare = Callable[[Robot, Recipe], Body]
+Draft = Callable[[Scenario], Arm]
 
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
+LOOK_EVERY = 10  # steps between two looks for events
+REST = 0.5  # [s] at a goal before the next one of several
+PATIENCE = 6.0  # [s] for which a goal of several may be out of reach before the next one is tried
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
 
 
@@ -42,8 +48,11 @@ class Session:
     Args:
         scenario: robot, start, goal, obstacles and control period.
         method: one of `METHODS`. numbers: of methods, by name; defaults for the rest.
+        goals: configurations (nv,) that are visited in turn from the start, see `VisitGoals`.
         ellipsoids: of a covering body per link, where the scenario does not say; None: as many as it takes.
         prepare: gives the body of a robot by a recipe; may take long.
+        draft: gives the arm of a description file in seconds; a finer one is made beside the loop then, which goes on.
+            None: such arms are prepared as others are.
         synchronous: motions are the same every time; the planner, say, holds the loop up.
 
     Raises:
@@ -63,10 +72,13 @@ class Session:
     running: bool
     edition: int
     _bodies: dict[str, Body]
+    _arms: dict[str, Arm]
     _mover: Mover
     _goal: tuple[
         Array | None, Array
     ]  # a pose (4, 4) or None, and the configuration, or one near that of the pose
+    _goal_written: bool
+    _visited: tuple[Array, ...]
     _contacts: tuple[str, ...]
     _times: deque[float]
     _rows: list[m.Row]
@@ -77,16 +89,20 @@ class Session:
         *,
         method: str = "controller",
         numbers: Mapping[str, Mapping[str, Any]] | None = None,
+        goals: Sequence[Array] = (),
         ellipsoids: int | None = None,
         prepare: Prepare,
+        draft: Draft | None = None,
         synchronous: bool = False,
     ) -> None:
-        self._prepare, self._usual_ellipsoids, self._synchronous = prepare, ellipsoids, synchronous
+        self._prepare, self._draft = prepare, draft
+        self._usual_ellipsoids, self._synchronous = ellipsoids, synchronous
+        self._refinement: Refinement | None = None
         self._numbers = {name: method.defaults for name, method in METHODS.items()}
         self._method = method_named(method)
         self.edition = 0
         self._rows = []
-        self._load(scenario, self._method, numbers or {})
+        self._load(scenario, self._method, numbers or {}, goals)
 
     # --- what happens ---
 
@@ -94,14 +110,20 @@ class Session:
         """Does what a command says; raises ValueError or OSError, and stays as it was, where it cannot."""
         match command:
             case m.SetJointGoal(position):
+                self._visited = ()
                 self._set_goal(None, self.robot.check_configuration(position, "goal"))
             case m.SetPoseGoal(pose, thorough):
                 last = None if self._goal[0] is None else self._mover.posture
                 near = self.stage.state()[0] if last is None else last.q
+                self._visited = ()
                 self._set_goal(finite(pose, "the pose of the goal"), near, thorough=thorough)
             case m.AddObstacle(thing):
                 check_names([*(actor.thing for actor in self.stage.actors), thing])
                 self._set_actors([*self.stage.actors, MovableObstacle(thing)])
+            case m.ReplaceObstacle(thing):
+                old = self.actor(thing.name)
+                new = MovableObstacle(thing.at(old.pose))
+                self._set_actors([new if actor is old else actor for actor in self.stage.actors])
             case m.RemoveObstacle(name):
                 gone = self.actor(name)
                 self._set_actors([actor for actor in self.stage.actors if actor is not gone])
@@ -129,11 +151,17 @@ class Session:
                 self._recording = recording
                 self._rows.clear()
             case m.Restart(until):
+                if self._visited:
+                    self._goal = None, self._visited[0]
+                    written, loaded = self._loaded_goal
+                    self._goal_written = written is None and np.array_equal(loaded, self._visited[0])
                 self._use(self._method, self._numbers[self._method.name])  # remembers nothing
                 self._begin()
                 self.running, self._until = until > 0.0, until
-            case m.Load(scenario, asked):
-                self._load(scenario, self._method if asked is None else method_named(asked), {})
+            case m.Load(scenario, asked, goals):
+                self._load(scenario, self._method if asked is None else method_named(asked), {}, goals)
+            case m.VisitGoals(goals):
+                self._visit(goals)
             case m.Seen() | m.Drawn():
                 return
         if not self.running:
@@ -155,6 +183,8 @@ class Session:
             raise RuntimeError(f"the physics diverged at {self.time:.3f} s; restart")
         self.time += self.period
         self._count += 1
+        if self._count % LOOK_EVERY == 0:
+            self._look_back(q)
         if self.time >= self._until - 0.5 * self.period:
             self.running = False
         if stage.data.ncon:
@@ -184,6 +214,8 @@ class Session:
             goal_pose=pose,
             posture=self._mover.posture,
             goal_written=self._goal_written,
+            draft=self._is_draft,
+            visited=self._visited,
             tip=self.tip,
             things=self._things,
             poses=self._poses(),
@@ -192,6 +224,7 @@ class Session:
             method=self._method.name,
             numbers={name: dict(numbers) for name, numbers in self._numbers.items()},
             **vars(account) | {"words": words},
+            events=self._events.told,
             torque_share=float((np.abs(self._torque) / limits.effort).max()),
             speed_share=float((np.abs(v) / limits.velocity).max()),
             contacts=self._contacts,
@@ -211,11 +244,18 @@ class Session:
 
     # --- parts ---
 
-    def _load(self, scenario: Scenario, method: Method, given: Mapping[str, Mapping[str, Any]]) -> None:
+    def _load(
+        self,
+        scenario: Scenario,
+        method: Method,
+        given: Mapping[str, Mapping[str, Any]],
+        goals: Sequence[Array],
+    ) -> None:
         robot = load_robot(scenario)
         bodies: dict[str, Body] = {}
+        arms: dict[str, Arm] = {}
         if self.edition and robot.fingerprint == self.robot.fingerprint:
-            robot, bodies = self.robot, dict(self._bodies)
+            robot, bodies, arms = self.robot, dict(self._bodies), dict(self._arms)
         start = coordinates(scenario.start, robot, "start.position")
         velocity = start_velocity(scenario.start, robot)
         goal = scenario.goal
@@ -223,13 +263,17 @@ class Session:
         end = goal if isinstance(goal, JointState) else goal.posture
         place = "goal.position" if pose is None else "goal.posture.position"
         near = start if end is None else coordinates(end, robot, place)
+        visited = tuple(robot.check_configuration(q, "goals") for q in goals)
         stage = SimulatedScene(robot, things_of(scenario), period=scenario.simulation.period)
         numbers = self._numbers_for(scenario, given)
-        mover = self._mover_of(method, numbers[method.name], scenario, robot, bodies)
+        mover = self._mover_of(method, numbers[method.name], scenario, robot, bodies, arms)
         mover.set_goal(pose, near, thorough=True)
         self._mover, self._goal, self._goal_written = mover, (pose, near), True
+        self._visited, self._loaded_goal = visited, (pose, near)
+        if self.edition and robot is not self.robot:
+            self.stop()
         self.scenario, self.robot, self.tip, self.stage = scenario, robot, tip_of(robot), stage
-        self._method, self._numbers, self._bodies = method, numbers, bodies
+        self._method, self._numbers, self._bodies, self._arms = method, numbers, bodies, arms
         self.period = scenario.simulation.period
         self._start = start, velocity
         self._begin()
@@ -252,13 +296,45 @@ class Session:
         self._contacts = ()
         self._torque = np.zeros(self.robot.num_coordinates)
         self._times = deque(maxlen=TIMED_STEPS)
+        self._events, self._late, self._arrived = Events(), 0.0, np.inf
         self._recording = False  # time goes back: a recording is of one motion
         self._set_actors([MovableObstacle(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(*self._start)
 
+    def _visit(self, goals: Sequence[Array]) -> None:
+        """Several goals in turn, beginning with the one that comes after the present one, if it is among them."""
+        self._visited = tuple(self.robot.check_configuration(q, "goals") for q in goals)
+        self._late = self.time
+        if self._visited:
+            self._set_goal(None, self._next_goal())
+
+    def _next_goal(self) -> Array:
+        """Of those that are visited: the one after the present goal."""
+        present = next((k for k, q in enumerate(self._visited) if np.array_equal(q, self._goal[1])), -1)
+        return self._visited[(present + 1) % len(self._visited)]
+
+    def _look_back(self, q: Array) -> None:
+        """Events of the last step, a finer body, and the next goal where the arm has been at this one for a while."""
+        if self._is_draft:
+            self._refine()
+        moment = self._mover.moment()
+        if moment is not None:
+            self._events.take(self.time, moment)
+        if not self._visited:
+            return
+        near = float(np.abs(q - self._goal[1]).max()) < NEAR_GOAL
+        if not near:
+            self._arrived = np.inf
+        elif np.isinf(self._arrived):
+            self._arrived = self.time
+        if self.time - self._arrived >= REST or self.time - self._late >= PATIENCE:
+            self._late, self._arrived = self.time, np.inf
+            self._set_goal(None, self._next_goal())
+
     def _set_goal(self, pose: Array | None, q: Array, *, thorough: bool = True) -> None:
         self._mover.set_goal(pose, q, thorough=thorough)
         self._goal, self._goal_written = (pose, q), False
+        self._events.tell(self.time, "new goal")
 
     def _set_actors(self, actors: list[MovableObstacle]) -> None:
         self.stage.set_things(actors)
@@ -266,7 +342,7 @@ class Session:
         self._look()
 
     def _use(self, method: Method, numbers: Numbers) -> None:
-        mover = self._mover_of(method, numbers, self.scenario, self.robot, self._bodies)
+        mover = self._mover_of(method, numbers, self.scenario, self.robot, self._bodies, self._arms)
         (pose, near), found = self._goal, self._mover.posture
         if pose is not None and found is not None and found.found:
             near = found.q
@@ -276,13 +352,66 @@ class Session:
         self._look()
 
     def _mover_of(
-        self, method: Method, numbers: Numbers, scenario: Scenario, robot: Robot, bodies: dict[str, Body]
+        self,
+        method: Method,
+        numbers: Numbers,
+        scenario: Scenario,
+        robot: Robot,
+        bodies: dict[str, Body],
+        arms: dict[str, Arm],
     ) -> Mover:
         recipe = recipe_of(method, numbers, scenario)
-        if str(recipe) not in bodies:
-            bodies[str(recipe)] = self._prepare(robot, recipe)
-        body = bodies[str(recipe)]
-        return build_mover(method, robot, body, numbers, scenario, synchronous=self._synchronous)
+        name = str(recipe)
+        described = recipe == Covering(None) and scenario.robot.urdf is not None
+        if name not in bodies and described and self._draft is not None:
+            arms[name] = self._draft(scenario)
+            bodies[name] = arms[name].body
+        if name not in bodies:
+            bodies[name] = self._prepare(robot, recipe)
+        if isinstance(recipe, Covering) and name not in arms:
+            arms[name] = Arm.from_robot(robot, bodies[name])
+        return build_mover(
+            method,
+            robot,
+            bodies[name],
+            numbers,
+            scenario,
+            arm=arms.get(name),
+            synchronous=self._synchronous,
+        )
+
+    @property
+    def _is_draft(self) -> bool:
+        """Whether the arm that moves is a draft, of which a finer one is on its way."""
+        arm = self._arms.get(str(Covering(None)))
+        return arm is not None and arm.is_draft
+
+    def _refine(self) -> None:
+        """Begins to make the fine body of a draft, or takes it over when it is there."""
+        name = str(Covering(None))
+        if self._refinement is None:
+            self._refinement = Refinement(self._arms[name])
+            return
+        if not self._refinement.is_done:
+            return
+        try:
+            fine = self._refinement.wait(0.0)
+        except RuntimeError as error:
+            self._events.tell(self.time, str(error))
+            fine = Arm(self._arms[name], description=lambda: self.robot)  # the draft, that stays
+        else:
+            self._events.tell(self.time, "finer body taken over")
+        self._arms[name], self._bodies[name] = fine, fine.body
+        uses = str(recipe_of(self._method, self._numbers[self._method.name], self.scenario)) == name
+        if uses and isinstance(self._mover, ControllerMover):
+            self._mover.set_arm(fine)
+        self._refinement = None
+
+    def stop(self) -> None:
+        """Ends what runs beside the loop."""
+        if self._refinement is not None:
+            self._refinement.cancel()
+            self._refinement = None
 
     def _look(self) -> None:
         """Lays out what is seen: points of each obstacle in its frame, and whose each point is."""

@@ -19,6 +19,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import Client, Connection, Listener
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from sidestep.arm import Arm
 from sidestep.body import Body
 from sidestep.extras import MissingExtraError
 from sidestep.robot import Robot
@@ -26,7 +30,9 @@ from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
 from sidestep.studio.command_queue import CommandQueue, add
 from sidestep.studio.session import Session
-from sidestep.studio.systems import Covering, Recipe, make_body
+from sidestep.studio.systems import Covering, Recipe, draft_arm, make_body
+
+Array = npt.NDArray[np.float64]
 
 FRAME = 1.0 / 30.0  # [s] between two snapshots
 IDLE_FRAME = 0.2  # [s] the same while the loop is paused
@@ -46,6 +52,7 @@ class Beginning:
     method: str
     numbers: Mapping[str, Mapping[str, Any]]
     ellipsoids: int | None = None
+    goals: tuple[Array, ...] = ()
 
 
 class SessionProcess:
@@ -174,21 +181,32 @@ def serve(connection: Connection[Any, Any]) -> None:
 
         return make_body(robot, recipe, progress)
 
+    def draft(scenario: Scenario) -> Arm:
+        def progress(stage: str, item: str, done: int, total: int) -> None:
+            connection.send(m.Preparing(f"{stage}: {item} ({done} of {total})"))
+
+        return draft_arm(scenario, progress)
+
     connection.send(m.Preparing(f"loading {beginning.scenario.name}"))
     try:
         session = Session(
             beginning.scenario,
             method=beginning.method,
             numbers=beginning.numbers,
+            goals=beginning.goals,
             ellipsoids=beginning.ellipsoids,
             prepare=prepare,
+            draft=draft,
         )
     except (ValueError, OSError, MissingExtraError) as error:
         connection.send(m.Failed(str(error), fatal=True))
         return
     gc.collect()
     gc.freeze()  # what lives as long as the process is not looked through again
-    _Pacer(session, connection).run()
+    try:
+        _Pacer(session, connection).run()
+    finally:
+        session.stop()
 
 
 class _Pacer:

@@ -31,7 +31,8 @@ def starting_scenario(
     effort_limits: Mapping[str, float] | None = None,
     velocity_limits: Mapping[str, float] | None = None,
 ) -> Scenario:
-    """A scenario by file or name, or one ball beside the way of a robot that turns its first joint.
+    """A scenario by file or name, or one ball beside the way of a robot that turns its first joint; the first scene of
+    the gallery where nothing is given.
 
     Raises:
         ValueError: more than one of scenario, robot and urdf. FileNotFoundError: see `Scenario.load`.
@@ -42,6 +43,10 @@ def starting_scenario(
         raise ValueError("limits of joints go with --urdf; a scenario file has robot.effort_limits")
     if scenario is not None:
         return Scenario.load(scenario)
+    if robot is None and urdf is None:
+        from sidestep.studio.gallery import GALLERY, OPENING
+
+        return GALLERY[OPENING].load()
     choice = (
         RobotConfig(name=robot or DEFAULT_ROBOT)
         if urdf is None

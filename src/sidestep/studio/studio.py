@@ -12,6 +12,7 @@ from sidestep.scenario.assembly import load_robot
 from sidestep.studio import guard as g
 from sidestep.studio import messages as m
 from sidestep.studio.clearance_monitor import ExactClearanceMonitor
+from sidestep.studio.gallery import ends_of
 from sidestep.studio.server import HOST, address_of, check_port, guarded_server
 from sidestep.studio.session_process import Beginning, SessionProcess
 
@@ -35,6 +36,7 @@ class Studio:
 
     Args:
         scenario: what is on the stage at first.
+        to_and_fro: whether the arm goes to and fro between start and goal from the beginning.
         method: one of `sidestep.studio.methods.METHODS`. numbers: parameters of methods, by method and name.
         host, port: where to listen; by default this machine alone can connect.
         ellipsoids: per link of a covering body; None: as `Body.cover` finds best, which takes longer.
@@ -50,6 +52,7 @@ class Studio:
         self,
         scenario: Scenario,
         *,
+        to_and_fro: bool = False,
         method: str = "controller",
         numbers: Mapping[str, Mapping[str, Any]] | None = None,
         host: str = HOST,
@@ -70,7 +73,8 @@ class Studio:
         self._stopping = threading.Event()
         self.snapshot: m.Snapshot | None = None
         self.error = ""
-        self._loop = SessionProcess(Beginning(scenario, method, dict(numbers or {}), ellipsoids))
+        goals = ends_of(scenario, robot) if to_and_fro else ()
+        self._loop = SessionProcess(Beginning(scenario, method, dict(numbers or {}), ellipsoids, goals))
         self.view: View = View(server, scenario, robot, self.send)
         self._truth = ExactClearanceMonitor(self.view.take_clearances, self.view.report)
         self._last_truth = 0.0

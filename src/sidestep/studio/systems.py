@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from sidestep._core import ControllerSettings
 from sidestep.arm import Arm
 from sidestep.body import Body
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
+from sidestep.scenario.assembly import pose_of
 from sidestep.scenario.config import controller_settings_of
 from sidestep.scenario.scenario import BodyConfig, MethodChoice
 from sidestep.studio.methods import METHODS
@@ -21,14 +22,18 @@ from sidestep.studio.thesis.methods import custom_scenario, numbers_of_custom
 from sidestep.studio.thesis.mover import SystemMover
 from sidestep.thesis.custom import custom_system, torque_qp_of
 
+if TYPE_CHECKING:
+    from sidestep.arm import Progress
+
 Mover = ControllerMover | SystemMover
 
 
 @dataclass(frozen=True)
 class Covering:
-    """A covering body with so many ellipsoids per link; None: as many as it takes."""
+    """A covering body with so many ellipsoids per link; None: as many as it takes. draft: made in seconds, coarser."""
 
     ellipsoids: int | None
+    draft: bool = False
 
 
 Recipe = Covering | BodyConfig  # of a body
@@ -44,23 +49,50 @@ def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> S
     return method.write(numbers, written)
 
 
-def recipe_of(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> Recipe:
-    """The body that a method needs."""
+def recipe_of(
+    method: Method, numbers: Mapping[str, Any], scenario: Scenario, *, draft: bool = False
+) -> Recipe:
+    """The body that a method needs; draft: where as many ellipsoids as it takes are wanted, a draft of them."""
     written = as_file(method, numbers, scenario)
     body = written.body
-    return Covering(body.ellipsoids) if method.controlled else dataclasses.replace(body, ellipsoids=None)
+    if method.controlled:
+        return Covering(body.ellipsoids, draft=draft and body.ellipsoids is None)
+    return dataclasses.replace(body, ellipsoids=None)
 
 
 def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], None] | None = None) -> Body:
     """The body, from the cache or made now."""
+    if isinstance(recipe, Covering) and recipe.draft:
+        return Body.cover(robot, effort="draft", progress=progress)
     if isinstance(recipe, Covering):
         return Body.cover(robot, components=recipe.ellipsoids, progress=progress)
     return Body.fit(robot, **fit_arguments(recipe), progress=progress)
 
 
+def draft_arm(scenario: Scenario, progress: Progress | None = None) -> Arm:
+    """The arm of a description file, prepared in seconds; the fine one where it is in the cache."""
+    choice = scenario.robot
+    assert choice.urdf is not None
+    return Arm.load(
+        scenario.file(choice.urdf),
+        package_dirs=[scenario.file(folder) for folder in choice.package_dirs],
+        tip=choice.tip,
+        locked=choice.locked,
+        base_pose=None if choice.base is None else pose_of(choice.base),
+        effort_limits=choice.effort_limits,
+        velocity_limits=choice.velocity_limits,
+        draft=True,
+        progress=progress,
+    )
+
+
 def fit_arguments(choice: BodyConfig) -> dict[str, Any]:
     """The arguments of `Body.fit` for a body of a scenario file."""
-    return {name: value for name, value in dataclasses.asdict(choice).items() if name != "ellipsoids"}
+    return {
+        name: value
+        for name, value in dataclasses.asdict(choice).items()
+        if name not in ("ellipsoids", "draft")
+    }
 
 
 def settings_of(written: Scenario, *, synchronous: bool = False) -> ControllerSettings:
@@ -76,9 +108,10 @@ def build_mover(
     numbers: Mapping[str, Any],
     scenario: Scenario,
     *,
+    arm: Arm | None = None,
     synchronous: bool = False,
 ) -> Mover:
-    """What moves the arm by a method, with a body of its recipe.
+    """What moves the arm by a method, with a body of its recipe, and the arm that is prepared with it, if it is.
 
     Raises:
         ValueError: names the number at fault.
@@ -86,7 +119,7 @@ def build_mover(
     written, tip = as_file(method, numbers, scenario), tip_of(robot)
     if method.controlled:
         settings = settings_of(written, synchronous=synchronous)
-        return ControllerMover(robot, Arm.from_robot(robot, body), settings, tip)
+        return ControllerMover(robot, arm or Arm.from_robot(robot, body), settings, tip)
     system = custom_system(written.embedding, written.system, robot, body)
     program = torque_qp_of(written, robot)
     return SystemMover(robot, system, program, tip)

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -93,7 +94,9 @@ class Controller {
   /// attached. Throws std::invalid_argument that says what differs.
   void set_arm(Arm arm);
   /// An object that a link holds from now on, see sidestep::attach; at the arm's last configuration it is taken to be apart from
-  /// all links. Throws std::invalid_argument that names what is wrong; nothing changes then.
+  /// all links. What rests on obstacles there (Attachment::rests_on) may stay as near to them as it is, see sidestep::resting, until
+  /// its whole cover is `lifted_room` off all obstacles. Throws std::invalid_argument that names what is wrong, such as an object that
+  /// rests before the first step; nothing changes then.
   void attach(const Attachment& object);
   /// Lets it go. Throws std::invalid_argument that lists what is attached.
   void detach(const std::string& name);
@@ -142,7 +145,10 @@ class Controller {
   struct Held {
     Attachment object;
     Eigen::VectorXd q;  // where it was attached; empty: before the first step
+    std::optional<RestingObject> resting;
   };
+  Impl& newest() const noexcept;
+  void forget_lifted() noexcept;
   void change(const Arm& whole, std::vector<Held> held);
 
   static void destroy(Impl* newest) noexcept;
@@ -153,7 +159,8 @@ class Controller {
   std::atomic<Impl*> next_{nullptr};       // which it takes over in the next step
   std::atomic<Impl*> retired_{nullptr};    // those before, for another thread to destroy
   mutable std::mutex setters_;
-  Impl* newest_;                           // of the two, which setters tell
+  Impl* newest_;                           // of those that step, which setters tell
+  Impl* lifted_ = nullptr;                 // the one that newest_ goes over to, which they tell too
   mutable std::mutex changes_;             // of what follows; held while a body is prepared
   Arm whole_;                              // without what is attached
   std::vector<Held> held_;

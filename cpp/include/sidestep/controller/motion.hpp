@@ -23,9 +23,9 @@ struct MotionRecord {
 };
 
 /// Moves a model that does exactly what it is told, by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every
-/// joint is within `tolerance` [rad | m] of `goal` (nv), which may be empty. Throws std::invalid_argument on sizes,
-/// states that are not finite, less than one step, and a controller that is not synchronous, whose threads keep the
-/// machine's time; Interruption where `interrupted` says so before a step.
+/// joint is within `tolerance` [rad], a sliding one within a tenth of it [m], of `goal` (nv), which may be empty. Throws
+/// std::invalid_argument on sizes, states that are not finite, less than one step, and a controller that is not
+/// synchronous, whose threads keep the machine's time; Interruption where `interrupted` says so before a step.
 MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const Eigen::VectorXd& v, int steps,
                        const Eigen::VectorXd& goal = {}, double tolerance = 0.0,
                        const Interrupted& interrupted = never_interrupted);

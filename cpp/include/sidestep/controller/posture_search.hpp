@@ -14,6 +14,7 @@ struct Posture {
   double position_error;  ///< distance of the farthest frame from its goal [m]
   double rotation_error;  ///< angle between them [rad]; 0 where the orientation is free
   double room = 0.0;      ///< [m] as the search was told; less than zero: something is in the way
+  bool touches_itself = false;  ///< the arm does, here and at all others with the pose that the search found
 
   /// Whether the frame is at the pose, to 1e-7.
   bool found() const noexcept;

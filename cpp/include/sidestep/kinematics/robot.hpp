@@ -42,12 +42,18 @@ struct Frame {
 struct JointLimits {
   /// [1/s] Ten milliseconds until the whole acceleration: no description says it, and drives that state theirs allow more.
   static constexpr double default_jerk = 100.0;
+  /// [rad | m] by which a measured or published configuration may be outside the position limits: encoders and rounding are. It is
+  /// taken in as the nearest one within.
+  static constexpr double rounding = 1e-3;
 
   Eigen::VectorXd lower, upper, velocity, acceleration, effort;
   Eigen::VectorXd jerk = {}, effort_rate = {};
 
   /// No limits at all, for `num` coordinates.
   static JointLimits unlimited(int num);
+
+  /// The nearest configuration within the position limits.
+  Eigen::VectorXd nearest_within(const Eigen::VectorXd& q) const { return q.cwiseMax(lower).cwiseMin(upper); }
 };
 
 /// The immutable kinematic model of an arm: joints in topological order, frames, coordinate names and limits.

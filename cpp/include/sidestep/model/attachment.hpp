@@ -7,6 +7,7 @@
 
 #include "sidestep/body/cover_refinement.hpp"
 #include "sidestep/model/arm.hpp"
+#include "sidestep/obstacles/obstacles.hpp"
 
 namespace sidestep {
 
@@ -19,6 +20,9 @@ struct Attachment {
   SolidEllipsoids cover;                                   ///< ellipsoids that hold all of it, in its own frame
   Inertial inertial;                                       ///< in its own frame; mass 0: unknown, or none
   std::vector<std::string> may_touch;                      ///< links that get no clearance from it, as the fingers
+  std::vector<std::string> rests_on;                       ///< names of obstacles that it stands on, until it is lifted; or `anything`
+
+  static constexpr const char* anything = "*";
 };
 
 /// The arm with an object attached: a frame, ellipsoids, pairs with every covered link that another joint moves, and its inertia
@@ -30,5 +34,21 @@ struct Attachment {
 Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q = {});
 
 constexpr double attached_room = 0.001;
+
+/// An object that stands on something, and by how much its cover has given way there.
+struct RestingObject {
+  Attachment object;
+  /// The whole of an ellipsoid of the cover is within this distance of what is left of it [m], one per ellipsoid.
+  std::vector<double> given;
+};
+
+/// The object with ellipsoids cut down to smaller ones inside them, which keep `room` [m] off the points of obstacles that it rests
+/// on. With the ellipsoid {c + A u : |u| <= 1} and a plane at w·u = β there, w a unit vector, the smaller one is
+/// {c − (1 − β)/2 A w + A (√a I + (a − √a) w wᵀ) u}, a = (1 + β)/2: it touches the plane, and the ellipsoid on the other side.
+/// Throws std::invalid_argument that names the object and an obstacle: one that there is not, or that it is more than
+/// `deepest_rest` [m] deep in.
+RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles, double room);
+
+constexpr double deepest_rest = 0.02;
 
 }  // namespace sidestep

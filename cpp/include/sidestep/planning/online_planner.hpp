@@ -127,6 +127,8 @@ class OnlinePlanner {
   const BodyClearance& body() const noexcept { return body_; }
 
  private:
+  static constexpr double usual_progress = 0.0202;  // [rad | m] within the patience, below which the arm is stuck
+
   /// What the loop tells the planner.
   struct State {
     Eigen::VectorXd q, v, goal;
@@ -139,6 +141,7 @@ class OnlinePlanner {
   struct Answer {
     std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
     PlanStatus status = PlanStatus::no_path;
+    double progress = 0.0;                   // on the route, that is asked for within the patience [rad | m]
     std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
   };
 
@@ -156,9 +159,7 @@ class OnlinePlanner {
   void follow(const State& state, const Eigen::MatrixXd& path, const Obstacles& obstacles, bool measured);
   Eigen::VectorXd on_route(double station) const;
   Eigen::Index waypoint_after(double station) const;
-  Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const {
-    return q.cwiseMax(body_.robot().limits().lower).cwiseMin(body_.robot().limits().upper);
-  }
+  Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const { return body_.robot().limits().nearest_within(q); }
   void answer(const State& state, PlanStatus status);
 
   BodyClearance body_;

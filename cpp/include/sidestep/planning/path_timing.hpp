@@ -16,6 +16,9 @@ struct PathTiming {
   double period = 0.0;             ///< [s]
   Eigen::MatrixXd q, v, a;         ///< (nv × K)
   Eigen::VectorXd station;         ///< (K), ascending
+
+  /// The shortest way along the path [rad | m] in any span of the motion that lasts so long [s]; infinity for a shorter motion.
+  double slowest(double duration) const noexcept;
 };
 
 /// The fastest motion along a path from the speed `begin` = ds/dt to rest, within the limits at every sample.

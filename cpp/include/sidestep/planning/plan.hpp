@@ -15,7 +15,7 @@ enum class PlanStatus {
   timeout,             ///< none within the budget of time
   start_in_collision,  ///< see Plan::obstruction
   goal_in_collision,   ///< see Plan::obstruction
-  invalid,             ///< start or goal is not finite or outside the position limits
+  invalid,             ///< start or goal is not finite, or outside the position limits by more than JointLimits::rounding
 };
 
 /// Short names, for example "goal_in_collision".
@@ -29,7 +29,7 @@ struct Obstruction {
   std::string obstacle;   ///< what messages call the obstacle, see Obstacles::words_for; empty for a pair or a plane
 };
 
-/// For example "link 'hand' is 31 mm deep in 'table'".
+/// For example "link 'hand' is 31 mm deep in 'table'", or "links 'hand' and 'forearm' touch, 12 mm deep".
 std::string describe(const Obstruction& obstruction);
 
 /// A path, or why there is none.

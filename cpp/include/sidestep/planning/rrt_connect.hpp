@@ -57,6 +57,7 @@ class RrtConnect {
   /// The body must outlive the planner, which is mutable: one per thread.
   RrtConnect(const BodyClearance& body, const PlannerSettings& settings);
 
+  /// A start or goal a rounding error outside the position limits is taken in: the path has the nearest one within.
   Plan plan(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, std::uint64_t seed);
 
   /// The two parts of a plan: the first path, then a better one. margin [m]: in place of the settings', at least the

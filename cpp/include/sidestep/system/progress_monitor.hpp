@@ -14,13 +14,10 @@ class ProgressMonitor {
   explicit ProgressMonitor(double patience = 2.0, double fraction = 0.02);
 
   /// Takes the potential of the goal at a time [s] that does not go back; whether patience has run out.
-  bool update(double time, double potential) noexcept {
-    if (potential < (1.0 - fraction_) * least_) {
-      since_ = time;
-      least_ = potential;
-    }
-    return time - since_ >= patience_;
-  }
+  bool update(double time, double potential) noexcept { return note(time, potential, (1.0 - fraction_) * least_); }
+
+  /// The same of a way that is left, which is to fall by a `step` of its unit, whatever is left.
+  bool update_way(double time, double way, double step) noexcept { return note(time, way, least_ - step); }
 
   /// For a new goal.
   void reset() noexcept {
@@ -29,6 +26,14 @@ class ProgressMonitor {
   }
 
  private:
+  bool note(double time, double value, double below) noexcept {
+    if (value < below) {
+      since_ = time;
+      least_ = value;
+    }
+    return time - since_ >= patience_;
+  }
+
   double patience_, fraction_;
   double least_ = std::numeric_limits<double>::infinity();
   double since_ = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// Included by one file per instruction set, after clearance_kernel.hpp and <immintrin.h> where there is one. Defines
+// Included by one file per instruction set, after clearance_kernel.hpp and intrinsics.hpp. Defines
 // measure, measure_points, begin, collect and sum_candidates in an anonymous namespace.
 
 namespace sidestep::kernels {
@@ -42,7 +42,7 @@ struct Measured {
     const Singles across = larger((1.0f + 2.0f * measure_error) * squared_speed - towards * towards, Singles{});
     const Singles growth = distance * apart * (0.5f - measure_error) * rough_inverse(radius) +
                            (1.0f + measure_error) * horizon * smaller(towards, Singles{});
-    room = (apart > 0.0f) & (growth > 0.0f)
+    room = ((apart > 0.0f) & (growth > 0.0f))
                ? apart - horizon * (towards + more) - (0.25f + measure_error) * horizon * horizon * across * rough_inverse(growth)
                : all(-__builtin_inff());
   }

@@ -1,9 +1,7 @@
 // For every processor of the architecture.
 #include "clearance_kernel.hpp"
 
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
+#include "../../kinematics/kernels/intrinsics.hpp"
 
 #include "clearance_kernel.inl"
 

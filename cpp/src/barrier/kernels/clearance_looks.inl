@@ -406,7 +406,7 @@ struct FarSight {
     const Singles sine = (1.0f + distance_error) * of.extent * inverse_distance, cosine = rough_root(1.0f - sine * sine);
     const Singles across = rough_root((1.0f + 1e-6f) * squared * squared_speed - along * along);
     const Singles turned = (along * cosine + across * sine) * inverse_distance + 2.0f * direction_error * speed;
-    closing = (sine < 1.0f) & (along * inverse_distance < speed * cosine) ? smaller(turned, speed) : speed;
+    closing = ((sine < 1.0f) & (along * inverse_distance < speed * cosine)) ? smaller(turned, speed) : speed;
   }
 };
 

@@ -1,4 +1,4 @@
-// Included by one file per instruction set, after gap_kernel.hpp and <immintrin.h> where there is one. Defines
+// Included by one file per instruction set, after gap_kernel.hpp and intrinsics.hpp. Defines
 // find_gaps and bound_gaps in an anonymous namespace.
 
 namespace sidestep::kernels {

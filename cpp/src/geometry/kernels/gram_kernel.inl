@@ -1,4 +1,4 @@
-// Included by one file per instruction set, after gram_kernel.hpp and <immintrin.h> where there is one. Defines
+// Included by one file per instruction set, after gram_kernel.hpp and intrinsics.hpp. Defines
 // add_gram in an anonymous namespace.
 
 namespace sidestep::kernels {

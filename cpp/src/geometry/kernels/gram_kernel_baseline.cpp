@@ -1,9 +1,7 @@
 // For every processor of the architecture.
 #include "gram_kernel.hpp"
 
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
+#include "../../kinematics/kernels/intrinsics.hpp"
 
 #include "gram_kernel.inl"
 

@@ -1,5 +1,5 @@
 // Doubles side by side in one register of the instruction set that the including file is compiled for. To be included
-// inside an anonymous namespace, after <immintrin.h> where there is one.
+// inside an anonymous namespace, after intrinsics.hpp.
 
 #if defined(__AVX512F__)
 inline constexpr int width = 8;
@@ -29,6 +29,8 @@ inline Lanes root(Lanes x) noexcept {
   return _mm256_sqrt_pd(x);
 #elif defined(__SSE2__)
   return _mm_sqrt_pd(x);
+#elif defined(__aarch64__)
+  return vsqrtq_f64(x);
 #else
   for (int i = 0; i < width; ++i) {
     x[i] = __builtin_sqrt(x[i]);
@@ -149,6 +151,9 @@ inline unsigned below(Lanes x, Lanes limit) noexcept {
   return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(x, limit, _CMP_LT_OQ)));
 #elif defined(__SSE2__)
   return static_cast<unsigned>(_mm_movemask_pd(_mm_cmplt_pd(x, limit)));
+#elif defined(__aarch64__)
+  constexpr uint64x2_t bit = {1, 2};
+  return static_cast<unsigned>(vaddvq_u64(vandq_u64(vcltq_f64(x, limit), bit)));
 #else
   unsigned bits = 0;
   for (int i = 0; i < width; ++i) {
@@ -205,7 +210,7 @@ inline Singles magnitude(Singles x) noexcept {
   return x;
 }
 
-/// 1/x and 1/√x of positive numbers, within this share of them: 2⁻¹⁴ or 3 · 2⁻¹³.
+/// 1/x and 1/√x of positive numbers, within this share of them: 2⁻¹⁴ or 3 · 2⁻¹³ (NEON, after a step of Newton's: 2⁻¹⁵).
 #if defined(__AVX512F__)
 inline constexpr float rough_error = 6.2e-5f;
 #else
@@ -218,6 +223,9 @@ inline Singles rough_inverse(Singles x) noexcept {
   return _mm256_rcp_ps(x);
 #elif defined(__SSE2__)
   return _mm_rcp_ps(x);
+#elif defined(__aarch64__)
+  const Singles y = vrecpeq_f32(x), step = vrecpsq_f32(x, y);  // y within 2⁻⁸; one step of Newton's
+  return y * step;
 #else
   return 1.0f / x;
 #endif
@@ -230,6 +238,9 @@ inline Singles rough_inverse_root(Singles x) noexcept {
   return _mm256_rsqrt_ps(x);
 #elif defined(__SSE2__)
   return _mm_rsqrt_ps(x);
+#elif defined(__aarch64__)
+  const Singles y = vrsqrteq_f32(x), step = vrsqrtsq_f32(x, y * y);
+  return y * step;
 #else
   Singles y;
   for (int i = 0; i < singles; ++i) {
@@ -313,6 +324,8 @@ inline Singles narrow(const double* p, double less = 0.0) noexcept {
   return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(low)), _mm256_cvtpd_ps(high), 1);
 #elif defined(__SSE2__)
   return _mm_movelh_ps(_mm_cvtpd_ps(low), _mm_cvtpd_ps(high));
+#elif defined(__aarch64__)
+  return vcvt_high_f32_f64(vcvt_f32_f64(low), high);
 #else
   Singles x;
   for (int i = 0; i < width; ++i) {
@@ -361,6 +374,9 @@ inline unsigned below(Singles x, Singles limit) noexcept {
   return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(x, limit, _CMP_LT_OQ)));
 #elif defined(__SSE2__)
   return static_cast<unsigned>(_mm_movemask_ps(_mm_cmplt_ps(x, limit)));
+#elif defined(__aarch64__)
+  constexpr uint32x4_t bit = {1, 2, 4, 8};
+  return vaddvq_u32(vandq_u32(vcltq_f32(x, limit), bit));
 #else
   unsigned bits = 0;
   for (int i = 0; i < singles; ++i) {

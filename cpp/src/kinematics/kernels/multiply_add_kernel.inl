@@ -1,4 +1,4 @@
-// Included by one file per instruction set, after multiply_add_kernel.hpp and <immintrin.h> where there is one. Defines
+// Included by one file per instruction set, after multiply_add_kernel.hpp and intrinsics.hpp. Defines
 // multiply_add in an anonymous namespace.
 
 namespace sidestep::kernels {

@@ -1,9 +1,7 @@
 // For every processor of the architecture, see CMakeLists.txt.
 #include "multiply_add_kernel.hpp"
 
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
+#include "intrinsics.hpp"
 
 #include "multiply_add_kernel.inl"
 

@@ -1,5 +1,5 @@
-// Included by one file per instruction set, after distance_kernel.hpp. Defines two functions in an anonymous namespace:
-// loops over `most_balls` floats that the compiler puts side by side in the registers it has.
+// Included by one file per instruction set, after distance_kernel.hpp and intrinsics.hpp. Defines two functions in an
+// anonymous namespace: loops over `most_balls` floats that the compiler puts side by side in the registers it has.
 
 namespace sidestep::kernels {
 namespace {
@@ -54,8 +54,17 @@ inline unsigned below(F x, float limit) noexcept {
     return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps((__m256)x, _mm256_set1_ps(limit), _CMP_LT_OQ)));
   }
 #endif
-  const typename SideBySide<int, lanes<F>>::Type is = x < limit;
   unsigned bits = 0;
+#if defined(__aarch64__)
+  constexpr uint32x4_t bit = {1, 2, 4, 8};
+  for (int i = 0; i < lanes<F>; i += 4) {
+    float32x4_t four;
+    __builtin_memcpy(&four, reinterpret_cast<const char*>(&x) + sizeof(float) * i, sizeof four);
+    bits |= vaddvq_u32(vandq_u32(vcltq_f32(four, vdupq_n_f32(limit)), bit)) << i;
+  }
+  return bits;
+#endif
+  const typename SideBySide<int, lanes<F>>::Type is = x < limit;
   for (int i = 0; i < lanes<F>; ++i) {
     bits |= static_cast<unsigned>(is[i] & 1) << i;
   }

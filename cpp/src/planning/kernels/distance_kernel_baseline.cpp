@@ -1,6 +1,8 @@
 // For every processor of the architecture.
 #include "distance_kernel.hpp"
 
+#include "../../kinematics/kernels/intrinsics.hpp"
+
 #include "distance_kernel.inl"
 
 namespace sidestep::kernels {

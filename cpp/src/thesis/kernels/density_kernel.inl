@@ -1,4 +1,4 @@
-// Included by one file per instruction set, after density_kernel.hpp and <immintrin.h> where there is one. Defines
+// Included by one file per instruction set, after density_kernel.hpp and intrinsics.hpp. Defines
 // add_density in an anonymous namespace.
 
 #include "../../kinematics/kernels/link_numbers.hpp"

@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 MOST_TRIANGLES = 60_000  # of an arm: a megabyte or two for each browser
 FIRST_CELL = 1e-3  # [m] detail that is given up first
 SHARP = 0.6  # [rad] edges sharper than this stay edges
+OPACITY = 0.22  # of a ghost
 SKIN = 2e-3  # [m] that a ghost is larger than its arm: surfaces in one place flicker, as of links that turn in place
 LEAST_REACH = 0.3  # [m] what the page is laid out for at least
 SAME, LEVER = (
@@ -34,7 +35,7 @@ TWO_DEVIATIONS = 4.0  # level of the ellipsoids of a body that is not calibrated
 
 
 class ArmView:
-    """An arm of `link_meshes`; `ghost` makes it see-through, in the colour of the goal.
+    """An arm of `link_meshes`; `ghost` is the colour of one that is see-through.
 
     Links with a mesh have a frame, and those of `frames`.
     """
@@ -46,7 +47,7 @@ class ArmView:
         meshes: dict[str, trimesh.Trimesh],
         name: str,
         *,
-        ghost: bool = False,
+        ghost: str | None = None,
         frames: Iterable[str] = (),
     ) -> None:
         self._robot, self._name = robot, name
@@ -59,15 +60,15 @@ class ArmView:
         for link in dict.fromkeys((*meshes, *frames)):
             self._frames[link] = server.scene.add_frame(f"{name}/{link}", show_axes=False)
         for link, mesh in meshes.items():
-            colour = colours.GOAL if ghost else colours.LINK if moving[link] else colours.BASE
+            colour = ghost or (colours.LINK if moving[link] else colours.BASE)
             if ghost and not moving[link]:
                 continue  # the base stands where the arm's own does
             self._meshes[link] = server.scene.add_mesh_simple(
                 f"{name}/{link}/mesh",
-                np.asarray(mesh.vertices + SKIN * ghost * mesh.vertex_normals, dtype=np.float32),
+                np.asarray(mesh.vertices + SKIN * bool(ghost) * mesh.vertex_normals, dtype=np.float32),
                 np.asarray(mesh.faces, dtype=np.uint32),
                 color=colours.rgb(colour),
-                opacity=0.22 if ghost else None,
+                opacity=OPACITY if ghost else None,
                 side="double",
                 cast_shadow=not ghost,
                 receive_shadow=not ghost,
@@ -86,10 +87,10 @@ class ArmView:
             frame = self._frames[link]
             frame.position, frame.wxyz = vector[:3], vector[3:]
 
-    def colour(self, clearances: dict[str, float]) -> None:
-        """Colours the links by their clearance [m]."""
+    def colour(self, clearances: dict[str, float], *, lit: str = "") -> None:
+        """Colours the links by their clearance [m]; one may be `lit`."""
         for link in self._moving:
-            shade = colours.shade(clearances.get(link, np.inf))
+            shade = colours.SHADE_LIT if link == lit else colours.shade(clearances.get(link, np.inf))
             if link in self._meshes and self._shades.get(link, 0) != shade:
                 self._shades[link] = shade
                 self._meshes[link].color = colours.shade_colour(shade)
@@ -188,13 +189,15 @@ def reach(robot: Robot) -> float:
     return max(LEAST_REACH, *(float(np.linalg.norm(place)) for place in places))
 
 
-def link_meshes(robot: Robot) -> dict[str, trimesh.Trimesh]:
-    """What each link looks like, in its frame, together at most `MOST_TRIANGLES`."""
-    return merged_meshes({link.name: link.visuals or link.collisions for link in robot.links})
+def link_meshes(robot: Robot, most: int = MOST_TRIANGLES) -> dict[str, trimesh.Trimesh]:
+    """What each link looks like, in its frame, together at most `most` triangles."""
+    return merged_meshes({link.name: link.visuals or link.collisions for link in robot.links}, most)
 
 
-def merged_meshes(geometries: Mapping[str, Sequence[Geometry]]) -> dict[str, trimesh.Trimesh]:
-    """The shapes of each link as one mesh in its frame, all together at most `MOST_TRIANGLES`."""
+def merged_meshes(
+    geometries: Mapping[str, Sequence[Geometry]], most: int = MOST_TRIANGLES
+) -> dict[str, trimesh.Trimesh]:
+    """The shapes of each link as one mesh in its frame, all together at most `most` triangles."""
     whole: dict[str, trimesh.Trimesh] = {}
     for link, shapes in geometries.items():
         parts = [shape.mesh() for shape in shapes]
@@ -202,11 +205,9 @@ def merged_meshes(geometries: Mapping[str, Sequence[Geometry]]) -> dict[str, tri
             merged: Any = trimesh.util.concatenate([trimesh.Trimesh(s.vertices, s.faces) for s in parts])
             whole[link] = merged
     meshes, cell = whole, FIRST_CELL
-    while (count := sum(len(mesh.faces) for mesh in meshes.values())) > MOST_TRIANGLES:
+    while (count := sum(len(mesh.faces) for mesh in meshes.values())) > most:
         if meshes is not whole:
-            cell *= max(
-                1.1, np.sqrt(count / MOST_TRIANGLES)
-            )  # triangles are as many as there are cells on a surface
+            cell *= max(1.1, np.sqrt(count / most))  # triangles are as many as there are cells on a surface
         meshes = {name: simplified(mesh, cell) for name, mesh in whole.items()}
     return {name: trimesh.graph.smooth_shade(mesh, angle=SHARP) for name, mesh in meshes.items()}
 

@@ -26,15 +26,22 @@ def batched(colour: Rgb) -> Rgb:
 
 
 OBSTACLE = palette.VERMILLION
+FURNITURE = palette.FURNITURE  # of an obstacle that is large: it would drown everything else
+LARGE = 0.25  # [m] radius of a ball that holds it
 GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
 TRAIL = palette.GREEN
+PATH = palette.SKY
+PULL = palette.BLACK
+LIT = palette.YELLOW  # of the link and the point that bend the motion
+OTHER = palette.ORANGE  # the arm of the other method
 METRIC = "#333333"
 SURFACE, NET = "#B7C3A5", "#7D8A68"
 LINK, BASE = "#CBD3DE", "#9AA2AE"
 RIM = "#FBFF00"  # viser's own
 
 NEAR_FROM = 0.20  # [m] clearance at which a link begins to change its colour
+SHADE_LIT = -1  # the shade of a link that is lit
 SHADES = 24  # steps of it: fewer messages, and nobody sees the difference
 
 LEGEND = (
@@ -46,6 +53,11 @@ LEGEND = (
         "both on the exact meshes",
     ),
     (OBSTACLE, "obstacle"),
+    (FURNITURE, "obstacle that is larger than 50 cm"),
+    (LIT, "link and obstacle point that bend the motion most now"),
+    (PATH, "path of the tip that is planned"),
+    (PULL, "arrow: how the goal or the path pulls at the tip"),
+    (OTHER, "ghost arm of the method that is compared"),
     (GOAL, "goal: ghost arm; the gizmo at its tip has the colours of the axes"),
     (TRAIL, "where the tip has been; on the surface, where the joints are and have been"),
     (
@@ -67,6 +79,8 @@ def shade(clearance: float) -> int:
 
 def shade_colour(index: int, base: str = LINK) -> Rgb:
     """The colour of a shade."""
+    if index == SHADE_LIT:
+        return rgb(LIT)
     share = index / SHADES
     mixed: npt.NDArray[np.float64] = (1.0 - share) * np.array(to_rgb(base)) + share * np.array(to_rgb(NEAR))
     r, g, b = np.round(255.0 * mixed).astype(int).tolist()

@@ -12,6 +12,7 @@ from sidestep.robot import Robot
 from sidestep.robot.pose import pose_vector
 from sidestep.simulation.pose_target import IkSolution
 from sidestep.studio import messages as m
+from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, reach
 from sidestep.studio.page.joint_sliders import JointSliders
 from sidestep.studio.page.obstacles import gizmo_pose
@@ -41,7 +42,7 @@ class GoalControl:
     ) -> None:
         self._robot, self._tip, self._send = robot, tip, send
         self.q = np.array(robot.neutral)
-        self.ghost = ArmView(server, robot, meshes, "/goal", ghost=True)
+        self.ghost = ArmView(server, robot, meshes, "/goal", ghost=colours.GOAL)
         self.gizmo = server.scene.add_transform_controls(
             "/goal_gizmo", scale=GIZMO_SIZE * reach(robot), depth_test=False, line_width=3.0
         )

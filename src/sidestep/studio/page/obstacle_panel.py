@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import dataclasses
 import shutil
 import tempfile
 import time as clock
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 NONE = "(none)"
+USUAL_SIDES = (12.0, 12.0, 12.0)  # [cm] of a new box
 PLACE_EVERY = 0.2  # [s] between two places that are shown of an obstacle that moves
 GIZMO_ROOM = 1.2  # of the length of its arrows: it is drawn on top of all, and takes the mouse
 
@@ -49,10 +51,15 @@ class ObstaclePanel:
             step=0.5,
             initial_value=6.0,
         )
+        self._sides: Any = gui.add_vector3(
+            "sides [cm]", USUAL_SIDES, min=(0.5,) * 3, max=(300.0,) * 3, step=0.5, visible=False
+        )
+        self._kind.on_update(lambda _: self._show_sizes())
         gui.add_button("Add").on_click(self._add)
         add_note(
             gui,
-            "A ball of this radius, a box or plate of points of this edge: near the goal, where it is free.",
+            "A ball of this radius, a box with these sides along x, y, z, or a plate of points of this edge: near the "
+            "goal, where it is free.",
         )
         gui.add_upload_button("Add a point cloud file …").on_upload(self._upload)
         add_note(
@@ -66,6 +73,10 @@ class ObstaclePanel:
         self._chosen: Any = gui.add_dropdown("obstacle", (NONE,))
         self._place: Any = gui.add_vector3("position [m]", (0.0, 0.0, 0.0), step=0.01)
         self._place.on_update(self._moved)
+        self._box: Any = gui.add_vector3(
+            "its sides [cm]", USUAL_SIDES, min=(0.5,) * 3, max=(300.0,) * 3, step=0.5, visible=False
+        )
+        self._box.on_update(self._resized)
         self._speed = gui.add_slider("speed [m/s]", min=0.1, max=2.0, step=0.1, initial_value=0.5)
         gui.add_button("Throw at the arm").on_click(self._throw)
         add_note(gui, "From where it is towards the tip.")
@@ -74,6 +85,7 @@ class ObstaclePanel:
         self._chosen.on_update(self._chose)
         self._count = 0
         self._shown = (NONE, 0.0, 0.0, 0.0)
+        self._box_shown: tuple[str, tuple[float, ...]] = NONE, ()
         self._followed = 0.0
         self._sent: list[tuple[str, Ball]] = []  # added, and not there yet
 
@@ -103,6 +115,13 @@ class ObstaclePanel:
         index, last = self._index(), self._view.last
         if index is not None and last is not None:
             x, y, z = (float(value) for value in last.poses[index][:3, 3].round(3))
+            size = last.things[index].obstacle.shape.size
+            self._box.visible = size is not None
+            if size is not None:
+                sides = tuple(round(100.0 * side, 2) for side in size)
+                if self._box_shown != (self._chosen.value, sides):
+                    self._box_shown = self._chosen.value, sides
+                    self._box.value = sides
             if self._shown != (self._chosen.value, x, y, z):  # else it may be typed over just now
                 self._shown = self._chosen.value, x, y, z
                 self._place.value = (x, y, z)
@@ -128,13 +147,29 @@ class ObstaclePanel:
             m.DragObstacle(self._chosen.value, pose_at(self._place.value, last.poses[index][:3, :3]))
         )
 
+    def _show_sizes(self) -> None:
+        """The sizes that the kind of a new obstacle has."""
+        self._sides.visible = self._kind.value == "box"
+        self._size.visible = self._kind.value != "box"
+
+    def _resized(self, event: Any) -> None:
+        index, last = self._index(), self._view.last
+        if event.client is None or index is None or last is None:
+            return
+        thing = last.things[index]
+        x, y, z = (float(side) / 100.0 for side in self._box.value)
+        shape = dataclasses.replace(thing.obstacle.shape, size=(x, y, z))
+        self._box_shown = self._chosen.value, tuple(map(float, self._box.value))
+        item = dataclasses.replace(thing.obstacle, shape=shape)
+        self._view.send(m.ReplaceObstacle(SceneObstacle(thing.name, item, thing.folder)))
+
     def _add(self, event: Any) -> None:
         kind, size = str(self._kind.value), self._size.value / 100.0
         name, nowhere = self._new_name(kind), np.zeros(3)
         if kind == "ball":
             made = ball(name, nowhere, size)
         elif kind == "box":
-            made = box(name, nowhere, np.full(3, size))
+            made = box(name, nowhere, np.array(self._sides.value) / 100.0)
         else:
             made = self._cloud(name, scattered(size, seed=self._count))
         with self._view.telling(event.client):

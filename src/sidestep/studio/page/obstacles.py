@@ -70,7 +70,11 @@ class _View:
         self._pose = np.zeros((4, 4))
         self._grip = np.zeros(3)
         self._path: deque[tuple[float, Array]] = deque()
-        name, colour = f"/obstacles/{thing.name}", colours.rgb(colours.OBSTACLE)
+        large = thing.size > colours.LARGE and thing.cloud is None
+        name, colour = (
+            f"/obstacles/{thing.name}",
+            colours.rgb(colours.FURNITURE if large else colours.OBSTACLE),
+        )
         solid = thing.solids[0]
         if thing.cloud is not None:
             unit = solid.surface(subdivisions=1)

@@ -28,7 +28,6 @@ HEIGHT, TIMES = 53, 24  # [px] of a plot, and of the times below the last one
 # where the axis reaches at least: it contains zero, and so much, that two of its labels can always be read
 PLOTS = (
     ("clearance", "exact clearance [mm]", 1e3, 0, colours.NEAR, 100.0),
-    ("psi", "height of the embedding |ψ|", 1.0, 1, palette.BLACK, 2.0),
     ("speed", "fastest joint [% of its limit]", 1e2, 1, palette.BLACK, 100.0),
     ("torque", "largest torque [% of its limit]", 1e2, 1, palette.BLACK, 100.0),
     ("step", "time of a step, p99 [ms]", 1e-3, 2, palette.BLACK, 1.0),
@@ -70,12 +69,10 @@ class Plots:
                 handle.data = NOTHING
         if not snapshot.status or (self._rows and snapshot.time == self._rows[-1][0]):
             return None  # there was no step yet, or none since
-        height = float(np.linalg.norm(snapshot.values))
         self._rows.append(
             (
                 snapshot.time,
                 clearance if np.isfinite(clearance) else np.nan,
-                height,
                 snapshot.speed_share,
                 snapshot.torque_share,
                 snapshot.timing.p99,
@@ -119,7 +116,7 @@ class Plots:
 
     @property
     def rows(self) -> Array:
-        """What is shown, (n, 6): time and the five quantities, in SI units (the step in microseconds)."""
+        """What is shown, (n, 5): time and the four quantities, in SI units (the step in microseconds)."""
         return np.array(self._rows).reshape(-1, 1 + len(PLOTS))
 
 

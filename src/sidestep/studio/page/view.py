@@ -20,10 +20,12 @@ from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, goal_posture, load_robot
 from sidestep.studio import messages as m
+from sidestep.studio.gallery import ends_of
 from sidestep.studio.methods import method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, BodyView, link_meshes, reach
 from sidestep.studio.page.camera import Viewpoint
+from sidestep.studio.page.compare_panel import ComparePanel
 from sidestep.studio.page.goal import GoalControl
 from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacle_panel import ObstaclePanel
@@ -32,8 +34,10 @@ from sidestep.studio.page.plots import Plots
 from sidestep.studio.page.recorder import Recorder
 from sidestep.studio.page.scenario_panel import ScenarioPanel
 from sidestep.studio.page.scene import point_cameras, set_up_scene
+from sidestep.studio.page.start_panel import StartPanel
 from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
+from sidestep.studio.page.why import Why
 from sidestep.studio.page.words import begun, in_box, stamped
 from sidestep.studio.scene_obstacle import SceneObstacle, thing_of
 from sidestep.studio.systems import Recipe, make_body, numbers_of, recipe_of
@@ -56,7 +60,7 @@ class View:
         robot: Robot,
         send: Callable[[m.Command], None],
     ) -> None:
-        self._server, self._send = server, send
+        self._server, self._send_to_loop = server, send
         self._lock = threading.RLock()
         self._clearances: tuple[Clearance, ...] = ()
         self._measured = np.nan  # [s] simulated time of the clearances
@@ -81,30 +85,39 @@ class View:
         self._run = gui.add_button_group("Loop", ("Run", "Pause", "Restart"))
         self._run.on_click(self._on_loop)
         tabs = gui.add_tab_group()
+        with tabs.add_tab("Start"):
+            self.start_panel = StartPanel(server, self)
         self._goal_tab = tabs.add_tab("Goal")
         with tabs.add_tab("Obstacles"):
             self.obstacle_panel = ObstaclePanel(server, self)
-        with tabs.add_tab("Method") as method_tab:
+        with tabs.add_tab("Compare"):
+            self.compare = ComparePanel(server, self)
+        with tabs.add_tab("Advanced"):
+            inner = gui.add_tab_group()
+        with inner.add_tab("Method") as method_tab:
             self.tuning = TuningPanel(server, self, method_tab)
-        with tabs.add_tab("Scenario"):
+        with inner.add_tab("Show"):
+            self._add_switches()
+        with inner.add_tab("Scenario"):
             ScenarioPanel(server, self, Path.cwd())
             gui.add_divider()
             self.recorder = Recorder(server, self)
-        with tabs.add_tab("Show"):
-            self._add_switches()
-        self.obstacles = ObstacleViews(server, send, self.obstacle_panel.select)
+        self.start_panel.add_mouse(server)
+        self.obstacles = ObstacleViews(server, self.send, self.obstacle_panel.select)
         self.surface = Surface(server, self._lock, self.report)
         self._body_now: Body | None = None
         self._choice = scenario.robot
         self._set_robot(scenario, robot)
 
     def send(self, command: m.Command) -> None:
-        """Hands a command to the loop."""
-        self._send(command)
+        """Hands a command to the loop, and to the other one of a comparison."""
+        self._send_to_loop(command)
+        self.compare.send(command)
 
-    def load(self, scenario: Scenario) -> None:
-        """Another scenario for loop and page, with the method that it is written for."""
-        self._send(m.Load(scenario, numbers_of(scenario)[0]))
+    def load(self, scenario: Scenario, *, to_and_fro: bool = False) -> None:
+        """Another scenario for loop and page, with the method that it is written for; `to_and_fro` between its ends."""
+        goals = ends_of(scenario, load_robot(scenario)) if to_and_fro else ()
+        self.send(m.Load(scenario, numbers_of(scenario)[0], goals))
 
     @contextlib.contextmanager
     def telling(self, client: Any) -> Iterator[None]:
@@ -125,15 +138,20 @@ class View:
             self.obstacles.set_things(row.things)
             self.obstacles.show(row.things, row.poses)
             self.arm.show(row.q)
-            self.arm.colour({item.link: item.distance for item in self._clearances})
+            clearances = {item.link: item.distance for item in self._clearances}
+            lit = snapshot.reason.link if index is None and self._why_shown.value else ""
+            self.arm.colour(clearances, lit=lit)
             if self._body is not None:
                 self._body.colour(self.arm.shades)
             self.marks.show_nearest(self._clearances, visible=self._nearest.value)
             self.marks.show_metric(row.q, row.metric, visible=self._metric.value)
             self.tuning.show(snapshot)
+            self.start_panel.show(snapshot)
+            self.compare.show(snapshot, self.least_clearance)
             self.recorder.show(snapshot.recording)
             self.obstacle_panel.follow(snapshot)
             now = clock.monotonic()
+            self.why.show(row.q, snapshot.reason, visible=self._why_shown.value and index is None)
             if index is None:
                 self.marks.show_trail(row.q, row.time, visible=self._trail.value)
                 self.goal.show(snapshot.goal, snapshot.goal_pose, snapshot.posture)
@@ -162,7 +180,7 @@ class View:
             self._set_robot(snapshot.scenario, load_robot(snapshot.scenario))
         self.last = snapshot
         numbers = snapshot.numbers[snapshot.method]
-        recipe = recipe_of(method_named(snapshot.method), numbers, snapshot.scenario)
+        recipe = recipe_of(method_named(snapshot.method), numbers, snapshot.scenario, draft=snapshot.draft)
         if self._body is None or recipe != self._recipe:
             self._load_body(recipe)
         if before is None or snapshot.edition != before.edition:
@@ -239,6 +257,7 @@ class View:
 
     def stop(self) -> None:
         """Ends what runs beside the page."""
+        self.compare.stop()
         self.surface.stop()
 
     def _show_words(self, now: float, snapshot: m.Snapshot) -> None:
@@ -251,8 +270,9 @@ class View:
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
         least = f" (least so far {1e3 * self.least_clearance:.0f} mm)"
         state = f"{touch} · {snapshot.time:.1f} s · {speed}"
-        facts = [*self._nearest_facts(snapshot.things, least), state, *status]
-        self._tell(now, begun(snapshot.words), facts)
+        coarse = ["the body is coarse; a finer one is on its way"] if snapshot.draft else []
+        facts = [*self._nearest_facts(snapshot.things, least), state, *status, *coarse]
+        self._tell(now, begun(snapshot.words), facts, snapshot.events)
 
     def _show_replay_words(self, now: float, row: m.Row) -> None:
         self._tell(
@@ -266,10 +286,12 @@ class View:
         pair = f"{html.escape(first.link)} – {html.escape(thing_of(first.obstacle, things))}"
         return [f"exact meshes: {pair} {1e3 * first.distance:.0f} mm{more}"]
 
-    def _tell(self, now: float, words: str, facts: list[str]) -> None:
+    def _tell(
+        self, now: float, words: str, facts: list[str], events: tuple[tuple[float, str], ...] = ()
+    ) -> None:
         if now - self._told >= WORDS_EVERY:
             self._told = now
-            self._say(in_box(f"{html.escape(words)}.", "<br>".join(facts)))
+            self._say(in_box(f"{html.escape(words)}.", "<br>".join(facts), events))
 
     def _say(self, text: str) -> None:
         self._text, content = text, stamped(text, self._stamp)
@@ -289,6 +311,7 @@ class View:
     def _add_switches(self) -> None:
         gui = self._server.gui
         self._ghost = gui.add_checkbox("goal", True)
+        self._why_shown = gui.add_checkbox("path, pull and what binds", True)
         self._body_shown = gui.add_checkbox("body", False)
         self._nearest = gui.add_checkbox("nearest line", True)
         self._trail = gui.add_checkbox("trail", True)
@@ -309,14 +332,15 @@ class View:
         meshes = link_meshes(robot)
         self.arm = ArmView(self._server, robot, meshes, "/arm")
         self.marks = Marks(self._server, robot, self.tip)
+        self.why = Why(self._server, robot, self.tip)
         self._body: BodyView | None = None
         with self._goal_tab:
-            self.goal = GoalControl(self._server, robot, meshes, self.tip, self._send)
+            self.goal = GoalControl(self._server, robot, meshes, self.tip, self.send)
         self._show_goal()
 
     def _remove_robot(self) -> None:
         self.surface.clear()
-        for part in (self._body, self.arm, self.marks, self.goal):
+        for part in (self._body, self.arm, self.marks, self.why, self.goal):
             if part is not None:
                 part.remove()
 
@@ -333,7 +357,8 @@ class View:
         """The two joints over which the curved space is shown, None when it is not."""
         names = list(self.robot.coordinate_names)
         pair = self._first.value, self._second.value
-        if not self._curved.value or not set(pair) <= set(names):
+        coarse = self.last is not None and self.last.draft
+        if not self._curved.value or coarse or not set(pair) <= set(names):
             return None
         return names.index(pair[0]), names.index(pair[1])
 
@@ -344,11 +369,11 @@ class View:
     def _on_loop(self, event: Any) -> None:
         match event.target.value:
             case "Run":
-                self._send(m.SetRunning(True))
+                self.send(m.SetRunning(True))
             case "Pause":
-                self._send(m.SetRunning(False))
+                self.send(m.SetRunning(False))
             case _:
-                self._send(m.Restart())
+                self.send(m.Restart())
 
 
 def begins_anew(before: m.Snapshot, now: m.Snapshot) -> bool:

@@ -11,6 +11,7 @@ from sidestep.scenario.assembly import POSTURE_STARTS
 from sidestep.simulation.pose_target import IkSolution, solve_ik
 from sidestep.simulation.run import status_name
 from sidestep.studio.mover import Account
+from sidestep.studio.reason import Reason
 
 Array = npt.NDArray[np.float64]
 
@@ -61,4 +62,8 @@ class SystemMover:
         if solution is not None:
             status += f", torque program {status_name(solution.status)}"
         words = self.posture.in_words(step.diagnosis.describe())
-        return Account(words, status, values=step.values, metric=step.metric)
+        reason = Reason(pull=-step.goal_gradient)
+        return Account(words, status, values=step.values, metric=step.metric, reason=reason)
+
+    def moment(self) -> None:
+        """No events: nothing is planned or kept off."""

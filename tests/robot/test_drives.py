@@ -1,0 +1,79 @@
+"""Joints that something else drives: their links are covered wherever they may be."""
+
+import numpy as np
+import pytest
+
+import sidestep as ss
+
+GRIPPER = """
+<robot name="gripper_on_a_wheel">
+  <link name="base"/>
+  <link name="hand">
+    <collision><geometry><box size="0.1 0.1 0.02"/></geometry></collision></link>
+  <link name="finger">
+    <collision><geometry><box size="0.01 0.02 0.06"/></geometry></collision></link>
+  <link name="pad">
+    <collision><origin xyz="0 0 0.05"/><geometry><box size="0.02 0.02 0.02"/></geometry></collision></link>
+  <link name="lever">
+    <collision><origin xyz="0 0.08 0"/><geometry><box size="0.01 0.04 0.01"/></geometry></collision></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" velocity="1" effort="10"/></joint>
+  <joint name="slide" type="prismatic"><parent link="hand"/><child link="finger"/>
+    <origin xyz="0.02 0 0.04"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="0.04" velocity="1" effort="10"/></joint>
+  <joint name="bolt" type="fixed"><parent link="finger"/><child link="pad"/></joint>
+  <joint name="swing" type="revolute"><parent link="pad"/><child link="lever"/>
+    <origin xyz="0 0 0.1"/><axis xyz="0 0 1"/>
+    <mimic joint="slide" multiplier="25"/><limit lower="0" upper="1" velocity="1" effort="10"/></joint>
+</robot>
+"""
+
+
+def corners(geometry_of, link):
+    return np.asarray(geometry_of.collision_mesh(link).convex_hull.vertices)
+
+
+def test_links_are_covered_wherever_another_drive_may_put_them():
+    driven = ss.Robot.from_urdf(GRIPPER, locked={"slide": [0.0, 0.04]})
+    assert driven.coordinate_names == ["turn"]
+    assert driven.held == {"slide": pytest.approx(0.02), "swing": pytest.approx(0.5)}
+    q = np.zeros(1)
+    for value in np.linspace(0.0, 0.04, 23):
+        held = ss.Robot.from_urdf(GRIPPER, locked={"slide": value})
+        for link in ("finger", "pad", "lever"):
+            X = np.linalg.inv(driven.pose(q, link)) @ held.pose(q, link)
+            points = corners(held, link) @ X[:3, :3].T + X[:3, 3]
+            hulls = driven.collision_mesh(link).split()  # a sweep is a union of convex hulls
+            planes = [(hull.face_normals, hull.triangles[:, 0]) for hull in hulls]
+            depth = max(min(float(np.sum((p - at) * n, axis=1).max()) for n, at in planes) for p in points)
+            assert depth < 1e-4, (link, value)
+    extents = driven.collision_mesh("finger").extents
+    assert extents == pytest.approx([0.05, 0.02, 0.06])
+    assert driven.fingerprint != ss.Robot.from_urdf(GRIPPER, locked={"slide": 0.02}).fingerprint
+
+
+def test_what_a_driven_gripper_may_reach_keeps_off_obstacles():
+    arm = ss.Arm.load(GRIPPER, locked={"slide": (0.0, 0.04)})
+    controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
+    # The pad is at 0.04 to 0.06 m along x where the gripper is closed, and at 0.08 where it is open.
+    controller.set_obstacles(ss.Obstacles([[0.085, 0.0, 0.1]], radii=0.005))
+    command = controller.step(np.zeros(1), np.zeros(1))
+    assert command.clearance < 0.012
+
+
+@pytest.mark.parametrize(
+    ("locked", "words"),
+    [
+        ({"slide": (0.04, 0.0)}, "must be a range that ascends"),
+        ({"slide": (0.0, 0.05)}, r"\[0.0, 0.05\] is outside its limits \[0.0, 0.04\]"),
+        ({"slide": (0.0, 0.01, 0.02)}, "must be one number, or two: a range"),
+        (
+            {"slide": (0.0, 0.04), "swing": (0.0, 1.0)},
+            "'swing' mimics another joint; give the range of that one",
+        ),
+        ({"slide": (np.nan, 0.04)}, "range that ascends"),
+    ],
+)
+def test_ranges_that_are_none_are_named(locked, words):
+    with pytest.raises(ValueError, match=words):
+        ss.Robot.from_urdf(GRIPPER, locked=locked)
