@@ -51,7 +51,7 @@ def on_config(config: Any) -> Any:
     for part in config.nav:
         for number, page in enumerate(part.get("Reference", ())):
             if page == "reference/python.md":
-                part["Reference"][number] = {"Python": [page, *pages]}
+                part["Reference"][number] = {"Python": [{"All names": page}, *pages]}
     return config
 
 
