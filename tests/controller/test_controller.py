@@ -260,14 +260,14 @@ def test_shapes_are_obstacles_and_words_have_their_names(robot: ss.Robot, arm: s
         controller = ss.Controller(arm, settings(planner=planner))
         controller.set_goal(goal)
         controller.set_obstacles([ss.Obstacles([[-1.0, 0.0, 0.2]], 0.05), table, ball])
-        motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=10000)
+        motion = ss.integrate(controller, robot.neutral, np.zeros(7), steps=16000)
         assert motion.activities[-1] == ss.Activity.blocked
         assert re.match(
             r"at the goal link 'fr3_\w+' is \d+ mm deep in 'table'; it goes on", controller.explain()
         )
         seen = controller.obstacles
         assert seen.groups == [("obstacle0", 1), ("table", len(table.balls()[0])), ("obstacle2", 1)]
-        np.testing.assert_allclose(seen.points[-1], [-0.5 - 0.1 * 9.999, 0.0, 0.5], atol=1e-9)
+        np.testing.assert_allclose(seen.points[-1], [-0.5 - 0.1 * 15.999, 0.0, 0.5], atol=1e-9)
         if controller.command.point >= 0:
             assert seen.name_of(controller.command.point) == "table"
     controller.clear_goal()
