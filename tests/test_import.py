@@ -188,6 +188,7 @@ def test_the_extras_hold_what_the_errors_say() -> None:
     assert requirements("studio") < requirements("demo")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "code", "extra"),
     [

@@ -16,6 +16,7 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Mon
     monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(Path(tmp_path_factory.getbasetemp()) / "bodies"))
 
 
+@pytest.mark.slow
 def test_links_that_touch_have_no_clearance_left() -> None:
     robot = Robot.named("planar3")
     body = Body.cover(robot, components=4)
@@ -68,6 +69,7 @@ def test_a_contact_moves_the_clearance_by_as_much() -> None:
         SelfCollisionBarrier(robot, body, [("link1", "link3", float("nan"))])
 
 
+@pytest.mark.slow
 def test_pairs_are_kept_and_made_again_where_they_cannot_be_read() -> None:
     robot = Robot.named("planar3")
     body = Body.cover(robot, components=4)
