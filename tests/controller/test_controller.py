@@ -250,6 +250,7 @@ def test_what_blocks_a_goal_is_said_without_a_planner_as_well(robot: ss.Robot, a
     assert "obstacle point 0" in words[0]
 
 
+@pytest.mark.slow
 def test_shapes_are_obstacles_and_words_have_their_names(robot: ss.Robot, arm: ss.Arm) -> None:
     """A shape, or a list that mixes shapes and points: as its balls, with links and obstacles by name."""
     goal = robot.neutral + np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -331,6 +332,7 @@ def test_a_posture_that_is_not_free_is_taken_only_where_there_is_no_other(
     found(pose[:3, 3])  # in the hand, where no posture is free
 
 
+@pytest.mark.slow
 def test_continuous_joints_take_the_nearest_turn_and_survive_encoders_that_wrap() -> None:
     text = """<robot name="spinner"><link name="base"/><joint name="turn" type="continuous"><parent link="base"/>
       <child link="bar"/><axis xyz="0 0 1"/><limit velocity="2" effort="50"/></joint><link name="bar"><inertial>

@@ -77,7 +77,8 @@ class GeometricSystem {
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
     Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
     Eigen::VectorXd activations;          ///< input: their activation distances (m), at first the system's
-    double horizon = Horizon::of_obstacles;  ///< input: τ [s] at least by which obstacles that approach are looked for, see Horizon
+    /// Input: τ [s] at least by which obstacles that approach are looked for, see Horizon.
+    double horizon = Horizon::of_obstacles;
     GraphMetric metric;
     GoalPull pull;                        ///< ∂U, v* and the way left
 
