@@ -11,7 +11,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double limit_rounding = 1e-9;  // [rad | m] of a goal at a limit
+constexpr double limit_rounding = 1e-9;                                 // [rad | m] of a goal at a limit
 constexpr double pose_position_share = 2.0, pose_rotation_share = 0.5;  // of the stiffness, per m² and per rad²
 
 }  // namespace
@@ -82,7 +82,8 @@ Controller::~Controller() {
 
 Controller::Use::Use(Controller& controller) : controller_(&controller) {
   if (controller.in_use_.exchange(true, std::memory_order_acquire)) {
-    throw std::runtime_error("the controller is in use: a RealTimeRun or another thread steps it; stop it first, or wait for its end");
+    throw std::runtime_error(
+        "the controller is in use: a RealTimeRun or another thread steps it; stop it first, or wait for its end");
   }
 }
 

@@ -156,8 +156,8 @@ void Controller::Impl::report(bool known) noexcept {
   if (apart_) {
     take_nearest(arm_workspace_.clearances);
   }
-  if (command.coordinate >= 0 && system->labels()[static_cast<std::size_t>(command.coordinate)].kind ==
-                                     CoordinateLabel::Kind::obstacle) {
+  if (command.coordinate >= 0 &&
+      system->labels()[static_cast<std::size_t>(command.coordinate)].kind == CoordinateLabel::Kind::obstacle) {
     command.point = nearest->nearest[command.coordinate];
   }
   switch (command.program) {
@@ -233,8 +233,8 @@ Activity Controller::Impl::judge_activity() noexcept {
   }
   const bool at_rest = arm_v_.cwiseAbs().maxCoeff() < settings.arrival.speed;
   const bool out_of_reach = !posture_found_;
-  const bool no_way = guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision ||
-                      (!guide && target_blocked_);
+  const bool no_way = guide_status_ == OnlinePlannerStatus::no_path ||
+                      guide_status_ == OnlinePlannerStatus::goal_in_collision || (!guide && target_blocked_);
   return at_rest && (no_way || out_of_reach) ? Activity::blocked : Activity::moving;
 }
 

@@ -112,11 +112,12 @@ Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::Vect
   search.seed = settings.seed + attempt;
   search.another = attempt > 0;
   search.limit_room = settings.position_margin + settings.barriers.limit_activation;
-  const Posture posture = find_posture(arm.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
-    return ends_->obstructed(q, around, obstruction)
-               ? -infinity
-               : std::max(0.0, body_.nearest(q, around, 2.0 * search.room, posture_room_).clearance);
-  });
+  const Posture posture =
+      find_posture(arm.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
+        return ends_->obstructed(q, around, obstruction)
+                   ? -infinity
+                   : std::max(0.0, body_.nearest(q, around, 2.0 * search.room, posture_room_).clearance);
+      });
   const std::lock_guard lock(mutex_);
   if (goal_count_ == goal_number) {
     shown_posture_ = posture;

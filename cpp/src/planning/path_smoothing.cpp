@@ -33,12 +33,12 @@ std::vector<double> stations(const Waypoints& path) {
   return at;
 }
 
-constexpr double sample = 0.1;       // between clearances on an edge [rad]
-constexpr double shift = 0.3;        // that a waypoint is shifted at a time [rad]
-constexpr int shifts = 8;            // tried for a waypoint
-constexpr double slowest = 0.25;     // share of the speed that is left where there is no clearance
-constexpr int misses = 3;            // share of the attempts to shorten that may fail in a row: one in three
-constexpr double gain = 1e-3;        // a length below which a shortcut is not worth a check [rad]
+constexpr double sample = 0.1;    // between clearances on an edge [rad]
+constexpr double shift = 0.3;     // that a waypoint is shifted at a time [rad]
+constexpr int shifts = 8;         // tried for a waypoint
+constexpr double slowest = 0.25;  // share of the speed that is left where there is no clearance
+constexpr int misses = 3;         // share of the attempts to shorten that may fail in a row: one in three
+constexpr double gain = 1e-3;     // a length below which a shortcut is not worth a check [rad]
 
 /// How long it takes to pass an edge at speeds proportional to the clearance, 1 rad/s from `wide` on [s].
 double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const BodyClearance& body, const Obstacles& obstacles,
@@ -157,8 +157,7 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
     return true;
   };
   int missed = 0;
-  for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2 && !interrupted();
-       ++attempt) {
+  for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2 && !interrupted(); ++attempt) {
     const Stretch stretch(way, random);
     ++missed;
     if (!stretch.bends()) {

@@ -27,14 +27,11 @@ double length(const Eigen::MatrixXd& path) noexcept {
 std::string describe(const Obstruction& obstruction) {
   const std::string in = " is " + std::to_string(static_cast<int>(std::lround(1e3 * obstruction.depth))) + " mm deep in ";
   switch (obstruction.label.kind) {
-    case CoordinateLabel::Kind::obstacle:
-      return "link '" + obstruction.label.name + "'" + in + obstruction.obstacle;
+    case CoordinateLabel::Kind::obstacle: return "link '" + obstruction.label.name + "'" + in + obstruction.obstacle;
     case CoordinateLabel::Kind::self:
       return "link '" + obstruction.label.name + "'" + in + "link '" + obstruction.label.other + "'";
-    case CoordinateLabel::Kind::plane:
-      return "link '" + obstruction.label.name + "'" + in + "a plane";
-    default:
-      return "nothing";
+    case CoordinateLabel::Kind::plane: return "link '" + obstruction.label.name + "'" + in + "a plane";
+    default: return "nothing";
   }
 }
 

@@ -25,9 +25,7 @@ constexpr double domain = 3.0;           // of the range: how far samples may be
 constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
 constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
 
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 std::vector<Eigen::VectorXd> to_root(const SearchTree& tree, int node) {
   std::vector<Eigen::VectorXd> way;

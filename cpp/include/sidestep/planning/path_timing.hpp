@@ -13,9 +13,9 @@ struct PathLimits {
 
 /// A motion along a path, as fast as limits allow, at samples that are `period` apart.
 struct PathTiming {
-  double period = 0.0;             ///< [s]
-  Eigen::MatrixXd q, v, a;         ///< (nv × K)
-  Eigen::VectorXd station;         ///< (K), ascending
+  double period = 0.0;      ///< [s]
+  Eigen::MatrixXd q, v, a;  ///< (nv × K)
+  Eigen::VectorXd station;  ///< (K), ascending
 };
 
 /// The fastest motion along a path from the speed `begin` = ds/dt to rest, within the limits at every sample.
