@@ -96,7 +96,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path, help="gets index.html and a page for each scene")
-    usual = [label for label, scene in GALLERY.items() if scene.to_and_fro]
+    usual = [
+        label for label, scene in GALLERY.items() if scene.to_and_fro and isinstance(scene.scenario, str)
+    ]
     parser.add_argument(
         "scenes", nargs="*", default=usual, help=f"of {', '.join(GALLERY)} [{', '.join(usual)}]"
     )

@@ -16,14 +16,14 @@ from sidestep.scenario.assembly import load_robot
 from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
 from sidestep.studio.clearance_monitor import solid_poses
-from sidestep.studio.comparison import Tally
+from sidestep.studio.comparison import Tally, changes
 from sidestep.studio.gallery import GALLERY, MOUSE_BALL, OPENING, ends_of
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import HALF, RIGHT, UP, VIEW, Viewpoint
 from sidestep.studio.page.mouse import on_plane, within_reach
 from sidestep.studio.page.why import PATH_POINTS, PATH_STEP, along
 from sidestep.studio.robot_file import scenario_of_upload
-from sidestep.studio.scene_obstacle import things_of
+from sidestep.studio.scene_obstacle import ball, box, things_of
 from sidestep.studio.session import Session
 from sidestep.studio.start import scenario_of, starting_scenario
 from sidestep.studio.systems import build_mover, draft_arm, make_body
@@ -183,12 +183,15 @@ def test_a_scenario_from_a_file_has_a_draft_that_moves_at_once(
         for _ in range(40):
             session.step()
         assert session.snapshot().draft  # it goes on with the draft until the finer one is there
+        session._hear("cover", "link1", 1, 3)
+        assert session.snapshot().refining == "cover, link1 (1 of 3)"
         Done.is_done = True
         for _ in range(20):
             session.step()
         now = session.snapshot()
         assert waited == [0.0]
         assert not now.draft
+        assert now.refining == ""
         assert now.events[-1][1] == "finer body taken over"
         assert now.touched == 0
     finally:
@@ -225,3 +228,16 @@ def test_what_counts_of_a_motion_begins_anew_with_it(make_session: object, scena
     tally.clearance = 0.1
     tally.take(first)  # of an earlier time: a restart
     assert (tally.arrived, tally.clearance) == (None, np.inf)
+
+
+def test_the_other_method_has_the_obstacles_that_there_are(make_session: object, scenario: Scenario) -> None:
+    session: Session = make_session(scenario)  # type: ignore[operator]
+    before = session.snapshot().things
+    small, crate = ball("ball", np.array([0.9, 0.0, 0.0]), 0.01), box("crate", np.ones(3), np.full(3, 0.1))
+    assert changes(before, before) == []
+    assert changes(before, (small, crate)) == [
+        m.RemoveObstacle("ball"),
+        m.AddObstacle(small),
+        m.AddObstacle(crate),
+    ]
+    assert changes(before, ()) == [m.RemoveObstacle("ball")]

@@ -180,6 +180,7 @@ def test_a_second_browser_sees_the_same(studio: Studio, looker: Looker, chromium
     try:
         assert len(studio.server.get_clients()) == 2
         looker.tab("Goal")
+        second.tab("Goal")
         looker.type("joint2 [°]", "25")
         until(lambda: bool(np.isclose(last(studio).goal[1], np.deg2rad(25.0))), "the goal")  # type: ignore[index]
         field = "xpath=//label[normalize-space()='joint2 [°]']/following::input[not(@type='hidden')][1]"

@@ -518,6 +518,7 @@ def test_the_place_of_an_obstacle_that_flies_is_followed(
         _view=view,
         _chosen=SimpleNamespace(value="ball"),
         _place=SimpleNamespace(value=None),
+        _box=SimpleNamespace(visible=False),
         _shown=("", 0.0, 0.0, 0.0),
         _followed=0.0,
     )

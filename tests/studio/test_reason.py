@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sidestep import Scenario
-from sidestep._core import Activity
+from sidestep._core import Activity, Limit, SafetyStatus
 from sidestep.studio import messages as m
 from sidestep.studio.gallery import ends_of
-from sidestep.studio.reason import AGAIN, EVENTS, LASTING, Events, Moment, path_from
+from sidestep.studio.reason import AGAIN, EVENTS, LASTING, Events, Moment, limit_in_words, path_from
 from sidestep.studio.session import REST, Session
 
 MakeSession = Callable[..., Session]
@@ -106,9 +106,23 @@ def test_events_are_changes_and_not_told_twice_in_a_second() -> None:
     assert len(events.told) == 3  # planned anew once in a second
     events.take(0.2 + AGAIN, replace(still, searches=4, activity=Activity.arrived))
     assert [word for _, word in events.told[-2:]] == ["arrived", "planned anew"]
+    limited = replace(still, searches=4, activity=Activity.arrived, limit="torque of joint2")
+    for time in (1.5, 1.6, 1.7):
+        events.take(time, limited)
+    assert events.told[-1] == (1.7, "limited by torque of joint2")
+    events.take(1.8, replace(limited, status=SafetyStatus.margin_lost))
+    assert events.told[-1] == (1.8, "a safety margin is lost")
     for k in range(EVENTS + 2):
         events.tell(2.0 + k, f"event {k}")
     assert [word for _, word in events.told] == [f"event {k}" for k in range(2, EVENTS + 2)]
+
+
+def test_a_limit_is_named_with_its_joint() -> None:
+    names = ("joint1", "joint2")
+    speed, torque = Limit.velocity_upper | Limit.jerk_upper, Limit.torque_lower
+    assert limit_in_words([speed, torque], names) == "torque of joint2"
+    assert limit_in_words([speed, Limit.jerk_lower], names) == "speed of joint1"
+    assert limit_in_words([Limit.acceleration_upper, Limit(0)], names) == ""
 
 
 def test_a_box_gets_other_sides_where_it_is(make_session: MakeSession, scenario: Scenario) -> None:

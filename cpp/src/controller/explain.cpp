@@ -67,7 +67,7 @@ std::string Controller::Impl::explain_target() const {
   return "at the goal " + describe(obstruction) +
          (!own          ? "; it goes on when that is free"
           : pose_goal() ? "; another posture is looked for"
-                        : "; set another goal, or allow the two to touch");
+                        : ", as far as the covering body says; set another goal, or allow the two to touch");
 }
 
 std::string Controller::Impl::explain_input() const {

@@ -20,6 +20,7 @@ constexpr double at_samples = 0.88;      // of the jerk: between samples it is u
 constexpr double of_effort = 0.7, of_effort_rate = 0.5;  // for motion along the path: the rest is for feedback, and clearances
 constexpr double least_share = 0.05;     // of the acceleration limits, where gravity takes the effort
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
+constexpr double stopping = 1.5;  // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
 
 /// p⁻¹ of SafetyRows: the speed [m/s] at which a clearance with this room may close.
 double closing_speed(double room, double A, double rate) {
@@ -83,6 +84,7 @@ PathLimits path_limits(const JointLimits& limits, double speed) {
     return Eigen::VectorXd(left_to_the_arm * speed * given.unaryExpr([&](double x) { return std::isfinite(x) ? x : otherwise; }));
   };
   PathLimits all{finite(limits.velocity, free_velocity), finite(limits.acceleration, free_acceleration), {}};
+  all.velocity = all.velocity.cwiseMin((2.0 * stopping * all.acceleration).cwiseSqrt());
   all.jerk = at_samples * limits.jerk.unaryExpr(
                               [](double x) { return std::isfinite(x) ? x : JointLimits::default_jerk * free_acceleration; });
   return all;

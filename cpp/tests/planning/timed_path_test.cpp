@@ -44,6 +44,16 @@ BOOST_AUTO_TEST_CASE(joints_use_their_share_of_the_limits) {
   BOOST_TEST(limits.acceleration[1] == 4.75, boost::test_tools::tolerance(1e-12));
 }
 
+BOOST_AUTO_TEST_CASE(no_joint_moves_on_for_long_while_it_stops) {
+  JointLimits given = JointLimits::unlimited(2);
+  given.velocity = Eigen::Vector2d(7.854, 2.0);  // of a wrist that takes 0.8 s to stop, and of one that does not
+  given.acceleration.setConstant(10.0);
+  const PathLimits limits = path_limits(given, 1.0);
+  const Eigen::Array2d way = 0.5 * limits.velocity.array().square() / limits.acceleration.array();
+  BOOST_TEST(way[0] == 1.5, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(limits.velocity[1] == 0.95 * 2.0, boost::test_tools::tolerance(1e-12));
+}
+
 BOOST_AUTO_TEST_CASE(a_clearance_closes_no_faster_than_safety_rows_let_it) {
   BodyClearance::Workspace w(body);
   Eigen::MatrixXd path(2, 2);

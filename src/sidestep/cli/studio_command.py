@@ -75,7 +75,8 @@ def studio(
 ) -> None:
     """Open the studio: the real loop in MuJoCo, in the browser, to see, push and tune.
 
-    Ends with Ctrl-C. The first run with a robot fits its body, which can take minutes; the page says how far it is.
+    Without a scenario the arm goes to and fro; without a robot either, it is an FR3 at a table. Ends with Ctrl-C. A
+    robot of a file is prepared in seconds, and its finer body takes over while it moves; the page says how far that is.
     """
     from sidestep.studio.start import starting_scenario
     from sidestep.studio.systems import numbers_of

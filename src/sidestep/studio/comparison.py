@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from sidestep.robot import Robot
 from sidestep.studio import messages as m
 from sidestep.studio.clearance_monitor import ExactClearanceMonitor
 from sidestep.studio.mover import NEAR_GOAL
+from sidestep.studio.scene_obstacle import SceneObstacle, things_of
 from sidestep.studio.session_process import Beginning, SessionProcess
 
 MIRRORED = (
@@ -52,6 +53,12 @@ class Tally:
             self.arrived = snapshot.time
 
 
+def changes(before: Sequence[SceneObstacle], now: Sequence[SceneObstacle]) -> list[m.Command]:
+    """The commands that make obstacles those that there are now."""
+    gone: list[m.Command] = [m.RemoveObstacle(thing.name) for thing in before if thing not in now]
+    return [*gone, *(m.AddObstacle(thing) for thing in now if thing not in before)]
+
+
 class Comparison:
     """The loop of the other method, its last state, and what counts of both.
 
@@ -74,6 +81,8 @@ class Comparison:
         self._lock = threading.Lock()
         self._loop = SessionProcess(Beginning(snapshot.scenario, method, numbers))
         self._truth = ExactClearanceMonitor(self._measured, report)
+        for command in changes(things_of(snapshot.scenario), snapshot.things):
+            self._loop.send(command)
 
     def send(self, command: m.Command) -> None:
         """Tells the other loop what the first one is told, where it concerns both."""

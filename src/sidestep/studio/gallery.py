@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from sidestep.scenario.scenario import JointState, Obstacle, Shape
 
 Array = npt.NDArray[np.float64]
 
+FILES = Path(__file__).parent / "scenes"
 MOUSE_BALL = "mouse ball"  # the obstacle that follows the mouse
 MOUSE_BALL_RADIUS = 0.06  # [m]
 MOUSE_BALL_PLACE = (0.75, 0.45, 0.75)  # [m] beside the way of the arm, in sight
@@ -22,10 +24,10 @@ MOUSE_BALL_PLACE = (0.75, 0.45, 0.75)  # [m] beside the way of the arm, in sight
 
 @dataclass(frozen=True)
 class GalleryScene:
-    """A scene of the gallery: a shipped scenario, and whether the arm goes to and fro in it beside a ball."""
+    """A scene of the gallery: a shipped scenario or a file, and whether the arm goes to and fro in it beside a ball."""
 
     label: str
-    scenario: str
+    scenario: str | Path
     to_and_fro: bool = True
 
     def load(self) -> Scenario:
@@ -42,6 +44,7 @@ GALLERY: dict[str, GalleryScene] = {
         GalleryScene("Cage", "cage"),
         GalleryScene("Boxes", "box"),
         GalleryScene("Kitchen", "kitchen"),
+        GalleryScene("Two arms", FILES / "two-arms.yaml"),
         GalleryScene("Thesis 6.2.3", "thesis-6.2.3", to_and_fro=False),
     )
 }

@@ -191,7 +191,7 @@ class Snapshot:
         things: the obstacles; poses: (N, 4, 4) of them in the world; velocities: (N, 3) [m/s];
             courses: by what they move.
         method: its name; numbers: its parameters by method and name.
-        draft: the body is coarse, and a finer one is on its way.
+        draft: the body is coarse; refining: how far a finer one is.
         visited: the configurations that are visited in turn; none where the arm stays with its goal.
         words, status, activity, nearest, values, metric, activations, reason: see `Account`; status is empty before
             the first step.
@@ -212,6 +212,7 @@ class Snapshot:
     posture: IkSolution | None
     goal_written: bool
     draft: bool
+    refining: str
     visited: tuple[Array, ...]
     tip: str
     things: tuple[SceneObstacle, ...]

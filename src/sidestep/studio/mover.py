@@ -15,7 +15,7 @@ from sidestep.robot import Robot
 from sidestep.simulation.joint_words import in_words, largest_ways
 from sidestep.simulation.pose_target import IkSolution, PoseTarget
 from sidestep.simulation.run import status_name
-from sidestep.studio.reason import Moment, Reason, binding, reason_of
+from sidestep.studio.reason import Moment, Reason, binding, limit_in_words, reason_of
 
 Array = npt.NDArray[np.float64]
 
@@ -151,7 +151,10 @@ class ControllerMover:
             return None
         command = self._said.command
         link, obstacle, _ = binding(self._said, self._seen)
-        return Moment(command.activity, command.avoiding, self._said.searches, link, obstacle)
+        limit = limit_in_words(command.limits, self._robot.coordinate_names)
+        return Moment(
+            command.activity, command.avoiding, self._said.searches, link, obstacle, command.status, limit
+        )
 
 
 def alike(told: Obstacles, seen: Obstacles) -> bool:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from sidestep._core import Activity, Controller, CoordinateKind, Obstacles
+from sidestep._core import Activity, Controller, CoordinateKind, Limit, Obstacles, SafetyStatus
 
 Array = npt.NDArray[np.float64]
 
@@ -22,6 +23,18 @@ ACTIVITIES = {
     Activity.blocked: "no way to the goal",
     Activity.stale: "stops: obstacles are too old",
 }
+STATUSES = {
+    SafetyStatus.relaxed: "limits gave way to clearances",
+    SafetyStatus.margin_lost: "a safety margin is lost",
+    SafetyStatus.stopping: "stopping",
+    SafetyStatus.clearance_lost: "clearance lost",
+}
+LIMITS = {  # that are worth an event
+    "torque": Limit.torque_lower | Limit.torque_upper,
+    "position": Limit.position_lower | Limit.position_upper,
+    "speed": Limit.velocity_lower | Limit.velocity_upper,
+}
+LASTING_LIMIT = 0.15  # [s] the same of a limit of a joint
 LASTING = 0.05  # [s] that something keeps bending the motion before it counts as an event
 
 
@@ -98,7 +111,7 @@ class Moment:
 
     Attributes:
         activity: of the command. stepping_aside: see `Reason`. searches: paths that were looked for.
-        link, obstacle: see `Reason`.
+        link, obstacle: see `Reason`. status: of the command. limit: that holds a joint back, in words; "": none.
     """
 
     activity: Activity
@@ -106,6 +119,17 @@ class Moment:
     searches: int
     link: str
     obstacle: str
+    status: SafetyStatus = SafetyStatus.ok
+    limit: str = ""
+
+
+def limit_in_words(limits: Sequence[Limit], names: Sequence[str]) -> str:
+    """The first joint that torque, speed or position limit hold back, such as "torque of joint2"; "" without one."""
+    for what, flags in LIMITS.items():
+        for name, limit in zip(names, limits, strict=True):
+            if limit & flags:
+                return f"{what} of {name}"
+    return ""
 
 
 class Events:
@@ -114,7 +138,9 @@ class Events:
     def __init__(self) -> None:
         self._told: deque[tuple[float, str]] = deque(maxlen=EVENTS)
         self._last: Moment | None = None
-        self._bound, self._since = ("", ""), 0.0
+        self._lasting: dict[
+            str, tuple[str, float]
+        ] = {}  # what is the case, and since when [s]; inf: it was told
 
     @property
     def told(self) -> tuple[tuple[float, str], ...]:
@@ -138,9 +164,17 @@ class Events:
             self.tell(time, "path planned" if before.searches == 0 else "planned anew")
         if now.stepping_aside and not before.stepping_aside:
             self.tell(time, f"stepped aside from {now.obstacle}" if now.obstacle else "stepped aside")
-        bound = now.link, now.obstacle
-        if bound != self._bound:
-            self._bound, self._since = bound, time
-        elif now.link and np.isfinite(self._since) and time - self._since >= LASTING:
-            self._since = np.inf  # told once
-            self.tell(time, f"{now.link} keeps off {now.obstacle or 'a limit or another link'}")
+        if now.status != before.status and now.status in STATUSES:
+            self.tell(time, STATUSES[now.status])
+        what = now.obstacle or "a limit or another link"
+        self._tell_if_it_lasts(time, "bound", f"{now.link} keeps off {what}" if now.link else "", LASTING)
+        self._tell_if_it_lasts(time, "limit", f"limited by {now.limit}" if now.limit else "", LASTING_LIMIT)
+
+    def _tell_if_it_lasts(self, time: float, about: str, words: str, long: float) -> None:
+        """Tells once what has been the case for so long [s]."""
+        known, since = self._lasting.get(about, ("", time))
+        if words != known:
+            self._lasting[about] = words, time
+        elif words and time - since >= long:
+            self._lasting[about] = words, np.inf
+            self.tell(time, words)

@@ -37,6 +37,7 @@ Draft = Callable[[Scenario], Arm]
 
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 LOOK_EVERY = 10  # steps between two looks for events
+FAILED = "failed, see the events"  # of a fine body: the draft stays
 REST = 0.5  # [s] at a goal before the next one of several
 PATIENCE = 6.0  # [s] for which a goal of several may be out of reach before the next one is tried
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
@@ -98,6 +99,7 @@ class Session:
         self._prepare, self._draft = prepare, draft
         self._usual_ellipsoids, self._synchronous = ellipsoids, synchronous
         self._refinement: Refinement | None = None
+        self._refining = ""
         self._numbers = {name: method.defaults for name, method in METHODS.items()}
         self._method = method_named(method)
         self.edition = 0
@@ -215,6 +217,7 @@ class Session:
             posture=self._mover.posture,
             goal_written=self._goal_written,
             draft=self._is_draft,
+            refining=self._refining if self._is_draft else "",
             visited=self._visited,
             tip=self.tip,
             things=self._things,
@@ -390,22 +393,27 @@ class Session:
         """Begins to make the fine body of a draft, or takes it over when it is there."""
         name = str(Covering(None))
         if self._refinement is None:
-            self._refinement = Refinement(self._arms[name])
+            self._refining = "begins"
+            self._refinement = Refinement(self._arms[name], progress=self._hear)
             return
-        if not self._refinement.is_done:
+        if not self._refinement.is_done or self._refining == FAILED:
             return
         try:
             fine = self._refinement.wait(0.0)
         except RuntimeError as error:
+            self._refining = FAILED
             self._events.tell(self.time, str(error))
-            fine = Arm(self._arms[name], description=lambda: self.robot)  # the draft, that stays
-        else:
-            self._events.tell(self.time, "finer body taken over")
+            return
+        self._events.tell(self.time, "finer body taken over")
         self._arms[name], self._bodies[name] = fine, fine.body
         uses = str(recipe_of(self._method, self._numbers[self._method.name], self.scenario)) == name
         if uses and isinstance(self._mover, ControllerMover):
             self._mover.set_arm(fine)
         self._refinement = None
+
+    def _hear(self, stage: str, item: str, done: int, total: int) -> None:
+        """How far the fine body is, from a thread of its own."""
+        self._refining = f"{stage}, {item} ({done} of {total})"
 
     def stop(self) -> None:
         """Ends what runs beside the loop."""

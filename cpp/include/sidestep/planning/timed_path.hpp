@@ -22,7 +22,7 @@ template <>
 const std::vector<Field<TimedPathSettings>>& fields();
 
 /// What a path may ask of the joints of a robot: `speed` of their velocity and acceleration limits, less 5 % that are left to
-/// an arm that follows; jerk 88/s times the acceleration limit,
+/// an arm that follows, and no velocity from which a joint moves on by more than 1.5 rad while it stops; jerk 88/s times the acceleration limit,
 /// which stays below 100/s between samples. Joints without a limit: 2 rad/s, 10 rad/s² (m, alike).
 PathLimits path_limits(const JointLimits& limits, double speed);
 

@@ -41,6 +41,11 @@ class ComparePanel:
         self._comparison: Comparison | None = None
         self._ghost: ArmView | None = None
 
+    @property
+    def running(self) -> Comparison | None:
+        """The comparison that runs."""
+        return self._comparison
+
     def send(self, command: m.Command) -> None:
         """What the loop is told, the other one is told as well."""
         if isinstance(command, m.Load):
@@ -90,10 +95,6 @@ class ComparePanel:
                 self._server, view.robot, link_meshes(view.robot), "/other", ghost=colours.OTHER
             )
             self._comparison = comparison
-            for name, pose in zip((thing.name for thing in last.things), last.poses, strict=True):
-                if name not in {thing.name for thing in last.scenario.obstacles}:
-                    added = next(thing for thing in last.things if thing.name == name)
-                    comparison.send(m.AddObstacle(added.at(pose)))
             if last.goal is not None:
                 view.send(m.SetJointGoal(last.goal))
             view.send(m.Restart())

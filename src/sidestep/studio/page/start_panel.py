@@ -73,7 +73,7 @@ class StartPanel:
 
     def add_mouse(self, server: viser.ViserServer) -> None:
         """The hidden field of the mouse, where it is called: outside of tabs, which are not always there."""
-        self._mouse = MouseBall(server, self._view.send, self._ball, lambda: bool(self._follows.value))
+        self._mouse = MouseBall(server, self._view.send, self._ball, self._follows_now)
 
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows what the loop has."""
@@ -90,6 +90,9 @@ class StartPanel:
                 value = float(np.clip(item.of(numbers), item.lower, item.upper))
                 if not np.isclose(slider.value, value):
                     slider.value = value
+
+    def _follows_now(self) -> bool:
+        return bool(self._follows.value) and not self._view.recorder.replaying
 
     def _ball(self) -> Array | None:
         last = self._view.last

@@ -270,7 +270,7 @@ class View:
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
         least = f" (least so far {1e3 * self.least_clearance:.0f} mm)"
         state = f"{touch} · {snapshot.time:.1f} s · {speed}"
-        coarse = ["the body is coarse; a finer one is on its way"] if snapshot.draft else []
+        coarse = [f"coarse body; the finer one: {html.escape(snapshot.refining)}"] if snapshot.draft else []
         facts = [*self._nearest_facts(snapshot.things, least), state, *status, *coarse]
         self._tell(now, begun(snapshot.words), facts, snapshot.events)
 
@@ -339,6 +339,7 @@ class View:
         self._show_goal()
 
     def _remove_robot(self) -> None:
+        self.compare.stop()
         self.surface.clear()
         for part in (self._body, self.arm, self.marks, self.why, self.goal):
             if part is not None:

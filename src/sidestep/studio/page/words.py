@@ -22,7 +22,7 @@ def in_box(words: str, facts: str = "", events: tuple[tuple[float, str], ...] = 
         f'line-height:1.35">'
         f'<div style="font-size:14px;font-weight:600">{words}</div>'
         f'<div style="font-size:12px;opacity:0.8;margin-top:4px">{facts}</div>'
-        f'<div id="events" style="font-size:12px;margin-top:6px">{lines}</div></div>'
+        f'<div id="events" style="font-size:12px;margin-top:{6 if lines else 0}px">{lines}</div></div>'
     )
 
 

@@ -1,0 +1,183 @@
+"""Pictures of every page and state of the studio, and of a report: python docs/screenshots_studio.py FOLDER [NAME ...]
+
+Needs Chromium and `pip install 'sidestep[headless]'`. Names choose some of the pictures. Without a graphics card
+each takes seconds, all together some minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sidestep.report import write_report
+from sidestep.scenario import Scenario
+from sidestep.scenario.runner import run_scenario
+from sidestep.scenario.scenario import RobotConfig
+from sidestep.studio import messages as m
+from sidestep.studio.gallery import GALLERY
+from sidestep.studio.headless import Window, browser, driver, go_to, new_page, picture, run_until
+from sidestep.studio.start import scenario_of, starting_scenario
+from sidestep.studio.studio import Studio
+
+SMALL, LARGE = Window(1280, 800), Window(1920, 1080)
+PLANAR = Path(__file__).parents[1] / "examples" / "planar3.urdf"
+ADVANCED = ("Method", "Show", "Scenario")  # tabs inside of this tab
+READY, PATIENCE = 600.0, 120.0  # [s] at most
+MOMENT = 0.8  # [s] of simulated time at which the arm is on its way
+TABS = ("Start", "Goal", "Obstacles", "Compare", *ADVANCED)
+
+
+class Photographer:
+    """One browser for all pictures."""
+
+    def __init__(self, chromium: Any, folder: Path) -> None:
+        self._chromium, self._folder = chromium, folder
+
+    @contextmanager
+    def studio(self, window: Window, scenario: Scenario, **options: Any) -> Iterator[tuple[Studio, Any]]:
+        """A studio that has run for `MOMENT`, and its page."""
+        with Studio(scenario, port=0, **options) as studio:
+            studio.wait_ready(READY)
+            studio.send(m.Restart(until=0.0))
+            page = new_page(self._chromium, window)
+            try:
+                go_to(page, studio.address)
+                run_until(studio, MOMENT)
+                yield studio, page
+            finally:
+                page.close()
+
+    def keep(self, studio: Studio, page: Any, name: str) -> None:
+        """Writes what the page shows."""
+        (self._folder / f"{name}.png").write_bytes(picture(studio, page))
+        print(f"{name}.png", flush=True)
+
+    def file(self, name: str, path: Path, *, whole: bool) -> None:
+        """Writes a picture of a page that needs no server, whole or its first screen."""
+        page = self._chromium.new_page(viewport={"width": SMALL.width, "height": SMALL.height})
+        page.goto(path.resolve().as_uri())
+        page.screenshot(path=self._folder / f"{name}.png", full_page=whole)
+        page.close()
+        print(f"{name}.png", flush=True)
+
+    @property
+    def folder(self) -> Path:
+        return self._folder
+
+
+def choose(page: Any, tab: str) -> None:
+    """Shows a tab."""
+    for name in ("Advanced", tab) if tab in ADVANCED else (tab,):
+        found = page.locator(f'[role=tab][title="{name}"]').first
+        found.focus()
+        found.press("Enter")
+    page.wait_for_timeout(300.0)
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    end = clock.monotonic() + PATIENCE
+    while not condition():
+        if clock.monotonic() > end:
+            raise TimeoutError(f"{what}: not within {PATIENCE:.0f} s")
+        clock.sleep(0.05)
+
+
+def opening(camera: Photographer) -> None:
+    """The page as it opens, in two windows."""
+    for window in (SMALL, LARGE):
+        with camera.studio(window, starting_scenario(), to_and_fro=True) as (studio, page):
+            camera.keep(studio, page, f"opening-{window.width}x{window.height}")
+
+
+def tabs(camera: Photographer) -> None:
+    """Every tab."""
+    with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
+        for tab in TABS:
+            choose(page, tab)
+            camera.keep(studio, page, f"tab-{tab.lower()}")
+
+
+def gallery(camera: Photographer) -> None:
+    """Every scene."""
+    for label, scene in GALLERY.items():
+        with camera.studio(SMALL, scene.load(), to_and_fro=scene.to_and_fro) as (studio, page):
+            camera.keep(studio, page, f"scene-{label.lower().replace(' ', '-')}")
+
+
+def comparison(camera: Photographer) -> None:
+    """Two methods, when both are on their way."""
+    with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
+        choose(page, "Compare")
+        page.get_by_role("button", name="Compare", exact=True).click()
+        panel = studio.view.compare
+        until(lambda: panel.running is not None and panel.running.last is not None, "the other method")
+        other = panel.running
+        assert other is not None
+        studio.view.send(m.Restart())
+        until(lambda: other.last is not None and MOMENT < other.last.time < 60.0, "its motion")
+        studio.view.send(m.SetRunning(False))
+        clock.sleep(1.0)
+        camera.keep(studio, page, "comparison")
+
+
+def goals(camera: Photographer) -> None:
+    """A goal out of reach, and one that is blocked."""
+    with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
+        assert studio.snapshot is not None
+        pose = studio.view.robot.pose(studio.snapshot.q, studio.view.tip)
+        for name, place in (("out-of-reach", [1.2, 0.2, 0.5]), ("blocked", [0.55, 0.0, 0.3])):
+            aim = pose.copy()
+            aim[:3, 3] = np.array(place)
+            studio.send(m.SetPoseGoal(aim))
+            studio.send(m.SetRunning(True))
+            begin = studio.snapshot.time
+            until(lambda begin=begin: studio.snapshot.time > begin + 1.5, "the motion")  # type: ignore[misc, union-attr]
+            studio.send(m.SetRunning(False))
+            clock.sleep(1.0)
+            camera.keep(studio, page, f"goal-{name}")
+
+
+def own_robot(camera: Photographer) -> None:
+    """A robot of a file, with its draft body."""
+    with camera.studio(SMALL, scenario_of(RobotConfig(urdf=str(PLANAR))), to_and_fro=True) as (studio, page):
+        camera.keep(studio, page, "own-robot")
+
+
+def report(camera: Photographer) -> None:
+    """A report, whole."""
+    folder = camera.folder / "report"
+    write_report(run_scenario(Scenario.load("table")), folder, animation=False)
+    camera.file("report", folder / "index.html", whole=True)
+
+
+MAKERS = {
+    maker.__name__.replace("_", "-"): maker
+    for maker in (opening, tabs, gallery, comparison, goals, own_robot, report)
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(MAKERS)} [all]")
+    options = parser.parse_args()
+    unknown = [name for name in options.names if name not in MAKERS]
+    if unknown:
+        parser.error(f"there is no {unknown[0]!r}; known: {', '.join(MAKERS)}")
+    options.folder.mkdir(parents=True, exist_ok=True)
+    with driver() as playwright, browser(playwright) as chromium:
+        camera = Photographer(chromium, options.folder)
+        for name in options.names or MAKERS:
+            MAKERS[name](camera)
+
+
+if __name__ == "__main__":
+    main()
