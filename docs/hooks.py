@@ -26,11 +26,17 @@ row = re.compile(r"^\| `(\w+)` \|", re.MULTILINE)
 heading = re.compile(r"^## `([\w.]+)`$", re.MULTILINE)
 
 
+def entry(module: str, name: str) -> str:
+    """What mkdocstrings describes; the docstring of settings has all their fields."""
+    lines = f"::: {module}.{name}"
+    return lines + "\n    options: {members: false}" if name.endswith("Settings") else lines
+
+
 def on_files(files: Files, config: Any) -> Files:
     """Adds a page for each part of the Python package, and one that the navigation shows for each."""
     pages = []
     for module, names in MAKE["public_names"]().items():
-        entries = "\n\n".join(f"::: {module}.{name}" for name in names)
+        entries = "\n\n".join(entry(module, name) for name in names)
         source = f"reference/python/{module.rpartition('.')[2]}.md"
         opening = (importlib.import_module(module).__doc__ or "").strip().split("\n\n")[0]
         text = f"# `{module}`\n\n{opening}\n\n{entries}\n"
@@ -59,6 +65,10 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
             parts[number] = f"## `{parts[number]}`"
         markdown = "".join(parts)
 
+    if source == Path("reference/cpp.md") and shutil.which("doxygen") is None:
+        left_out = "This copy of the site was made without Doxygen, so it has no pages of classes."
+        markdown = re.sub(r"<p>By Doxygen:.*?</p>", left_out, markdown, flags=re.DOTALL)
+
     def as_text(link: re.Match[str]) -> str:
         target = (DOCS / source.parent / link[2]).resolve()
         if DOCS in target.parents:
@@ -84,3 +94,6 @@ def on_post_build(config: Any) -> None:
         log.warning("doxygen: %s", line)
     if found.returncode != 0:
         log.warning("doxygen ended with %d", found.returncode)
+    for link in re.findall(r'href="(cpp/[^"#]+)', (target.parent / "cpp.html").read_text(encoding="utf-8")):
+        if not (target.parent / link).is_file():
+            log.warning("reference/cpp.md links to %s, which Doxygen does not write", link)

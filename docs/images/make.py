@@ -1,36 +1,35 @@
-"""Makes the pictures of the README: python docs/images/make.py [demo | studio | animation ...]
+"""Makes the pictures of README and site: python docs/images/make.py [NAME ...], by default all of them.
 
-Those of the studio need Chromium and `pip install 'sidestep[headless]'`; without a graphics card the animation takes
-minutes.
+demo, studio; in figures.py those of concepts and theory; in table.py that of the first screen. That of the studio
+needs Chromium and `pip install 'sidestep[headless]'`.
 """
 
+import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from PIL import Image
 
 HERE = Path(__file__).parent
-STUDIO = ("sidestep", "studio", "thesis-6.2.3", "--method", "controller", "--headless")
+SIDESTEP = (sys.executable, "-m", "sidestep")
 
 
 def demo(folder: Path) -> None:
     """The arm of `sidestep demo` at six times."""
-    subprocess.run(["sidestep", "demo", "--no-studio", "--out", folder], check=True)
+    subprocess.run([*SIDESTEP, "demo", "--no-studio", "--out", folder], check=True)
     keep(folder / "arm.png", HERE / "demo.png")
 
 
 def studio(folder: Path) -> None:
-    """The studio's page, when the arm has passed over the balls."""
+    """The studio's page as it opens, when the arm is on its way."""
     screen = folder / "studio.png"
-    subprocess.run([*STUDIO, "--screenshot", screen, "--duration", "4"], check=True)
+    subprocess.run(
+        [*SIDESTEP, "studio", "--headless", "--screenshot", screen, "--duration", "0.8"], check=True
+    )
     keep(screen, HERE / "studio.png")
-
-
-def animation(folder: Path) -> None:
-    """The same motion until the arm has passed."""
-    subprocess.run([*STUDIO, "--video", HERE / "studio.webp", "--duration", "5"], check=True)
 
 
 def keep(source: Path, target: Path) -> None:
@@ -38,9 +37,22 @@ def keep(source: Path, target: Path) -> None:
     Image.open(source).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE).save(target, optimize=True)
 
 
-MAKERS = {"demo": demo, "studio": studio, "animation": animation}
+MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio}
+FIGURES = (
+    *("loop", "barriers", "planner", "look-ahead", "body", "guarantees"),  # of the concepts
+    *("geometry", "control", "clearances", "timed-path"),  # of the theory
+)
 
 if __name__ == "__main__":
+    os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo draws without a display; or osmesa
+    import figures
+    import table
+
+    MAKERS |= {name: lambda _, name=name: getattr(figures, name.replace("-", "_"))() for name in FIGURES}
+    MAKERS["table"] = lambda _: table.table()
+    wrong = [name for name in sys.argv[1:] if name not in MAKERS]
+    if wrong:
+        sys.exit(f"there is no picture {wrong[0]!r}; allowed: {', '.join(MAKERS)}")
     with tempfile.TemporaryDirectory() as temporary:
         for name in sys.argv[1:] or MAKERS:
             MAKERS[name](Path(temporary))

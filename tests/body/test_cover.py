@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from sidestep import Body, Robot, _core
-from sidestep.body.cover import CoverSettings
+from sidestep.body.cover import CoverSettings, components_for
 from sidestep.body.cover_certificate import certify, complete
 from sidestep.body.cover_overshoot import overshoot, union_volume
 from sidestep.body.cover_problem import TradeOff
@@ -246,6 +246,10 @@ def test_a_rearrangement_splits_one_ellipsoid_and_leaves_another_out_or_shifts_a
 def test_a_named_link_gets_its_number_and_the_others_share_the_rest(planar: Robot) -> None:
     shared = Body.cover(planar, components={"link2": 2}, max_components=3, cache=False)
     assert {c.link: c.num_components for c in shared.link_covers} == {"link1": 1, "link2": 2}
+
+
+def test_arms_with_many_links_have_more_ellipsoids_to_share() -> None:
+    assert [components_for(n) for n in (1, 12, 13, 17)] == [80, 80, 90, 130]
 
 
 def test_refining_a_ball_inside_a_ball_finds_its_surface() -> None:

@@ -1,6 +1,7 @@
 #include "sidestep/planning/path_smoothing.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -8,6 +9,8 @@ namespace sidestep {
 namespace {
 
 using Waypoints = std::vector<Eigen::VectorXd>;
+
+constexpr double slow_share = 0.5;   // of the median velocity limit, below which a joint counts as slow
 
 /// From every waypoint on to the farthest that can be seen from it.
 Waypoints skip(const Waypoints& path, const BodyClearance& body, const Obstacles& obstacles, const Margins& margins,
@@ -24,11 +27,24 @@ Waypoints skip(const Waypoints& path, const BodyClearance& body, const Obstacles
   return kept;
 }
 
+/// What a joint counts in a length: 1, or, of one slower than half the median, such as the lift of a torso, how much longer it takes.
+Eigen::VectorXd slowness(const Robot& robot) {
+  const Eigen::VectorXd& v = robot.limits().velocity;
+  Eigen::VectorXd sorted = v;
+  std::sort(sorted.begin(), sorted.end());
+  const double median = sorted[sorted.size() / 2];
+  return v.unaryExpr([&](double speed) { return std::isfinite(median) && speed < slow_share * median ? median / speed : 1.0; });
+}
+
+double length_of(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& slowness) {
+  return (b - a).cwiseProduct(slowness).norm();
+}
+
 /// Lengths from the start to every waypoint.
-std::vector<double> stations(const Waypoints& path) {
+std::vector<double> stations(const Waypoints& path, const Eigen::VectorXd& slowness) {
   std::vector<double> at{0.0};
   for (std::size_t i = 1; i < path.size(); ++i) {
-    at.push_back(at.back() + (path[i] - path[i - 1]).norm());
+    at.push_back(at.back() + length_of(path[i - 1], path[i], slowness));
   }
   return at;
 }
@@ -41,9 +57,9 @@ constexpr int misses = 3;            // share of the attempts to shorten that ma
 constexpr double gain = 1e-3;        // a length below which a shortcut is not worth a check [rad]
 
 /// How long it takes to pass an edge at speeds proportional to the clearance, 1 rad/s from `wide` on [s].
-double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const BodyClearance& body, const Obstacles& obstacles,
-                double wide, BodyClearance::Workspace& w) {
-  const double length = (b - a).norm();
+double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& slowness, const BodyClearance& body,
+                const Obstacles& obstacles, double wide, BodyClearance::Workspace& w) {
+  const double length = length_of(a, b, slowness);
   const int pieces = 1 + static_cast<int>(length / sample);
   double sum = 0.0;
   for (int i = 0; i < pieces; ++i) {
@@ -56,7 +72,7 @@ double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const BodyCl
 /// A path whose stretch between two points of it is another.
 class Stretch {
  public:
-  Stretch(const Waypoints& way, RandomStream& random) : way_(way), at_(stations(way)) {
+  Stretch(const Waypoints& way, const Eigen::VectorXd& slowness, RandomStream& random) : way_(way), at_(stations(way, slowness)) {
     from_ = random.uniform(0.0, at_.back());
     to_ = random.uniform(0.0, at_.back());
     if (from_ > to_) {
@@ -117,17 +133,18 @@ Eigen::MatrixXd widen(const Eigen::MatrixXd& path, const BodyClearance& body, co
                       const Interrupted& interrupted) {
   Eigen::MatrixXd way = path;
   const Eigen::VectorXd &low = body.robot().limits().lower, &high = body.robot().limits().upper;
+  const Eigen::VectorXd slow = slowness(body.robot());
   const auto around = [&](Eigen::Index k, const Eigen::VectorXd& q) {
-    return duration(way.col(k - 1), q, body, obstacles, wide, workspace) +
-           duration(q, way.col(k + 1), body, obstacles, wide, workspace);
+    return duration(way.col(k - 1), q, slow, body, obstacles, wide, workspace) +
+           duration(q, way.col(k + 1), slow, body, obstacles, wide, workspace);
   };
   for (Eigen::Index k = 1; k + 1 < way.cols() && !interrupted(); ++k) {
     double best = around(k, way.col(k));
-    const double least = (way.col(k) - way.col(k - 1)).norm() + (way.col(k + 1) - way.col(k)).norm();
+    const double least = length_of(way.col(k - 1), way.col(k), slow) + length_of(way.col(k), way.col(k + 1), slow);
     for (int i = 0; i < shifts && best > least; ++i) {
       Eigen::VectorXd q = way.col(k);
       for (Eigen::Index j = 0; j < q.size(); ++j) {
-        q[j] = std::clamp(q[j] + random.uniform(-shift, shift), low[j], high[j]);
+        q[j] = std::clamp(q[j] + random.uniform(-shift, shift) / slow[j], low[j], high[j]);
       }
       const double found = around(k, q);
       if (found < best && body.edge_free(way.col(k - 1), q, obstacles, margins, workspace) &&
@@ -147,6 +164,7 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
   for (Eigen::Index k = 0; k < path.cols(); ++k) {
     way.push_back(path.col(k));
   }
+  const Eigen::VectorXd slow = slowness(body.robot());
   way = skip(way, body, obstacles, margins, workspace);
   const auto free = [&](const Waypoints& between) {
     for (std::size_t k = 1; k < between.size(); ++k) {
@@ -159,14 +177,14 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
   int missed = 0;
   for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2 && !interrupted();
        ++attempt) {
-    const Stretch stretch(way, random);
+    const Stretch stretch(way, slow, random);
     ++missed;
     if (!stretch.bends()) {
       continue;
     }
     const auto joint = static_cast<Eigen::Index>(random.uniform(0.0, static_cast<double>(path.rows())));
     for (const Waypoints& between : {stretch.straight(), stretch.evened(joint)}) {
-      if (stations(between).back() < stretch.length() - gain && free(between)) {
+      if (stations(between, slow).back() < stretch.length() - gain && free(between)) {
         way = stretch.with(between);
         missed = 0;
         break;

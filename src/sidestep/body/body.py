@@ -14,11 +14,18 @@ from sidestep import _core
 from sidestep.arm import shipped_arms
 from sidestep.body import cache as fit_cache
 from sidestep.body import file as body_file
-from sidestep.body.cover import MAX_COMPONENTS as MAX_COVER_COMPONENTS
-from sidestep.body.cover import CoverProgress, CoverSettings, LinkCover, cover_mixtures, density_fit
+from sidestep.body.cover import (
+    CoverProgress,
+    CoverSettings,
+    LinkCover,
+    components_for,
+    cover_mixtures,
+    density_fit,
+)
 from sidestep.body.cover_problem import EffortName
 from sidestep.body.fitting import Components, FitSettings, LinkFit, Progress, fit_links
 from sidestep.body.mixture import CovarianceType
+from sidestep.body.sampling import links_with_geometry
 from sidestep.body.selection import MAX_COMPONENTS
 
 if TYPE_CHECKING:
@@ -142,7 +149,7 @@ class Body(_core.Body):
         robot: Robot,
         *,
         components: int | Mapping[str, int] | None = None,
-        max_components: int = MAX_COVER_COMPONENTS,
+        max_components: int | None = None,
         seed: int = 0,
         effort: EffortName = "fine",
         progress: CoverProgress | None = None,
@@ -166,7 +173,8 @@ class Body(_core.Body):
             components: ellipsoids per link: one number for all, or {link: number}, such as more for a gripper
                 that works close to things. Links that are not named share what is left of max_components so that
                 overshoot, relative to the size of the link, is even; all links do if it is None.
-            max_components: ellipsoids in all; fewer are used if every link overshoots little enough.
+            max_components: ellipsoids in all; fewer are used if every link overshoots little enough. By default 80 for
+                up to 12 links, and 10 for each one more.
             seed: seed of the starts.
             effort: "draft", "fine" or "best", see `CoverSettings`.
             progress: called as progress(link, done, in_all); not called when the cache answers.
@@ -178,6 +186,8 @@ class Body(_core.Body):
         """
         if isinstance(components, Mapping):
             components = dict(components)
+        if max_components is None:
+            max_components = components_for(len(links_with_geometry(robot)))
         settings = CoverSettings(
             components=components, max_components=max_components, seed=seed, effort=effort
         )

@@ -35,9 +35,16 @@ NUM_SAMPLES = 4000  # surface points by which the density of the cover is assess
 SOLID_LEVEL = 5.0  # (y - mu)^T Sigma^-1 (y - mu) on the boundary of a solid ellipsoid of covariance Sigma
 LEVEL_ROUNDING = 1e-9  # levels are larger by this share: rounding of the covariances cannot bare a corner
 
+MORE_COMPONENTS = 10  # for each link beyond `FEW_LINKS`: trees with a base, a torso and a head
+FEW_LINKS = 12
 DRAFT_COMPONENTS = 6  # ellipsoids of a link in a draft
 
 CoverProgress = Callable[[str, int, int], None]
+
+
+def components_for(num_links: int) -> int:
+    """How many ellipsoids a number of links shares by default."""
+    return MAX_COMPONENTS + MORE_COMPONENTS * max(0, num_links - FEW_LINKS)
 
 
 @dataclass(frozen=True)
