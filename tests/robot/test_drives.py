@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sidestep as ss
+from sidestep.cli.limit_options import locked_by_joint
 
 GRIPPER = """
 <robot name="gripper_on_a_wheel">
@@ -72,8 +73,33 @@ def test_what_a_driven_gripper_may_reach_keeps_off_obstacles():
             "'swing' mimics another joint; give the range of that one",
         ),
         ({"slide": (np.nan, 0.04)}, "range that ascends"),
+        ({"slide": (0.0, 0.04), "swing": 0.5}, "'swing' = 0.5 mimics 'slide', which something else drives"),
     ],
 )
 def test_ranges_that_are_none_are_named(locked, words):
     with pytest.raises(ValueError, match=words):
         ss.Robot.from_urdf(GRIPPER, locked=locked)
+
+
+def test_ranges_are_of_mjcf_too():
+    text = """
+    <mujoco><worldbody><body name="hand"><joint name="turn" axis="0 0 1" range="-90 90" limited="true"/>
+      <geom type="box" size=".05 .05 .01"/>
+      <body name="left" pos=".02 0 .04"><geom type="box" size=".005 .01 .03"/>
+        <joint name="slide" type="slide" axis="1 0 0" range="0 .04" limited="true"/></body>
+      <body name="right" pos="-.02 0 .04"><geom type="box" size=".005 .01 .03"/>
+        <joint name="follow" type="slide" axis="-1 0 0" range="0 .04" limited="true"/></body>
+    </body></worldbody><equality><joint joint1="follow" joint2="slide"/></equality></mujoco>"""
+    limits = {"velocity_limits": {"turn": 1.0}, "effort_limits": {"turn": 1.0}}
+    robot = ss.Robot.from_urdf(text, locked={"slide": (0.0, 0.04)}, **limits)
+    assert robot.held == {"slide": pytest.approx(0.02), "follow": pytest.approx(0.02)}
+    for finger in ("left", "right"):
+        assert robot.collision_mesh(finger).extents == pytest.approx([0.05, 0.02, 0.06])
+
+
+def test_ranges_on_the_command_line():
+    given = ["a=0..0.04", "b=-1e-3..-.5", "c=open", "d=0.1"]
+    assert locked_by_joint(given) == {"a": (0.0, 0.04), "b": (-0.001, -0.5), "c": "open", "d": 0.1}
+    for wrong in ("a=0..", "a=..1", "a=0..x", "a=", "0..1"):
+        with pytest.raises(ValueError, match=r"JOINT=LOW\.\.HIGH"):
+            locked_by_joint([wrong])

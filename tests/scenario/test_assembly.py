@@ -9,11 +9,12 @@ import pytest
 
 from sidestep._core import Controller, DistanceSwitch, GeometricSystem, Obstacles
 from sidestep.distance import SceneObject
-from sidestep.robot import planar_arm
+from sidestep.robot import Robot, planar_arm
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import Scenario, ScenarioError
 from sidestep.scenario.assembly import Assembly, assemble, solids
 from sidestep.scenario.perception import seen_at, view_of
+from sidestep.studio.snippet import robot_code
 
 BASE = """\
 format: 1
@@ -372,6 +373,24 @@ def test_joints_are_locked_at_the_value_of_a_posture(tmp_path: Path) -> None:
     assert (robot.held, robot.num_coordinates) == ({"joint3": 0.7}, 2)
     with pytest.raises(ScenarioError, match=r"robot: locked: 'joint3' is 'straight', .*one of: bent"):
         assemble(parse(text.replace("bent", "straight"), folder=tmp_path))
+
+
+def test_a_joint_of_a_file_is_driven_within_a_range(tmp_path: Path) -> None:
+    text = LACKING.format(method="custom", mode="kinematic", more=", locked: {joint3: [0.5, 0.9]}")
+    (tmp_path / "arm.urdf").write_text(planar_arm(3))
+    scenario = parse(text, folder=tmp_path)
+    robot = assemble(scenario).robot
+    assert (robot.held, robot.num_coordinates) == ({"joint3": pytest.approx(0.7)}, 2)
+    whole = Robot.from_urdf(tmp_path / "arm.urdf", locked={"joint3": (0.5, 0.9)})
+    assert robot.fingerprint == whole.fingerprint
+    assert "locked={'joint3': (0.5, 0.9)}" in robot_code(scenario.robot, scenario)
+    for wrong, words in (
+        ("[0.5]", "joint3"),
+        ("[0.5, 0.6, 0.7]", "joint3"),
+        ("[0.9, 0.5]", "range that ascends"),
+    ):
+        with pytest.raises(ScenarioError, match=words):
+            assemble(parse(text.replace("[0.5, 0.9]", wrong), folder=tmp_path))
 
 
 def test_limits_by_joint_go_with_a_file() -> None:

@@ -287,7 +287,8 @@ void Controller::Impl::let_rest(const std::vector<RestingObject>& objects) {
     for (std::size_t k = 0; k < system->labels().size(); ++k) {
       const CoordinateLabel& label = system->labels()[k];
       if (label.kind == CoordinateLabel::Kind::obstacle && label.name == one.object.name) {
-        resting_.push_back({static_cast<Eigen::Index>(k), one.given[i++] + lifted_room});
+        resting_.push_back(
+            {static_cast<Eigen::Index>(k), one.given[i++] + std::max(lifted_room, settings.safety.margin + attached_room)});
       }
     }
   }

@@ -116,21 +116,24 @@ void Controller::change(const Arm& whole, std::vector<Held> held) {
     fresh->lifted = new Impl(std::move(lifted_arm), settings_, command_);
   }
   std::unique_ptr<Impl> passed_over;  // ends after the lock
+  Impl* old = nullptr;
   {
     const std::lock_guard lock(setters_);
     Impl& last = newest();
+    Impl* const lifted = fresh->lifted;
     fresh->take_orders_of(last);
-    lifted_ = fresh->lifted;
-    if (lifted_ != nullptr) {
-      lifted_->take_orders_of(last);
+    if (lifted != nullptr) {
+      lifted->take_orders_of(last);
     }
     passed_over.reset(next_.exchange(nullptr));
+    old = retired_.exchange(nullptr, std::memory_order_acquire);  // before `fresh` can be among them
+    lifted_ = lifted;
     newest_ = fresh.get();
-    next_.store(fresh.release(), std::memory_order_release);
     whole_ = whole;
     held_ = std::move(held);
+    next_.store(fresh.release(), std::memory_order_release);
   }
-  destroy(retired_.exchange(nullptr, std::memory_order_acquire));
+  destroy(old);
 }
 
 Controller::Impl& Controller::newest() const noexcept {
@@ -183,8 +186,12 @@ void Controller::attach(const Attachment& object) {
       throw std::invalid_argument("attach '" + object.name +
                                   "': it rests on obstacles, but where the arm is nobody has said; step once before");
     }
-    sidestep::attach(whole_, object);  // for what is wrong with it
-    last.resting = resting(whole_.robot(), object, last.q, *around, settings_.safety.margin + attached_room);
+    Arm holding = whole_;
+    for (const Held& one : held_) {
+      holding = sidestep::attach(holding, one.object, one.q);
+    }
+    sidestep::attach(holding, object);  // for what is wrong with it
+    last.resting = resting(holding.robot(), object, last.q, *around, settings_.safety.margin + attached_room);
   }
   change(whole_, std::move(held));
 }

@@ -304,9 +304,12 @@ class Controller::Impl : private StepState {
 template <class Action>
 void Controller::tell(Action&& action) {
   const std::lock_guard lock(setters_);
-  action(*newest_);
+  // The one that takes over is told first: then it has no older order. The other one needs none after that.
   if (lifted_ != nullptr) {
     action(*lifted_);
+  }
+  if (lifted_ == nullptr || newest_->lifted.load() != nullptr) {
+    action(*newest_);
   }
 }
 

@@ -74,6 +74,12 @@ double largest_difference(const Eigen::Vector3d& c, const Eigen::Matrix3d& A, co
   return largest;
 }
 
+[[noreturn]] void cannot_rest(const Attachment& object, const std::string& why) {
+  throw std::invalid_argument("attach '" + object.name + "': " + why);
+}
+
+std::string millimetres(double length) { return std::to_string(static_cast<int>(std::ceil(1000.0 * length - 1e-9))) + " mm"; }
+
 std::string quoted_list(const Obstacles& obstacles) {
   std::string names;
   for (const auto& [name, count] : obstacles.groups()) {
@@ -124,31 +130,33 @@ RestingObject resting(const Robot& robot, const Attachment& object, const Eigen:
     const Eigen::Matrix3d whole_A = R * object.cover.shapes[i];
     Eigen::Vector3d c = whole_c;
     Eigen::Matrix3d A = whole_A;
-    double given = 0.0;
-    for (int k = 0; k < most_cuts; ++k) {
+    bool is_cut = false;
+    for (int k = 0;; ++k) {
       const Cut cut = worst(c, A, obstacles, points, room);
       if (cut.gap >= room - tolerance) {
         break;
       }
+      const double deep = (whole_A.transpose() * cut.normal).norm() - (cut.offset - cut.normal.dot(whole_c)) - room;
+      if (!(deep <= deepest_rest)) {
+        const bool is_known = std::isfinite(deep);
+        cannot_rest(object, "its cover is " + (is_known ? millimetres(deep) : std::string("too")) + " deep in " +
+                                obstacles.words_for(cut.point) + ", where it may rest at most " + millimetres(deepest_rest) +
+                                " deep; are its own points, or those of the gripper, among the obstacles?");
+      }
       const Eigen::Vector3d along = A.transpose() * cut.normal;
-      const double depth = along.norm() - (cut.offset - cut.normal.dot(c)), beta = 1.0 - depth / along.norm();
-      given += depth;
-      const double deep = given - room;
-      if (!(deep <= deepest_rest) || !(beta > -1.0)) {
-        const bool is_known = std::isfinite(given);
-        throw std::invalid_argument(
-            "attach '" + object.name + "': its cover is " +
-            (is_known ? std::to_string(static_cast<int>(std::ceil(1000.0 * deep))) + " mm" : std::string("too")) + " deep in " +
-            obstacles.words_for(cut.point) + ", where it may rest at most " +
-            std::to_string(static_cast<int>(1000.0 * deepest_rest)) +
-            " mm deep; are its own points, or those of the gripper, among the obstacles?");
+      const double beta = (cut.offset - cut.normal.dot(c)) / along.norm();
+      if (!(beta > -1.0) || k >= most_cuts) {
+        cannot_rest(object, "an ellipsoid of its cover lies wholly within " + millimetres(room) +
+                                ", safety.margin and 1 mm, of " + obstacles.words_for(cut.point) +
+                                "; lower safety.margin, or give fewer components");
       }
       const Eigen::Vector3d w = along.normalized();
       const double a = 0.5 * (1.0 + beta), across = std::sqrt(a);
       c -= 0.5 * (1.0 - beta) * (A * w);
       A = A * (across * Eigen::Matrix3d::Identity() + (a - across) * w * w.transpose());
+      is_cut = true;
     }
-    out.given.push_back(given > 0.0 ? largest_difference(whole_c, whole_A, c, A) : 0.0);
+    out.given.push_back(is_cut ? largest_difference(whole_c, whole_A, c, A) : 0.0);
     out.object.cover.centres[i] = X_WA.inverse() * c;
     out.object.cover.shapes[i] = R.transpose() * A;
   }

@@ -296,7 +296,7 @@ BOOST_AUTO_TEST_CASE(what_stands_on_something_may_until_it_is_lifted) {
     object.rests_on = {"table"};
     BOOST_TEST(what_is_said([&] { controller.attach(object); }).find("there are: 'ball'") != std::string::npos);
     object.rests_on = {"ball"};
-    controller.set_obstacles(test::ball(X_WA * Eigen::Vector3d(0.0, 0.0, 0.22 + 0.05), 0.05).named({"ball"}, {1}));
+    controller.set_obstacles(test::ball(X_WA * Eigen::Vector3d(0.0, 0.0, 0.21 + 0.05), 0.05).named({"ball"}, {1}));
     controller.step(q, v);
     BOOST_TEST(what_is_said([&] { controller.attach(object); }).find(" mm deep in 'ball'") != std::string::npos);
     controller.set_obstacles(ball);

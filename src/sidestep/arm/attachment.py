@@ -51,7 +51,7 @@ def attachment(
         inertia: (3, 3) [kg m^2] about the centre of mass; of a solid of even density by default.
         may_touch: links that get no clearance from it, as the fingers that hold it.
         rests_on: names of obstacles that it stands on, or "*" for whatever it stands on. Until its whole cover is
-            5 mm off all obstacles it may stay as near to them as it is. Its cover may be 20 mm deep in them at most.
+            5 mm off all obstacles it may stay as near to them as it is. Its cover may be 30 mm deep in them at most.
         components: ellipsoids of it at most.
 
     Raises:

@@ -12,6 +12,7 @@ from sidestep import _core
 from sidestep.arm import clearance_tables, link_pairs
 from sidestep.body import cache as body_cache
 from sidestep.body.cover import CoverSettings
+from sidestep.body.cover_problem import EFFORTS
 from sidestep.robot import Robot
 
 FORMAT_VERSION = 1  # to be raised with the version of the file format (cpp/src/model/arm_file.cpp)
@@ -28,7 +29,9 @@ def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str, draf
     add(FORMAT_VERSION, source, robot.name, sorted(sorted(pair) for pair in allowed))
     add(body_cache.cache_path(robot, CoverSettings(effort="draft" if draft else "fine")).name)
     pairs, tables = link_pairs, clearance_tables
-    add(tables.ALGORITHM_VERSION, tables.BEYOND, tables.NEAR, pairs.ALGORITHM_VERSION, pairs.MOST_LOST)
+    add(EFFORTS["draft" if draft else "fine"])
+    add(tables.ALGORITHM_VERSION, tables.BEYOND, tables.NEAR, tables.STEP, tables.FULL)
+    add(pairs.ALGORITHM_VERSION, pairs.MOST_LOST, pairs.HALVINGS, pairs.CHECKS)
     add(pairs.FEW, pairs.TOUCHING, pairs.NEAR, pairs.SHARE, pairs.DRAFT if draft else pairs.FULL)
     limits = robot.limits
     add(limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.effort)

@@ -6,9 +6,14 @@ from typing import Annotated, TypeAlias
 
 import typer
 
+Locked: TypeAlias = float | str | tuple[float, float]
+"""Where a joint is held: its value, the name of a posture, or the range in which something else drives it."""
 LockedOption: TypeAlias = Annotated[
     list[str] | None,
-    typer.Option(help="JOINT=VALUE [rad or m], or JOINT=POSTURE: held there; of a file; repeatable."),
+    typer.Option(
+        help="JOINT=VALUE [rad or m] or JOINT=POSTURE: held there; JOINT=LOW..HIGH: driven by something else in that "
+        "range; of a file; may be repeated."
+    ),
 ]
 EffortLimitOption: TypeAlias = Annotated[
     list[str] | None,
@@ -48,17 +53,27 @@ def by_joint(texts: list[str] | None, option: str) -> dict[str, float]:
     return values
 
 
-def locked_by_joint(texts: list[str] | None) -> dict[str, float | str]:
-    """Values of --locked: numbers, or names of postures.
+def locked_by_joint(texts: list[str] | None) -> dict[str, Locked]:
+    """Values of --locked: numbers, ranges, or names of postures.
 
     Raises:
-        ValueError: as `by_joint`.
+        ValueError: names what was written and what is allowed.
     """
-    values: dict[str, float | str] = {}
+    values: dict[str, Locked] = {}
     for text in texts or ():
         joint, _, value = text.rpartition("=")
-        if not (joint and value):
-            raise ValueError(f"--locked is {text!r}; allowed: JOINT=VALUE or JOINT=POSTURE")
+        lower, dots, upper = value.partition("..")
+        try:
+            if not (joint and value):
+                raise ValueError
+            if dots:
+                values[joint] = float(lower), float(upper)
+                continue
+        except ValueError:
+            raise ValueError(
+                f"--locked is {text!r}; allowed: JOINT=VALUE, JOINT=POSTURE or JOINT=LOW..HIGH, for example "
+                "--locked finger=0..0.04"
+            ) from None
         try:
             values[joint] = float(value)
         except ValueError:

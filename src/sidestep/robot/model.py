@@ -156,7 +156,7 @@ class Robot(_core.Robot):
         *,
         base_pose: ArrayLike | None = None,
         tip: str | None = None,
-        locked: Mapping[str, float] | None = None,
+        locked: Mapping[str, ArrayLike | str] | None = None,
         locked_beyond_limits: bool = False,
         acceleration_limits: LimitValues | None = None,
         velocity_limits: LimitValues | None = None,
@@ -201,7 +201,11 @@ class Robot(_core.Robot):
 
     @classmethod
     def named(
-        cls, name: str, *, locked: Mapping[str, float] | None = None, locked_beyond_limits: bool = False
+        cls,
+        name: str,
+        *,
+        locked: Mapping[str, ArrayLike | str] | None = None,
+        locked_beyond_limits: bool = False,
     ) -> Robot:
         """One of the robots listed by `sidestep.robots()`, such as "fr3", "fr3_arm", "panda" or "planar2"; or a name of
         the packages `robot_descriptions` ("panda_mj_description") or `mujoco_menagerie`, where they are installed.

@@ -62,7 +62,7 @@ def build_tree(
     still = [joint for joint in still if joint.name not in locks]
     locks |= {joint.name: position_bounds(joint)[0] for joint in still}
     drives = drives_of(urdf, locks)
-    _check_followers(urdf, values, drives)
+    _check_followers(urdf, values, ranges, drives)
     kept = _kept_joints(urdf, drives, tip)
     for joint in kept:
         if joint in still:
@@ -152,7 +152,7 @@ def at_postures(
             if value not in known:
                 raise ValueError(
                     f"locked: {joint!r} is {value!r}, and no posture of that name gives the joint a value; allowed: "
-                    f"a number, or one of: {', '.join(known) or 'no posture does'}"
+                    f"a number, two: a range, or one of: {', '.join(known) or 'no posture does'}"
                 )
             value = known[value]
         numbers[joint] = value
@@ -224,7 +224,12 @@ def _checked_locks(
     return locks
 
 
-def _check_followers(urdf: Urdf, locked: Mapping[str, float], drives: dict[str, Drive]) -> None:
+def _check_followers(
+    urdf: Urdf,
+    locked: Mapping[str, float],
+    ranges: Mapping[str, tuple[float, float]],
+    drives: dict[str, Drive],
+) -> None:
     """A mimic joint may be named with the one that it follows, at the place where it then is."""
     for name, value in locked.items():
         if drives[name].source is not None:
@@ -232,10 +237,24 @@ def _check_followers(urdf: Urdf, locked: Mapping[str, float], drives: dict[str, 
                 f"locked: joint {name!r} mimics another; lock that one; joints that can be locked: "
                 f"{', '.join(_lockable(urdf))}"
             )
+        source = _followed(urdf, name)
+        if source != name and source in ranges:
+            raise ValueError(
+                f"locked: {name!r} = {value} mimics {source!r}, which something else drives in a range; "
+                f"lock {source!r} alone"
+            )
         if not math.isclose(drives[name].offset, value, abs_tol=FOLLOWER_TOLERANCE):
             raise ValueError(
                 f"locked: {name!r} = {value} mimics another that is locked and puts it at {drives[name].offset}"
             )
+
+
+def _followed(urdf: Urdf, name: str) -> str:
+    """The joint at the end of a chain of mimic joints; its own name where it follows none."""
+    joint = urdf.joints[name]
+    while joint.mimic is not None:
+        joint = urdf.joints[joint.mimic.joint]
+    return joint.name
 
 
 def _lockable(urdf: Urdf) -> list[str]:

@@ -17,6 +17,7 @@ from sidestep.scenario.config import MAX_LOOK_STEPS, Section, check_steps, secti
 from sidestep.scenario.validation import MAX_CHARACTERS, ScenarioError, check_document, parse_yaml
 
 Vector3 = tuple[float, float, float]
+Locked = dict[str, float | str | tuple[float, float]]  # values, names of postures, ranges
 Mode = Literal["torque", "kinematic"]
 SwitchType = Literal["none", "harmonic_only", "geodesic_only", "binary", "sigmoid", "distance"]
 
@@ -35,8 +36,8 @@ class BasePose:
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """A robot by name, or by URDF file with the joints `locked` at a value [rad | m] or at that of a posture, a `tip`,
-    a `base`, and limits by joint.
+    """A robot by name, or by URDF file with the joints `locked` at a value [rad | m], at that of a posture or within a
+    range, a `tip`, a `base`, and limits by joint.
 
     effort_limits [Nm | N], velocity_limits [rad/s | m/s]: in place of those of the file.
     """
@@ -45,7 +46,7 @@ class RobotConfig:
     urdf: str | None = None
     package_dirs: tuple[str, ...] = ()
     tip: str | None = None
-    locked: dict[str, float | str] | None = None
+    locked: Locked | None = None
     base: BasePose | None = None
     effort_limits: dict[str, float] | None = None
     velocity_limits: dict[str, float] | None = None
@@ -359,12 +360,19 @@ def _has_all(kind: Any, value: Any) -> bool:
 
 def _numbers(value: Any, kinds: tuple[Any, ...]) -> Any:
     if isinstance(value, dict):
-        if dict[str, float | str] in kinds:
-            return {k: v if isinstance(v, str) else float(v) for k, v in value.items()}
+        if Locked in kinds:
+            return {k: _locked(v) for k, v in value.items()}
         return {k: float(v) if dict[str, float] in kinds else int(v) for k, v in value.items()}
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value) if float in kinds else int(value) if int in kinds else value
     return value
+
+
+def _locked(value: Any) -> float | str | tuple[float, ...]:
+    """A value, the name of a posture, or a range."""
+    if isinstance(value, list):
+        return tuple(float(bound) for bound in value)
+    return value if isinstance(value, str) else float(value)
 
 
 def _plain(value: Any) -> Any:
