@@ -212,13 +212,13 @@ def prepare(path: Path, cache: Path, problems: int) -> dict[str, Any]:
         row: dict[str, Any] = {"prepare_s": round(time.perf_counter() - start, 2), "draft": bool(draft)}
         if problems:
             try:
-                row["reach"] = reach(arm, problems)
+                row["reach"] = reach(arm, path, problems)
             except Exception as error:
                 row["reach_failed"] = f"{type(error).__name__}: {error}"
     return row
 
 
-def reach(arm: ss.Arm, count: int) -> dict[str, Any]:
+def reach(arm: ss.Arm, path: Path, count: int) -> dict[str, Any]:
     """Counts over the first problems of seed 0."""
     from sidestep.bench.motion import ControllerMover, MotionSettings
     from sidestep.bench.outcome import Judge
@@ -228,7 +228,7 @@ def reach(arm: ss.Arm, count: int) -> dict[str, Any]:
     robot, settings = arm.robot, MotionSettings()
     assert isinstance(robot, ss.Robot)  # it comes from a description
     own = SelfCollision(robot)
-    generator = ProblemGenerator(ProblemSettings(robot=robot.name), robot=robot, self_collision=own)
+    generator = ProblemGenerator(ProblemSettings(robot=str(path)), robot=robot, self_collision=own)
     judge, mover = Judge(robot, self_collision=own), ControllerMover(robot, arm)
     outcomes = []
     for index in range(count):
@@ -239,4 +239,6 @@ def reach(arm: ss.Arm, count: int) -> dict[str, Any]:
         "success": sum(item.success for item in outcomes),
         "contacts": sum(item.collision or item.self_collision for item in outcomes),
         "limit_violations": sum(bool(item.limits) for item in outcomes),
+        "limits_broken": sorted({name for item in outcomes for name in item.limits}),
+        "under_way": sum(item.under_way for item in outcomes),
     }

@@ -14,8 +14,12 @@ from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from sidestep.studio.headless import browser, driver
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 ROOT = Path(__file__).parents[1]
 SITE, TARGET = ROOT / "build" / "site", ROOT / "build" / "screenshots"
@@ -27,7 +31,9 @@ TOO_WIDE = "() => document.documentElement.scrollWidth > window.innerWidth"
 def pages(chosen: list[str]) -> list[Path]:
     """The pages to look at; raises FileNotFoundError where there is none."""
     found = [SITE / f"{name}.html" for name in chosen] or [
-        path for path in sorted(SITE.rglob("*.html")) if "reference/cpp/" not in path.as_posix()
+        path
+        for path in sorted(SITE.rglob("*.html"))
+        if not path.relative_to(SITE).as_posix().startswith(("reference/cpp/", "runs/"))
     ]
     missing = [path for path in found if not path.is_file()]
     if missing or not found:
@@ -51,6 +57,20 @@ def served() -> Iterator[str]:
     server.shutdown()
 
 
+def states(chromium: Any, page: Page, address: str) -> None:
+    """Pictures of what a page can be: with results of a search, dark, and narrow."""
+    page.goto(f"{address}index.html", wait_until="load")
+    page.fill("input.md-search__input", "obstacle")
+    page.wait_for_selector(".md-search-result__link", timeout=30_000)  # [ms] the index is loaded first
+    page.screenshot(path=TARGET / "state-search.png")
+    dark = chromium.new_page(viewport=WINDOW, color_scheme="dark")
+    dark.goto(f"{address}concepts/planner.html", wait_until="load")
+    dark.screenshot(path=TARGET / "state-dark.png")
+    page.set_viewport_size({"width": 420, "height": 800})
+    page.goto(f"{address}start/tour.html", wait_until="load")
+    page.screenshot(path=TARGET / "state-narrow.png")
+
+
 def main() -> int:
     faults = 0
     with served() as address, driver() as playwright, browser(playwright) as chromium:
@@ -70,6 +90,8 @@ def main() -> int:
             wrong += ["is wider than the window"] if page.evaluate(TOO_WIDE) else []
             faults += len(wrong)
             print(name.with_suffix("").as_posix(), *wrong, sep="\n    ")
+        if not sys.argv[1:]:
+            states(chromium, page, address)
     return 1 if faults else 0
 
 

@@ -31,6 +31,7 @@ simulation: {{mode: kinematic, duration: 5.0}}
 @pytest.fixture(autouse=True)
 def cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr("sidestep.cli.output.LINE_EVERY", 0.0)
     return tmp_path / "cache"
 
 
@@ -90,6 +91,7 @@ def test_reach_takes_a_file_and_a_draft(urdf: Path, tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     found = json.loads(out.read_text())
     assert (found["draft"], found["problems"], found["success"]) == (True, 2, 2)
+    assert "2 of 2, arrived" in done.output
     assert "preparing link" in done.output
 
 

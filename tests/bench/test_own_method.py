@@ -37,6 +37,18 @@ def test_a_spring_is_integrated_and_judged(tmp_path: Path) -> None:
     assert any(outcome.collision for outcome in result.outcomes)
 
 
+def test_the_method_of_the_page_runs(tmp_path: Path) -> None:
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "comparing.md"
+    path = tmp_path / "my_method.py"
+    path.write_text(
+        page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0], encoding="utf-8"
+    )
+    result = run_bench(settings(path))
+    assert [item.success for item in result.outcomes] == [
+        not p.straight_line_blocked for p in result.problems
+    ]
+
+
 def test_what_is_wrong_is_named(tmp_path: Path) -> None:
     robot = Robot.named("planar3")
     with pytest.raises(FileNotFoundError, match=r"there is no file '.*none\.py'"):

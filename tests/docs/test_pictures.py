@@ -46,8 +46,8 @@ def test_the_arm_of_the_first_picture_leaves_for_its_goal(monkeypatch: pytest.Mo
     monkeypatch.syspath_prepend(str(IMAGES))
     import table
 
-    rows = list(itertools.islice(table.motion(), 300))
+    rows = list(itertools.islice(table.motion(), 80))
     first, last = rows[0], rows[-1]
     assert last[5] == 0  # contacts
-    assert np.abs(last[3] - first[3]).max() > 0.05  # [rad] in 0.3 s
-    assert np.linalg.norm(last[4] - first[4]) == pytest.approx(0.3 * table.FASTEST, rel=0.05)  # the ball
+    assert np.abs(last[3] - first[3]).max() > 1e-3  # [rad] in 0.08 s, while a posture is searched and a path
+    assert np.linalg.norm(last[4] - first[4]) == pytest.approx(0.079 * table.FASTEST, rel=0.01)  # the ball

@@ -74,6 +74,12 @@ def test_the_file_beside_a_urdf_is_found_and_another_can_be_given(tmp_path: Path
     robot = Robot.from_urdf(urdf)
     assert robot.allowed_pairs == (("a", "b"),)
     assert {name: q.tolist() for name, q in robot.postures.items()} == {"home": [0.5, -1.0]}
+    held = Robot.from_urdf(urdf, locked={"x": "half"})
+    assert (held.held, held.coordinate_names) == ({"x": 0.5}, ["y"])
+    with pytest.raises(
+        ValueError, match=r"'x' is 'up', and no posture .*; allowed: a number, or one of: home, half"
+    ):
+        Robot.from_urdf(urdf, locked={"x": "up"})
     given = tmp_path / "given.srdf"
     given.write_text('<robot name="any"><disable_collisions link1="a" link2="c"/></robot>')
     assert Robot.from_urdf(urdf, srdf=given).allowed_pairs == (("a", "c"),)

@@ -221,6 +221,7 @@ def test_a_pose_is_reached_from_a_posture_that_has_it() -> None:
     assert (alone.settings.local_minimum, alone.settings.look_ahead) == (None, None)
 
 
+@pytest.mark.slow
 def test_a_barrier_sees_a_box_without_gaps() -> None:
     parts = assemble(Scenario.from_text(POSE.format(method="barrier", frame="tip", activation=0.12)))
     assert isinstance(parts.seen, Obstacles)
@@ -360,6 +361,17 @@ def test_torque_needs_effort_limits_and_inertias(tmp_path: Path, method: str) ->
     with pytest.raises(ScenarioError, match=r"no moving link of robot 'planar2' has an <inertial> with mass"):
         assembled("torque")
     assert assembled("kinematic").robot.num_coordinates == 2
+
+
+def test_joints_are_locked_at_the_value_of_a_posture(tmp_path: Path) -> None:
+    text = LACKING.format(method="custom", mode="kinematic", more=", locked: {joint3: bent}")
+    (tmp_path / "arm.urdf").write_text(planar_arm(3))
+    state = '<group_state name="bent" group="arm"><joint name="joint3" value="0.7"/></group_state>'
+    (tmp_path / "arm.srdf").write_text(f'<robot name="planar3">{state}</robot>')
+    robot = assemble(parse(text, folder=tmp_path)).robot
+    assert (robot.held, robot.num_coordinates) == ({"joint3": 0.7}, 2)
+    with pytest.raises(ScenarioError, match=r"robot: locked: 'joint3' is 'straight', .*one of: bent"):
+        assemble(parse(text.replace("bent", "straight"), folder=tmp_path))
 
 
 def test_limits_by_joint_go_with_a_file() -> None:

@@ -33,6 +33,7 @@ NEAR = 0.002  # distance of meshes that counts as touching [m]
 MOST_LOST = 0.3  # of samples that lose their clearance without touching: above, ellipsoids are no measure
 CHECKS = 100  # configurations by which a coarse table is judged
 HALVINGS = 14  # of a way from touching to apart: to 1/16,000 of it
+UNBOUNDED = 1e9  # [m/rad | m/m] more than any arm
 SHARE = 0.95  # of samples in which the meshes are apart that the ellipsoids must be: otherwise they are no measure
 
 
@@ -42,7 +43,8 @@ class PairEffort:
 
     Attributes:
         samples: random configurations, of which the gaps between ellipsoids are taken.
-        ways: from samples in which they touch to others, on which the contact is looked for.
+        ways: from samples in which they touch to others, on which the contact is looked for; half of them from those
+            with the widest gaps.
         tables: of the pairs that have them.
     """
 
@@ -255,7 +257,9 @@ class _Samples:
         if not len(touching) or not len(apart):
             return -np.inf  # nothing touches, or everything
         pair, ways, draw = self._pairs[k], self._effort.ways, np.random.default_rng(1)
-        starts, ends = draw.choice(touching, ways), draw.choice(apart, ways)
+        deep = touching[np.argsort(-gap[touching], kind="stable")][: ways // 2]  # which have the widest gaps
+        starts = np.concatenate([deep, draw.choice(touching, ways - len(deep))])
+        ends = draw.choice(apart, ways)
         gaps = _gaps(self._robot, self._body, [pair])
         travel = self._travel(pair)
         largest = -np.inf
@@ -288,7 +292,10 @@ class _Samples:
             reach = np.sqrt(variances * np.asarray(levels)[own, None])
             signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
             corners = np.asarray(self._body.means)[own, None] + reach[:, None] * signs
-            travel += travel_per_joint(self._robot, link, corners.reshape(-1, 3))
+            try:
+                travel += travel_per_joint(self._robot, link, corners.reshape(-1, 3))
+            except ValueError:  # a slide without limits: nothing bounds how far a link behind it turns
+                return np.where(between, UNBOUNDED, 0.0)
         return np.where(between, travel, 0.0)
 
 

@@ -32,6 +32,7 @@ FIXED_ALLOWANCE = 2.0  # in the mean, its square beyond MAX_AIM, of links that o
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
 GROWTH = 1.3  # numbers of ellipsoids tried on a link grow by this factor
 NUM_SAMPLES = 4000  # surface points by which the density of the cover is assessed
+DRAFT_SAMPLES = 500  # the same of a draft
 SOLID_LEVEL = 5.0  # (y - mu)^T Sigma^-1 (y - mu) on the boundary of a solid ellipsoid of covariance Sigma
 LEVEL_ROUNDING = 1e-9  # levels are larger by this share: rounding of the covariances cannot bare a corner
 
@@ -321,6 +322,7 @@ def cover_mixtures(
             0.5 * (covariances + covariances.transpose(0, 2, 1)),
             volumes / volumes.sum(),
             settings.seed,
+            samples=DRAFT_SAMPLES if settings.effort == "draft" else NUM_SAMPLES,
         )
         levels = np.full(len(ellipsoids), SOLID_LEVEL * (1.0 + LEVEL_ROUNDING))
         results.append((fit, mixture, levels, cover))
@@ -328,10 +330,17 @@ def cover_mixtures(
 
 
 def density_fit(
-    robot: Robot, link: str, means: Array, covariances: Array, weights: Array, seed: int
+    robot: Robot,
+    link: str,
+    means: Array,
+    covariances: Array,
+    weights: Array,
+    seed: int,
+    *,
+    samples: int = NUM_SAMPLES,
 ) -> tuple[LinkFit, Mixture]:
     """How well the density of one link's cover describes its surface, and the mixture: arrays as in `Mixture`."""
-    points = sample_link(robot, link, count=NUM_SAMPLES, seed=seed)
+    points = sample_link(robot, link, count=samples, seed=seed)
     mixture = Mixture(weights, means, covariances, log_likelihood=0.0, converged=True)
     mixture = replace(mixture, log_likelihood=_log_likelihood(points, mixture))
     return assess(link, points, mixture, None), mixture

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Literal, TypeAlias
 
@@ -47,6 +47,7 @@ class Effort:
         merged: vertices of a mesh of more than that many triangles are merged first, where they are nearer than a third
             of a piece, and the proof alone is on all triangles; 0: never.
         most: ellipsoids of a link, of those that links share: more hold a box little better, and cost every step.
+        outline: steps of the descent of an outline: with 300 it overshoots 3 % more than with 800.
         trial_starts: outlines tried while numbers of ellipsoids are compared.
         trial_hops: rearrangements tried of the best of them.
         final_starts: more of them with the final number: the best of 10 overshoots 5 to 15 % less.
@@ -63,6 +64,7 @@ class Effort:
     detail: SurfaceDetail
     merged: int
     most: int
+    outline: int
     trial_starts: int
     trial_hops: int
     final_starts: int
@@ -80,6 +82,7 @@ EFFORTS: dict[EffortName, Effort] = {
         SurfaceDetail(nodes=16_000, pieces=1_500),
         merged=3_000,
         most=6,
+        outline=300,
         trial_starts=2,
         trial_hops=0,
         final_starts=0,
@@ -95,6 +98,7 @@ EFFORTS: dict[EffortName, Effort] = {
         SurfaceDetail(),
         merged=0,
         most=16,
+        outline=800,
         trial_starts=1,
         trial_hops=2,
         final_starts=3,
@@ -110,6 +114,7 @@ EFFORTS: dict[EffortName, Effort] = {
         SurfaceDetail(),
         merged=0,
         most=80,
+        outline=800,
         trial_starts=2,
         trial_hops=10,
         final_starts=10,
@@ -218,11 +223,10 @@ class LinkProblem:
 
     def _search(self, number: int, starts: range) -> _Solution:
         """The best of several outlines, refined with finer points and completed."""
-        outlines = []
+        outlines, settings = [], replace(OUTLINE, steps=self.effort.outline)
         for start in starts:
-            outline = self._outline(
-                initial(self.surface, self._samples.coarse, number, self.seed + start), OUTLINE
-            )
+            first = initial(self.surface, self._samples.coarse, number, self.seed + start)
+            outline = self._outline(first, settings)
             outlines.append((self._excess(outline), start, outline))
         return self._polish(min(outlines, key=lambda entry: entry[:2])[2])
 

@@ -29,6 +29,7 @@ from sidestep.cli.limit_options import (
     LockedOption,
     VelocityLimitOption,
     by_joint,
+    locked_by_joint,
 )
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
@@ -108,7 +109,7 @@ def reach(
     options = {
         "package_dirs": package_dir,
         "tip": tip,
-        "locked": by_joint(locked, "--locked"),
+        "locked": locked_by_joint(locked),
         "effort_limits": by_joint(effort_limit, "--effort-limit"),
         "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
         "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),

@@ -7,7 +7,8 @@ from typing import Annotated, TypeAlias
 import typer
 
 LockedOption: TypeAlias = Annotated[
-    list[str] | None, typer.Option(help="JOINT=VALUE [rad or m], held there; of a file; may be repeated.")
+    list[str] | None,
+    typer.Option(help="JOINT=VALUE [rad or m], or JOINT=POSTURE: held there; of a file; repeatable."),
 ]
 EffortLimitOption: TypeAlias = Annotated[
     list[str] | None,
@@ -44,4 +45,22 @@ def by_joint(texts: list[str] | None, option: str) -> dict[str, float]:
             joint = ""
         if not joint:
             raise ValueError(f"{option} is {text!r}; allowed: JOINT=VALUE, for example {option} joint1=87")
+    return values
+
+
+def locked_by_joint(texts: list[str] | None) -> dict[str, float | str]:
+    """Values of --locked: numbers, or names of postures.
+
+    Raises:
+        ValueError: as `by_joint`.
+    """
+    values: dict[str, float | str] = {}
+    for text in texts or ():
+        joint, _, value = text.rpartition("=")
+        if not (joint and value):
+            raise ValueError(f"--locked is {text!r}; allowed: JOINT=VALUE or JOINT=POSTURE")
+        try:
+            values[joint] = float(value)
+        except ValueError:
+            values[joint] = value
     return values

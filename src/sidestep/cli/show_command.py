@@ -15,6 +15,7 @@ from sidestep.cli.limit_options import (
     LockedOption,
     VelocityLimitOption,
     by_joint,
+    locked_by_joint,
 )
 from sidestep.cli.output import JsonOption, console, write_json
 
@@ -51,7 +52,7 @@ def show(
     options: dict[str, Any] = {
         "package_dirs": package_dir,
         "tip": tip,
-        "locked": by_joint(locked, "--locked"),
+        "locked": locked_by_joint(locked),
         "effort_limits": by_joint(effort_limit, "--effort-limit"),
         "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
         "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),

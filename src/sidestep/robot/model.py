@@ -21,9 +21,9 @@ from sidestep.robot.link import Array, Geometry, Link
 from sidestep.robot.mjcf import is_mjcf, no_mjcf, read_mjcf, warn_of_defaults
 from sidestep.robot.plausibility import arm_length, warn_of_sizes
 from sidestep.robot.source import read_description
-from sidestep.robot.srdf import read_extras
+from sidestep.robot.srdf import read_extras, read_states, srdf_of
 from sidestep.robot.tool import tree_with_tool
-from sidestep.robot.tree import KinematicTree, build_tree
+from sidestep.robot.tree import KinematicTree, at_postures, build_tree
 from sidestep.robot.urdf import parse_urdf
 
 if TYPE_CHECKING:  # imported where they are used: each takes longer to import than a robot to load
@@ -61,7 +61,7 @@ class Robot(_core.Robot):
         package_dirs: Sequence[str | Path] = (),
         base_pose: ArrayLike | None = None,
         tip: str | None = None,
-        locked: Mapping[str, ArrayLike] | None = None,
+        locked: Mapping[str, ArrayLike | str] | None = None,
         locked_beyond_limits: bool = False,
         acceleration_limits: LimitValues | None = None,
         velocity_limits: LimitValues | None = None,
@@ -89,7 +89,8 @@ class Robot(_core.Robot):
             base_pose: pose (4, 4) of the root link in the world, identity by default.
             tip: a link; keeps the joints from the root to it, and links fixed rigidly to links before it.
                 What hangs on the tip itself, and every other branch that moves, is dropped.
-            locked: joints held at a value [rad | m]; joints that mimic them are held too, and may be named too.
+            locked: joints held at a value [rad | m], or at that of a posture, by the name that the SRDF or a keyframe
+                gives it; joints that mimic them are held too, and may be named too.
                 Floating and planar joints at a pose (4, 4), or x, y, z [m], roll, pitch, yaw [rad]; where they
                 are written by default. Two numbers, a range: something else drives the joint, as a gripper's own
                 controller; what it moves is covered wherever it may be, and held in the middle of the range.
@@ -119,6 +120,13 @@ class Robot(_core.Robot):
             urdf = parse_urdf(
                 read_description(source, package_dirs=package_dirs, xacro_arguments=xacro_arguments)
             )
+        if any(isinstance(value, str) for value in (locked or {}).values()):
+            if mjcf is not None:
+                states = [(key, dict(values)) for key, values in mjcf.keyframes.items()]
+            else:
+                file = srdf_of(srdf, source, urdf.name)
+                states = read_states(file) if file else []
+            locked = at_postures(locked or {}, states)
         tree = build_tree(
             urdf,
             base_pose=base_pose,

@@ -56,21 +56,33 @@ def read_postures(source: str | Path, joints: Sequence[str]) -> dict[str, tuple[
     Raises:
         FileNotFoundError, ValueError: as `read_srdf`.
     """
+    return {
+        name: tuple(values[joint] for joint in joints)
+        for name, values in read_states(source)
+        if all(joint in values for joint in joints)
+    }
+
+
+def read_states(source: str | Path) -> list[tuple[str, dict[str, float]]]:
+    """The `<group_state>`s of an SRDF, of whatever joints: their names, which several groups may share, and values.
+
+    Raises:
+        FileNotFoundError, ValueError: as `read_srdf`.
+    """
     root, label = _root(source)
-    postures = {}
+    states = []
     for state in root.findall("group_state"):
         try:
             values = {
-                joint.get("name"): float(joint.get("value", "").split()[0])
+                joint.get("name", ""): float(joint.get("value", "").split()[0])
                 for joint in state.findall("joint")
             }
         except (ValueError, IndexError):
             raise ValueError(
                 f"{label}: the <group_state> {state.get('name')!r} has a joint without a number as value"
             ) from None
-        if all(joint in values for joint in joints):
-            postures[state.get("name", "")] = tuple(values[joint] for joint in joints)
-    return postures
+        states.append((state.get("name", ""), values))
+    return states
 
 
 def srdf_beside(path: Path, robot: str) -> Path | None:
@@ -92,11 +104,16 @@ def srdf_beside(path: Path, robot: str) -> Path | None:
     return None
 
 
+def srdf_of(srdf: str | Path | None, urdf: str | Path, robot: str) -> str | Path | None:
+    """The SRDF that is given, or the one beside a URDF; None without one."""
+    return srdf or (None if is_text(urdf) else srdf_beside(Path(urdf), robot))
+
+
 def read_extras(
     srdf: str | Path | None, urdf: str | Path, robot: str, joints: Sequence[str], links: Iterable[str]
 ) -> tuple[dict[str, NDArray[np.float64]], tuple[Pair, ...]]:
     """Postures and pairs that may touch, of an SRDF or the one beside a URDF (`srdf_beside`); none without one."""
-    file = srdf or (None if is_text(urdf) else srdf_beside(Path(urdf), robot))
+    file = srdf_of(srdf, urdf, robot)
     if not file:
         return {}, ()
     postures = {name: np.array(values) for name, values in read_postures(file, joints).items()}

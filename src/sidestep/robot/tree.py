@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -132,6 +132,31 @@ def build_tree(
         links,
         {joint.name: drives[joint.name].offset for joint in kept if joint.moves and _held(drives, joint)},
     )
+
+
+def at_postures(
+    locked: Mapping[str, ArrayLike | str], states: Sequence[tuple[str, Mapping[str, float]]]
+) -> dict[str, ArrayLike]:
+    """`locked` with the values that postures give in place of their names.
+
+    Args:
+        locked: by joint. states: names of postures, and the values of joints that they give.
+
+    Raises:
+        ValueError: no posture of that name gives the joint a value; names those that do.
+    """
+    numbers: dict[str, ArrayLike] = {}
+    for joint, value in locked.items():
+        if isinstance(value, str):
+            known = {name: values[joint] for name, values in states if joint in values}
+            if value not in known:
+                raise ValueError(
+                    f"locked: {joint!r} is {value!r}, and no posture of that name gives the joint a value; allowed: "
+                    f"a number, or one of: {', '.join(known) or 'no posture does'}"
+                )
+            value = known[value]
+        numbers[joint] = value
+    return numbers
 
 
 def _poses_and_values(

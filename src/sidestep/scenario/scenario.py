@@ -35,7 +35,8 @@ class BasePose:
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """A robot by name, or by URDF file with the joints `locked` [rad | m], a `tip`, a `base`, and limits by joint.
+    """A robot by name, or by URDF file with the joints `locked` at a value [rad | m] or at that of a posture, a `tip`,
+    a `base`, and limits by joint.
 
     effort_limits [Nm | N], velocity_limits [rad/s | m/s]: in place of those of the file.
     """
@@ -44,7 +45,7 @@ class RobotConfig:
     urdf: str | None = None
     package_dirs: tuple[str, ...] = ()
     tip: str | None = None
-    locked: dict[str, float] | None = None
+    locked: dict[str, float | str] | None = None
     base: BasePose | None = None
     effort_limits: dict[str, float] | None = None
     velocity_limits: dict[str, float] | None = None
@@ -358,6 +359,8 @@ def _has_all(kind: Any, value: Any) -> bool:
 
 def _numbers(value: Any, kinds: tuple[Any, ...]) -> Any:
     if isinstance(value, dict):
+        if dict[str, float | str] in kinds:
+            return {k: v if isinstance(v, str) else float(v) for k, v in value.items()}
         return {k: float(v) if dict[str, float] in kinds else int(v) for k, v in value.items()}
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value) if float in kinds else int(value) if int in kinds else value

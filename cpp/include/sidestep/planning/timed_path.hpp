@@ -22,7 +22,7 @@ template <>
 const std::vector<Field<TimedPathSettings>>& fields();
 
 /// What a path may ask of the joints of a robot: `speed` of their velocity and acceleration limits, less 5 % that are left to
-/// an arm that follows; jerk 88/s times the acceleration limit,
+/// an arm that follows, and no velocity from which a joint moves on by more than 1.5 rad while it stops; jerk 88/s times the acceleration limit,
 /// which stays below 100/s between samples. Joints without a limit: 2 rad/s, 10 rad/s² (m, alike).
 PathLimits path_limits(const JointLimits& limits, double speed);
 
@@ -68,7 +68,8 @@ struct TimedPathFollower {
   static constexpr Eigen::Index most_places = 5;
   /// The narrow places between the reference and as far behind it as the arm may be, or every second, third, … of them:
   /// writes them into the columns of (nv × most_places), and says how many they are.
-  Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings, Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
+  Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings,
+                      Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
 
   /// Moves on for `duration` [s]; writes the reference, its velocity and its acceleration (nv). The pace r follows
   ///
