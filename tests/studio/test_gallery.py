@@ -22,6 +22,7 @@ from sidestep.studio.gallery import GALLERY, MOUSE_BALL, OPENING, ends_of
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.camera import HALF, Viewpoint, clear_view
 from sidestep.studio.page.mouse import on_plane, within_reach
+from sidestep.studio.page.obstacles import box_edges
 from sidestep.studio.page.why import PATH_POINTS, PATH_STEP, along
 from sidestep.studio.robot_file import scenario_of_upload
 from sidestep.studio.scene_obstacle import ball, box, things_of
@@ -245,3 +246,11 @@ def test_the_other_method_has_the_obstacles_that_there_are(make_session: object,
         m.AddObstacle(crate),
     ]
     assert changes(before, ()) == [m.RemoveObstacle("ball")]
+
+
+def test_a_box_has_twelve_edges() -> None:
+    edges = box_edges(np.array([0.2, 0.4, 0.6]))
+    assert edges.shape == (12, 2, 3)
+    lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    np.testing.assert_allclose(np.sort(lengths), np.repeat([0.2, 0.4, 0.6], 4), rtol=1e-6)
+    np.testing.assert_allclose(np.abs(edges).max(axis=(0, 1)), [0.1, 0.2, 0.3], rtol=1e-6)

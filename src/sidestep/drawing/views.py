@@ -88,9 +88,9 @@ class ArmViews:
             pose = item.pose if self._poses is None else pose_matrix(self._poses[0, i])
             solids.append(moved(np.array(item.surface().triangles, dtype=float), pose))
         triangles = np.concatenate(solids)
-        hidden = [float(hidden(points, triangles, direction(*side)).mean()) for side in SIDES]
-        best = int(np.argmin(hidden))
-        return SIDES[best] if hidden[best] < hidden[0] - BETTER else SIDES[0]
+        shares = [float(hidden(points, triangles, direction(*side)).mean()) for side in SIDES]
+        best = int(np.argmin(shares))
+        return SIDES[best] if shares[best] < shares[0] - BETTER else SIDES[0]
 
     def _reached(self, goal: Array) -> Array:
         """Points (N, 3) that the arm and the solids reach, world [m]; the solids at start, middle and end."""

@@ -27,6 +27,7 @@ def batched(colour: Rgb) -> Rgb:
 
 OBSTACLE = palette.VERMILLION
 FURNITURE = palette.FURNITURE  # of an obstacle that is large: it would drown everything else
+EDGE = "#7A4A2B"  # of boxes
 LARGE = 0.25  # [m] radius of a ball that holds it
 GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line

@@ -90,6 +90,13 @@ class _View:
             self.handle = server.scene.add_icosphere(name, solid.size[0], color=colour)
         elif solid.kind == "box":
             self.handle = server.scene.add_box(name, color=colour, dimensions=np.array(solid.size))
+            server.scene.add_line_segments(  # faces that the light does not reach look alike
+                f"{name}/edges",
+                box_edges(np.array(solid.size)),
+                colours.rgb(colours.EDGE),
+                thickness=1.5,
+                thickness_units="screen",
+            )
         else:
             mesh = solid.surface()
             self.handle = server.scene.add_mesh_simple(
@@ -128,6 +135,14 @@ class _View:
             self._send(m.ThrowObstacle(self.thing.name, throw_velocity(list(self._path))))
         else:
             self._send(m.DragObstacle(self.thing.name, pose_at(hand + self._grip, self._pose[:3, :3])))
+
+
+def box_edges(size: Array) -> npt.NDArray[np.float32]:
+    """The edges (12, 2, 3) of a box with these sides (3,) [m] around the origin."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    pairs = [(i, j) for i in range(8) for j in range(i + 1, 8) if (corners[i] != corners[j]).sum() == 1]
+    edges: npt.NDArray[np.float32] = (corners[np.array(pairs)] * size).astype(np.float32)
+    return edges
 
 
 def throw_velocity(path: list[tuple[float, Array]]) -> Array:
