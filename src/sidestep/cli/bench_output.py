@@ -100,12 +100,13 @@ def with_status(terminal: Console, run: Callable[[Callable[..., None]], Result])
 
 
 def figures_table(first: str, *figures: str, **options: Any) -> Table:
-    """A table with a column of names, which is not wrapped, and columns of figures."""
+    """A table with a column of names, which is not wrapped, and columns of figures; units in brackets are printed."""
     from rich import box
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=box.SIMPLE, pad_edge=False, **options)
-    table.add_column(first, no_wrap=True)
+    table.add_column(escape(first), no_wrap=True)
     for name in figures:
-        table.add_column(name, justify="right")
+        table.add_column(escape(name), justify="right")
     return table
