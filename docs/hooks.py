@@ -1,7 +1,8 @@
 """What MkDocs does for this site beside turning Markdown into pages.
 
 It generates a page for each part of the Python package from its public names. It turns links to files beside `docs`
-into plain text, since the site does not hold them. It adds the C++ pages of Doxygen where Doxygen is installed.
+into plain text, since the site does not hold them. It adds the C++ pages of Doxygen where Doxygen is installed, and the
+recorded runs of record_runs.py where they are in build/runs.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from mkdocs.structure.files import File, Files
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
+RUNS = ROOT / "build" / "runs"  # of record_runs.py
 MAKE = runpy.run_path(str(DOCS / "make_reference.py"))
 log = logging.getLogger("mkdocs.hooks.sidestep")
 outside = re.compile(r"\[([^\]]+)\]\(((?:\.\./)+[^)#]+)(?:#[^)]*)?\)")
@@ -65,6 +67,9 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
             parts[number] = f"## `{parts[number]}`"
         markdown = "".join(parts)
 
+    if source == Path("index.md") and (RUNS / "index.html").is_file():
+        runs = '| watch recorded runs in the browser | <a href="runs/index.html">Recorded runs</a> |'
+        markdown = markdown.replace("| see it move", f"{runs}\n| see it move", 1)
     if source == Path("reference/cpp.md") and shutil.which("doxygen") is None:
         left_out = "This copy of the site was made without Doxygen, so it has no pages of classes."
         markdown = re.sub(r"<p>By Doxygen:.*?</p>", left_out, markdown, flags=re.DOTALL)
@@ -82,7 +87,11 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def on_post_build(config: Any) -> None:
-    """Writes the C++ pages by Doxygen, where it is installed."""
+    """Copies the recorded runs, where they were made; writes the C++ pages by Doxygen, where it is installed."""
+    if (RUNS / "index.html").is_file():
+        shutil.copytree(RUNS, Path(config.site_dir) / "runs", dirs_exist_ok=True)
+    else:
+        log.info("The site has no recorded runs (python docs/record_runs.py build/runs)")
     target = Path(config.site_dir) / "reference" / "cpp"
     if shutil.which("doxygen") is None:
         log.info("Doxygen is not installed: the site has no C++ pages (apt-get install doxygen)")

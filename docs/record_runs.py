@@ -20,7 +20,7 @@ from sidestep.studio.gallery import GALLERY, MOUSE_BALL, ends_of
 from sidestep.studio.guard import Guard
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, link_meshes
-from sidestep.studio.page.camera import Viewpoint
+from sidestep.studio.page.camera import Viewpoint, clear_view
 from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacles import ObstacleViews
 from sidestep.studio.page.scene import point_cameras, set_up_scene
@@ -61,7 +61,11 @@ def record(label: str, seconds: float) -> tuple[str, str]:
         ends = [coordinates(scenario.start, robot, "start"), *goals]
         places = [robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames]
         point_cameras(
-            server, Viewpoint.of(np.array([*places, *(item.position for item in scenario.obstacles)]))
+            server,
+            Viewpoint.of(
+                np.array([*places, *(item.position for item in scenario.obstacles)]),
+                clear_view(np.array(places), [thing.triangles for thing in session.snapshot().things]),
+            ),
         )
         serializer = server.get_scene_serializer()
         moves = MOUSE_BALL in {item.name for item in scenario.obstacles}

@@ -31,7 +31,9 @@ TOO_WIDE = "() => document.documentElement.scrollWidth > window.innerWidth"
 def pages(chosen: list[str]) -> list[Path]:
     """The pages to look at; raises FileNotFoundError where there is none."""
     found = [SITE / f"{name}.html" for name in chosen] or [
-        path for path in sorted(SITE.rglob("*.html")) if "reference/cpp/" not in path.as_posix()
+        path
+        for path in sorted(SITE.rglob("*.html"))
+        if not path.relative_to(SITE).as_posix().startswith(("reference/cpp/", "runs/"))
     ]
     missing = [path for path in found if not path.is_file()]
     if missing or not found:

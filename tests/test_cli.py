@@ -275,6 +275,7 @@ def test_help_imports_nothing_heavy() -> None:
     assert time.perf_counter() - begin < 5.0  # [s] takes 0.2 s; ten times that when the machine is busy
 
 
+@pytest.mark.slow
 def test_a_run_without_report_imports_neither_matplotlib_nor_jsonschema() -> None:
     code = (
         "import sys\n"

@@ -117,7 +117,7 @@ def test_the_version_is_that_of_the_project_file() -> None:
     assert sidestep.__version__ == PROJECT["version"]
 
 
-def test_changelog_and_citation_are_of_this_version() -> None:
+def test_changelog_citation_and_recipe_are_of_this_version() -> None:
     root = Path(__file__).parents[1]
     changes, citation = (
         (root / name).read_text(encoding="utf-8") for name in ("CHANGELOG.md", "CITATION.cff")
@@ -126,6 +126,7 @@ def test_changelog_and_citation_are_of_this_version() -> None:
     assert newest is not None
     assert newest[1] == PROJECT["version"]
     assert f"\nversion: {newest[1]}\ndate-released: {newest[2]}\n" in citation
+    assert f"\n  version: {newest[1]}\n" in (root / "recipe/recipe.yaml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("shipped", [False, True])
@@ -188,6 +189,7 @@ def test_the_extras_hold_what_the_errors_say() -> None:
     assert requirements("studio") < requirements("demo")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "code", "extra"),
     [

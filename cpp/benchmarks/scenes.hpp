@@ -18,8 +18,8 @@ namespace sidestep::benchmarks {
 
 struct Scene {
   Robot robot;
-  Body body;             ///< one Gaussian per link, fitted by hand: centred between joints, as long as the link
-  Obstacles obstacles;   ///< one point beside the middle of the arm, at rest
+  Body body;            ///< one Gaussian per link, fitted by hand: centred between joints, as long as the link
+  Obstacles obstacles;  ///< one point beside the middle of the arm, at rest
 };
 
 /// Rotation by roll, pitch and yaw about fixed axes, as in URDF; and a translation [m].
@@ -77,8 +77,8 @@ inline Scene planar(int num_joints) {
 inline Scene fr3() {
   constexpr double quarter = 0.5 * std::numbers::pi;
   const std::vector<Eigen::Isometry3d> placements = {
-      placement({0.0, 0.0, 0.333}, 0.0),       placement({0.0, 0.0, 0.0}, -quarter),
-      placement({0.0, -0.316, 0.0}, quarter),  placement({0.0825, 0.0, 0.0}, quarter),
+      placement({0.0, 0.0, 0.333}, 0.0),          placement({0.0, 0.0, 0.0}, -quarter),
+      placement({0.0, -0.316, 0.0}, quarter),     placement({0.0825, 0.0, 0.0}, quarter),
       placement({-0.0825, 0.384, 0.0}, -quarter), placement({0.0, 0.0, 0.0}, quarter),
       placement({0.088, 0.0, 0.0}, quarter),
   };
@@ -133,8 +133,8 @@ inline Obstacles table(int num) {
   Eigen::Matrix3Xd points(3, num);
   for (Eigen::Index n = 0; n < num; ++n) {
     const double a = unit(engine), b = unit(engine);
-    points.col(n) = n % 20 == 0 ? Eigen::Vector3d(0.5, 0.2 * b, 0.05 + 0.3 * a)
-                                : Eigen::Vector3d(0.25 + 0.8 * a, 1.2 * b - 0.6, 0.05);
+    points.col(n) =
+        n % 20 == 0 ? Eigen::Vector3d(0.5, 0.2 * b, 0.05 + 0.3 * a) : Eigen::Vector3d(0.25 + 0.8 * a, 1.2 * b - 0.6, 0.05);
   }
   return Obstacles(std::move(points), Eigen::VectorXd::Zero(num), Eigen::Matrix3Xd::Zero(3, num));
 }

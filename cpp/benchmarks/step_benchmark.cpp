@@ -16,9 +16,10 @@ constexpr int num_states = 1000;
 constexpr std::size_t num_steps = 1'000'000;
 
 void report(const char* kind, std::size_t batch, const benchmarks::Timing& t, bool last) {
-  std::printf("      \"%s\": {\"batch\": %zu, \"median_ns\": %.1f, \"p95_ns\": %.1f, \"p99_ns\": %.1f, "
-              "\"p999_ns\": %.1f, \"max_ns\": %.1f, \"steps_per_s\": %.0f}%s\n",
-              kind, batch, t.median, t.p95, t.p99, t.p999, t.max, t.throughput, last ? "" : ",");
+  std::printf(
+      "      \"%s\": {\"batch\": %zu, \"median_ns\": %.1f, \"p95_ns\": %.1f, \"p99_ns\": %.1f, "
+      "\"p999_ns\": %.1f, \"max_ns\": %.1f, \"steps_per_s\": %.0f}%s\n",
+      kind, batch, t.median, t.p95, t.p99, t.p999, t.max, t.throughput, last ? "" : ",");
 }
 
 int run(const benchmarks::Scene& scene, bool last) {

@@ -41,8 +41,8 @@ Timing time_calls(Call&& call, std::size_t num, std::size_t batch) {
   const auto quantile = [&](double p) {
     return samples[std::min(samples.size() - 1, static_cast<std::size_t>(p * static_cast<double>(samples.size())))];
   };
-  return {quantile(0.5), quantile(0.95), quantile(0.99), quantile(0.999), samples.back(),
-          1e9 * static_cast<double>(num) / total};
+  return {quantile(0.5),   quantile(0.95), quantile(0.99),
+          quantile(0.999), samples.back(), 1e9 * static_cast<double>(num) / total};
 }
 
 /// Model name of the processor, from the kernel; "unknown" where it does not say.

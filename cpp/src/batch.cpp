@@ -21,7 +21,8 @@ constexpr double most_record_bytes = 8.0 * 1024.0 * 1024.0 * 1024.0;
 }  // namespace
 
 Eigen::Index most_rows(double bytes_per_row, Eigen::Index motions) noexcept {
-  return static_cast<Eigen::Index>(most_record_bytes / (bytes_per_row * static_cast<double>(std::max<Eigen::Index>(motions, 1))));
+  return static_cast<Eigen::Index>(most_record_bytes /
+                                   (bytes_per_row * static_cast<double>(std::max<Eigen::Index>(motions, 1))));
 }
 
 void share(Eigen::Index num, int threads, const Interrupted& interrupted,

@@ -1,7 +1,7 @@
 """Makes the pictures of README and site: python docs/images/make.py [NAME ...], by default all of them.
 
-demo, studio, animation; in figures.py those of concepts and theory; in table.py that of the first screen. Those of
-the studio need Chromium and `pip install 'sidestep[headless]'`; without a graphics card the animation takes minutes.
+demo, studio; in figures.py those of concepts and theory; in table.py that of the first screen. That of the studio
+needs Chromium and `pip install 'sidestep[headless]'`.
 """
 
 import os
@@ -15,7 +15,6 @@ from PIL import Image
 
 HERE = Path(__file__).parent
 SIDESTEP = (sys.executable, "-m", "sidestep")
-STUDIO = (*SIDESTEP, "studio", "thesis-6.2.3", "--method", "controller", "--headless")
 
 
 def demo(folder: Path) -> None:
@@ -25,15 +24,12 @@ def demo(folder: Path) -> None:
 
 
 def studio(folder: Path) -> None:
-    """The studio's page, when the arm has passed over the balls."""
+    """The studio's page as it opens, when the arm is on its way."""
     screen = folder / "studio.png"
-    subprocess.run([*STUDIO, "--screenshot", screen, "--duration", "4"], check=True)
+    subprocess.run(
+        [*SIDESTEP, "studio", "--headless", "--screenshot", screen, "--duration", "0.8"], check=True
+    )
     keep(screen, HERE / "studio.png")
-
-
-def animation(folder: Path) -> None:
-    """The same motion until the arm has passed."""
-    subprocess.run([*STUDIO, "--video", HERE / "studio.webp", "--duration", "5"], check=True)
 
 
 def keep(source: Path, target: Path) -> None:
@@ -41,7 +37,7 @@ def keep(source: Path, target: Path) -> None:
     Image.open(source).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE).save(target, optimize=True)
 
 
-MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio, "animation": animation}
+MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio}
 FIGURES = (
     *("loop", "barriers", "planner", "look-ahead", "body", "guarantees"),  # of the concepts
     *("geometry", "control", "clearances", "timed-path"),  # of the theory

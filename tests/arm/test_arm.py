@@ -19,6 +19,7 @@ def arm() -> ss.Arm:
     return ss.Arm.from_robot(robot, ss.Body.cover(robot, components=2, cache=False))
 
 
+@pytest.mark.slow
 def test_a_file_holds_all_of_it_bit_for_bit(arm: ss.Arm, tmp_path: Path) -> None:
     path = tmp_path / "planar3.arm"
     arm.save(path)

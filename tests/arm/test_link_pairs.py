@@ -17,6 +17,7 @@ def cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_links_that_touch_have_no_clearance_left() -> None:
     robot = Robot.named("planar3")
     body = Body.cover(robot, components=4)
@@ -69,6 +70,7 @@ def test_a_contact_moves_the_clearance_by_as_much() -> None:
         SelfCollisionBarrier(robot, body, [("link1", "link3", float("nan"))])
 
 
+@pytest.mark.slow
 def test_pairs_are_kept_and_made_again_where_they_cannot_be_read(cache_folder: Path) -> None:
     robot = Robot.named("planar3")
     body = Body.cover(robot, components=4)

@@ -26,6 +26,7 @@ def _own_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(tmp_path))
 
 
+@pytest.mark.slow
 def test_a_draft_covers_every_triangle_and_the_fine_body_is_taken_over_without_a_stop():
     draft = ss.Arm.load(PLANAR, draft=True)
     assert draft.is_draft
@@ -72,6 +73,7 @@ def test_a_draft_covers_every_triangle_and_the_fine_body_is_taken_over_without_a
     assert Refinement(again).is_done
 
 
+@pytest.mark.slow
 def test_what_fails_is_told_and_what_is_cancelled_stays_a_draft(tmp_path):
     path = tmp_path / "two.urdf"
     path.write_text(PLANAR)

@@ -48,6 +48,7 @@ def robot_of(name: str) -> ss.Robot:
     return robot
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_nothing_is_made")
 @pytest.mark.parametrize("name", NAMES)
 def test_it_is_taken_for_its_robot_and_holds_every_link(name: str) -> None:
@@ -72,6 +73,7 @@ def test_it_is_taken_for_its_robot_and_holds_every_link(name: str) -> None:
     assert len(shipped_arms.shipped_file(name).read_bytes()) < 1_000_000  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_that_of_the_fr3_overshoots_by_as_little_as_is_said() -> None:
     robot = robot_of("fr3")
     body = ss.Body.cover(robot)
@@ -167,6 +169,7 @@ def test_a_damaged_shipped_arm_is_left_out_with_a_warning(
         ss.Arm.load("fr3")
 
 
+@pytest.mark.slow
 def test_the_command_tells_every_link_and_pair_where_its_output_is_no_terminal(tmp_path: Path) -> None:
     joints = "".join(
         f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><axis xyz="0 0 1"/>'

@@ -112,6 +112,7 @@ def test_every_kind_is_reported_as_a_set() -> None:
         run_dynamic(settings, count=0)
 
 
+@pytest.mark.slow
 def test_an_arm_beside_a_ball_in_its_goal_has_not_arrived() -> None:
     settings = SceneSettings(
         robot="planar3",

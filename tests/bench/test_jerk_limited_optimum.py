@@ -25,6 +25,7 @@ def seven_segments(way: float, velocity: float, acceleration: float, jerk: float
     return 4.0 * np.cbrt(way / (2.0 * jerk))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("velocity", "acceleration", "jerk"),
     [

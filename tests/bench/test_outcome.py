@@ -128,6 +128,7 @@ def test_a_state_that_is_not_finite_ends_the_motion(generator: ProblemGenerator,
     assert outcome.time_s == pytest.approx(0.019)
 
 
+@pytest.mark.slow
 def test_a_motion_ends_where_it_arrives(generator: ProblemGenerator, mover: ControllerMover) -> None:
     problem = planted((3.0, 0.0, 0.0), 0.05, generator)
     motion = mover.move(problem, SETTINGS)

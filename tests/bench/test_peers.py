@@ -16,6 +16,7 @@ def document():
     return run_peers(PeerSettings(seconds=0.05))
 
 
+@pytest.mark.slow
 def test_every_way_is_measured_or_said_to_be_missing(document):
     assert [len(group["rows"]) for group in document["groups"]] == [5, 4, 2]
     for row in (row for group in document["groups"] for row in group["rows"]):

@@ -121,6 +121,7 @@ def test_every_link_of_a_planar_arm_is_proven_covered(planar: Robot, body: Body)
         assert cover.slimness >= 0.2 - 1e-9  # rounding of the limit
 
 
+@pytest.mark.slow
 def test_weights_are_shares_of_volume_and_levels_those_of_solids(body: Body) -> None:
     own = np.asarray(body.links) == "link1"
     volumes = np.sqrt(np.linalg.det(body.covariances[own]))

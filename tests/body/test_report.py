@@ -18,6 +18,7 @@ def test_the_table_states_the_fit_in_readable_units(planar: Robot) -> None:
         assert row.mean_distance_mm == 1000.0 * fit.mean_distance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("components", "names"), [(1, ["links", "arm"]), ("bic", ["links", "arm", "criterion"])]
 )

@@ -29,6 +29,7 @@ def bad_goals(robot: ss.Robot) -> dict[str, object]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", FREE_SIDES)
 @pytest.mark.parametrize("kind", ["not finite", "outside the limits", "drifts over a limit"])
 def test_a_slow_ball_does_not_touch_an_arm_with_a_bad_goal(

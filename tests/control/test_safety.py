@@ -86,6 +86,7 @@ def drive(s: Scene, *, torque: bool, delay: int = 0, steps: int = 2000) -> tuple
 SAMPLING = 0.0002
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar3", "ur5", "fr3"])
 @pytest.mark.parametrize("torque", [False, True])
 def test_a_ball_in_the_way_is_not_touched(name: str, torque: bool) -> None:

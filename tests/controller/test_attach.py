@@ -29,6 +29,7 @@ def covers(shape, points, **options):
     return float(np.min(radii, axis=0).max()), len(mine)
 
 
+@pytest.mark.slow
 def test_shapes_and_points_are_covered_whole():
     rng = np.random.default_rng(0)
     u = rng.normal(size=(4000, 3))

@@ -53,6 +53,7 @@ def distance(arm, goal, q):
     return float(np.linalg.norm(arm.robot.pose(q, goal.frame)[:3, 3] - goal.pose[:3, 3]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", [True, False])
 def test_two_arms_reach_a_pose_each(arm, planner):
     wanted = np.array([0.3, 0.4, 0.5, -0.6, 0.2, -0.4, 0.6, -0.5, 0.1])

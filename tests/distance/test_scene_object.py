@@ -125,6 +125,7 @@ def test_a_shape_says_its_velocity_once() -> None:
     assert SceneObject.from_shape("it", Sphere(0.1)).motion == "fixed"
 
 
+@pytest.mark.slow
 def test_judge_and_controller_have_the_same_shapes(tmp_path: Path) -> None:
     """Said once: the same list goes to both, and the balls are at most the excess nearer than the exact solid."""
     robot = ss.Robot.named("planar2")

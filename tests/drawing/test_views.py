@@ -46,6 +46,7 @@ def test_an_obstacle_that_moves_is_drawn_where_it_is_at_the_sample() -> None:
     assert abs(end[1] - start[1]) < 5  # x has not changed; shading moves the mean a little
 
 
+@pytest.mark.slow
 def test_an_arm_in_space_is_seen_from_the_side_and_from_above() -> None:
     arm = Robot.named("z1")
     q = np.stack([arm.neutral, arm.neutral + 0.1])

@@ -171,6 +171,7 @@ def test_accelerations_are_those_of_the_python_api(way: str) -> None:
     np.testing.assert_array_equal(found, stepped("acceleration")[0])
 
 
+@pytest.mark.slow
 def test_a_method_is_the_same_in_a_file_and_in_the_benchmark() -> None:
     """Without planner the arm moves otherwise, by both in the same way."""
     found = of_bench("barrier")
@@ -270,6 +271,7 @@ TORQUES: dict[str, Callable[[], Array]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", TORQUES)
 def test_torques_in_physics_are_those_of_the_simulation(way: str) -> None:
     found = TORQUES[way]()
@@ -277,6 +279,7 @@ def test_torques_in_physics_are_those_of_the_simulation(way: str) -> None:
     np.testing.assert_array_equal(found, simulated().torques)
 
 
+@pytest.mark.slow
 def test_a_pose_goal_is_the_same_in_a_file_in_the_studio_and_in_python() -> None:
     place = "{frame: fr3_hand_tcp, position: [0.43, 0.44, 0.24], rotation_deg: [180, 10, 30]}"
     joints = f"{{unit: rad, position: {GOAL.tolist()}}}"

@@ -26,6 +26,7 @@ def stacked(state: State, limits: thesis.JointLimitPotential, unit: float) -> tu
     return jacobian, hessians, np.einsum("aij,i,j->a", hessians, state.v, state.v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("num_coordinates", [1, 2])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_closed_form_agrees_with_dense_christoffel_symbols(name: str, num_coordinates: int) -> None:

@@ -165,6 +165,7 @@ COUNTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COUNTS)
 def test_few_balls_suffice(name: str) -> None:
     shape, at_most = COUNTS[name]

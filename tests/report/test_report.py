@@ -49,6 +49,7 @@ def folder(result: ScenarioResult, tmp_path_factory: pytest.TempPathFactory) -> 
     return target
 
 
+@pytest.mark.slow
 def test_every_figure_is_there(folder: Path) -> None:
     names = {path.stem for path in folder.glob("*.png")}
     assert names == {"position", "velocity", "acceleration", "torque", "switch", "psi", "clearance", "arm"}

@@ -68,7 +68,7 @@ def test_arm_by_name_takes_every_option_and_pairs_of_the_description(
     """Up to the preparation, which takes minutes."""
     seen = []
 
-    def prepare(robot: Robot, *, allowed: object, source: str, draft: bool, progress: object) -> ss.Arm:
+    def prepare(robot: Robot, *, allowed: object, source: str, **_: object) -> ss.Arm:
         seen.append((robot.name, robot.limits.velocity.tolist(), allowed, source))
         return ss.Arm.load("planar2")
 

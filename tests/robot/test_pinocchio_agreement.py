@@ -128,6 +128,7 @@ def states(robot: Robot) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(robot.random_configuration(rng), rng.uniform(-speed, speed)) for _ in range(NUM_STATES)]
 
 
+@pytest.mark.slow
 def test_poses_jacobians_and_bias_accelerations(pair: tuple[Robot, Oracle]) -> None:
     robot, oracle = pair
     for q, v in states(robot):

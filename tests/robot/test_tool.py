@@ -33,6 +33,7 @@ def test_a_tool_moves_with_its_link_and_adds_its_inertia(arm: Robot) -> None:
     assert "gripper" not in [link.name for link in arm.links]
 
 
+@pytest.mark.slow
 def test_a_tool_is_covered_like_any_link(arm: Robot) -> None:
     armed = arm.with_tool("gripper", box(), link="link2")
     body = Body.cover(armed, components={"link1": 1, "link2": 1, "gripper": 2}, cache=False)

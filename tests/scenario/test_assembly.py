@@ -221,6 +221,7 @@ def test_a_pose_is_reached_from_a_posture_that_has_it() -> None:
     assert (alone.settings.local_minimum, alone.settings.look_ahead) == (None, None)
 
 
+@pytest.mark.slow
 def test_a_barrier_sees_a_box_without_gaps() -> None:
     parts = assemble(Scenario.from_text(POSE.format(method="barrier", frame="tip", activation=0.12)))
     assert isinstance(parts.seen, Obstacles)

@@ -124,6 +124,7 @@ def test_hitting_a_free_ball_is_seen_by_physics_and_by_exact_clearance() -> None
     assert "pushes ball away" in result.sentence()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar-one-obstacle", "planar-several", "planar-drop"])
 def test_planar_scenarios_go_around(name: str) -> None:
     result = run_scenario(Scenario.load(name))
@@ -190,6 +191,7 @@ def test_the_thesis_s_scenarios_arrive_by_the_barriers(name: str) -> None:
         assert evaluation.min_clearance_m > 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["kinematic", "torque"])
 @pytest.mark.parametrize(
     "how",

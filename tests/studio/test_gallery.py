@@ -12,6 +12,7 @@ import pytest
 from sidestep import ExactClearance, Robot, Scenario
 from sidestep.body import Body
 from sidestep.distance import SelfCollision
+from sidestep.drawing.views import hidden
 from sidestep.scenario.assembly import load_robot
 from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
@@ -19,7 +20,7 @@ from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.comparison import Tally, changes
 from sidestep.studio.gallery import GALLERY, MOUSE_BALL, OPENING, ends_of
 from sidestep.studio.methods import METHODS
-from sidestep.studio.page.camera import HALF, RIGHT, UP, VIEW, Viewpoint
+from sidestep.studio.page.camera import HALF, Viewpoint, clear_view
 from sidestep.studio.page.mouse import on_plane, within_reach
 from sidestep.studio.page.why import PATH_POINTS, PATH_STEP, along
 from sidestep.studio.robot_file import scenario_of_upload
@@ -54,10 +55,13 @@ def test_start_and_goal_of_a_scene_are_free_and_in_view(label: str) -> None:
         assert SelfCollision(robot).distance(q).distance > 0.0
     places = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
     beside = [np.array(item.position) for item in scenario.obstacles]
-    view = Viewpoint.of(np.array([*places, *beside]))
+    direction = clear_view(places, [thing.triangles for thing in things])
+    view = Viewpoint.of(np.array([*places, *beside]), direction)
     offsets = places - view.position
-    shown = offsets @ np.array([RIGHT, UP]).T / (HALF * (offsets @ VIEW))[:, None]
+    shown = offsets @ np.array([view.right, view.up]).T / (HALF * (offsets @ view.view))[:, None]
     assert (np.abs(shown) < FREE).all()
+    solids = np.concatenate([thing.triangles for thing in things])
+    assert hidden(places, solids, -direction).mean() < 0.5  # links are wider than their frames
     assert MOUSE_BALL in {thing.name for thing in things}
 
 

@@ -357,7 +357,7 @@ def test_pictures_show_the_motion_from_its_start(
     scenario, options = scenario_of(RobotConfig(name="planar2")), {"method": "unswitched", "ellipsoids": 3}
     studio.send(m.SetRunning(True))  # it begins again
     take_pictures(scenario, **options, duration=2 * FRAME, screenshot=end, video=way, window=window)  # type: ignore[arg-type]
-    assert asked == [(scenario, {**options, "port": 0})]
+    assert asked == [(scenario, {**options, "to_and_fro": False, "port": 0})]
     assert politeness == [headless.POLITE]
     assert last(studio).time == pytest.approx(2 * FRAME, abs=1e-3)  # one period
     assert Image.open(end).size == (window.width, window.height)

@@ -66,6 +66,7 @@ def test_a_ball_drawn_into_the_way_is_not_touched(
     np.testing.assert_allclose(last.poses[0][:3, 3], place[:3, 3], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_arm_arrives_past_the_ball(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
     last, clearance = record(session, 9.0)  # [s] with a way around by a sub-goal
@@ -217,6 +218,7 @@ def test_a_pose_out_of_reach_is_approached_and_said(make_session: MakeSession, s
     assert not last.posture.found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["controller", "barrier", "reactive"])
 def test_a_goal_that_is_itself_blocked_is_said_and_the_arm_rests(
     make_session: MakeSession, scenario: Scenario, method: str

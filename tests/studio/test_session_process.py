@@ -42,6 +42,7 @@ def wait_for(loop: SessionProcess, condition: Callable[[m.Snapshot], bool]) -> m
     raise AssertionError("no such snapshot")
 
 
+@pytest.mark.slow
 def test_a_loop_runs_answers_and_ends(scenario: Scenario) -> None:
     loop = SessionProcess(Beginning(scenario, "unswitched", {}, 2))
     try:

@@ -74,6 +74,7 @@ def make(kind: str, psi: float, nv: int) -> thesis.Unswitched:
     }[kind]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SWITCHES)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_mode_and_damping_form(name: str, kind: str) -> None:

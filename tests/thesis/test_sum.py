@@ -28,6 +28,7 @@ def test_a_sum_adds_values_jacobians_curvatures_and_hessians() -> None:
         )
 
 
+@pytest.mark.slow
 def test_terms_must_fit_together() -> None:
     with pytest.raises(ValueError, match="sum of embeddings: there is no term"):
         thesis.Sum([])

@@ -19,8 +19,7 @@ std::vector<BodyEllipsoid> body_ellipsoids(const Robot& robot, const Body& body,
     const Eigen::Matrix3d R = frame.X_JF.linear();
     const Eigen::Matrix3d shape = body.levels[k] * R * body.covariances[i] * R.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(shape, Eigen::EigenvaluesOnly);
-    ellipsoids.push_back({frame.joint, k, frame.X_JF * body.means.col(k), shape,
-                          std::sqrt(eigen.eigenvalues().maxCoeff())});
+    ellipsoids.push_back({frame.joint, k, frame.X_JF * body.means.col(k), shape, std::sqrt(eigen.eigenvalues().maxCoeff())});
   }
   std::stable_sort(ellipsoids.begin(), ellipsoids.end(),
                    [](const BodyEllipsoid& a, const BodyEllipsoid& b) { return a.joint < b.joint; });
@@ -28,8 +27,7 @@ std::vector<BodyEllipsoid> body_ellipsoids(const Robot& robot, const Body& body,
 }
 
 const KinematicState::Link& link_or_world(const KinematicState& state, int joint) noexcept {
-  static const KinematicState::Link world{
-      -1, -1, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), {}, {}, {}};
+  static const KinematicState::Link world{-1, -1, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), {}, {}, {}};
   return joint < 0 ? world : state.link(joint);
 }
 

@@ -18,8 +18,7 @@ ClearanceBarrier::ClearanceBarrier(const Robot& robot, const Body& body, Barrier
   set_num_coordinates(field_.size());
 }
 
-void ClearanceBarrier::add_to(EmbeddingView out, const KinematicState& state,
-                              const Obstacles& obstacles) const noexcept {
+void ClearanceBarrier::add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept {
   Horizon ahead = horizon(state);
   ahead.time = std::max(ahead.time, out.horizon);
   field_.evaluate(state, obstacles, reach_, ahead, out.clearances);

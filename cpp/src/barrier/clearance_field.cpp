@@ -17,9 +17,7 @@
 namespace sidestep {
 namespace {
 
-kernels::ClearanceKernel clearance_kernel() noexcept {
-  return SIDESTEP_KERNEL_IN_USE(kernels::clearance_kernel)();
-}
+kernels::ClearanceKernel clearance_kernel() noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::clearance_kernel)(); }
 
 void copy(const Eigen::Vector3d& from, double* to) noexcept { Eigen::Vector3d::Map(to) = from; }
 
@@ -37,7 +35,8 @@ kernels::LinkMotion motion_of(const KinematicState::Link& link) noexcept {
 }
 
 kernels::Points points_of(const PointTree& tree) noexcept {
-  kernels::Points points{{tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), tree.common_radius(), {}, {}, {}};
+  kernels::Points points{
+      {tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), tree.common_radius(), {}, {}, {}};
   if (tree.size() > 0) {
     points.leaf_balls = tree.leaf_balls();
     points.leaf_boxes = tree.leaf_boxes();
@@ -84,8 +83,9 @@ class Means {
   /// With w' = −w h'/T.
   ClearanceSample nearest() const noexcept {
     const double *s = sums_, k = inverse_T_;
-    ClearanceSample mean = BoltzmannMean::Sums{s[0], -k * s[1], k * (k * s[3] - s[2]), s[4], s[1] - k * s[5],
-                                               s[2] - k * (2.0 * s[3] + s[6] - k * s[7])}.mean();
+    ClearanceSample mean = BoltzmannMean::Sums{s[0], -k * s[1],       k * (k * s[3] - s[2]),
+                                               s[4], s[1] - k * s[5], s[2] - k * (2.0 * s[3] + s[6] - k * s[7])}
+                               .mean();
     mean.gradient = wrench(((1.0 + k * mean.value) * gradient(of_weights) - k * gradient(of_heights)) * (1.0 / s[0]));
     mean.value += query_.reference;
     return mean;
@@ -271,9 +271,7 @@ class ClearanceField::Search {
  private:
   static constexpr int most_put_off = 1024, most_passes = 3;
 
-  const Ellipsoid& ellipsoid(int k) const noexcept {
-    return field_.ellipsoids_[static_cast<std::size_t>(cluster_->first + k)];
-  }
+  const Ellipsoid& ellipsoid(int k) const noexcept { return field_.ellipsoids_[static_cast<std::size_t>(cluster_->first + k)]; }
 
   void surround() noexcept {
     const Eigen::Vector3d centre = link_->p_WL + link_->R_WL * cluster_->centre;
@@ -411,8 +409,8 @@ class ClearanceField::Search {
   std::array<int, most_put_off> put_off_;
 };
 
-void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach,
-                              const Horizon& horizon, ClearanceView out) const noexcept {
+void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
+                              ClearanceView out) const noexcept {
   Search search(*this, obstacles.tree(), reach, horizon);
   for (const Cluster& cluster : clusters_) {
     if (search.find(cluster, state.link(ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint))) {

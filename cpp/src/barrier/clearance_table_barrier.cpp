@@ -19,8 +19,8 @@ struct Tangent {
 
 }  // namespace
 
-ClearanceTableBarrier::ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables,
-                                             BarrierFunction barrier, double reach)
+ClearanceTableBarrier::ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables, BarrierFunction barrier,
+                                             double reach)
     : Barrier(robot, barrier, "clearance table barrier"),
       reach_(std::max(reach, barrier.activation)),
       tables_(std::move(tables)) {
@@ -54,8 +54,8 @@ void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& stat
     const Tangent here = tangent(0.0);
     Tangent minded = here;
     if (here.value - ahead.time * steepest_[i].dot(v.cwiseAbs()) < ahead.distance) {
-      const double cells = ahead.time * std::max(std::abs(v.x()) / table.axes[0].spacing,
-                                                 std::abs(v.y()) / table.axes[1].spacing);
+      const double cells =
+          ahead.time * std::max(std::abs(v.x()) / table.axes[0].spacing, std::abs(v.y()) / table.axes[1].spacing);
       const double steps = std::ceil(std::min(cells, most_steps_ahead));
       for (double step = 1.0; step <= steps; ++step) {
         const Tangent there = tangent(ahead.time * step / steps);

@@ -6,9 +6,7 @@
 namespace sidestep {
 namespace {
 
-kernels::GapKernel gap_kernel() noexcept {
-  return SIDESTEP_KERNEL_IN_USE(kernels::gap_kernel)();
-}
+kernels::GapKernel gap_kernel() noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::gap_kernel)(); }
 
 template <int capacity>
 void write(const Eigen::Matrix3d& S, double (&columns)[6][capacity], int k) noexcept {

@@ -2,8 +2,7 @@
 
 namespace sidestep {
 
-bool Embedding::touches(const KinematicState& /*state*/, const Obstacles& /*obstacles*/,
-                        double /*depth*/) const noexcept {
+bool Embedding::touches(const KinematicState& /*state*/, const Obstacles& /*obstacles*/, double /*depth*/) const noexcept {
   return false;
 }
 
@@ -24,8 +23,7 @@ EmbeddingEvaluation evaluate(const Embedding& embedding, const Eigen::VectorXd& 
   KinematicState state(robot);
   state.update(robot, q, v);
   const int m = embedding.num_coordinates();
-  EmbeddingEvaluation result{Eigen::VectorXd::Zero(m), {}, Eigen::VectorXd::Zero(m),
-                             Clearances(robot.num_coordinates(), m)};
+  EmbeddingEvaluation result{Eigen::VectorXd::Zero(m), {}, Eigen::VectorXd::Zero(m), Clearances(robot.num_coordinates(), m)};
   Eigen::MatrixXd jacobian_transposed = Eigen::MatrixXd::Zero(robot.num_coordinates(), m);
   embedding.add_to({{result.values.data(), m},
                     {jacobian_transposed.data(), jacobian_transposed.rows(), m},
@@ -36,15 +34,13 @@ EmbeddingEvaluation evaluate(const Embedding& embedding, const Eigen::VectorXd& 
   return result;
 }
 
-std::vector<Eigen::MatrixXd> hessians(const Embedding& embedding, const Eigen::VectorXd& q,
-                                      const Obstacles& obstacles) {
+std::vector<Eigen::MatrixXd> hessians(const Embedding& embedding, const Eigen::VectorXd& q, const Obstacles& obstacles) {
   const int nv = embedding.robot().num_coordinates();
   const Obstacles frozen = obstacles.frozen();
   const auto quadratic_form = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     return evaluate(embedding, q, v, frozen).curvatures;
   };
-  std::vector<Eigen::MatrixXd> result(static_cast<std::size_t>(embedding.num_coordinates()),
-                                      Eigen::MatrixXd::Zero(nv, nv));
+  std::vector<Eigen::MatrixXd> result(static_cast<std::size_t>(embedding.num_coordinates()), Eigen::MatrixXd::Zero(nv, nv));
   for (int i = 0; i < nv; ++i) {
     for (int j = 0; j <= i; ++j) {
       // vᵀ H w = ¼ [(v + w)ᵀ H (v + w) − (v − w)ᵀ H (v − w)]

@@ -27,8 +27,7 @@ JointLimitBarrier::JointLimitBarrier(const Robot& robot, BarrierFunction barrier
   }
 }
 
-void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
-                               const Obstacles& /*obstacles*/) const noexcept {
+void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state, const Obstacles& /*obstacles*/) const noexcept {
   for (std::size_t i = 0; i < limits_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const PositionLimit& limit = limits_[i];
@@ -48,8 +47,7 @@ void JointLimitBarrier::add_to(EmbeddingView out, const KinematicState& state,
 
 CoordinateLabel JointLimitBarrier::label(int k) const {
   const PositionLimit& limit = limits_[static_cast<std::size_t>(k)];
-  return {CoordinateLabel::Kind::joint_limit,
-          robot().coordinate_names()[static_cast<std::size_t>(limit.joint_coordinate)],
+  return {CoordinateLabel::Kind::joint_limit, robot().coordinate_names()[static_cast<std::size_t>(limit.joint_coordinate)],
           limit.sign > 0.0 ? "lower" : "upper", floor(k), robot().slides(limit.joint_coordinate)};
 }
 

@@ -23,8 +23,8 @@ class PairOfLinks {
         second_(link_or_world(state, second.joint)),
         R_(first_.R_WL.transpose() * second_.R_WL),
         p_(first_.R_WL.transpose() * (second_.p_WL - first_.p_WL)),
-        velocity_(in_first(second_.velocity.angular - first_.velocity.angular,
-                           second_.velocity.linear - first_.velocity.linear)),
+        velocity_(
+            in_first(second_.velocity.angular - first_.velocity.angular, second_.velocity.linear - first_.velocity.linear)),
         a_{first.ellipsoids, first.rows, first.centre, first.radius},
         b_{second.ellipsoids, second.rows, R_ * second.centre + p_, second.radius} {}
 
@@ -96,11 +96,9 @@ class PairOfLinks {
     return velocity_.linear + velocity_.angular.cross(point);
   }
   /// Of balls.
-  double closing_speed(const Eigen::Vector3d& a, double radius_a, const Eigen::Vector3d& b,
-                       double radius_b) const noexcept {
+  double closing_speed(const Eigen::Vector3d& a, double radius_a, const Eigen::Vector3d& b, double radius_b) const noexcept {
     const Eigen::Vector3d d = a - b, v = velocity_at(b);
-    return Horizon::closing_speed(d.dot(v), d.norm(), radius_a + radius_b, v.norm()) +
-           velocity_.angular.norm() * radius_b;
+    return Horizon::closing_speed(d.dot(v), d.norm(), radius_a + radius_b, v.norm()) + velocity_.angular.norm() * radius_b;
   }
   static bool near(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double distance) noexcept {
     return distance > 0.0 && (b - a).squaredNorm() < distance * distance;
@@ -235,9 +233,8 @@ void check_reach(double reach, const char* owner) {
 std::vector<BodyEllipsoid> of_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& link,
                                    const char* owner) {
   std::vector<BodyEllipsoid> found;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(found), [&](const BodyEllipsoid& e) {
-    return body.links[static_cast<std::size_t>(e.component)] == link;
-  });
+  std::copy_if(all.begin(), all.end(), std::back_inserter(found),
+               [&](const BodyEllipsoid& e) { return body.links[static_cast<std::size_t>(e.component)] == link; });
   if (found.empty()) {
     throw std::invalid_argument(std::string(owner) + ": the body has no ellipsoid on link '" + link + "'");
   }
@@ -246,9 +243,8 @@ std::vector<BodyEllipsoid> of_link(const std::vector<BodyEllipsoid>& all, const 
 
 }  // namespace
 
-SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
-                                           const std::vector<LinkPair>& pairs, BarrierFunction barrier, double temperature,
-                                           double reach)
+SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<LinkPair>& pairs,
+                                           BarrierFunction barrier, double temperature, double reach)
     : Barrier(robot, barrier, self_owner), temperature_(temperature), reach_(std::max(reach, barrier.activation)) {
   check_reach(reach, self_owner);
   check_temperature(temperature, self_owner);
@@ -257,8 +253,12 @@ SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body,
   }
   const std::vector<BodyEllipsoid> all = body_ellipsoids(robot, body, self_owner);
   const auto group = [&](const std::string& link) {
-    Group g{link, robot.frames()[static_cast<std::size_t>(robot.frame_index(link))].joint,
-            of_link(all, body, link, self_owner), {}, Eigen::Vector3d::Zero(), 0.0};
+    Group g{link,
+            robot.frames()[static_cast<std::size_t>(robot.frame_index(link))].joint,
+            of_link(all, body, link, self_owner),
+            {},
+            Eigen::Vector3d::Zero(),
+            0.0};
     for (const BodyEllipsoid& e : g.ellipsoids) {
       if (g.rows.empty() || g.rows.back().full()) {
         g.rows.emplace_back();
@@ -326,9 +326,8 @@ CoordinateLabel SelfCollisionBarrier::label(int k) const {
   return {CoordinateLabel::Kind::self, pair.first.link, pair.second.link, function().floor};
 }
 
-PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point,
-                           const Eigen::Vector3d& normal, const std::vector<std::string>& links,
-                           BarrierFunction barrier, double temperature, double reach)
+PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
+                           const std::vector<std::string>& links, BarrierFunction barrier, double temperature, double reach)
     : Barrier(robot, barrier, plane_owner),
       normal_(normal.normalized()),
       offset_(normal_.dot(point)),
@@ -357,8 +356,7 @@ CoordinateLabel PlaneBarrier::label(int k) const {
   return {CoordinateLabel::Kind::plane, names_[static_cast<std::size_t>(k)], {}, function().floor};
 }
 
-void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
-                          const Obstacles& /*obstacles*/) const noexcept {
+void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state, const Obstacles& /*obstacles*/) const noexcept {
   const Horizon ahead = horizon(state);
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
@@ -372,8 +370,10 @@ void PlaneBarrier::add_to(EmbeddingView out, const KinematicState& state,
       const double value = normal_.dot(centre) - offset_ - support.value;
       const PointMotion motion = point_motion(link, centre);
       const SpatialForce wrench{(centre - support.point).cross(normal_), normal_};
-      const ClearanceSample sample{value, normal_.dot(motion.velocity) - support.rate,
-                                   normal_.dot(motion.acceleration) - support.curvature, {wrench, {}}};
+      const ClearanceSample sample{value,
+                                   normal_.dot(motion.velocity) - support.rate,
+                                   normal_.dot(motion.acceleration) - support.curvature,
+                                   {wrench, {}}};
       approach.add(sample);
       if (mean.matters(value) && mean.add(sample)) {
         nearest = ellipsoid.component;

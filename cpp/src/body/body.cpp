@@ -24,13 +24,13 @@ Body::Body(std::vector<std::string> links_, Eigen::VectorXd weights_, Eigen::Mat
     throw std::invalid_argument("body has no Gaussian component");
   }
   if (weights.size() != num || means.cols() != num || static_cast<Eigen::Index>(covariances.size()) != num) {
-    throw std::invalid_argument("body has " + std::to_string(num) + " links, " + std::to_string(weights.size()) +
-                                " weights, " + std::to_string(means.cols()) + " means and " +
-                                std::to_string(covariances.size()) + " covariances; the numbers must be equal");
+    throw std::invalid_argument("body has " + std::to_string(num) + " links, " + std::to_string(weights.size()) + " weights, " +
+                                std::to_string(means.cols()) + " means and " + std::to_string(covariances.size()) +
+                                " covariances; the numbers must be equal");
   }
   if (levels.size() != 0 && levels.size() != num) {
-    throw std::invalid_argument("body has " + std::to_string(num) + " components and " +
-                                std::to_string(levels.size()) + " levels; give one each, or none");
+    throw std::invalid_argument("body has " + std::to_string(num) + " components and " + std::to_string(levels.size()) +
+                                " levels; give one each, or none");
   }
   std::map<std::string, double> weight_of_link;
   for (Eigen::Index k = 0; k < num; ++k) {

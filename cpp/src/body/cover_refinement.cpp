@@ -11,13 +11,13 @@
 namespace sidestep {
 namespace {
 
-constexpr double momentum = 0.9;         // of Adam's first moment
+constexpr double momentum = 0.9;          // of Adam's first moment
 constexpr double second_momentum = 0.98;  // of its second: forgets in about 50 steps
-constexpr int selection_steps = 5;       // steps for which the points near the union's boundary are kept
-constexpr double reach_in_rates = 1.5;   // how far the boundary is taken to move in that time, in lengths of a step
+constexpr int selection_steps = 5;        // steps for which the points near the union's boundary are kept
+constexpr double reach_in_rates = 1.5;    // how far the boundary is taken to move in that time, in lengths of a step
 constexpr double least_axis = 0.1;        // in `unit`: a semi-axis does not vanish on the way
-constexpr double point_weight = 0.025;   // of a point against the overshoot, at stiffness 1
-constexpr double tiny = 1e-12;           // keeps quotients finite
+constexpr double point_weight = 0.025;    // of a point against the overshoot, at stiffness 1
+constexpr double tiny = 1e-12;            // keeps quotients finite
 
 struct Adam {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -80,9 +80,7 @@ class Descent {
 
   /// Whether a point is deep in an ellipsoid; tries the one that kept it last and tells the one that does now.
   bool stays_covered(const Eigen::Vector3d& y, std::size_t& keeper) const {
-    const auto deep = [&](std::size_t k) {
-      return (inverses_[k] * (y - ellipsoids_.centres[k])).squaredNorm() < surely_[k];
-    };
+    const auto deep = [&](std::size_t k) { return (inverses_[k] * (y - ellipsoids_.centres[k])).squaredNorm() < surely_[k]; };
     if (deep(keeper)) {
       return true;
     }
@@ -186,8 +184,8 @@ class Descent {
   void limit_slimness() {
     for (Eigen::Matrix3d& shape : ellipsoids_.shapes) {
       const Eigen::JacobiSVD<Eigen::Matrix3d> svd(shape, Eigen::ComputeFullU);
-      const Eigen::Vector3d axes = svd.singularValues().cwiseMax(
-          std::max(settings_.slimness * svd.singularValues()[0], least_axis * settings_.unit));
+      const Eigen::Vector3d axes =
+          svd.singularValues().cwiseMax(std::max(settings_.slimness * svd.singularValues()[0], least_axis * settings_.unit));
       shape = svd.matrixU() * axes.asDiagonal() * svd.matrixU().transpose();
     }
   }
@@ -202,8 +200,8 @@ class Descent {
   std::vector<Eigen::Vector3d> centre_gradients_;
   std::vector<Eigen::Matrix3d> shape_gradients_;
   std::vector<Adam> adam_;
-  std::vector<double> squared_;  // of the radii of the point at hand
-  std::vector<double> surely_;   // squared radii within which a point stays covered until the next selection
+  std::vector<double> squared_;       // of the radii of the point at hand
+  std::vector<double> surely_;        // squared radii within which a point stays covered until the next selection
   std::vector<std::size_t> keepers_;  // an ellipsoid that held the point at the last selection
   std::vector<Eigen::Index> selected_;
 };
@@ -236,9 +234,9 @@ double DistanceGrid::operator()(const Eigen::Vector3d& point, Eigen::Vector3d& g
   return mix(y0, y1, t[2]);
 }
 
-void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points,
-                  const std::vector<Eigen::Matrix3Xd>& directions, const CoverRefinement& settings,
-                  SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers, const Interrupted& interrupted) {
+void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points, const std::vector<Eigen::Matrix3Xd>& directions,
+                  const CoverRefinement& settings, SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers,
+                  const Interrupted& interrupted) {
   const auto refuse = [](const std::string& what) { throw std::invalid_argument("refine_cover: " + what); };
   const auto nodes = static_cast<std::size_t>(grid.shape[0]) * static_cast<std::size_t>(grid.shape[1]) *
                      static_cast<std::size_t>(grid.shape[2]);

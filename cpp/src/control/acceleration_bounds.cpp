@@ -8,7 +8,6 @@
 namespace sidestep {
 namespace {
 
-
 /// The speed w >= 0 with D(w) + c w T = distance >= 0. On the segment n of D the left side grows from
 /// (n^2/2 + c n) A T^2 with slope ((2n + 1)/2 + c) T.
 double speed_within(double distance, double c, double acceleration, double period) noexcept {
@@ -81,7 +80,8 @@ AccelerationInterval acceleration_interval(double q, double v, const ScalarLimit
 namespace {
 
 /// Lets the acceleration limit give way up to a factor; position and velocity limits stay.
-void widen(AccelerationInterval& interval, double q, double v, const ScalarLimits& limits, double factor, double period) noexcept {
+void widen(AccelerationInterval& interval, double q, double v, const ScalarLimits& limits, double factor,
+           double period) noexcept {
   ScalarLimits wide = limits;
   wide.acceleration *= factor;
   const double A = limits.acceleration;
@@ -135,8 +135,8 @@ double jerk_braking_distance(double v, double a, double A, double J) noexcept {
   return from_rest(first) - time * (first + a * time / 6.0);
 }
 
-SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval, const ScalarLimits& limits,
-                               double jerk, double period) noexcept {
+SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval,
+                               const ScalarLimits& limits, double jerk, double period) noexcept {
   const double step = jerk * period, A = limits.acceleration;
   SmoothInterval smooth{interval.lower, interval.upper, interval.lower_limit, interval.upper_limit};
   if (!(step < infinity)) {
@@ -161,7 +161,8 @@ SmoothInterval smooth_interval(double q, double v, double before, const Accelera
       const double next = speed + candidate * period, then = std::max(candidate - half, -A);
       const double fastest = then > 0.0 ? next + 0.5 * then * then / jerk : next;  // of the profile
       return (std::max(next, 0.5 * (next + speed)) + 0.5 * std::max(fastest, 0.0)) * period +
-                 jerk_braking_distance(next, then, A, jerk) <= room;
+                 jerk_braking_distance(next, then, A, jerk) <=
+             room;
     };
     if (room < infinity && !fits(x)) {
       limit = at_position;
@@ -176,8 +177,10 @@ SmoothInterval smooth_interval(double q, double v, double before, const Accelera
     return x;
   };
   Limit upper_limit = Limit::jerk_upper, lower_limit = Limit::jerk_lower;
-  const double upper = viable_up_to(limits.upper - q, v, before - step, before + step, Limit::velocity_upper, Limit::position_upper, upper_limit);
-  const double lower = -viable_up_to(q - limits.lower, -v, -before - step, -before + step, Limit::velocity_lower, Limit::position_lower, lower_limit);
+  const double upper = viable_up_to(limits.upper - q, v, before - step, before + step, Limit::velocity_upper,
+                                    Limit::position_upper, upper_limit);
+  const double lower = -viable_up_to(q - limits.lower, -v, -before - step, -before + step, Limit::velocity_lower,
+                                     Limit::position_lower, lower_limit);
   if (upper < smooth.upper) {
     smooth.upper = std::max(upper, before - step);
     smooth.upper_limit = upper_limit;
@@ -207,11 +210,11 @@ AccelerationBounds::AccelerationBounds(int num_coordinates)
       position_lower(lower),
       position_upper(upper) {}
 
-void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, ConstVectorRef v, double period, const LimitMargins& margins,
-                                const Eigen::VectorXd* before) noexcept {
+void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, ConstVectorRef v, double period,
+                                const LimitMargins& margins, const Eigen::VectorXd* before) noexcept {
   for (Eigen::Index i = 0; i < lower.size(); ++i) {
-    const ScalarLimits joint{limits.lower[i] + margins.position, limits.upper[i] - margins.position,
-                             limits.velocity[i], limits.acceleration[i]};
+    const ScalarLimits joint{limits.lower[i] + margins.position, limits.upper[i] - margins.position, limits.velocity[i],
+                             limits.acceleration[i]};
     AccelerationInterval interval = acceleration_interval(q[i], v[i], joint, period);
     if (margins.acceleration_factor > 1.0) {
       widen(interval, q[i], v[i], joint, margins.acceleration_factor, period);
@@ -224,7 +227,8 @@ void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, Con
     lower_limit[at] = interval.lower_limit;
     upper_limit[at] = interval.upper_limit;
     const double jerk = before == nullptr ? infinity : margins.jerk_share * limits.jerk[i];
-    const SmoothInterval smooth = smooth_interval(q[i], v[i], before == nullptr ? 0.0 : (*before)[i], interval, joint, jerk, period);
+    const SmoothInterval smooth =
+        smooth_interval(q[i], v[i], before == nullptr ? 0.0 : (*before)[i], interval, joint, jerk, period);
     smooth_lower[i] = smooth.lower;
     smooth_upper[i] = smooth.upper;
     smooth_lower_limit[at] = smooth.lower_limit;

@@ -48,7 +48,8 @@ void DisturbanceObserver::find_rotor(Eigen::Index j, double mass) noexcept {
   Seen residual;
   residual << equations.partialPivLu().solve(joint.instrumented.col(num_terms)), -1.0;
   const double left = residual.dot(joint.products * residual), sum = joint.products(num_terms, num_terms - 1);
-  const double variation = joint.products(num_terms, num_terms) - sum * sum / std::max(joint.products(num_terms - 1, num_terms - 1), period_);
+  const double variation =
+      joint.products(num_terms, num_terms) - sum * sum / std::max(joint.products(num_terms - 1, num_terms - 1), period_);
   const double found = left < (1.0 - explained) * variation ? residual[0] : 0.0;
   const double most = std::isfinite(most_rotor_[j]) ? most_rotor_[j] : 0.0;
   const double share = std::min(1.0, static_cast<double>(joints_.size()) * period_ / adoption);
@@ -68,7 +69,8 @@ void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::Vec
     }
     disturbance_[j] = std::clamp(disturbance_[j] + share_of_period_ * surplus, -most_disturbance_[j], most_disturbance_[j]);
     const double v = after[j], dry = std::tanh(v / direction);
-    identify(j, (Seen() << acceleration_[j], moved, dry, v, 1.0, missing).finished(), Terms(predicted[j], expected, dry, v, 1.0));
+    identify(j, (Seen() << acceleration_[j], moved, dry, v, 1.0, missing).finished(),
+             Terms(predicted[j], expected, dry, v, 1.0));
     if (static_cast<std::size_t>(j) == next_) {
       find_rotor(j, mass_matrix(j, j));
     }

@@ -65,8 +65,8 @@ QuadraticProgramData::QuadraticProgramData(int num_variables, int num_rows)
 
 QuadraticProgram::QuadraticProgram(int num_variables, int num_rows) : n_(num_variables), m_(num_rows) {
   if (n_ < 1 || m_ < 0) {
-    throw std::invalid_argument("quadratic program: got " + std::to_string(n_) + " variables and " +
-                                std::to_string(m_) + " rows, needs at least 1 and 0");
+    throw std::invalid_argument("quadratic program: got " + std::to_string(n_) + " variables and " + std::to_string(m_) +
+                                " rows, needs at least 1 and 0");
   }
   active_.resize(static_cast<std::size_t>(n_));
   is_active_.resize(static_cast<std::size_t>(n_ + m_));
@@ -308,9 +308,8 @@ void QuadraticProgram::recompute(const QuadraticProgramData& data) noexcept {
 QuadraticProgramStatus QuadraticProgram::solve(const QuadraticProgramData& data) noexcept {
   iterations_ = 0;
   multipliers_.setZero();
-  if (data.H.rows() != n_ || data.H.cols() != n_ || data.g.size() != n_ || data.lower.size() != n_ ||
-      data.upper.size() != n_ || data.A.rows() != m_ || data.A.cols() != n_ || data.row_lower.size() != m_ ||
-      data.row_upper.size() != m_) {
+  if (data.H.rows() != n_ || data.H.cols() != n_ || data.g.size() != n_ || data.lower.size() != n_ || data.upper.size() != n_ ||
+      data.A.rows() != m_ || data.A.cols() != n_ || data.row_lower.size() != m_ || data.row_upper.size() != m_) {
     return QuadraticProgramStatus::wrong_size;
   }
   if (!all_finite(data.H) || !all_finite(data.g) || !all_finite(data.A)) {
@@ -450,8 +449,8 @@ double optimality_residual(const QuadraticProgramData& data, const QuadraticProg
     check(x[i], std::abs(x[i]), data.lower[i], data.upper[i], multipliers[i]);
   }
   for (Eigen::Index k = 0; k < data.A.rows(); ++k) {
-    check(data.A.row(k).dot(x), data.A.row(k).cwiseAbs().dot(x.cwiseAbs().transpose()), data.row_lower[k],
-          data.row_upper[k], row_multipliers[k]);
+    check(data.A.row(k).dot(x), data.A.row(k).cwiseAbs().dot(x.cwiseAbs().transpose()), data.row_lower[k], data.row_upper[k],
+          row_multipliers[k]);
   }
   return residual;
 }

@@ -89,7 +89,8 @@ template <>
 const std::vector<Field<SafetySettings>>& fields() {
   using S = SafetySettings;
   static const std::vector<Field<S>> all{
-      {"margin", &S::margin, "m", 0.0, 0.5, "clearance that every command keeps: covers tracking error, delay and noise of points"},
+      {"margin", &S::margin, "m", 0.0, 0.5,
+       "clearance that every command keeps: covers tracking error, delay and noise of points"},
       {"rate", &S::rate, "1/s", 0.5, 200.0, "how quickly a clearance may close on its margin: larger comes close quicker"},
       {"braking_fraction", &S::braking_fraction, "-", 0.05, 1.0, "share of the hardest deceleration that is counted on"},
       {"correction", &S::correction, "-", 0.01, 1.0, "share of an excess of closing speed that one period takes away"},
@@ -98,9 +99,7 @@ const std::vector<Field<SafetySettings>>& fields() {
   return all;
 }
 
-void SafetySettings::validate() const {
-  check_fields("safety: ", *this);
-}
+void SafetySettings::validate() const { check_fields("safety: ", *this); }
 
 SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
     : normals(RowMatrix::Zero((settings.validate(), settings.max_rows), num_coordinates)),
@@ -130,9 +129,8 @@ bool SafetyRows::usable(const Clearances& clearances) const noexcept {
   }
   for (Eigen::Index k = 0; k < num; ++k) {
     if (clearances.nearest[k] >= 0 &&
-        !(!std::isnan(clearances.least[k]) && std::isfinite(clearances.curvatures[k]) &&
-          std::isfinite(approach.values[k]) && std::isfinite(approach.rates[k]) && std::isfinite(approach.curvatures[k]) &&
-          approach.gradients.col(k).allFinite())) {
+        !(!std::isnan(clearances.least[k]) && std::isfinite(clearances.curvatures[k]) && std::isfinite(approach.values[k]) &&
+          std::isfinite(approach.rates[k]) && std::isfinite(approach.curvatures[k]) && approach.gradients.col(k).allFinite())) {
       return false;
     }
   }
@@ -180,7 +178,8 @@ double SafetyRows::hardest_by_torque(int row, const JointLimits& limits, const B
 }
 
 double SafetyRows::largest_by_both(ConstVectorRef direction, const Eigen::VectorXd& least, const Eigen::VectorXd& most,
-                                   const Eigen::VectorXd& row_lower, const Eigen::VectorXd& row_upper, double otherwise) noexcept {
+                                   const Eigen::VectorXd& row_lower, const Eigen::VectorXd& row_upper,
+                                   double otherwise) noexcept {
   // w n·a − |a|²/2 with so large a w that the second term does not count.
   double size = 0.0;
   for (Eigen::Index j = 0; j < most.size(); ++j) {
@@ -220,8 +219,9 @@ double SafetyRows::stop_time(const Eigen::VectorXd& v, const JointLimits& limits
   return std::clamp(by_torque, by_limits, longest_stop * by_limits);
 }
 
-double SafetyRows::smoothed(double required, double room, double u, double c, double A, ConstVectorRef gradient, const LastMotion& last,
-                            const AccelerationBounds& bounds, const JointLimits& limits, double period) noexcept {
+double SafetyRows::smoothed(double required, double room, double u, double c, double A, ConstVectorRef gradient,
+                            const LastMotion& last, const AccelerationBounds& bounds, const JointLimits& limits,
+                            double period) noexcept {
   const double jerk = last.jerk_share * gradient.cwiseAbs().dot(limits.jerk);
   if (!(jerk < infinity)) {
     return required;
@@ -266,9 +266,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
   least_ = -limits.acceleration;
   const double rate = tau * settings_.rate > 1.0 ? 1.0 / tau : settings_.rate;
   const ClearanceState& approach = clearances.approach;
-  const auto room_of = [&](Eigen::Index k) {
-    return approach.values[k] - std::min(settings_.margin, clearances.margins[k]);
-  };
+  const auto room_of = [&](Eigen::Index k) { return approach.values[k] - std::min(settings_.margin, clearances.margins[k]); };
   // Insert into the list of the most critical, which is kept sorted; it is short.
   const int first = size_ = std::min(size_, max_size() - max_size() / 2);
   for (Eigen::Index k = 0; k < clearances.nearest.size(); ++k) {
@@ -320,11 +318,12 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     double by_both = std::min(by_limits, by_torque);
     const bool counts = torque != nullptr && u > 0.0 && u / rate + 0.5 * u * u / (scarce * by_both) > room;
     if (counts) {
-      by_both = std::min(by_both, largest_by_both(gradient, least_, limits.acceleration, effort_lower_, effort_upper_, by_both));
+      by_both =
+          std::min(by_both, largest_by_both(gradient, least_, limits.acceleration, effort_lower_, effort_upper_, by_both));
     }
     const double hardest = std::max(std::min(by_limits, by_torque), smallest_deceleration);
-    const ClosingLimits closing{std::max(settings_.braking_fraction * by_both, smallest_deceleration), hardest,
-                                rate, settings_.correction};
+    const ClosingLimits closing{std::max(settings_.braking_fraction * by_both, smallest_deceleration), hardest, rate,
+                                settings_.correction};
     // Of the points, but no more than the mean where it says that a surface recedes: see the header.
     const double c = std::min(approach.curvatures[k], std::max(clearances.curvatures[k], 0.0));
     double required = demanded_deceleration(room, u, closing, period) - c;
@@ -391,8 +390,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
   }
 }
 
-bool SafetyRows::satisfied_within(int k, const Eigen::VectorXd& box_lower,
-                                  const Eigen::VectorXd& box_upper) const noexcept {
+bool SafetyRows::satisfied_within(int k, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper) const noexcept {
   return -largest_product(-normals.row(k).transpose(), box_lower, box_upper) >= lower[k];
 }
 

@@ -29,7 +29,8 @@ template <>
 const std::vector<Field<SpeedLimitSettings>>& fields() {
   using S = SpeedLimitSettings;
   static const std::vector<Field<S>> all{
-      {"near_speed", &S::near_speed, "m/s", 0.02, 10.0, "that no frame of the arm exceeds at near_distance from an obstacle, and nearer"},
+      {"near_speed", &S::near_speed, "m/s", 0.02, 10.0,
+       "that no frame of the arm exceeds at near_distance from an obstacle, and nearer"},
       {"near_distance", &S::near_distance, "m", 0.0, 10.0, "to obstacles, up to which near_speed is the limit"},
       {"far_speed", &S::far_speed, "m/s", 0.02, 10.0, "that no frame of the arm exceeds anywhere"},
       {"far_distance", &S::far_distance, "m", 0.01, 10.0,

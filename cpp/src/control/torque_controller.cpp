@@ -88,8 +88,8 @@ void TorqueControllerSettings::validate(const Robot& robot) const {
   check_weight(tracking_weight, "tracking_weight", nv, false);
   check_weight(torque_weight, "torque_weight", nv, true);
   require_positive(slack_weight, "torque controller: slack_weight");
-  require(velocity_overrun >= 1.0 && velocity_overrun < infinity, "torque controller: velocity_overrun",
-          velocity_overrun, "finite and >= 1");
+  require(velocity_overrun >= 1.0 && velocity_overrun < infinity, "torque controller: velocity_overrun", velocity_overrun,
+          "finite and >= 1");
   require(acceleration_overrun >= 1.0 && acceleration_overrun < infinity, "torque controller: acceleration_overrun",
           acceleration_overrun, "finite and >= 1");
   safety.validate();
@@ -156,12 +156,10 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
 TorqueController::LeastShortfall::LeastShortfall(int nv, int num)
     : num_rows(num), data(nv + num, nv + num), program(nv + num, nv + num) {}
 
-TorqueStatus TorqueController::solve(ConstVectorRef q,
-                                     ConstVectorRef v,
-                                     ConstVectorRef acceleration,
-                                     const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                     ConstVectorRef bias, const Clearances* clearances, const SecondState& second,
-                                     const LastCommand& last, TorqueSolution& solution, const SpeedRows* speed) noexcept {
+TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration,
+                                     const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix, ConstVectorRef bias,
+                                     const Clearances* clearances, const SecondState& second, const LastCommand& last,
+                                     TorqueSolution& solution, const SpeedRows* speed) noexcept {
   const auto usable = [this](const auto& x) { return x.size() == nv_ && all_finite(x); };
   const bool q_known = usable(q), v_known = usable(v), wanted_known = usable(acceleration), bias_known = usable(bias);
   const bool two = second.clearances != nullptr;
@@ -190,8 +188,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   solution.slack.setZero();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (q_known && v_known) {
-    bounds_.update(limits_, q, v, settings_.period,
-                   {settings_.position_margin, share, last.acceleration_factor},
+    bounds_.update(limits_, q, v, settings_.period, {settings_.position_margin, share, last.acceleration_factor},
                    last.binds ? last.acceleration : nullptr);
     if (last.acceleration_factor > 1.0 && wanted_known) {
       bounds_.draw_in(limits_.acceleration, acceleration);
@@ -218,7 +215,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
   report_clearance(second.clearances, solution);
   if (q_known && v_known && mass_known && bias_known) {
     write_torque_rows(last);
-    const bool rates = last.torque != nullptr && limits_.effort_rate.array().isFinite().any() && solution.least_clearance >= 0.0;
+    const bool rates =
+        last.torque != nullptr && limits_.effort_rate.array().isFinite().any() && solution.least_clearance >= 0.0;
     if (rates && last.acceleration != nullptr) {
       jerk_lower_ = *last.acceleration - settings_.period * limits_.jerk;
       jerk_upper_ = *last.acceleration + settings_.period * limits_.jerk;
@@ -233,7 +231,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       if (two) {
-        rows_.add(*second.clearances, *second.velocity, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
+        rows_.add(*second.clearances, *second.velocity, limits_, bounds_, settings_.period, limited ? &braking : nullptr,
+                  before);
       }
     }
     if (last.decided != nullptr) {
@@ -274,9 +273,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q,
       }
     }
     if (solved && !presses_for_lost()) {
-      const bool free = std::all_of(solution.active.begin(), solution.active.end(),
-                                    [](Limit limit) { return limit == Limit::none; });
-      status = !kept ? TorqueStatus::relaxed
+      const bool free =
+          std::all_of(solution.active.begin(), solution.active.end(), [](Limit limit) { return limit == Limit::none; });
+      status = !kept                                                                    ? TorqueStatus::relaxed
                : free && row_multipliers_.isZero(0.0) && speed_multipliers_.isZero(0.0) ? TorqueStatus::ok
                                                                                         : TorqueStatus::limited;
     } else {
@@ -487,8 +486,11 @@ void TorqueController::report_safety(TorqueSolution& solution) noexcept {
     const auto at = static_cast<std::size_t>(k);
     const double short_by = rows_.lower[k] - rows_.normals.row(k).dot(solution.acceleration.transpose());
     const bool rounding = short_by <= slack_tolerance * (1.0 + std::abs(rows_.lower[k]) + wanted_.norm());
-    solution.safety[at] = {rows_.coordinates[at], rows_.nearest[at], rows_.along_path[at] != 0,
-                           rows_.lengths[k] * rows_.lower[k], rounding ? 0.0 : rows_.lengths[k] * short_by,
+    solution.safety[at] = {rows_.coordinates[at],
+                           rows_.nearest[at],
+                           rows_.along_path[at] != 0,
+                           rows_.lengths[k] * rows_.lower[k],
+                           rounding ? 0.0 : rows_.lengths[k] * short_by,
                            row_multipliers_[k]};
     if (row_multipliers_[k] > largest) {
       largest = row_multipliers_[k];
@@ -544,8 +546,7 @@ void TorqueController::stop(bool mass_known, TorqueSolution& solution) noexcept 
   solution.torque = bias_;
   if (mass_known) {
     for (int j = 0; j < nv_; ++j) {
-      const double wanted = std::clamp(-velocity_[j] / settings_.stop_time, -limits_.acceleration[j],
-                                       limits_.acceleration[j]);
+      const double wanted = std::clamp(-velocity_[j] / settings_.stop_time, -limits_.acceleration[j], limits_.acceleration[j]);
       const bool bounded = solution.lower[j] <= solution.upper[j];  // not without a position
       const double braking = bounded ? std::clamp(wanted, solution.lower[j], solution.upper[j]) : wanted;
       solution.torque += braking * mass_.col(j);

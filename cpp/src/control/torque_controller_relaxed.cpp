@@ -103,8 +103,8 @@ bool TorqueController::solve_least(LeastShortfall& least, bool of_lost, TorqueSo
 }
 
 bool TorqueController::find_least_shortfalls(TorqueSolution& solution) noexcept {
-  LeastShortfall& least = *std::find_if(least_.begin(), least_.end() - 1,
-                                        [this](const LeastShortfall& l) { return l.num_rows >= num_rows_used_; });
+  LeastShortfall& least =
+      *std::find_if(least_.begin(), least_.end() - 1, [this](const LeastShortfall& l) { return l.num_rows >= num_rows_used_; });
   QuadraticProgramData& data = least.data;
   data.A.topLeftCorner(nv_, nv_) = mass_;
   data.A.bottomRows(least.num_rows).setZero();
@@ -182,7 +182,8 @@ bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noe
   const int first_row = nv_ + num_slacks_;  // multipliers of the bounds come before those of the rows
   for (int i = 0; i < nv_; ++i) {
     add_active(i, std::max(multipliers[i], multipliers[first_row + i]),
-               std::min(multipliers[i], multipliers[first_row + nv_ + i]), multipliers[first_row + 2 * nv_ + i], false, solution);
+               std::min(multipliers[i], multipliers[first_row + nv_ + i]), multipliers[first_row + 2 * nv_ + i], false,
+               solution);
   }
   for (int n = 0; n < num_rows_used_; ++n) {
     row_multipliers_[rows_used_[static_cast<std::size_t>(n)]] = std::max(-multipliers[first_row + 3 * nv_ + n], 0.0);
@@ -201,9 +202,8 @@ TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept 
   row_multipliers_.setZero();
   speed_multipliers_.setZero();
   const bool found = (solve_comfort(false, solution) && !presses_for_lost()) ||
-                     (find_least_shortfalls(solution) &&
-                      (solve_comfort(false, solution) || solve_comfort(true, solution) ||
-                       (find_least_shortfalls(solution) && accept(solution))));
+                     (find_least_shortfalls(solution) && (solve_comfort(false, solution) || solve_comfort(true, solution) ||
+                                                          (find_least_shortfalls(solution) && accept(solution))));
   if (!found) {
     stop(true, solution);
     return TorqueStatus::fallback_solver;

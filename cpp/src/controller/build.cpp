@@ -16,9 +16,9 @@
 namespace sidestep {
 namespace {
 
-constexpr double usable_acceleration = 0.9;   // of the limits, for velocities, twists and trajectories: the rest is for feedback
-constexpr Eigen::Index most_held = 6;         // bounds that a twist is held by
-constexpr double most_per_period = 0.2;       // of the feedback's frequency: a slow rate holds its torques for long
+constexpr double usable_acceleration = 0.9;  // of the limits, for velocities, twists and trajectories: the rest is for feedback
+constexpr Eigen::Index most_held = 6;        // bounds that a twist is held by
+constexpr double most_per_period = 0.2;      // of the feedback's frequency: a slow rate holds its torques for long
 constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
 
 std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const BarrierSettings& b) {
@@ -45,7 +45,8 @@ std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const Barrier
   return std::make_shared<GeometricSystem>(robot, std::move(parts), std::move(settings));
 }
 
-std::unique_ptr<OnlinePlanner> make_guide(const Arm& arm, const BodyClearance& body, const ControllerSettings& settings, bool torque) {
+std::unique_ptr<OnlinePlanner> make_guide(const Arm& arm, const BodyClearance& body, const ControllerSettings& settings,
+                                          bool torque) {
   if (!settings.planner) {
     return nullptr;
   }
@@ -188,7 +189,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
       shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
       body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables()),
       here_(body_),
-      drives_track_(settings.output == ControllerSettings::Output::position || settings.output == ControllerSettings::Output::velocity),
+      drives_track_(settings.output == ControllerSettings::Output::position ||
+                    settings.output == ControllerSettings::Output::velocity),
       speed_rows_(arm.robot()),
       arm_speed_rows_(speed_rows_),
       leader_(arm.robot()),
@@ -219,9 +221,9 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
                                 ", but arm '" + arm.name() + "' is not moved by torque, allowed: 0");
   }
   if (is_impedance() && q_.size() > most_of_impedance) {
-    throw std::invalid_argument("controller: tracking.stiffness is " + std::to_string(settings.tracking.stiffness) + " for an arm of " +
-                                std::to_string(q_.size()) + " joints, allowed: 0, or at most " + std::to_string(most_of_impedance) +
-                                " joints");
+    throw std::invalid_argument("controller: tracking.stiffness is " + std::to_string(settings.tracking.stiffness) +
+                                " for an arm of " + std::to_string(q_.size()) + " joints, allowed: 0, or at most " +
+                                std::to_string(most_of_impedance) + " joints");
   }
   frequency_ = std::min(settings.tracking.frequency, most_per_period / settings.period);
   guide = make_guide(arm, body_, settings, torque);
@@ -243,7 +245,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
     tracking_program_.emplace(of_arm, program);
     torque_program_.emplace(of_reference, program);
     if (settings.tracking.observer_time < infinity) {
-      observer_.emplace(arm.robot().limits(), settings.period, settings.tracking.observer_time, settings.tracking.observer_share);
+      observer_.emplace(arm.robot().limits(), settings.period, settings.tracking.observer_time,
+                        settings.tracking.observer_share);
     }
     if (arm.has_dynamics()) {
       dynamics_.emplace(arm.dynamics());

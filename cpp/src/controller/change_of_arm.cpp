@@ -41,7 +41,9 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
   GoalOrder& order = goal_orders_.current();
   if (order.number == goal_number_) {
     std::swap(order.order, before.goal_orders_.current().order);
-    goal_ = before.goal_ == nullptr ? nullptr : before.goal_ == &before.input_goal_ ? &input_goal_ : std::get_if<Goal>(&order.order);
+    goal_ = before.goal_ == nullptr               ? nullptr
+            : before.goal_ == &before.input_goal_ ? &input_goal_
+                                                  : std::get_if<Goal>(&order.order);
   }
   // The target stays; a way to it is looked for anew.
   target_blocked_ = false;
@@ -152,11 +154,13 @@ void Controller::set_arm(Arm arm) {
   forget_lifted();
   const Robot &now = whole_.robot(), &then = arm.robot();
   if (!now.same_joints(then) || now.coordinate_names() != then.coordinate_names()) {
-    throw std::invalid_argument("controller: arm '" + arm.name() + "' has other joints than '" + whole_.name() + "'; make a controller for it");
+    throw std::invalid_argument("controller: arm '" + arm.name() + "' has other joints than '" + whole_.name() +
+                                "'; make a controller for it");
   }
   const JointLimits &a = now.limits(), &b = then.limits();
-  if (a.lower != b.lower || a.upper != b.upper || a.velocity != b.velocity || a.acceleration != b.acceleration || a.effort != b.effort ||
-      a.jerk != b.jerk || a.effort_rate != b.effort_rate || whole_.has_dynamics() != arm.has_dynamics()) {
+  if (a.lower != b.lower || a.upper != b.upper || a.velocity != b.velocity || a.acceleration != b.acceleration ||
+      a.effort != b.effort || a.jerk != b.jerk || a.effort_rate != b.effort_rate ||
+      whole_.has_dynamics() != arm.has_dynamics()) {
     throw std::invalid_argument("controller: arm '" + arm.name() + "' has other limits than '" + whole_.name() +
                                 "', or inertias where that has none; make a controller for it");
   }
@@ -176,7 +180,8 @@ void Controller::attach(const Attachment& object) {
   }
   if (!object.rests_on.empty()) {
     if (last.q.size() == 0) {
-      throw std::invalid_argument("attach '" + object.name + "': it rests on obstacles, but where the arm is nobody has said; step once before");
+      throw std::invalid_argument("attach '" + object.name +
+                                  "': it rests on obstacles, but where the arm is nobody has said; step once before");
     }
     sidestep::attach(whole_, object);  // for what is wrong with it
     last.resting = resting(whole_.robot(), object, last.q, *around, settings_.safety.margin + attached_room);
@@ -193,7 +198,8 @@ void Controller::detach(const std::string& name) {
     for (const Held& one : held) {
       names += (names.empty() ? "'" : ", '") + one.object.name + "'";
     }
-    throw std::invalid_argument("controller: no object '" + name + "' is attached; attached: " + (names.empty() ? "none" : names));
+    throw std::invalid_argument("controller: no object '" + name +
+                                "' is attached; attached: " + (names.empty() ? "none" : names));
   }
   for (Held& one : held) {
     std::erase(one.object.may_touch, name);

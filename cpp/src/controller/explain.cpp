@@ -17,16 +17,11 @@ std::string millimetres(double metres) {
 
 std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
   switch (label.kind) {
-    case CoordinateLabel::Kind::obstacle:
-      return "link '" + label.name + "' and " + obstacle;
-    case CoordinateLabel::Kind::self:
-      return "links '" + label.name + "' and '" + label.other + "'";
-    case CoordinateLabel::Kind::plane:
-      return "link '" + label.name + "' and a plane";
-    case CoordinateLabel::Kind::joint_limit:
-      return "joint '" + label.name + "' and its " + label.other + " limit";
-    case CoordinateLabel::Kind::potential:
-      break;
+    case CoordinateLabel::Kind::obstacle: return "link '" + label.name + "' and " + obstacle;
+    case CoordinateLabel::Kind::self: return "links '" + label.name + "' and '" + label.other + "'";
+    case CoordinateLabel::Kind::plane: return "link '" + label.name + "' and a plane";
+    case CoordinateLabel::Kind::joint_limit: return "joint '" + label.name + "' and its " + label.other + " limit";
+    case CoordinateLabel::Kind::potential: break;
   }
   return "a potential";
 }
@@ -53,7 +48,8 @@ std::string Controller::Impl::explain_target() const {
   around.advance(obstacle_age_);
   Obstruction obstruction;
   RrtConnect ends(body_, exact);
-  if (touches_itself && ends.obstructed(target_, Obstacles::none(), obstruction)) {  // no obstacle that goes away frees the goal
+  if (touches_itself &&
+      ends.obstructed(target_, Obstacles::none(), obstruction)) {  // no obstacle that goes away frees the goal
     return "no posture without self-collision was found for the pose: at the last one " + describe(obstruction) +
            "; others are looked for";
   }
@@ -85,14 +81,16 @@ std::string Controller::Impl::explain() const {
   if (command.status == SafetyStatus::stopping) {
     text = command.program == TorqueStatus::fallback_solver
                ? "braking to a stop: the program was not solved"
-               : std::string("braking to a stop: the ") + (solution.fault == TorqueFault::none ? "state" : name(solution.fault)) +
+               : std::string("braking to a stop: the ") +
+                     (solution.fault == TorqueFault::none ? "state" : name(solution.fault)) +
                      " of this step is unusable; check its size and that it is finite";
     return text;
   }
   const auto diagnosis = system->diagnose(workspace);
   if (command.status == SafetyStatus::clearance_lost && command.coordinate >= 0) {
     const CoordinateLabel& label = system->labels()[static_cast<std::size_t>(command.coordinate)];
-    text = parties(label, obstacles().words_for(command.point)) + " overlap by " + millimetres(command.clearance) + ", as far as the covering body says; ";
+    text = parties(label, obstacles().words_for(command.point)) + " overlap by " + millimetres(command.clearance) +
+           ", as far as the covering body says; ";
     if (label.kind == CoordinateLabel::Kind::obstacle) {
       text += "if points lie on the arm itself, filter the arm out of the cloud; ";
     }
@@ -113,8 +111,9 @@ std::string Controller::Impl::explain() const {
   }
   switch (command.activity) {
     case Activity::no_goal: return text + "no goal: it holds still, and evades what comes";
-    case Activity::stale: return text + "stopped: the obstacles are " + std::to_string(obstacle_age_) +
-                                 " s old, more than obstacle_timeout; set_obstacles must be called more often";
+    case Activity::stale:
+      return text + "stopped: the obstacles are " + std::to_string(obstacle_age_) +
+             " s old, more than obstacle_timeout; set_obstacles must be called more often";
     case Activity::waiting: return text + "waiting for a posture that reaches the pose";
     case Activity::arrived: return text + "arrived";
     case Activity::blocked:

@@ -22,8 +22,8 @@ constexpr int looks = 2, first_looks = 8;  // in a step, and in that which takes
 constexpr double sliding_lead = 0.2;       // of inputs.lead, of joints that slide [m/rad]
 constexpr double sudden = 0.002;           // [s] of acceleration: velocities so small begin and end at once
 constexpr double waiting_rate = 0.05;
-constexpr double from_now = -1.0;          // where the path is looked at: anew
-constexpr double receding = 0.001;         // [m] by which the path may come nearer than the arm is already
+constexpr double from_now = -1.0;   // where the path is looked at: anew
+constexpr double receding = 0.001;  // [m] by which the path may come nearer than the arm is already
 
 }  // namespace
 
@@ -96,7 +96,8 @@ void Controller::Impl::run_clock(const TrajectoryOrder& order) noexcept {
     lag = std::max(lag, std::abs(path_q_[j] - q_[j]) / (is_sliding_[static_cast<std::size_t>(j)] ? sliding_lead : 1.0));
   }
   fastest = std::min(fastest, steepest / rate_foresight);
-  double rate = std::max(std::min(1.0, sudden * most), std::min(order.path.rate(c.time), order.path.rate(c.time + rate_foresight * c.rate)));
+  double rate = std::max(std::min(1.0, sudden * most),
+                         std::min(order.path.rate(c.time), order.path.rate(c.time + rate_foresight * c.rate)));
   rate *= std::clamp(2.0 - lag / settings.inputs.lead, 0.0, 1.0);
   if (order.behaviour == TrajectoryBehaviour::keep_path) {
     look_along(order.path, 0.5 * c.rate * c.rate / (braking_share * most) + window_beyond);
@@ -164,15 +165,16 @@ std::string Controller::Impl::explain_trajectory() const {
     words += text;
   }
   if (command.deviation > 0.001) {
-    std::snprintf(text, sizeof text, "%s%.2g rad or m off %s", words.empty() ? "" : ", ", command.deviation, words.empty() ? "the trajectory" : "it");
+    std::snprintf(text, sizeof text, "%s%.2g rad or m off %s", words.empty() ? "" : ", ", command.deviation,
+                  words.empty() ? "the trajectory" : "it");
     words += text;
   }
   if (clock_.blocked && has_input() && order->behaviour == TrajectoryBehaviour::keep_path) {
     const CoordinateLabel& label = body_.label(clock_.blocker.item);
     words += (words.empty() ? "" : ": ") + std::string("the path ahead is blocked by ") +
              (label.kind == CoordinateLabel::Kind::obstacle ? obstacles().words_for(clock_.blocker.point)
-              : label.other.empty()                         ? "a plane"
-                                                            : "the arm itself, links '" + label.name + "' and '" + label.other + "'");
+              : label.other.empty() ? "a plane"
+                                    : "the arm itself, links '" + label.name + "' and '" + label.other + "'");
   }
   return words;
 }

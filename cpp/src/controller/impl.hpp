@@ -72,7 +72,7 @@ class Controller::Impl : private StepState {
   GeometricSystem::Workspace workspace;
   TorqueSolution solution;
   Command& command;
-  Impl* before = nullptr;  // of those that wait for another thread to destroy them
+  Impl* before = nullptr;              // of those that wait for another thread to destroy them
   std::atomic<Impl*> lifted{nullptr};  // to go on with once what rests is lifted; its own until then
   std::unique_ptr<OnlinePlanner> guide;
   bool torque = false;
@@ -110,14 +110,14 @@ class Controller::Impl : private StepState {
     std::uint64_t goal_number = 0, posture_attempt = 0;
     std::uint64_t obstacle_number = 0;
     double obstacle_age = 0.0;
-    JointGoal followed;                  // the reference of the step
-    bool on_trajectory = false;          // of the order, which began there, and whose clock is there
+    JointGoal followed;          // the reference of the step
+    bool on_trajectory = false;  // of the order, which began there, and whose clock is there
     Eigen::VectorXd begin_q, begin_v;
     double clock = 0.0, rate = 0.0;
-    bool by_pose = false;                // the pose goal itself is followed, as it moves
-    double order_age = 0.0;              // for how long it has moved [s]
+    bool by_pose = false;    // the pose goal itself is followed, as it moves
+    double order_age = 0.0;  // for how long it has moved [s]
     OnlinePlanner::Following following;
-    Eigen::MatrixXd places;              // where barriers leave room (nv × num_places)
+    Eigen::MatrixXd places;  // where barriers leave room (nv × num_places)
     Eigen::Index num_places = 0;
     bool avoiding = false;
     AvoidanceTrajectory trajectory;
@@ -153,7 +153,9 @@ class Controller::Impl : private StepState {
   /// than one that approaches a goal.
   void hold_to_path(const Eigen::VectorXd& q, const Eigen::VectorXd& v, JointGoal& reference) const noexcept;
   void leave_room(bool looks) noexcept;
-  const TrajectoryOrder* trajectory_order() const noexcept { return std::get_if<TrajectoryOrder>(&goal_orders_.current().order); }
+  const TrajectoryOrder* trajectory_order() const noexcept {
+    return std::get_if<TrajectoryOrder>(&goal_orders_.current().order);
+  }
   bool is_fresh() const noexcept { return order_age_ <= settings.inputs.timeout; }
   /// Velocity, twist or trajectory, while no goal has taken its place.
   bool has_input() const noexcept { return goal_ == &input_goal_ && moves_; }
@@ -169,7 +171,9 @@ class Controller::Impl : private StepState {
   void follow_trajectory(const TrajectoryOrder& order) noexcept;
   void run_clock(const TrajectoryOrder& order) noexcept;
   void look_along(const JointTrajectory& path, double window) noexcept;
-  bool keeps_path() const noexcept { return pulls_ && trajectory_order() && trajectory_order()->behaviour == TrajectoryBehaviour::keep_path; }
+  bool keeps_path() const noexcept {
+    return pulls_ && trajectory_order() && trajectory_order()->behaviour == TrajectoryBehaviour::keep_path;
+  }
   std::string explain_trajectory() const;
   std::string explain_input() const;
   /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
@@ -209,7 +213,9 @@ class Controller::Impl : private StepState {
   void keep_room() noexcept;
   bool has_goal() const noexcept { return goal_ != nullptr; }
   /// The target is inside something, and the arm goes straight to it: it stops before.
-  bool stops_short() const noexcept { return target_blocked_ && (!guide || (path_reference_.arrives && followed_ == &reference_)); }
+  bool stops_short() const noexcept {
+    return target_blocked_ && (!guide || (path_reference_.arrives && followed_ == &reference_));
+  }
   const PoseGoal* pose_goal() const noexcept { return goal_ == nullptr ? nullptr : std::get_if<PoseGoal>(goal_); }
 
   // Of the worker; in `step` where synchronous.
@@ -221,8 +227,8 @@ class Controller::Impl : private StepState {
   void guarded(Action&& action) noexcept;
   void note_fault(const char* what) noexcept;
   Obstacles obstacles_at(const Snapshot& snapshot) const;
-  Posture search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles,
-                         std::uint64_t attempt, std::uint64_t goal_number);
+  Posture search_posture(const PoseGoal& goal, const Eigen::VectorXd& near, const Obstacles& obstacles, std::uint64_t attempt,
+                         std::uint64_t goal_number);
   LookAhead::Leader leader_of(const OnlinePlanner::Following& following) const;
   LookAhead::Leader leader_of(JointTrajectory path, double clock, double rate) const;
   /// Writes activation distances that leave room at places; whether the last of them is inside a barrier.
@@ -237,7 +243,7 @@ class Controller::Impl : private StepState {
   TripleBuffer<FoundPosture> postures_;
   TripleBuffer<FoundTrajectory> trajectories_;
   TripleBuffer<Eigen::VectorXd> measured_;  // NaN before the first step
-  mutable std::mutex mutex_;  // of what follows; the step never takes it unless synchronous
+  mutable std::mutex mutex_;                // of what follows; the step never takes it unless synchronous
   Order shown_order_;
   std::uint64_t goal_count_ = 0, obstacle_count_ = 0;
   std::shared_ptr<const Obstacles> shown_obstacles_;
@@ -252,10 +258,10 @@ class Controller::Impl : private StepState {
   std::optional<LocalMinimumRecovery> escape_;
   BodyClearance body_;
   BodyClearance::Workspace here_;
-  bool drives_track_ = false;                   // the output is position or velocity
-  SpeedRows speed_rows_, arm_speed_rows_;       // of the reference, of the arm
-  int nearest_point_ = -1;                      // of obstacles
-  KinematicState leader_;                       // the reference on the planner's path
+  bool drives_track_ = false;              // the output is position or velocity
+  SpeedRows speed_rows_, arm_speed_rows_;  // of the reference, of the arm
+  int nearest_point_ = -1;                 // of obstacles
+  KinematicState leader_;                  // the reference on the planner's path
   GeometricSystem::Workspace arm_workspace_;
   TorqueSolution tracked_;
   Eigen::SelfAdjointEigenSolver<Small> modes_;  // of an impedance
@@ -266,17 +272,17 @@ class Controller::Impl : private StepState {
     double clearance;  // from which on its whole ellipsoid is free [m]
   };
   std::vector<Resting> resting_;
-  Goal* goal_ = nullptr;          // in the current order
+  Goal* goal_ = nullptr;  // in the current order
   OnlinePlanner::Reference path_reference_;
   OnlinePlannerStatus guide_status_ = OnlinePlannerStatus::idle;
   const Goal* followed_ = nullptr;
   Eigen::VectorXd held_v_;
-  Eigen::MatrixXd held_;         // directions that limits hold, orthonormal (nv × 6)
+  Eigen::MatrixXd held_;  // directions that limits hold, orthonormal (nv × 6)
   KinematicState twist_state_;
   Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_, projected_;
   Eigen::VectorXd most_v_, most_a_;  // limits that motions use
   Eigen::VectorXd seen_q_, seen_v_, seen_a_, path_step_;
-  bool pending_ = false;          // a trajectory out of the way, found and not followed yet
+  bool pending_ = false;  // a trajectory out of the way, found and not followed yet
   Eigen::MatrixXd places_, lowered_places_;
   Eigen::Index num_places_ = 0, num_lowered_ = -1;
   std::uint64_t lowered_version_ = 0;  // of obstacles
@@ -284,7 +290,7 @@ class Controller::Impl : private StepState {
 
   // Of the worker.
   std::unique_ptr<LookAhead> evasion_;
-  std::optional<RrtConnect> ends_;     // says what is free at an end
+  std::optional<RrtConnect> ends_;  // says what is free at an end
   BodyClearance::Workspace posture_room_;
   GeometricSystem::Workspace worker_workspace_;
   std::uint64_t sought_goal_ = 0, sought_attempt_ = 0;

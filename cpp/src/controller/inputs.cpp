@@ -23,13 +23,14 @@ constexpr double least_free = 0.05;      // share of a bound's direction that th
 
 void Controller::Impl::set_velocity(const Eigen::VectorXd& v) {
   if (v.size() != q_.size()) {
-    throw std::invalid_argument("controller: velocity has " + std::to_string(v.size()) + " entries, allowed: " +
-                                std::to_string(q_.size()) + ", one for each joint");
+    throw std::invalid_argument("controller: velocity has " + std::to_string(v.size()) +
+                                " entries, allowed: " + std::to_string(q_.size()) + ", one for each joint");
   }
   for (Eigen::Index j = 0; j < v.size(); ++j) {
     if (!std::isfinite(v[j])) {
-      throw std::invalid_argument("controller: velocity of joint '" + arm.robot().coordinate_names()[static_cast<std::size_t>(j)] +
-                                  "' is " + std::to_string(v[j]) + ", allowed: finite numbers");
+      throw std::invalid_argument("controller: velocity of joint '" +
+                                  arm.robot().coordinate_names()[static_cast<std::size_t>(j)] + "' is " + std::to_string(v[j]) +
+                                  ", allowed: finite numbers");
     }
   }
   put(VelocityOrder{v});
@@ -202,7 +203,8 @@ bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
     const double norm = near.gradients.col(k).norm();
     // Obstacles that come nearer are given way to.
     const double comes = std::min(0.0, near.rates[k] - near.gradients.col(k).dot(workspace.state().v()));
-    const double least = -comes - clearance_rate * std::max(0.0, near.values[k] - std::min(near.margins[k], settings.safety.margin));
+    const double least =
+        -comes - clearance_rate * std::max(0.0, near.values[k] - std::min(near.margins[k], settings.safety.margin));
     const double excess = norm > 0.0 ? (least - near.gradients.col(k).dot(wanted_v_)) / norm : 0.0;
     if (excess > worst) {
       worst = excess;

@@ -14,27 +14,29 @@ namespace {
 
 constexpr double shortest_station = 0.005;  // [s] between rates
 constexpr double most_stations = 20000.0;
-constexpr double standing = 1e-9;           // [rad/s | m/s]
+constexpr double standing = 1e-9;  // [rad/s | m/s]
 
 void refuse_trajectory(const std::string& what) { throw std::invalid_argument("controller: trajectory: " + what); }
 
 void check_samples(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::VectorXd& times) {
   const int nv = robot.num_coordinates();
   if (times.size() == 0 || q.rows() != nv || q.cols() != times.size()) {
-    refuse_trajectory(std::to_string(q.cols()) + " samples of " + std::to_string(q.rows()) + " joints at " + std::to_string(times.size()) +
-           " times; needed are as many samples as times, at least one, of " + std::to_string(nv) + " joints");
+    refuse_trajectory(std::to_string(q.cols()) + " samples of " + std::to_string(q.rows()) + " joints at " +
+                      std::to_string(times.size()) + " times; needed are as many samples as times, at least one, of " +
+                      std::to_string(nv) + " joints");
   }
   for (Eigen::Index k = 0; k < times.size(); ++k) {
     const double least = k == 0 ? 0.0 : times[k - 1];
     if (!std::isfinite(times[k]) || (k == 0 ? times[k] < 0.0 : times[k] <= least)) {
-      refuse_trajectory("time " + std::to_string(k) + " is " + std::to_string(times[k]) + " s, allowed: " +
-             (k == 0 ? "0 or more" : "more than the one before, " + std::to_string(least)));
+      refuse_trajectory("time " + std::to_string(k) + " is " + std::to_string(times[k]) +
+                        " s, allowed: " + (k == 0 ? "0 or more" : "more than the one before, " + std::to_string(least)));
     }
     for (int j = 0; j < nv; ++j) {
       const double lower = robot.limits().lower[j], upper = robot.limits().upper[j];
       if (!(q(j, k) >= lower - JointLimits::rounding && q(j, k) <= upper + JointLimits::rounding && std::isfinite(q(j, k)))) {
-        refuse_trajectory("joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] + "' of sample " + std::to_string(k) + " is " +
-               std::to_string(q(j, k)) + ", allowed: " + std::to_string(lower) + " to " + std::to_string(upper));
+        refuse_trajectory("joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] + "' of sample " +
+                          std::to_string(k) + " is " + std::to_string(q(j, k)) + ", allowed: " + std::to_string(lower) +
+                          " to " + std::to_string(upper));
       }
     }
   }
@@ -52,7 +54,8 @@ JointTrajectory::JointTrajectory(const Robot& robot, const Eigen::MatrixXd& q, c
   times_ = Eigen::VectorXd::Zero(begin + num);
   times_.tail(num) = times;
   q_ = Eigen::MatrixXd::Zero(q.rows(), begin + num);
-  q_.rightCols(num) = q.array().max(robot.limits().lower.replicate(1, num).array()).min(robot.limits().upper.replicate(1, num).array());
+  q_.rightCols(num) =
+      q.array().max(robot.limits().lower.replicate(1, num).array()).min(robot.limits().upper.replicate(1, num).array());
   v_ = Eigen::MatrixXd::Zero(q.rows(), begin + num);
   const auto slope = [&](Eigen::Index k) { return Eigen::VectorXd((q_.col(k + 1) - q_.col(k)) / (times_[k + 1] - times_[k])); };
   const auto span = [&](Eigen::Index k) { return times_[k + 1] - times_[k]; };
@@ -101,8 +104,11 @@ void JointTrajectory::sample(double s, Eigen::VectorXd& q, Eigen::VectorXd& v, E
   const double h = times_[k + 1] - times_[k], u = (s - times_[k]) / h;
   const double b = u * u * (3.0 - 2.0 * u);  // share of the second sample
   q = (1.0 - b) * q_.col(k) + b * q_.col(k + 1) + h * u * (1.0 - u) * ((1.0 - u) * v_.col(k) - u * v_.col(k + 1));
-  v = 6.0 * u * (1.0 - u) / h * (q_.col(k + 1) - q_.col(k)) + (1.0 - u) * (1.0 - 3.0 * u) * v_.col(k) - u * (2.0 - 3.0 * u) * v_.col(k + 1);
-  a = (6.0 * (1.0 - 2.0 * u) / h * (q_.col(k + 1) - q_.col(k)) - (4.0 - 6.0 * u) * v_.col(k) - (2.0 - 6.0 * u) * v_.col(k + 1)) / h;
+  v = 6.0 * u * (1.0 - u) / h * (q_.col(k + 1) - q_.col(k)) + (1.0 - u) * (1.0 - 3.0 * u) * v_.col(k) -
+      u * (2.0 - 3.0 * u) * v_.col(k + 1);
+  a = (6.0 * (1.0 - 2.0 * u) / h * (q_.col(k + 1) - q_.col(k)) - (4.0 - 6.0 * u) * v_.col(k) -
+       (2.0 - 6.0 * u) * v_.col(k + 1)) /
+      h;
 }
 
 double JointTrajectory::rate(double s) const noexcept {

@@ -44,8 +44,15 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
     throw std::invalid_argument("integrate: the controller must be synchronous, as its threads keep the machine's time");
   }
   const double period = controller.settings().period;
-  MotionRecord record{Eigen::MatrixXd(steps, nv), Eigen::MatrixXd(steps, nv), Eigen::MatrixXd(steps, nv), {}, {},
-                      Eigen::VectorXd(steps),     Eigen::VectorXd(steps),     q,                          v};
+  MotionRecord record{Eigen::MatrixXd(steps, nv),
+                      Eigen::MatrixXd(steps, nv),
+                      Eigen::MatrixXd(steps, nv),
+                      {},
+                      {},
+                      Eigen::VectorXd(steps),
+                      Eigen::VectorXd(steps),
+                      q,
+                      v};
   const Robot robot = controller.arm().robot();
   const std::vector<bool> unlimited = unlimited_joints(robot);
   std::vector<bool> slides(unlimited.size());
@@ -56,7 +63,8 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
     double largest = 0.0;
     for (Eigen::Index j = 0; j < nv; ++j) {
       const double error = at[j] - goal[j];
-      const double way = std::abs(unlimited[static_cast<std::size_t>(j)] ? std::remainder(error, 2.0 * std::numbers::pi) : error);
+      const double way =
+          std::abs(unlimited[static_cast<std::size_t>(j)] ? std::remainder(error, 2.0 * std::numbers::pi) : error);
       largest = std::max(largest, slides[static_cast<std::size_t>(j)] ? way / sliding_tolerance : way);
     }
     return largest;
@@ -92,8 +100,8 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
 }
 
 std::vector<MotionRecord> integrate_batch(const std::vector<Controller*>& controllers, const Eigen::MatrixXd& q,
-                                          const Eigen::MatrixXd& v, int steps, const Eigen::MatrixXd& goals,
-                                          double tolerance, int threads, const Interrupted& interrupted) {
+                                          const Eigen::MatrixXd& v, int steps, const Eigen::MatrixXd& goals, double tolerance,
+                                          int threads, const Interrupted& interrupted) {
   const auto num = static_cast<Eigen::Index>(controllers.size());
   for (const Eigen::MatrixXd* rows : {&q, &v, &goals}) {
     if (rows->rows() != num && !(rows == &goals && goals.size() == 0)) {
@@ -108,7 +116,8 @@ std::vector<MotionRecord> integrate_batch(const std::vector<Controller*>& contro
   const double row = (3.0 * static_cast<double>(q.cols()) + 2.0) * sizeof(double) + sizeof(SafetyStatus) + sizeof(Activity);
   if (const Eigen::Index most = most_rows(row, num); steps > most) {
     throw std::invalid_argument("integrate_batch: steps is " + std::to_string(steps) + ", must be at most " +
-                                std::to_string(most) + " for " + std::to_string(num) + " motions: their records may have 8 GiB");
+                                std::to_string(most) + " for " + std::to_string(num) +
+                                " motions: their records may have 8 GiB");
   }
   std::deque<Controller::Use> uses;
   for (Controller* const controller : controllers) {

@@ -14,18 +14,19 @@
 namespace sidestep {
 namespace {
 
-constexpr int iterations = 50;         // from a configuration nearby about ten are enough
-constexpr int most_fruitless = 8;      // iterations in a row that come no nearer: out of reach from here
-constexpr double progress = 0.99;      // of the error: less is no progress
+constexpr int iterations = 50;            // from a configuration nearby about ten are enough
+constexpr int most_fruitless = 8;         // iterations in a row that come no nearer: out of reach from here
+constexpr double progress = 0.99;         // of the error: less is no progress
 constexpr double largest_damping = 0.03;  // [m | rad] directions in which an arm moves less than this are left alone
-constexpr double largest_step = 0.3;   // [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
-constexpr double accuracy = 1e-7;      // [m] and [rad]: the frame is at the pose
-constexpr double most_room = 0.05;     // of a joint's range
-constexpr double least_room = 0.02;    // [rad | m] barriers keep the arm off the last of the way to a limit
-constexpr double clearly = 0.9;        // of the error of a posture nearby: less is worth a way to quite another one
+constexpr double largest_step = 0.3;      // [rad | m] of any joint: a metre of arm moves 4 cm beside the tangent
+constexpr double accuracy = 1e-7;         // [m] and [rad]: the frame is at the pose
+constexpr double most_room = 0.05;        // of a joint's range
+constexpr double least_room = 0.02;       // [rad | m] barriers keep the arm off the last of the way to a limit
+constexpr double clearly = 0.9;           // of the error of a posture nearby: less is worth a way to quite another one
 
 /// Limits with room to them, and a turn for joints that have none.
-std::pair<Eigen::VectorXd, Eigen::VectorXd> finite_interval(const Robot& robot, const Eigen::VectorXd& near, double limit_room) {
+std::pair<Eigen::VectorXd, Eigen::VectorXd> finite_interval(const Robot& robot, const Eigen::VectorXd& near,
+                                                            double limit_room) {
   Eigen::VectorXd lower = robot.limits().lower, upper = robot.limits().upper;
   for (Eigen::Index j = 0; j < lower.size(); ++j) {
     const double room = std::min(limit_room, most_room * (upper[j] - lower[j]));
@@ -44,7 +45,10 @@ double size_of(const Posture& posture) noexcept {
 class Descent {
  public:
   Descent(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, double limit_room)
-      : robot_(robot), interval_(finite_interval(robot, near, limit_room)), state_(robot), rest_(Eigen::VectorXd::Zero(near.size())) {
+      : robot_(robot),
+        interval_(finite_interval(robot, near, limit_room)),
+        state_(robot),
+        rest_(Eigen::VectorXd::Zero(near.size())) {
     add(goal);
     for (const PoseGoal& other : goal.others) {
       add(other);
@@ -136,8 +140,8 @@ PoseError pose_error(const PoseGoal& goal, const KinematicState& state) noexcept
   return largest;
 }
 
-Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near, const PostureSearchSettings& settings,
-                     const std::function<double(const Eigen::VectorXd&)>& room) {
+Posture find_posture(const Robot& robot, const PoseGoal& goal, const Eigen::VectorXd& near,
+                     const PostureSearchSettings& settings, const std::function<double(const Eigen::VectorXd&)>& room) {
   Descent wide(robot, goal, near, settings.limit_room), narrow(robot, goal, near, std::min(settings.limit_room, least_room));
   std::mt19937_64 random(settings.seed);
   const auto judged = [&](Posture posture) {

@@ -10,8 +10,8 @@
 namespace sidestep {
 namespace {
 
-constexpr double near_moving = 0.1;       // [m] of the arm: near what moves barriers leave no room
-constexpr double moving_foresight = 1.0;  // [s] in which it could be as near
+constexpr double near_moving = 0.1;                  // [m] of the arm: near what moves barriers leave no room
+constexpr double moving_foresight = 1.0;             // [s] in which it could be as near
 constexpr std::uint64_t most_posture_attempts = 12;  // one after the other
 constexpr double posture_pause = 2.0;                // [s] until as many more
 constexpr int periods_late = 1000;                   // a trajectory is moved on by at most so many at once
@@ -93,8 +93,8 @@ void Controller::Impl::choose_reference() noexcept {
       }
     }
     // A posture that no way leads to: another one.
-    const bool fails = guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision ||
-                       (stops_short() && (!guide || rests_));
+    const bool fails = guide_status_ == OnlinePlannerStatus::no_path ||
+                       guide_status_ == OnlinePlannerStatus::goal_in_collision || (stops_short() && (!guide || rests_));
     if (has_target_ && fails && time_ >= next_posture_) {
       if (++posture_attempt_ % most_posture_attempts == 0) {
         next_posture_ = time_ + posture_pause;
@@ -125,7 +125,8 @@ void Controller::Impl::choose_reference() noexcept {
 
 void Controller::Impl::hold_to_path(const Eigen::VectorXd& q, const Eigen::VectorXd& v, JointGoal& reference) const noexcept {
   const double w = settings.inputs.frequency, K = settings.barriers.stiffness, D = settings.barriers.damping;
-  reference.acceleration += std::max(0.0, w * w - K) * (reference.position - q) + std::max(0.0, 2.0 * w - D) * (reference.velocity - v);
+  reference.acceleration +=
+      std::max(0.0, w * w - K) * (reference.position - q) + std::max(0.0, 2.0 * w - D) * (reference.velocity - v);
 }
 
 void Controller::Impl::write_places(Eigen::MatrixXd& places, Eigen::Index& num) const noexcept {

@@ -12,7 +12,7 @@ namespace {
 // What comes is taken to come no faster [m/s], whatever a new scene seems to say: the speed of walking of ISO 13855.
 constexpr double walking = 1.6;
 // In which the pace along a path is slowed: as rows slow the arm, the reference would run ahead, and corners be cut.
-constexpr double foresight = 0.1;   // [s]
+constexpr double foresight = 0.1;  // [s]
 constexpr double of_limit = 0.95;  // below that of the rows
 
 }  // namespace
@@ -58,8 +58,8 @@ std::string Controller::Impl::explain_speed() const {
     std::snprintf(away, sizeof away, ", %.2f m from ", command.distance);
   }
   const std::string& frame = arm.robot().frames()[static_cast<std::size_t>(solution.speed_frame)].name;
-  return (solution.speed_slack > 0.0 ? "faster than the speed limit, which gives way: '" : "slowed by the speed limit: '") + frame +
-         "' may move at " + limit + (away[0] == '\0' ? "" : away + obstacles().words_for(nearest_point_)) + "; ";
+  return (solution.speed_slack > 0.0 ? "faster than the speed limit, which gives way: '" : "slowed by the speed limit: '") +
+         frame + "' may move at " + limit + (away[0] == '\0' ? "" : away + obstacles().words_for(nearest_point_)) + "; ";
 }
 
 }  // namespace sidestep

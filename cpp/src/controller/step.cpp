@@ -161,8 +161,8 @@ void Controller::Impl::report(bool known) noexcept {
   if (apart_) {
     take_nearest(arm_workspace_.clearances);
   }
-  if (command.coordinate >= 0 && system->labels()[static_cast<std::size_t>(command.coordinate)].kind ==
-                                     CoordinateLabel::Kind::obstacle) {
+  if (command.coordinate >= 0 &&
+      system->labels()[static_cast<std::size_t>(command.coordinate)].kind == CoordinateLabel::Kind::obstacle) {
     command.point = nearest->nearest[command.coordinate];
   }
   switch (command.program) {
@@ -242,8 +242,8 @@ Activity Controller::Impl::judge_activity() noexcept {
     rests_ = rests_ && std::abs(arm_v_[j]) < share * settings.arrival.speed;
   }
   const bool out_of_reach = !posture_found_;
-  const bool no_way = guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision ||
-                      stops_short();
+  const bool no_way =
+      guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision || stops_short();
   return rests_ && (no_way || out_of_reach) ? Activity::blocked : Activity::moving;
 }
 

@@ -18,40 +18,41 @@ namespace sidestep {
 struct StepState {
   explicit StepState(const Robot& robot);
 
-  Eigen::VectorXd q_, v_, a_, wanted_;          // the reference: now, and its acceleration in the last period or this one
-  Eigen::VectorXd smooth_a_;                    // from which jerk goes on
-  Eigen::VectorXd next_q_, next_v_;             // after this period
+  Eigen::VectorXd q_, v_, a_, wanted_;  // the reference: now, and its acceleration in the last period or this one
+  Eigen::VectorXd smooth_a_;            // from which jerk goes on
+  Eigen::VectorXd next_q_, next_v_;     // after this period
   Eigen::VectorXd arm_q_, arm_v_, last_arm_q_, last_arm_v_, turns_;  // measured
-  bool apart_ = false;                          // the arm is not exactly where the reference is
+  bool apart_ = false;                                               // the arm is not exactly where the reference is
   bool has_last_torque_ = false;
-  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, expected_v_, last_measured_v_, coupling_, feedback_, gravity_, gravity_change_;
+  Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, expected_v_, last_measured_v_, coupling_, feedback_,
+      gravity_, gravity_change_;
   Eigen::MatrixXd model_mass_;
   Eigen::VectorXd model_bias_;
   std::optional<DisturbanceObserver> observer_;
-  double frequency_ = 0.0;                      // of the feedback [1/s]
+  double frequency_ = 0.0;  // of the feedback [1/s]
   Eigen::MatrixXd mass_, mass_cholesky_;
   Eigen::VectorXd bias_;
   double time_ = 0.0, next_look_ = 0.0, next_posture_ = 0.0, obstacle_age_ = 0.0;
   bool begins_goal_ = false, wakes_worker_ = false;
   bool known_before_ = false, disturbed_ = false, target_blocked_ = false;
-  bool rests_ = false;            // short of a goal that it was on the way to
+  bool rests_ = false;  // short of a goal that it was on the way to
   std::uint64_t goal_number_ = 0, obstacle_number_ = 0, posture_attempt_ = 0, tick_ = 0;
   bool has_target_ = false, posture_found_ = false, moves_ = false;
-  Eigen::VectorXd target_;        // a configuration that the arm is led to
-  Goal reference_;                // JointGoal
-  Goal avoidance_goal_;           // JointGoal: the target of the trajectory
+  Eigen::VectorXd target_;  // a configuration that the arm is led to
+  Goal reference_;          // JointGoal
+  Goal avoidance_goal_;     // JointGoal: the target of the trajectory
   // Of velocities, twists and trajectories.
-  Goal input_goal_;               // JointGoal: where and how the arm is to move now
-  Goal input_pull_;               // JointGoal whose pull is the acceleration that is wanted for that
+  Goal input_goal_;  // JointGoal: where and how the arm is to move now
+  Goal input_pull_;  // JointGoal whose pull is the acceleration that is wanted for that
   bool pulls_ = false, begins_input_ = false, waits_ = false;
-  double order_age_ = 0.0;        // [s]
+  double order_age_ = 0.0;  // [s]
   Eigen::VectorXd wanted_v_, last_wanted_v_, pulled_;
   bool has_last_wanted_v_ = false;
   struct Clock {
-    double time = 0.0, rate = 0.0, change = 0.0;   // s [s], ds/dt, d²s/dt² [1/s]
-    double free = 0.0, seen = -1.0;                // the path is free up to there; it is looked at there
-    double delay = 0.0;                            // behind time, at the end the last [s]
-    double room = 0.0;                             // clearance that is asked for [m]
+    double time = 0.0, rate = 0.0, change = 0.0;  // s [s], ds/dt, d²s/dt² [1/s]
+    double free = 0.0, seen = -1.0;               // the path is free up to there; it is looked at there
+    double delay = 0.0;                           // behind time, at the end the last [s]
+    double room = 0.0;                            // clearance that is asked for [m]
     bool blocked = false;
     BodyClearance::Nearest blocker{};
   } clock_;

@@ -11,14 +11,14 @@
 namespace sidestep {
 namespace {
 
-constexpr double close = 0.003;        // to the reference [rad | m]: feedback keeps the acceleration limits
+constexpr double close = 0.003;         // to the reference [rad | m]: feedback keeps the acceleration limits
 constexpr double feedback_room = 20.0;  // of accelerations elsewhere: dry friction on a light wrist takes so much
 constexpr double impedance_room = 1e3;  // of accelerations that an impedance asks for: of light joints, and by impacts
 constexpr double like_reference = 0.1;  // of the acceleration limits, by which feedback may differ [-]
-constexpr double jitter = 0.1;         // of measured velocities, at rest [rad/s | m/s]
+constexpr double jitter = 0.1;          // of measured velocities, at rest [rad/s | m/s]
 constexpr double of_rate = 0.5;         // of the torque's rate, that feedback asks for [-]
-constexpr double free_share = 0.2;     // of the largest error, from which the arm draws the reference to itself [-]
-constexpr double sliding_share = 0.2;  // of the largest error, of joints that slide [m/rad]
+constexpr double free_share = 0.2;      // of the largest error, from which the arm draws the reference to itself [-]
+constexpr double sliding_share = 0.2;   // of the largest error, of joints that slide [m/rad]
 
 }  // namespace
 
@@ -107,7 +107,8 @@ void Controller::Impl::take_dynamics(const KinematicState& state, const Eigen::R
                                      const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
   // Without inertias of its own, an arm has to be told them in every step.
   if (mass_matrix != nullptr) {
-    const bool fits = mass_matrix->rows() == mass_.rows() && mass_matrix->cols() == mass_.cols() && bias->size() == bias_.size();
+    const bool fits =
+        mass_matrix->rows() == mass_.rows() && mass_matrix->cols() == mass_.cols() && bias->size() == bias_.size();
     if (fits) {
       mass_ = *mass_matrix;
       bias_ = *bias;
@@ -128,10 +129,14 @@ void Controller::Impl::take_dynamics(const KinematicState& state, const Eigen::R
   }
 }
 
-LastCommand Controller::Impl::last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque,
-                                           double factor, bool binds) const noexcept {
-  return {acceleration, has_last_torque_ ? of_torque : nullptr, dynamics_ ? &gravity_ : nullptr,
-          dynamics_ ? &gravity_change_ : nullptr, factor, binds};
+LastCommand Controller::Impl::last_command(const Eigen::VectorXd* acceleration, const Eigen::VectorXd* of_torque, double factor,
+                                           bool binds) const noexcept {
+  return {acceleration,
+          has_last_torque_ ? of_torque : nullptr,
+          dynamics_ ? &gravity_ : nullptr,
+          dynamics_ ? &gravity_change_ : nullptr,
+          factor,
+          binds};
 }
 
 void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
@@ -162,7 +167,8 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
     // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
     const bool told = mass_matrix != nullptr && (!apart_ || !dynamics_);
     take_dynamics(workspace.state(), told ? mass_matrix : nullptr, told ? bias : nullptr);
-    command.program = torque_program_->solve(q_, v_, wanted_, mass_, bias_, &workspace.clearances, second, last, solution, speed);
+    command.program =
+        torque_program_->solve(q_, v_, wanted_, mass_, bias_, &workspace.clearances, second, last, solution, speed);
     reference_torque_ = solution.torque;
   } else {
     command.program = filter_->apply(q_, v_, wanted_, &workspace.clearances, second, last, solution, speed);
@@ -187,7 +193,8 @@ double Controller::Impl::feedback_frequency() noexcept {
   return w;
 }
 
-void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
+void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
+                             const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
   if (!apart_ || drives_track_) {
     tracked_.torque = solution.torque;
     tracked_.acceleration = solution.acceleration;

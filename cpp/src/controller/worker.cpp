@@ -113,12 +113,13 @@ Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::Vect
   search.another = attempt > 0;
   search.limit_room = settings.position_margin + settings.barriers.limit_activation;
   bool free_of_itself = false;
-  Posture posture = find_posture(arm.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
-    free_of_itself = free_of_itself || body_.nearest(q, Obstacles::none(), 0.0, posture_room_).clearance >= 0.0;
-    return ends_->obstructed(q, around, obstruction)
-               ? -infinity
-               : std::max(0.0, body_.nearest(q, around, 2.0 * search.room, posture_room_).clearance);
-  });
+  Posture posture =
+      find_posture(arm.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
+        free_of_itself = free_of_itself || body_.nearest(q, Obstacles::none(), 0.0, posture_room_).clearance >= 0.0;
+        return ends_->obstructed(q, around, obstruction)
+                   ? -infinity
+                   : std::max(0.0, body_.nearest(q, around, 2.0 * search.room, posture_room_).clearance);
+      });
   posture.touches_itself = posture.found() && !free_of_itself;
   const std::lock_guard lock(mutex_);
   if (goal_count_ == goal_number) {

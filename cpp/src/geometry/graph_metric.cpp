@@ -9,9 +9,7 @@
 namespace sidestep {
 namespace {
 
-kernels::AddGram add_gram() noexcept {
-  return SIDESTEP_KERNEL_IN_USE(kernels::add_gram);
-}
+kernels::AddGram add_gram() noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::add_gram); }
 
 }  // namespace
 
@@ -112,8 +110,7 @@ Eigen::VectorXd geodesic_acceleration(const Eigen::MatrixXd& jacobian, const Eig
 std::vector<Eigen::MatrixXd> christoffel_symbols(const Eigen::MatrixXd& jacobian,
                                                  const std::vector<Eigen::MatrixXd>& hessians) {
   const Eigen::Index nv = jacobian.cols();
-  const Eigen::MatrixXd inverse =
-      (Eigen::MatrixXd::Identity(nv, nv) + jacobian.transpose() * jacobian).inverse();
+  const Eigen::MatrixXd inverse = (Eigen::MatrixXd::Identity(nv, nv) + jacobian.transpose() * jacobian).inverse();
   std::vector<Eigen::MatrixXd> derivative(static_cast<std::size_t>(nv), Eigen::MatrixXd::Zero(nv, nv));  // ∂_k G
   for (Eigen::Index k = 0; k < nv; ++k) {
     for (std::size_t a = 0; a < hessians.size(); ++a) {
@@ -122,9 +119,7 @@ std::vector<Eigen::MatrixXd> christoffel_symbols(const Eigen::MatrixXd& jacobian
       derivative[static_cast<std::size_t>(k)] += H.transpose() * J + J.transpose() * H;
     }
   }
-  const auto d = [&](Eigen::Index k, Eigen::Index i, Eigen::Index j) {
-    return derivative[static_cast<std::size_t>(k)](i, j);
-  };
+  const auto d = [&](Eigen::Index k, Eigen::Index i, Eigen::Index j) { return derivative[static_cast<std::size_t>(k)](i, j); };
   std::vector<Eigen::MatrixXd> symbols(static_cast<std::size_t>(nv), Eigen::MatrixXd::Zero(nv, nv));
   for (Eigen::Index k = 0; k < nv; ++k) {
     for (Eigen::Index i = 0; i < nv; ++i) {

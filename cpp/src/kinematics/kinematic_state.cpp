@@ -47,8 +47,7 @@ KinematicState::KinematicState(const Robot& robot)
   update(robot, zero, zero);
 }
 
-void KinematicState::update(const Robot& robot, ConstVectorRef q,
-                            ConstVectorRef v) noexcept {
+void KinematicState::update(const Robot& robot, ConstVectorRef q, ConstVectorRef v) noexcept {
   with_size(robot.num_coordinates(), [&](auto nv) {
     sized(q_, nv) = sized(q, nv);
     sized(v_, nv) = sized(v, nv);

@@ -12,9 +12,7 @@ namespace {
 
 constexpr long rounds = 10'000;  // of a run: some hundred microseconds
 
-int multiply_add(double& result) noexcept {
-  return SIDESTEP_KERNEL_IN_USE(kernels::multiply_add)(rounds, result);
-}
+int multiply_add(double& result) noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::multiply_add)(rounds, result); }
 
 }  // namespace
 

@@ -14,8 +14,8 @@ constexpr double orthonormality_tolerance = 1e-9;  // the same for a rotation ma
 
 void check_placement(const Eigen::Isometry3d& X, const std::string& owner) {
   const Eigen::Matrix3d R = X.linear();
-  if (!X.matrix().allFinite() ||
-      !(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), orthonormality_tolerance) || R.determinant() < 0.0) {
+  if (!X.matrix().allFinite() || !(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), orthonormality_tolerance) ||
+      R.determinant() < 0.0) {
     throw std::invalid_argument(owner + ": placement is not a rigid transform with finite entries");
   }
 }
@@ -62,9 +62,9 @@ std::uint64_t hash_of(const std::vector<Joint>& joints, const std::vector<std::s
   }
   for (const Joint& joint : joints) {
     hash.add(joint.name);
-    for (const double number : {static_cast<double>(joint.type), static_cast<double>(joint.parent),
-                                static_cast<double>(joint.coordinate), joint.multiplier, joint.offset, joint.axis[0],
-                                joint.axis[1], joint.axis[2]}) {
+    for (const double number :
+         {static_cast<double>(joint.type), static_cast<double>(joint.parent), static_cast<double>(joint.coordinate),
+          joint.multiplier, joint.offset, joint.axis[0], joint.axis[1], joint.axis[2]}) {
       hash.add(number);
     }
     for (const double number : joint.X_PJ.matrix().reshaped()) {
@@ -82,8 +82,8 @@ JointLimits JointLimits::unlimited(int num) {
   return {-upper, upper, upper, upper, upper, upper, upper};
 }
 
-Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> frames,
-             std::vector<std::string> coordinate_names, JointLimits limits)
+Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> frames, std::vector<std::string> coordinate_names,
+             JointLimits limits)
     : name_(std::move(name)),
       joints_(std::move(joints)),
       frames_(std::move(frames)),
@@ -99,8 +99,7 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
     const std::string owner = "joint '" + joint.name + "'";
     if (joint.parent < -1 || joint.parent >= i) {
       throw std::invalid_argument(owner + ": parent index " + std::to_string(joint.parent) +
-                                  " must be -1 (base) or that of an earlier joint (joint index " + std::to_string(i) +
-                                  ")");
+                                  " must be -1 (base) or that of an earlier joint (joint index " + std::to_string(i) + ")");
     }
     if (joint.coordinate < 0 || joint.coordinate >= nv) {
       throw std::invalid_argument(owner + ": coordinate " + std::to_string(joint.coordinate) + " is outside 0.." +
@@ -143,8 +142,8 @@ Robot::Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> fra
   }
   for (int i = 0; i < nv; ++i) {
     if (!(limits_.lower[i] < limits_.upper[i])) {
-      throw std::invalid_argument("position limits of '" + coordinate_names_[static_cast<std::size_t>(i)] +
-                                  "': lower " + std::to_string(limits_.lower[i]) + " must be below upper " +
+      throw std::invalid_argument("position limits of '" + coordinate_names_[static_cast<std::size_t>(i)] + "': lower " +
+                                  std::to_string(limits_.lower[i]) + " must be below upper " +
                                   std::to_string(limits_.upper[i]));
     }
   }

@@ -13,7 +13,8 @@ constexpr double stiffness = 10.0;                // ω [1/s]
 
 }  // namespace
 
-AvoidanceTrajectory::AvoidanceTrajectory(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Eigen::VectorXd target)
+AvoidanceTrajectory::AvoidanceTrajectory(const JointLimits& limits, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                         Eigen::VectorXd target)
     : fastest_(share_of_limits * limits.velocity),
       hardest_(share_of_limits * limits.acceleration.unaryExpr(
                                      [](double limit) { return std::isfinite(limit) ? limit : unlimited_acceleration; })),
@@ -27,7 +28,8 @@ Eigen::VectorXd AvoidanceTrajectory::acceleration(ConstVectorRef q, ConstVectorR
   return a;
 }
 
-void AvoidanceTrajectory::acceleration(ConstVectorRef q, ConstVectorRef v, double period, Eigen::Ref<Eigen::VectorXd> out) const noexcept {
+void AvoidanceTrajectory::acceleration(ConstVectorRef q, ConstVectorRef v, double period,
+                                       Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   for (Eigen::Index j = 0; j < out.size(); ++j) {
     out[j] = stiffness * stiffness * (position_[j] - q[j]) + 2.0 * stiffness * (velocity_[j] - v[j]) +
              reference_acceleration(j, period);

@@ -25,7 +25,7 @@ constexpr double touched = -0.02;
 constexpr std::size_t enough_references = 10;  // that go far: the others are sorted out only while there are more
 // coarse motions in one look: so many to the horizon, more if they end before
 constexpr int coarse_horizons = 25;
-constexpr std::size_t num_fine = 4;            // fine ones of trajectories, at most
+constexpr std::size_t num_fine = 4;  // fine ones of trajectories, at most
 
 const GeometricSystem& checked(const std::shared_ptr<const GeometricSystem>& system) {
   if (system == nullptr) {
@@ -115,8 +115,8 @@ LookAhead::LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSet
 }
 
 std::optional<AvoidanceTrajectory> LookAhead::look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                                    const Obstacles& obstacles, const std::optional<AvoidanceTrajectory>& followed,
-                                    const Leader& leader) {
+                                                   const Obstacles& obstacles,
+                                                   const std::optional<AvoidanceTrajectory>& followed, const Leader& leader) {
   const auto usable = [this](const Eigen::VectorXd& x) { return x.size() == num_coordinates() && x.allFinite(); };
   if (!obstacles.tree().moves() || !usable(q) || !usable(v)) {
     return std::nullopt;
@@ -161,7 +161,7 @@ std::optional<AvoidanceTrajectory> LookAhead::look(const Goal& goal, const Eigen
 }
 
 const AvoidanceTrajectory* LookAhead::pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                              const Obstacles& obstacles, double period, const Leader& leader) {
+                                             const Obstacles& obstacles, double period, const Leader& leader) {
   // Less than half a period too early, so that sums of periods may be rounded. Written so that a period that is not a
   // number makes it look.
   if (is_due(period)) {
@@ -243,7 +243,8 @@ double LookAhead::least_clearance(Motion motion, Stepper& stepper, double enough
   return least;
 }
 
-std::vector<AvoidanceTrajectory> LookAhead::draw_flights(const Motion& now, const std::optional<AvoidanceTrajectory>& followed) {
+std::vector<AvoidanceTrajectory> LookAhead::draw_flights(const Motion& now,
+                                                         const std::optional<AvoidanceTrajectory>& followed) {
   struct Reference {
     AvoidanceTrajectory flight, moved;
     int free = 0;  // steps
@@ -253,8 +254,7 @@ std::vector<AvoidanceTrajectory> LookAhead::draw_flights(const Motion& now, cons
   for (int number = 0; number < settings_.tries; ++number) {
     check_interrupted();
     const double spread = spreads[static_cast<std::size_t>(number / 2) % spreads.size()];
-    Eigen::VectorXd target =
-        number % 2 == 1 && followed ? draw(followed->target(), spread_of_followed) : draw(now.q, spread);
+    Eigen::VectorXd target = number % 2 == 1 && followed ? draw(followed->target(), spread_of_followed) : draw(now.q, spread);
     const AvoidanceTrajectory flight(system_->robot().limits(), now.q, now.v, std::move(target));
     references.push_back({flight, flight});
   }

@@ -70,8 +70,7 @@ Arm::Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<Cleara
          std::vector<Inertial> inertials, ArmDetails details) {
   auto content = std::make_shared<Content>(Content{std::move(robot), std::move(body), std::move(pairs), std::move(tables),
                                                    std::move(inertials), std::move(details), ""});
-  const ArmParts parts{content->robot,  content->body,      content->pairs,
-                       content->tables, content->inertials, content->details};
+  const ArmParts parts{content->robot, content->body, content->pairs, content->tables, content->inertials, content->details};
   check(parts);
   content->hash = hexadecimal(sha256(encode_content(parts)));
   content_ = std::move(content);

@@ -203,8 +203,8 @@ void write_robot(Writer& out, const Robot& robot) {
     out.text(name);
   }
   const JointLimits& limits = robot.limits();
-  for (const auto* limit : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.effort,
-                            &limits.jerk, &limits.effort_rate}) {
+  for (const auto* limit : {&limits.lower, &limits.upper, &limits.velocity, &limits.acceleration, &limits.effort, &limits.jerk,
+                            &limits.effort_rate}) {
     out.numbers(*limit);
   }
 }
@@ -296,8 +296,8 @@ void write_proof(Writer& out, const std::vector<CoverProof>& proof) {
   for (const CoverProof& link : proof) {
     out.text(link.link);
     out.text(link.volume_of);
-    for (const double value : {link.coverage, link.mean_overshoot, link.max_overshoot, link.volume_ratio,
-                               link.interior_coverage, link.slimness}) {
+    for (const double value :
+         {link.coverage, link.mean_overshoot, link.max_overshoot, link.volume_ratio, link.interior_coverage, link.slimness}) {
       out.number(value);
     }
   }
@@ -468,19 +468,19 @@ std::vector<std::byte> encode_arm(const ArmParts& parts) {
 
 Arm decode_arm(std::span<const std::byte> file) {
   Reader header(file.first(std::min(file.size(), header_size)));
-  const bool starts_well = file.size() >= magic.size() &&
-                           std::equal(magic.begin(), magic.end(), file.begin(),
-                                      [](char c, std::byte b) { return static_cast<std::byte>(c) == b; });
+  const bool starts_well =
+      file.size() >= magic.size() &&
+      std::equal(magic.begin(), magic.end(), file.begin(), [](char c, std::byte b) { return static_cast<std::byte>(c) == b; });
   if (!starts_well) {
     throw std::invalid_argument(std::string("it is not an arm file") + advice);
   }
   header.raw(magic.size());
   const auto found = header.integer<std::uint32_t>();
   if (found < oldest_version || found > version) {
-    throw std::invalid_argument("it has format version " + std::to_string(found) + ", this Sidestep reads versions " +
-                                std::to_string(oldest_version) + " to " + std::to_string(version) +
-                                (found > version ? "; install a newer Sidestep, or prepare the arm again with this one"
-                                                 : advice));
+    throw std::invalid_argument(
+        "it has format version " + std::to_string(found) + ", this Sidestep reads versions " + std::to_string(oldest_version) +
+        " to " + std::to_string(version) +
+        (found > version ? "; install a newer Sidestep, or prepare the arm again with this one" : advice));
   }
   const auto size = header.integer<std::uint64_t>();
   const auto hash = header.raw(32);
@@ -509,8 +509,7 @@ Arm decode_arm(std::span<const std::byte> file) {
     return from;
   });
   in.expect_end("the payload");
-  return Arm(std::move(robot), std::move(body), std::move(pairs), std::move(tables), std::move(inertials),
-             std::move(details));
+  return Arm(std::move(robot), std::move(body), std::move(pairs), std::move(tables), std::move(inertials), std::move(details));
 }
 
 Arm Arm::load(const std::filesystem::path& path) {
@@ -540,8 +539,8 @@ Arm Arm::load(const std::filesystem::path& path) {
 
 void Arm::save(const std::filesystem::path& path) const {
   const Content& content = *content_;
-  const std::vector<std::byte> bytes = encode_arm(
-      {content.robot, content.body, content.pairs, content.tables, content.inertials, content.details});
+  const std::vector<std::byte> bytes =
+      encode_arm({content.robot, content.body, content.pairs, content.tables, content.inertials, content.details});
   TemporaryFile temporary(path);
   errno = 0;
   if (!temporary.write(bytes)) {

@@ -35,7 +35,8 @@ Body with_cover(const Arm& arm, const Attachment& object) {
     const Eigen::Matrix3d& shape = object.cover.shapes[i];
     if (!shape.allFinite() || !object.cover.centres[i].allFinite() ||
         !(Eigen::JacobiSVD<Eigen::Matrix3d>(shape).singularValues()[2] > thinnest)) {
-      refuse(object, "ellipsoid " + std::to_string(k) + " must be finite, with semi-axes longer than " + std::to_string(thinnest) + " m");
+      refuse(object, "ellipsoid " + std::to_string(k) + " must be finite, with semi-axes longer than " +
+                         std::to_string(thinnest) + " m");
     }
     links.push_back(object.name);
     covariances.push_back(shape * shape.transpose() / solid_level);
@@ -76,14 +77,16 @@ Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q) {
     refuse(object, "no joint moves link '" + object.link + "'");
   }
   const Eigen::Matrix3d R = object.X_LA.linear();
-  if (!object.X_LA.matrix().allFinite() || !(R * R.transpose()).isApprox(Eigen::Matrix3d::Identity(), 1e-6) || R.determinant() < 0.0) {
+  if (!object.X_LA.matrix().allFinite() || !(R * R.transpose()).isApprox(Eigen::Matrix3d::Identity(), 1e-6) ||
+      R.determinant() < 0.0) {
     refuse(object, "the pose must be finite, a rotation and a position");
   }
   if (object.cover.size() == 0) {
     refuse(object, "it has no ellipsoid: nothing would keep it off obstacles");
   }
   if (q.size() != 0 && (q.size() != robot.num_coordinates() || !q.allFinite())) {
-    refuse(object, "q has " + std::to_string(q.size()) + " entries, needed are " + std::to_string(robot.num_coordinates()) + " finite ones");
+    refuse(object, "q has " + std::to_string(q.size()) + " entries, needed are " + std::to_string(robot.num_coordinates()) +
+                       " finite ones");
   }
   object.inertial.validate("attach '" + object.name + "'");
   for (const std::string& name : object.may_touch) {

@@ -37,8 +37,8 @@ void Inertial::validate(const std::string& owner) const {
 
 std::vector<Inertial> fold_inertials(const Robot& robot, const std::vector<Inertial>& links) {
   if (links.size() != robot.frames().size()) {
-    throw std::invalid_argument("robot '" + robot.name() + "' has " + std::to_string(robot.frames().size()) +
-                                " links and " + std::to_string(links.size()) + " inertias; give one each");
+    throw std::invalid_argument("robot '" + robot.name() + "' has " + std::to_string(robot.frames().size()) + " links and " +
+                                std::to_string(links.size()) + " inertias; give one each");
   }
   std::vector<Inertial> folded(static_cast<std::size_t>(robot.num_joints()));
   for (std::size_t i = 0; i < links.size(); ++i) {
@@ -58,8 +58,7 @@ std::vector<Inertial> fold_inertials(const Robot& robot, const std::vector<Inert
     if (frame.joint >= 0) {
       Inertial& body = folded[static_cast<std::size_t>(frame.joint)];
       const Eigen::Matrix3d R = frame.X_JF.linear();
-      body.inertia += R * links[i].inertia * R.transpose() +
-                      point_inertia(links[i].mass, frame.X_JF * links[i].com - body.com);
+      body.inertia += R * links[i].inertia * R.transpose() + point_inertia(links[i].mass, frame.X_JF * links[i].com - body.com);
     }
   }
   return folded;
@@ -68,8 +67,8 @@ std::vector<Inertial> fold_inertials(const Robot& robot, const std::vector<Inert
 RigidBodyDynamics::RigidBodyDynamics(Robot robot, std::vector<Inertial> inertials, const Eigen::Vector3d& gravity)
     : robot_(std::move(robot)), inertials_(std::move(inertials)), gravity_(gravity) {
   if (inertials_.size() != robot_.joints().size()) {
-    throw std::invalid_argument("robot '" + robot_.name() + "' has " + std::to_string(robot_.num_joints()) +
-                                " joints and " + std::to_string(inertials_.size()) + " inertias; give one each");
+    throw std::invalid_argument("robot '" + robot_.name() + "' has " + std::to_string(robot_.num_joints()) + " joints and " +
+                                std::to_string(inertials_.size()) + " inertias; give one each");
   }
   for (std::size_t i = 0; i < inertials_.size(); ++i) {
     inertials_[i].validate("inertia of joint '" + robot_.joints()[i].name + "'");
@@ -85,8 +84,7 @@ RigidBodyDynamics::Workspace::Workspace(const RigidBodyDynamics& dynamics)
       forces_(dynamics.inertials_.size()),
       rest_(Eigen::VectorXd::Zero(dynamics.robot_.num_coordinates())) {}
 
-void RigidBodyDynamics::mass_matrix(ConstVectorRef q, Workspace& workspace,
-                                    Eigen::Ref<Eigen::MatrixXd> mass) const noexcept {
+void RigidBodyDynamics::mass_matrix(ConstVectorRef q, Workspace& workspace, Eigen::Ref<Eigen::MatrixXd> mass) const noexcept {
   workspace.state_.update(robot_, q, workspace.rest_);
   mass_matrix(workspace.state_, workspace, mass);
 }

@@ -13,7 +13,7 @@ namespace sidestep {
 namespace {
 
 constexpr int most_cuts = 40;         // of one ellipsoid
-constexpr double tolerance = 5e-4;   // [m] of the room
+constexpr double tolerance = 5e-4;    // [m] of the room
 constexpr int halvings = 60;          // of the interval of t
 constexpr int num_directions = 2000;  // in which supports are compared
 
@@ -40,8 +40,8 @@ struct Cut {
   Eigen::Index point = -1;
 };
 
-Cut worst(const Eigen::Vector3d& centre, const Eigen::Matrix3d& A, const Obstacles& obstacles, const std::vector<Eigen::Index>& points,
-          double room) {
+Cut worst(const Eigen::Vector3d& centre, const Eigen::Matrix3d& A, const Obstacles& obstacles,
+          const std::vector<Eigen::Index>& points, double room) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(A * A.transpose());
   const Eigen::Vector3d squares = solver.eigenvalues().cwiseMax(0.0);
   const double extent = std::sqrt(squares[2]);
@@ -62,7 +62,8 @@ Cut worst(const Eigen::Vector3d& centre, const Eigen::Matrix3d& A, const Obstacl
 }
 
 /// How far a support function of one is from that of the other at most [m].
-double largest_difference(const Eigen::Vector3d& c, const Eigen::Matrix3d& A, const Eigen::Vector3d& smaller_c, const Eigen::Matrix3d& smaller_A) {
+double largest_difference(const Eigen::Vector3d& c, const Eigen::Matrix3d& A, const Eigen::Vector3d& smaller_c,
+                          const Eigen::Matrix3d& smaller_A) {
   double largest = 0.0;
   for (int k = 0; k < num_directions; ++k) {
     const double z = 1.0 - (2.0 * k + 1.0) / num_directions, angle = k * std::numbers::pi * (3.0 - std::sqrt(5.0));
@@ -85,13 +86,16 @@ std::string quoted_list(const Obstacles& obstacles) {
 
 std::vector<Eigen::Index> points_of(const Attachment& object, const Obstacles& obstacles) {
   const auto is_named = [&](const std::string& name) {
-    return std::any_of(object.rests_on.begin(), object.rests_on.end(), [&](const std::string& n) { return n == name || n == Attachment::anything; });
+    return std::any_of(object.rests_on.begin(), object.rests_on.end(),
+                       [&](const std::string& n) { return n == name || n == Attachment::anything; });
   };
   const auto groups = obstacles.groups();
   for (const std::string& name : object.rests_on) {
-    if (name != Attachment::anything && std::none_of(groups.begin(), groups.end(), [&](const auto& g) { return g.first == name; })) {
-      throw std::invalid_argument("attach '" + object.name + "': it rests on '" + name + "', which is no obstacle; there are: " +
-                                  quoted_list(obstacles) + "; or \"" + Attachment::anything + "\", for whatever it stands on");
+    if (name != Attachment::anything &&
+        std::none_of(groups.begin(), groups.end(), [&](const auto& g) { return g.first == name; })) {
+      throw std::invalid_argument("attach '" + object.name + "': it rests on '" + name +
+                                  "', which is no obstacle; there are: " + quoted_list(obstacles) + "; or \"" +
+                                  Attachment::anything + "\", for whatever it stands on");
     }
   }
   std::vector<Eigen::Index> points;
@@ -107,7 +111,8 @@ std::vector<Eigen::Index> points_of(const Attachment& object, const Obstacles& o
 
 }  // namespace
 
-RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles, double room) {
+RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles,
+                      double room) {
   const std::vector<Eigen::Index> points = points_of(object, obstacles);
   KinematicState state(robot);
   state.update(robot, q, Eigen::VectorXd::Zero(q.size()));
@@ -131,11 +136,12 @@ RestingObject resting(const Robot& robot, const Attachment& object, const Eigen:
       const double deep = given - room;
       if (!(deep <= deepest_rest) || !(beta > -1.0)) {
         const bool is_known = std::isfinite(given);
-        throw std::invalid_argument("attach '" + object.name + "': its cover is " +
-                                    (is_known ? std::to_string(static_cast<int>(std::ceil(1000.0 * deep))) + " mm" : std::string("too")) + " deep in " +
-                                    obstacles.words_for(cut.point) + ", where it may rest at most " +
-                                    std::to_string(static_cast<int>(1000.0 * deepest_rest)) +
-                                    " mm deep; are its own points, or those of the gripper, among the obstacles?");
+        throw std::invalid_argument(
+            "attach '" + object.name + "': its cover is " +
+            (is_known ? std::to_string(static_cast<int>(std::ceil(1000.0 * deep))) + " mm" : std::string("too")) + " deep in " +
+            obstacles.words_for(cut.point) + ", where it may rest at most " +
+            std::to_string(static_cast<int>(1000.0 * deepest_rest)) +
+            " mm deep; are its own points, or those of the gripper, among the obstacles?");
       }
       const Eigen::Vector3d w = along.normalized();
       const double a = 0.5 * (1.0 + beta), across = std::sqrt(a);

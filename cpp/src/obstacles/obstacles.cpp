@@ -20,8 +20,7 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
   }
   if (radii_.size() != num || velocities_.cols() != num) {
     throw std::invalid_argument("obstacles: " + std::to_string(num) + " points, " + std::to_string(radii_.size()) +
-                                " radii and " + std::to_string(velocities_.cols()) +
-                                " velocities; the numbers must be equal");
+                                " radii and " + std::to_string(velocities_.cols()) + " velocities; the numbers must be equal");
   }
   for (Eigen::Index i = 0; i < num; ++i) {
     const auto owner = [i] { return "obstacles: point " + std::to_string(i); };
@@ -41,8 +40,8 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
 
 Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const {
   if (names.size() != counts.size()) {
-    throw std::invalid_argument("obstacles: " + std::to_string(names.size()) + " names and " +
-                                std::to_string(counts.size()) + " counts; the numbers must be equal");
+    throw std::invalid_argument("obstacles: " + std::to_string(names.size()) + " names and " + std::to_string(counts.size()) +
+                                " counts; the numbers must be equal");
   }
   std::vector<Eigen::Index> ends;
   Eigen::Index total = 0;

@@ -75,7 +75,9 @@ std::vector<int> spatial_order(const Eigen::Matrix3Xd& points) {
   return order;
 }
 
-std::size_t groups(std::size_t count, int of) { return (count + static_cast<std::size_t>(of) - 1) / static_cast<std::size_t>(of); }
+std::size_t groups(std::size_t count, int of) {
+  return (count + static_cast<std::size_t>(of) - 1) / static_cast<std::size_t>(of);
+}
 
 }  // namespace
 
@@ -140,8 +142,8 @@ void PointTree::fit(std::size_t level, int node) noexcept {
   }
   at.radius[n] = at.largest[n] = 0.0;
   for (std::size_t i = begin; i < end; ++i) {
-    const Ball member = leaf ? Ball{columns_[0][i], columns_[1][i], columns_[2][i], columns_[3][i]}
-                             : below.ball(static_cast<int>(i));
+    const Ball member =
+        leaf ? Ball{columns_[0][i], columns_[1][i], columns_[2][i], columns_[3][i]} : below.ball(static_cast<int>(i));
     const Eigen::Vector3d away(member.x - at.centre[0][n], member.y - at.centre[1][n], member.z - at.centre[2][n]);
     at.radius[n] = std::max(at.radius[n], away.norm() + member.radius);
     at.largest[n] = std::max(at.largest[n], leaf ? member.radius : below.largest[i]);

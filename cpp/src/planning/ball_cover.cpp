@@ -19,7 +19,7 @@ std::vector<CoverBall> cover_by_balls(const Eigen::Vector3d& mean, const Eigen::
     for (int j = 0; j < across; ++j) {
       const double x[2] = {a[2] * (2.0 * i / along - 1.0), a[2] * (2.0 * (i + 1) / along - 1.0)};
       const double y[2] = {a[1] * (2.0 * j / across - 1.0), a[1] * (2.0 * (j + 1) / across - 1.0)};
-      const auto nearest = [](const double(&ends)[2]) { return std::clamp(0.0, ends[0], ends[1]); };
+      const auto nearest = [](const double (&ends)[2]) { return std::clamp(0.0, ends[0], ends[1]); };
       if (nearest(x) * nearest(x) / squares[2] + nearest(y) * nearest(y) / squares[1] >= 1.0) {
         continue;  // beside the ellipsoid
       }

@@ -12,8 +12,8 @@ namespace sidestep {
 namespace {
 
 constexpr const char* owner = "body clearance";
-constexpr double closest_centres = 1e-6;      // [m] of which a direction is taken
-constexpr int planes_of_pair = 3;             // tried before the gap of two ellipsoids is looked for
+constexpr double closest_centres = 1e-6;  // [m] of which a direction is taken
+constexpr int planes_of_pair = 3;         // tried before the gap of two ellipsoids is looked for
 
 static_assert(kernels::most_balls == PointTree::leaf_size);
 
@@ -130,8 +130,7 @@ void BodyClearance::place(ConstVectorRef q, Workspace& w) const noexcept {
     child.p = parent.p + parent.R * joint.X_PJ.translation();
     if (joint.type == JointType::revolute) {
       const Rotation& rotation = rotations_[i];
-      const Eigen::Matrix3d R_PL =
-          rotation.fixed + std::cos(position) * rotation.cosine + std::sin(position) * rotation.sine;
+      const Eigen::Matrix3d R_PL = rotation.fixed + std::cos(position) * rotation.cosine + std::sin(position) * rotation.sine;
       child.R = parent.R.lazyProduct(R_PL);
     } else {
       child.R = parent.R.lazyProduct(joint.X_PJ.linear());
@@ -267,8 +266,7 @@ double BodyClearance::look_at_pair(const Item& item, const Asked& asked, const W
         n = (d - on_a / reach_a - on_b / reach_b).normalized();
       }
       if (bound < least) {
-        const double gap =
-            bound < asked.near ? ellipsoid_gap(d, e.shape, R_XY * f.shape * R_XY.transpose()).value : bound;
+        const double gap = bound < asked.near ? ellipsoid_gap(d, e.shape, R_XY * f.shape * R_XY.transpose()).value : bound;
         least = std::min(least, gap);
         if (least < asked.stop) {
           return least;
@@ -307,8 +305,8 @@ BodyClearance::Nearest BodyClearance::nearest(ConstVectorRef q, const Obstacles&
   return nearest;
 }
 
-BodyClearance::Nearest BodyClearance::nearest(int item, ConstVectorRef q, const Obstacles& obstacles,
-                                              double cap, Workspace& w) const noexcept {
+BodyClearance::Nearest BodyClearance::nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap,
+                                              Workspace& w) const noexcept {
   w.field_.follow(obstacles);
   place(q, w);
   const Found found = look(items_[static_cast<std::size_t>(item)], obstacles, {cap, infinity, -infinity}, w);
@@ -329,8 +327,7 @@ BodyClearance::Nearest BodyClearance::nearest_obstacle(ConstVectorRef q, const O
   return nearest;
 }
 
-double BodyClearance::nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time,
-                                     Workspace& w) const noexcept {
+double BodyClearance::nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept {
   double nearest = infinity;
   if (!obstacles.tree().moves()) {
     return nearest;

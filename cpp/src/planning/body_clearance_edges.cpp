@@ -9,7 +9,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double exact_within = 0.015;         // [m] above a margin: beyond, a lower bound proves an edge well enough
+constexpr double exact_within = 0.015;  // [m] above a margin: beyond, a lower bound proves an edge well enough
 
 /// How far an item comes towards what it keeps off, its margin included, within a share of an edge around a place.
 struct Motion {
@@ -72,8 +72,7 @@ void BodyClearance::bound_motions(ConstVectorRef displacement, Workspace& w) con
   w.curvatures_.noalias() = bends_ * w.products_;
 }
 
-double BodyClearance::motion(int item, ConstVectorRef q, ConstVectorRef displacement,
-                             Workspace& w) const noexcept {
+double BodyClearance::motion(int item, ConstVectorRef q, ConstVectorRef displacement, Workspace& w) const noexcept {
   place(q, w);
   bound_motions(displacement, w);
   move(displacement, w);
@@ -81,8 +80,7 @@ double BodyClearance::motion(int item, ConstVectorRef q, ConstVectorRef displace
   return moved.distance(1.0);
 }
 
-double BodyClearance::margin_at(int item, ConstVectorRef q, const Margins& margins,
-                                double& slope) const noexcept {
+double BodyClearance::margin_at(int item, ConstVectorRef q, const Margins& margins, double& slope) const noexcept {
   double lowered = 0.0;
   for (const Margins::End& end : margins.ends) {
     const double deficit = end.deficits[item];
@@ -95,8 +93,7 @@ double BodyClearance::margin_at(int item, ConstVectorRef q, const Margins& margi
   return margin(item, margins) - lowered;
 }
 
-bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins,
-                         Workspace& w) const noexcept {
+bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
   if (!q.allFinite()) {
     return false;
   }
@@ -115,8 +112,8 @@ bool BodyClearance::free(ConstVectorRef q, const Obstacles& obstacles, const Mar
   return true;
 }
 
-bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b,
-                              const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept {
+bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles, const Margins& margins,
+                              Workspace& w) const noexcept {
   w.difference_ = b - a;
   if (!a.allFinite() || !w.difference_.allFinite()) {
     return false;
@@ -145,8 +142,7 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b,
         const double least = margin_at(i, w.q_, margins, slope);
         const Motion moved{w.motions_[i], slope, speed(item, w), w.curvatures_[i]};
         const double enough = least - margins.slack + moved.distance(at.half);
-        const double clearance =
-            look(item, obstacles, {std::max(least, enough), least + exact_within, least}, w).clearance;
+        const double clearance = look(item, obstacles, {std::max(least, enough), least + exact_within, least}, w).clearance;
         if (clearance < least) {
           w.last_ = i;
           return false;

@@ -25,8 +25,9 @@ int BodyClearance::add_link(const std::vector<BodyEllipsoid>& all, const Body& b
   for (const BodyEllipsoid& e : all) {
     if (body.links[static_cast<std::size_t>(e.component)] == name) {
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(e.shape);
-      link.ellipsoids.push_back({e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), e.shape, e.extent,
-                                 cover_by_balls(e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), cover_overshoot)});
+      link.ellipsoids.push_back(
+          {e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), e.shape, e.extent,
+           cover_by_balls(e.mean, eigen.eigenvectors().transpose(), eigen.eigenvalues(), cover_overshoot)});
       link.centre += e.mean;
     }
   }
@@ -44,7 +45,7 @@ int BodyClearance::add_link(const std::vector<BodyEllipsoid>& all, const Body& b
 void BodyClearance::add_reach(Item& item, const Link& link) const {
   // Up the chain, with a ball around the origin below that holds the link in every configuration.
   double ball = 0.0;
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // of that origin, from joint j
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();                  // of that origin, from joint j
   Eigen::VectorXd later = Eigen::VectorXd::Zero(item.reach.size());  // R of the joints from here to the link
   for (int j = link.joint; j != item.base;) {
     const Joint& joint = robot_.joints()[static_cast<std::size_t>(j)];

@@ -32,9 +32,7 @@ const char* name(OnlinePlannerStatus status) noexcept {
 void OnlinePlannerConfig::validate() const {
   planner.validate();
   route.validate();
-  const auto positive = [](double value, const char* what) {
-    require(value > 0.0, what, value, "positive");
-  };
+  const auto positive = [](double value, const char* what) { require(value > 0.0, what, value, "positive"); };
   positive(period, "online planner: period");
   positive(patience, "online planner: patience");
   positive(retry, "online planner: retry");
@@ -195,7 +193,8 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
 
 OnlinePlanner::Following OnlinePlanner::following() noexcept {
   const Answer& answer = answers_.current();
-  const bool follows = answer.goal_number == goal_number_ && answer.status == PlanStatus::found && answer.route_number == followed_;
+  const bool follows =
+      answer.goal_number == goal_number_ && answer.status == PlanStatus::found && answer.route_number == followed_;
   return {follows ? followed_ : 0, follower_};
 }
 

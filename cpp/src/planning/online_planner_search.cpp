@@ -8,11 +8,11 @@
 namespace sidestep {
 namespace {
 
-constexpr double widening = 1.5;  // the margin grows by this factor each time the arm was stuck
-constexpr int widenings = 4;      // and begins anew after so many
-constexpr double shorter = 0.9;   // a straight way is shorter than the rest of a path by this factor to let go of it
+constexpr double widening = 1.5;        // the margin grows by this factor each time the arm was stuck
+constexpr int widenings = 4;            // and begins anew after so many
+constexpr double shorter = 0.9;         // a straight way is shorter than the rest of a path by this factor to let go of it
 constexpr double progress_share = 0.5;  // of the way that a route makes within the patience, that the arm must make
-constexpr double back = 0.05;     // between places behind the reference where an arm may find back to its path [rad]
+constexpr double back = 0.05;           // between places behind the reference where an arm may find back to its path [rad]
 
 }  // namespace
 
@@ -66,12 +66,11 @@ void OnlinePlanner::look(const State& state) {
   // To let go of a path it must be wide, as barriers may stop what goes straight through a narrow place, and shorter, among
   // obstacles that the path was not made for.
   const bool taken_up = state.route_number == route_number_;
-  const bool lets_go = !have_path_ || (changed_ && taken_up &&
-                                       (state.goal - state.q).norm() < shorter * (rounded_->length() - state.station));
+  const bool lets_go =
+      !have_path_ || (changed_ && taken_up && (state.goal - state.q).norm() < shorter * (rounded_->length() - state.station));
   const PlannerSettings& asked = settings_.planner;
   const double wide = have_path_ ? asked.margin : std::sqrt(asked.margin * asked.floor);
-  const bool straight = lets_go && state.stops == 0 && !stuck &&
-                        planner_.sees(state.q, state.goal, wide, obstacles);
+  const bool straight = lets_go && state.stops == 0 && !stuck && planner_.sees(state.q, state.goal, wide, obstacles);
   if (straight) {
     Obstruction found;
     if (!planner_.obstructed(state.goal, obstacles, found) && !planner_.obstructed(state.q, obstacles, found)) {
@@ -234,9 +233,9 @@ void OnlinePlanner::follow(const State& state, const Eigen::MatrixXd& path, cons
   }
   rounded_.emplace(path_, body_, obstacles, path_margins_, planner_.workspace());
   const Eigen::VectorXd v = settings_.synchronous ? state.v : states_.get().v;
-  route_ = std::make_shared<const TimedPath>(
-      make_route(*rounded_, v, body_, obstacles, settings_.route, settings_.safety, planner_.workspace(), measured,
-                 settings_.dynamics ? &*settings_.dynamics : nullptr));
+  route_ = std::make_shared<const TimedPath>(make_route(*rounded_, v, body_, obstacles, settings_.route, settings_.safety,
+                                                        planner_.workspace(), measured,
+                                                        settings_.dynamics ? &*settings_.dynamics : nullptr));
   ++route_number_;
   answer(state, PlanStatus::found);
 }

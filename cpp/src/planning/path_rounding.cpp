@@ -6,11 +6,11 @@
 namespace sidestep {
 namespace {
 
-constexpr double shortest = 1e-9;    // edge [rad]
-constexpr double deviation = 5e-4;   // of any point of the arm from chords, and from a corner that is not free [m]
-constexpr double straight = 1e-9;    // change of direction that is none
+constexpr double shortest = 1e-9;   // edge [rad]
+constexpr double deviation = 5e-4;  // of any point of the arm from chords, and from a corner that is not free [m]
+constexpr double straight = 1e-9;   // change of direction that is none
 constexpr int most_chords = 64;
-constexpr int pieces = 16;           // of a rounding at least, among the stations
+constexpr int pieces = 16;  // of a rounding at least, among the stations
 
 }  // namespace
 
@@ -44,7 +44,8 @@ RoundedPath::RoundedPath(const Eigen::MatrixXd& path, const BodyClearance& body,
     const double before = (starts_[k + 1] - starts_[k]) * (k == 0 ? 1.0 : 0.5);
     const double after = (starts_[k + 2] - starts_[k + 1]) * (k + 1 == corners_.size() ? 1.0 : 0.5);
     const double widest = std::min(before, after), narrowest = std::min(widest, deviation / (0.1875 * turn * reach));
-    for (corners_[k].half = widest; corners_[k].half > narrowest; corners_[k].half = std::max(narrowest, 0.5 * corners_[k].half)) {
+    for (corners_[k].half = widest; corners_[k].half > narrowest;
+         corners_[k].half = std::max(narrowest, 0.5 * corners_[k].half)) {
       if (corner_is_free(k, body, obstacles, margins, workspace)) {
         break;
       }
@@ -91,7 +92,8 @@ void RoundedPath::at(double station, Point& point) const {
     }
     const double half = corners_[k].half, width = 2.0 * half, x = (s - corners_[k].station + half) / width;
     const Eigen::VectorXd turn = directions_[k + 1] - directions_[k];
-    point.q = waypoints_[k + 1] - half * directions_[k] + x * width * directions_[k] + width * x * x * x * (1.0 - 0.5 * x) * turn;
+    point.q =
+        waypoints_[k + 1] - half * directions_[k] + x * width * directions_[k] + width * x * x * x * (1.0 - 0.5 * x) * turn;
     point.first = directions_[k] + x * x * (3.0 - 2.0 * x) * turn;
     point.second = 6.0 * x * (1.0 - x) / width * turn;
   }

@@ -10,7 +10,7 @@ namespace {
 
 using Waypoints = std::vector<Eigen::VectorXd>;
 
-constexpr double slow_share = 0.5;   // of the median velocity limit, below which a joint counts as slow
+constexpr double slow_share = 0.5;  // of the median velocity limit, below which a joint counts as slow
 
 /// From every waypoint on to the farthest that can be seen from it.
 Waypoints skip(const Waypoints& path, const BodyClearance& body, const Obstacles& obstacles, const Margins& margins,
@@ -49,12 +49,12 @@ std::vector<double> stations(const Waypoints& path, const Eigen::VectorXd& slown
   return at;
 }
 
-constexpr double sample = 0.1;       // between clearances on an edge [rad]
-constexpr double shift = 0.3;        // that a waypoint is shifted at a time [rad]
-constexpr int shifts = 8;            // tried for a waypoint
-constexpr double slowest = 0.25;     // share of the speed that is left where there is no clearance
-constexpr int misses = 3;            // share of the attempts to shorten that may fail in a row: one in three
-constexpr double gain = 1e-3;        // a length below which a shortcut is not worth a check [rad]
+constexpr double sample = 0.1;    // between clearances on an edge [rad]
+constexpr double shift = 0.3;     // that a waypoint is shifted at a time [rad]
+constexpr int shifts = 8;         // tried for a waypoint
+constexpr double slowest = 0.25;  // share of the speed that is left where there is no clearance
+constexpr int misses = 3;         // share of the attempts to shorten that may fail in a row: one in three
+constexpr double gain = 1e-3;     // a length below which a shortcut is not worth a check [rad]
 
 /// How long it takes to pass an edge at speeds proportional to the clearance, 1 rad/s from `wide` on [s].
 double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen::VectorXd& slowness, const BodyClearance& body,
@@ -72,7 +72,8 @@ double duration(const Eigen::VectorXd& a, const Eigen::VectorXd& b, const Eigen:
 /// A path whose stretch between two points of it is another.
 class Stretch {
  public:
-  Stretch(const Waypoints& way, const Eigen::VectorXd& slowness, RandomStream& random) : way_(way), at_(stations(way, slowness)) {
+  Stretch(const Waypoints& way, const Eigen::VectorXd& slowness, RandomStream& random)
+      : way_(way), at_(stations(way, slowness)) {
     from_ = random.uniform(0.0, at_.back());
     to_ = random.uniform(0.0, at_.back());
     if (from_ > to_) {
@@ -175,8 +176,7 @@ Eigen::MatrixXd shorten(const Eigen::MatrixXd& path, const BodyClearance& body, 
     return true;
   };
   int missed = 0;
-  for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2 && !interrupted();
-       ++attempt) {
+  for (int attempt = 0; attempt < attempts && missed < 1 + attempts / misses && way.size() > 2 && !interrupted(); ++attempt) {
     const Stretch stretch(way, slow, random);
     ++missed;
     if (!stretch.bends()) {

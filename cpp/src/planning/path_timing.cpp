@@ -9,9 +9,9 @@
 namespace sidestep {
 namespace {
 
-constexpr int halvings = 40;         // of an interval of x
+constexpr int halvings = 40;  // of an interval of x
 constexpr int most_rounds = 8;
-constexpr double crawl = 1e-4;       // least x, so that time is finite
+constexpr double crawl = 1e-4;                     // least x, so that time is finite
 constexpr double longest = 0.004, finest = 0.001;  // between samples [s]
 constexpr int per_window = 5;
 constexpr double most_samples = 20'000;
@@ -19,8 +19,8 @@ constexpr double most_samples = 20'000;
 /// The passes over stations.
 class Passes {
  public:
-  Passes(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest, const Eigen::VectorXd& usable,
-         const PathLimits& limits)
+  Passes(const RoundedPath& path, const Eigen::VectorXd& stations, const Eigen::VectorXd& fastest,
+         const Eigen::VectorXd& usable, const PathLimits& limits)
       : share(usable), s_(stations), limits_(limits) {
     const Eigen::Index num = s_.size(), nv = limits.velocity.size();
     first_.resize(nv, num);
@@ -125,7 +125,8 @@ class Clock {
     }
     const Eigen::Index i = std::upper_bound(t_.begin(), t_.end(), t) - t_.begin() - 1;
     const double h = t - t_[i], u = (speed_[i + 1] - speed_[i]) / (t_[i + 1] - t_[i]);
-    return {sum_[i] + h * (s_[i] + h * (0.5 * speed_[i] + h * u / 6.0)), s_[i] + h * (speed_[i] + 0.5 * h * u), speed_[i] + h * u};
+    return {sum_[i] + h * (s_[i] + h * (0.5 * speed_[i] + h * u / 6.0)), s_[i] + h * (speed_[i] + 0.5 * h * u),
+            speed_[i] + h * u};
   }
 
  private:
@@ -194,7 +195,8 @@ PathTiming time_path(const RoundedPath& path, const Eigen::VectorXd& stations, c
   if (stations.size() < 2) {
     RoundedPath::Point point;
     path.at(0.0, point);
-    return {longest, point.q, Eigen::MatrixXd::Zero(point.q.size(), 1), Eigen::MatrixXd::Zero(point.q.size(), 1), Eigen::VectorXd::Zero(1)};
+    return {longest, point.q, Eigen::MatrixXd::Zero(point.q.size(), 1), Eigen::MatrixXd::Zero(point.q.size(), 1),
+            Eigen::VectorXd::Zero(1)};
   }
   const double window = 2.0 * limits.acceleration.cwiseQuotient(limits.jerk).maxCoeff();
   Passes passes(path, stations, fastest, share, limits);
@@ -222,7 +224,8 @@ PathTiming time_path(const RoundedPath& path, const Eigen::VectorXd& stations, c
       }
       const double from = timing.station[std::max<Eigen::Index>(0, k - around)];
       const double to = timing.station[std::min(factor.size() - 1, k + around)];
-      for (Eigen::Index i = std::max<Eigen::Index>(0, std::upper_bound(stations.begin(), stations.end(), from) - stations.begin() - 1);
+      for (Eigen::Index i =
+               std::max<Eigen::Index>(0, std::upper_bound(stations.begin(), stations.end(), from) - stations.begin() - 1);
            i < stations.size() && (stations[i] <= to || stations[std::max<Eigen::Index>(0, i - 1)] <= to); ++i) {
         lower[i] = std::min(lower[i], 0.99 / (factor[k] * factor[k]));
       }

@@ -28,14 +28,11 @@ std::string describe(const Obstruction& obstruction) {
   const std::string millimetres = std::to_string(static_cast<int>(std::lround(1e3 * obstruction.depth)));
   const std::string in = " is " + millimetres + " mm deep in ";
   switch (obstruction.label.kind) {
-    case CoordinateLabel::Kind::obstacle:
-      return "link '" + obstruction.label.name + "'" + in + obstruction.obstacle;
+    case CoordinateLabel::Kind::obstacle: return "link '" + obstruction.label.name + "'" + in + obstruction.obstacle;
     case CoordinateLabel::Kind::self:
       return "links '" + obstruction.label.name + "' and '" + obstruction.label.other + "' touch, " + millimetres + " mm deep";
-    case CoordinateLabel::Kind::plane:
-      return "link '" + obstruction.label.name + "'" + in + "a plane";
-    default:
-      return "nothing";
+    case CoordinateLabel::Kind::plane: return "link '" + obstruction.label.name + "'" + in + "a plane";
+    default: return "nothing";
   }
 }
 

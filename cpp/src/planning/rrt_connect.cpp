@@ -16,17 +16,15 @@ namespace sidestep {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
-constexpr double slack_share = 0.25;     // of a margin: proofs of edges along it cost as much the less slack they have
-constexpr double local = 0.3;            // of the samples are around a node: narrow places are near others
-constexpr double around_node = 2.4;      // how far each joint of such a sample may be from the node's [rad | m]
-constexpr double octaves = 2.5;          // of the lengths of steps from a node that was trapped, below the range
-constexpr double domain = 3.0;           // of the range: how far samples may be from a node that was trapped
-constexpr int draws = 32;                // of a sample until one is within the domain of the node nearest to it
-constexpr double touching = 1e-6;        // [m] below what an end has: rounding when it is asked for again
+constexpr double slack_share = 0.25;  // of a margin: proofs of edges along it cost as much the less slack they have
+constexpr double local = 0.3;         // of the samples are around a node: narrow places are near others
+constexpr double around_node = 2.4;   // how far each joint of such a sample may be from the node's [rad | m]
+constexpr double octaves = 2.5;       // of the lengths of steps from a node that was trapped, below the range
+constexpr double domain = 3.0;        // of the range: how far samples may be from a node that was trapped
+constexpr int draws = 32;             // of a sample until one is within the domain of the node nearest to it
+constexpr double touching = 1e-6;     // [m] below what an end has: rounding when it is asked for again
 
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 std::vector<Eigen::VectorXd> to_root(const SearchTree& tree, int node) {
   std::vector<Eigen::VectorXd> way;

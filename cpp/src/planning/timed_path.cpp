@@ -9,18 +9,19 @@
 namespace sidestep {
 namespace {
 
-constexpr double spacing = 0.05;         // of places [rad]
-constexpr double fine = 0.01;            // of stations [rad]
-constexpr double seen = 0.1;             // clearance from which it bounds no speed [m]
-constexpr double least_room = 0.001;     // [m]
+constexpr double spacing = 0.05;          // of places [rad]
+constexpr double fine = 0.01;             // of stations [rad]
+constexpr double seen = 0.1;              // clearance from which it bounds no speed [m]
+constexpr double least_room = 0.001;      // [m]
 constexpr double left_to_the_arm = 0.95;  // of the limits
-constexpr double unmeasured = 0.35;      // of the limits
-constexpr double of_closing = 0.8;       // of the speed at which a clearance may close: rows that bind are not smooth
-constexpr double at_samples = 0.88;      // of the jerk: between samples it is up to an eighth more
+constexpr double unmeasured = 0.35;       // of the limits
+constexpr double of_closing = 0.8;        // of the speed at which a clearance may close: rows that bind are not smooth
+constexpr double at_samples = 0.88;       // of the jerk: between samples it is up to an eighth more
 constexpr double of_effort = 0.7, of_effort_rate = 0.5;  // for motion along the path: the rest is for feedback, and clearances
-constexpr double least_share = 0.05;     // of the acceleration limits, where gravity takes the effort
+constexpr double least_share = 0.05;                     // of the acceleration limits, where gravity takes the effort
 constexpr double free_velocity = 2.0, free_acceleration = 10.0;
-constexpr double stopping = 1.5;  // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
+constexpr double stopping =
+    1.5;  // by which a joint may move on while it stops [rad | m]: farther, no clearance can be foreseen
 
 /// p⁻¹ of SafetyRows: the speed [m/s] at which a clearance with this room may close.
 double closing_speed(double room, double A, double rate) {
@@ -70,18 +71,18 @@ const std::vector<Field<TimedPathSettings>>& fields() {
   using S = TimedPathSettings;
   static const std::vector<Field<S>> all{
       {"wide", &S::wide, "m", 0.001, 0.1, "clearance below which a place is narrow: barriers leave room there"},
-      {"lead", &S::lead, "rad", 0.01, 3.0, "distance at which the reference waits for the arm: larger is faster and cuts corners"},
+      {"lead", &S::lead, "rad", 0.01, 3.0,
+       "distance at which the reference waits for the arm: larger is faster and cuts corners"},
   };
   return all;
 }
 
-void TimedPathSettings::validate() const {
-  check_fields("timed path: ", *this);
-}
+void TimedPathSettings::validate() const { check_fields("timed path: ", *this); }
 
 PathLimits path_limits(const JointLimits& limits, double speed) {
   const auto finite = [&](const Eigen::VectorXd& given, double otherwise) {
-    return Eigen::VectorXd(left_to_the_arm * speed * given.unaryExpr([&](double x) { return std::isfinite(x) ? x : otherwise; }));
+    return Eigen::VectorXd(left_to_the_arm * speed *
+                           given.unaryExpr([&](double x) { return std::isfinite(x) ? x : otherwise; }));
   };
   PathLimits all{finite(limits.velocity, free_velocity), finite(limits.acceleration, free_acceleration), {}};
   all.velocity = all.velocity.cwiseMin((2.0 * stopping * all.acceleration).cwiseSqrt());

@@ -6,7 +6,7 @@
 namespace sidestep {
 namespace {
 
-constexpr double first = 1.0;     // part of the path on which an arm that moved while the route was made enters it [rad]
+constexpr double first = 1.0;  // part of the path on which an arm that moved while the route was made enters it [rad]
 constexpr double stiffness = 400.0, damping = 40.0;  // of the pace
 constexpr double most_change = 10.0;                 // of the pace [1/s]
 

@@ -31,28 +31,23 @@ struct Parties {
 Parties parties(const Diagnosis& d, const CoordinateLabel& label, const Obstacles& obstacles) {
   const std::string away = std::isfinite(d.clearance) ? ", " + distance(d.clearance) : "";
   switch (label.kind) {
-    case CoordinateLabel::Kind::obstacle:
-      return {"link " + label.name, obstacles.words_for(d.point) + away};
-    case CoordinateLabel::Kind::self:
-      return {"link " + label.name, "link " + label.other + away};
-    case CoordinateLabel::Kind::plane:
-      return {"link " + label.name, "the plane" + away};
+    case CoordinateLabel::Kind::obstacle: return {"link " + label.name, obstacles.words_for(d.point) + away};
+    case CoordinateLabel::Kind::self: return {"link " + label.name, "link " + label.other + away};
+    case CoordinateLabel::Kind::plane: return {"link " + label.name, "the plane" + away};
     case CoordinateLabel::Kind::joint_limit:
       return {"joint " + label.name,
               "its " + label.other + " limit" +
                   (std::isfinite(d.clearance) ? ", " + way(std::abs(d.clearance), "%.3f rad", label.slides) +
                                                     (d.clearance < 0.0 ? " beyond it" : " away")
                                               : "")};
-    case CoordinateLabel::Kind::potential:
-      break;
+    case CoordinateLabel::Kind::potential: break;
   }
   return {"the arm", "an obstacle or a limit (a density does not tell which)"};
 }
 
 bool arrived(const GoalPull& pull) noexcept {
   const auto within = [](double error, double limit) { return std::isnan(error) || error < limit; };
-  return within(pull.joint_error, judgement::arrived_joint) &&
-         within(pull.position_error, judgement::arrived_position) &&
+  return within(pull.joint_error, judgement::arrived_joint) && within(pull.position_error, judgement::arrived_position) &&
          within(pull.rotation_error, judgement::arrived_rotation);
 }
 
@@ -60,20 +55,13 @@ bool arrived(const GoalPull& pull) noexcept {
 
 const char* name(MotionState state) noexcept {
   switch (state) {
-    case MotionState::free:
-      return "free";
-    case MotionState::sliding:
-      return "sliding";
-    case MotionState::arriving:
-      return "arriving";
-    case MotionState::stuck:
-      return "stuck";
-    case MotionState::blocked_at_goal:
-      return "blocked_at_goal";
-    case MotionState::inside_barrier:
-      return "inside_barrier";
-    case MotionState::fallback:
-      break;
+    case MotionState::free: return "free";
+    case MotionState::sliding: return "sliding";
+    case MotionState::arriving: return "arriving";
+    case MotionState::stuck: return "stuck";
+    case MotionState::blocked_at_goal: return "blocked_at_goal";
+    case MotionState::inside_barrier: return "inside_barrier";
+    case MotionState::fallback: break;
   }
   return "fallback";
 }
@@ -92,21 +80,16 @@ std::string Diagnosis::describe(const CoordinateLabel& label, const Obstacles& o
   const Parties p = parties(*this, label, obstacles);
   const bool known = coordinate >= 0;
   switch (state) {
-    case MotionState::free:
-      return "on the way, " + way_left() + " from the goal";
-    case MotionState::sliding:
-      return p.who + " slides along " + p.what;
-    case MotionState::arriving:
-      return "arriving, " + way_left() + " from the goal";
+    case MotionState::free: return "on the way, " + way_left() + " from the goal";
+    case MotionState::sliding: return p.who + " slides along " + p.what;
+    case MotionState::arriving: return "arriving, " + way_left() + " from the goal";
     case MotionState::stuck:
-      return "stuck " + way_left() + " from the goal: " +
-             (known ? p.who + " against " + p.what : "nothing is in the way, so the pose is out of reach");
+      return "stuck " + way_left() +
+             " from the goal: " + (known ? p.who + " against " + p.what : "nothing is in the way, so the pose is out of reach");
     case MotionState::blocked_at_goal:
       return "stopped " + way_left() + " from the goal, which is itself blocked: " + p.who + " against " + p.what;
-    case MotionState::inside_barrier:
-      return p.who + " is inside the barrier of " + p.what + ", and moves out";
-    case MotionState::fallback:
-      break;
+    case MotionState::inside_barrier: return p.who + " is inside the barrier of " + p.what + ", and moves out";
+    case MotionState::fallback: break;
   }
   return "braking to a stop: the input of the step is unusable (see its status)";
 }
@@ -170,8 +153,8 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
   return d;
 }
 
-Diagnosis GeometricSystem::diagnose(ConstVectorRef q, ConstVectorRef v,
-                                    const Goal& goal, const Obstacles& obstacles, Workspace& w) const noexcept {
+Diagnosis GeometricSystem::diagnose(ConstVectorRef q, ConstVectorRef v, const Goal& goal, const Obstacles& obstacles,
+                                    Workspace& w) const noexcept {
   static_cast<void>(acceleration(q, v, goal, obstacles, w));
   const Diagnosis here = diagnose(w);
   const auto* joint = std::get_if<JointGoal>(&goal);

@@ -23,9 +23,8 @@ double sigmoid(double u) noexcept { return 1.0 / (1.0 + std::exp(-u)); }
 
 void check_gain(const Eigen::MatrixXd& gain, const char* name, int nv) {
   if (gain.rows() != nv || gain.cols() != nv) {
-    throw std::invalid_argument(std::string(name) + " is " + std::to_string(gain.rows()) + " × " +
-                                std::to_string(gain.cols()) + ", expected " + std::to_string(nv) + " × " +
-                                std::to_string(nv));
+    throw std::invalid_argument(std::string(name) + " is " + std::to_string(gain.rows()) + " × " + std::to_string(gain.cols()) +
+                                ", expected " + std::to_string(nv) + " × " + std::to_string(nv));
   }
   constexpr double tolerance = 1e-12;  // rounding of a symmetric gain, relative to its largest entry
   const double margin = tolerance * gain.cwiseAbs().maxCoeff() + std::numeric_limits<double>::min();
@@ -68,9 +67,8 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
   check_gain(settings_.damping, "damping", nv);
   require_positive(settings_.fallback_rate, "fallback rate");
   settings_.recovery.validate();
-  floors_ = Eigen::VectorXd::NullaryExpr(num_embedding_coordinates_, [this](Eigen::Index k) {
-    return labels_[static_cast<std::size_t>(k)].floor;
-  });
+  floors_ = Eigen::VectorXd::NullaryExpr(num_embedding_coordinates_,
+                                         [this](Eigen::Index k) { return labels_[static_cast<std::size_t>(k)].floor; });
   activations_.resize(num_embedding_coordinates_);
   Eigen::Index start = 0;
   for (const auto& embedding : embeddings_) {
@@ -78,7 +76,9 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
     start += embedding->num_coordinates();
   }
   std::visit(Overloaded{
-                 [](const Unswitched&) {}, [](const HarmonicOnly&) {}, [](const GeodesicOnly&) {},
+                 [](const Unswitched&) {},
+                 [](const HarmonicOnly&) {},
+                 [](const GeodesicOnly&) {},
                  [](const BinarySwitch& s) { check_finite(s.threshold, "switch threshold"); },
                  [](const SigmoidSwitch& s) {
                    check_finite(s.threshold, "switch threshold");
@@ -87,12 +87,11 @@ GeometricSystem::GeometricSystem(Robot robot, std::vector<std::shared_ptr<const 
                  [&](const DistanceSwitch& s) {
                    require_positive(s.slope, "switch slope");
                    if (s.thresholds.size() != nv || !s.thresholds.allFinite()) {
-                     throw std::invalid_argument("switch thresholds: expected " + std::to_string(nv) +
-                                                 " finite values, got " + std::to_string(s.thresholds.size()));
+                     throw std::invalid_argument("switch thresholds: expected " + std::to_string(nv) + " finite values, got " +
+                                                 std::to_string(s.thresholds.size()));
                    }
                    if (!measures_distances) {
-                     throw std::invalid_argument(
-                         "a distance switch needs an embedding with a body, such as CollisionDensity");
+                     throw std::invalid_argument("a distance switch needs an embedding with a body, such as CollisionDensity");
                    }
                  },
              },
@@ -135,23 +134,21 @@ GeometricSystem::Workspace::Workspace(const GeometricSystem& system)
       recovery_(system.robot().num_coordinates(), system.num_embedding_coordinates()),
       joint_goal_(JointGoal(acceleration)) {}
 
-StepStatus GeometricSystem::acceleration(ConstVectorRef q, ConstVectorRef v,
-                                         ConstVectorRef goal, const Obstacles& obstacles,
+StepStatus GeometricSystem::acceleration(ConstVectorRef q, ConstVectorRef v, ConstVectorRef goal, const Obstacles& obstacles,
                                          Workspace& w) const noexcept {
   with_size(robot_.num_coordinates(),
             [&](auto nv) { sized(std::get<JointGoal>(w.joint_goal_).position, nv) = sized(goal, nv); });
   return acceleration(q, v, w.joint_goal_, obstacles, w);
 }
 
-StepStatus GeometricSystem::acceleration(ConstVectorRef q, ConstVectorRef v,
-                                         const Goal& goal, const Obstacles& obstacles,
+StepStatus GeometricSystem::acceleration(ConstVectorRef q, ConstVectorRef v, const Goal& goal, const Obstacles& obstacles,
                                          Workspace& w) const noexcept {
   return with_size(robot_.num_coordinates(), [&](auto nv) { return step(q, v, goal, obstacles, w, nv); });
 }
 
 template <class Size>
-StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v,
-                                 const Goal& goal, const Obstacles& obstacles, Workspace& w, Size nv) const noexcept {
+StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v, const Goal& goal, const Obstacles& obstacles, Workspace& w,
+                                 Size nv) const noexcept {
   if (!embed(q, v, obstacles, w)) {
     return fall_back(StepStatus::invalid_state, v, w);
   }
@@ -197,17 +194,16 @@ StepStatus GeometricSystem::step(ConstVectorRef q, ConstVectorRef v,
   if (!all_finite(acceleration)) {
     return fall_back(StepStatus::not_finite, v, w);
   }
-  w.status_ = w.inside >= 0                                       ? StepStatus::inside_barrier
-              : fault == GoalFault::invalid                       ? StepStatus::invalid_goal
-              : fault == GoalFault::outside_limits                ? StepStatus::goal_outside_limits
-              : is_outside(sized(q, nv), robot_.limits(), nv)     ? StepStatus::outside_limits
-              : fault == GoalFault::out_of_reach                  ? StepStatus::goal_out_of_reach
-                                                                  : StepStatus::ok;
+  w.status_ = w.inside >= 0                                   ? StepStatus::inside_barrier
+              : fault == GoalFault::invalid                   ? StepStatus::invalid_goal
+              : fault == GoalFault::outside_limits            ? StepStatus::goal_outside_limits
+              : is_outside(sized(q, nv), robot_.limits(), nv) ? StepStatus::outside_limits
+              : fault == GoalFault::out_of_reach              ? StepStatus::goal_out_of_reach
+                                                              : StepStatus::ok;
   return w.status_;
 }
 
-bool GeometricSystem::embed(ConstVectorRef q, ConstVectorRef v,
-                            const Obstacles& obstacles, Workspace& w) const noexcept {
+bool GeometricSystem::embed(ConstVectorRef q, ConstVectorRef v, const Obstacles& obstacles, Workspace& w) const noexcept {
   if (!with_size(robot_.num_coordinates(), [&](auto nv) { return all_finite(sized(q, nv)) && all_finite(sized(v, nv)); })) {
     return false;
   }
@@ -231,8 +227,7 @@ bool GeometricSystem::embed(ConstVectorRef q, ConstVectorRef v,
   return true;
 }
 
-bool GeometricSystem::touches(ConstVectorRef q, const Obstacles& obstacles, double depth,
-                              Workspace& w) const noexcept {
+bool GeometricSystem::touches(ConstVectorRef q, const Obstacles& obstacles, double depth, Workspace& w) const noexcept {
   w.state_.update(robot_, q, w.rest_);
   return std::any_of(embeddings_.begin(), embeddings_.end(),
                      [&](const auto& embedding) { return embedding->touches(w.state_, obstacles, depth); });
@@ -278,8 +273,7 @@ void GeometricSystem::combine(const Obstacles& obstacles, Workspace& w, Size nv)
              settings_.combination);
 }
 
-StepStatus GeometricSystem::fall_back(StepStatus status, ConstVectorRef v,
-                                      Workspace& w) const noexcept {
+StepStatus GeometricSystem::fall_back(StepStatus status, ConstVectorRef v, Workspace& w) const noexcept {
   for (Eigen::Index i = 0; i < v.size(); ++i) {
     const double limit = robot_.limits().acceleration[i];
     w.acceleration[i] = std::isfinite(v[i]) ? std::clamp(-settings_.fallback_rate * v[i], -limit, limit) : 0.0;

@@ -45,15 +45,14 @@ const Frame& moved_frame(const Robot& robot, const std::string& name, const std:
 JointGoal::JointGoal(Eigen::VectorXd q)
     : position(std::move(q)), velocity(Eigen::VectorXd::Zero(position.size())), acceleration(velocity) {}
 
-JointGoal::JointGoal(Eigen::VectorXd q, Eigen::VectorXd v)
-    : JointGoal(std::move(q), v, Eigen::VectorXd::Zero(v.size())) {}
+JointGoal::JointGoal(Eigen::VectorXd q, Eigen::VectorXd v) : JointGoal(std::move(q), v, Eigen::VectorXd::Zero(v.size())) {}
 
 JointGoal::JointGoal(Eigen::VectorXd q, Eigen::VectorXd v, Eigen::VectorXd a)
     : position(std::move(q)), velocity(std::move(v)), acceleration(std::move(a)) {
   if (velocity.size() != position.size() || acceleration.size() != position.size()) {
     throw std::invalid_argument("joint goal: velocity has " + std::to_string(velocity.size()) + " and acceleration " +
-                                std::to_string(acceleration.size()) + " entries, position " +
-                                std::to_string(position.size()) + "; must be equal");
+                                std::to_string(acceleration.size()) + " entries, position " + std::to_string(position.size()) +
+                                "; must be equal");
   }
 }
 
@@ -118,8 +117,7 @@ PoseGoal& PoseGoal::add(PoseGoal other) {
 bool advance(Goal& goal, double duration) noexcept {
   if (auto* joint = std::get_if<JointGoal>(&goal)) {
     const auto velocity = joint->velocity + duration * joint->acceleration;
-    const auto position =
-        joint->position + (duration * joint->velocity + 0.5 * duration * duration * joint->acceleration);
+    const auto position = joint->position + (duration * joint->velocity + 0.5 * duration * duration * joint->acceleration);
     if (!all_finite(position) || !all_finite(velocity)) {
       return false;
     }
@@ -156,11 +154,12 @@ bool is_moving(const Goal& goal) noexcept {
 namespace {
 
 GoalFault check_pose(const PoseGoal& frame, const Robot& robot) noexcept {
-  if (!frame.is_for(robot) ||
-      !frame.pose.matrix().allFinite() || !frame.twist.allFinite() || !frame.settings.rest.allFinite()) {
+  if (!frame.is_for(robot) || !frame.pose.matrix().allFinite() || !frame.twist.allFinite() ||
+      !frame.settings.rest.allFinite()) {
     return GoalFault::invalid;
   }
-  GoalFault worst = (frame.pose.translation() - frame.shoulder()).norm() > frame.reach() ? GoalFault::out_of_reach : GoalFault::none;
+  GoalFault worst =
+      (frame.pose.translation() - frame.shoulder()).norm() > frame.reach() ? GoalFault::out_of_reach : GoalFault::none;
   for (const PoseGoal& other : frame.others) {
     const GoalFault fault = check_pose(other, robot);
     worst = fault == GoalFault::invalid || worst == GoalFault::none ? fault : worst;
@@ -178,7 +177,8 @@ GoalFault check(const Goal& goal, const Robot& robot) noexcept {
           return GoalFault::invalid;
         }
       }
-      return is_outside(sized(joint->position, nv), robot.limits(), nv, limit_rounding) ? GoalFault::outside_limits : GoalFault::none;
+      return is_outside(sized(joint->position, nv), robot.limits(), nv, limit_rounding) ? GoalFault::outside_limits
+                                                                                        : GoalFault::none;
     });
   }
   return check_pose(std::get<PoseGoal>(goal), robot);
@@ -257,8 +257,7 @@ void GoalPull::add(const PoseGoal& goal, bool posture, const KinematicState& sta
   jacobian_transposed_.setZero();
   for (int j = goal.frame().joint; j >= 0; j = state.link(j).parent) {
     const KinematicState::Link& mover = state.link(j);
-    jacobian_transposed_.row(mover.coordinate).head<3>() +=
-        (mover.screw.linear + mover.screw.angular.cross(p)).transpose();
+    jacobian_transposed_.row(mover.coordinate).head<3>() += (mover.screw.linear + mover.screw.angular.cross(p)).transpose();
     if (!settings.position_only) {
       jacobian_transposed_.row(mover.coordinate).tail<3>() += mover.screw.angular.transpose();
     }

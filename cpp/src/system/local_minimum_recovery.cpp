@@ -10,11 +10,11 @@
 namespace sidestep {
 namespace {
 
-constexpr double half_patience = 0.5;    // a sub-goal need not be reached: half the patience is enough for it
-constexpr double near_sub_goal = 0.2;    // [rad | m] is as good as there
-constexpr double at_goal = 0.01;         // [rad | m] nothing is left to be stuck on the way to
-constexpr double jump = 2.0;             // a squared distance that grows so much in one step is one to another goal,
-constexpr double elsewhere = 0.2;        // [rad | m] and so is one that is so far from that of the step before
+constexpr double half_patience = 0.5;  // a sub-goal need not be reached: half the patience is enough for it
+constexpr double near_sub_goal = 0.2;  // [rad | m] is as good as there
+constexpr double at_goal = 0.01;       // [rad | m] nothing is left to be stuck on the way to
+constexpr double jump = 2.0;           // a squared distance that grows so much in one step is one to another goal,
+constexpr double elsewhere = 0.2;      // [rad | m] and so is one that is so far from that of the step before
 
 const LocalMinimumSettings& validated(const LocalMinimumSettings& settings) {
   settings.validate();
@@ -50,9 +50,7 @@ const std::vector<Field<LocalMinimumSettings>>& fields() {
   return all;
 }
 
-void LocalMinimumSettings::validate() const {
-  check_fields("local_minimum: ", *this);
-}
+void LocalMinimumSettings::validate() const { check_fields("local_minimum: ", *this); }
 
 LocalMinimumRecovery::LocalMinimumRecovery(const Robot& robot, LocalMinimumSettings settings)
     : settings_(validated(settings)),
@@ -64,8 +62,7 @@ LocalMinimumRecovery::LocalMinimumRecovery(const Robot& robot, LocalMinimumSetti
       sub_goal_(JointGoal(Eigen::VectorXd::Zero(robot.num_coordinates()))),
       configuration_(Eigen::VectorXd::Zero(robot.num_coordinates())) {}
 
-const Goal& LocalMinimumRecovery::pursue(const Goal& goal, ConstVectorRef q, double potential,
-                           double period) noexcept {
+const Goal& LocalMinimumRecovery::pursue(const Goal& goal, ConstVectorRef q, double potential, double period) noexcept {
   time_ += period;
   if (is_elsewhere(goal)) {
     turn(false, q);
@@ -102,9 +99,9 @@ bool LocalMinimumRecovery::is_elsewhere(const Goal& goal) noexcept {
     configuration_ = joint->position;
   } else {
     const PoseGoal& now = std::get<PoseGoal>(goal);
-    here = here && (now.pose.translation() - pose_.translation()).norm() <= elsewhere &&
-           (now.settings.position_only ||
-            Eigen::AngleAxisd(pose_.linear().transpose() * now.pose.linear()).angle() <= elsewhere);
+    here =
+        here && (now.pose.translation() - pose_.translation()).norm() <= elsewhere &&
+        (now.settings.position_only || Eigen::AngleAxisd(pose_.linear().transpose() * now.pose.linear()).angle() <= elsewhere);
     pose_ = now.pose;
   }
   return !here;
@@ -120,8 +117,7 @@ void LocalMinimumRecovery::turn(bool escape, ConstVectorRef q) noexcept {
   if (escape) {
     ++count_;
     ++tries_;
-    random_configuration(random_, lower_, upper_, q, tries_ * settings_.spread,
-                         std::get<JointGoal>(sub_goal_).position);
+    random_configuration(random_, lower_, upper_, q, tries_ * settings_.spread, std::get<JointGoal>(sub_goal_).position);
   }
 }
 

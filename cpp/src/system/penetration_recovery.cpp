@@ -32,8 +32,9 @@ PenetrationRecoveryWorkspace::PenetrationRecoveryWorkspace(int nv, int m)
       fades_(Eigen::VectorXd::Ones(m)),
       curvatures_(Eigen::VectorXd::Zero(m)) {}
 
-int PenetrationRecoveryWorkspace::update(const PenetrationRecovery& settings, const Eigen::VectorXd& floors, const Clearances& clearances,
-                              const Eigen::MatrixXd& jacobian_transposed, Eigen::VectorXd& push) noexcept {
+int PenetrationRecoveryWorkspace::update(const PenetrationRecovery& settings, const Eigen::VectorXd& floors,
+                                         const Clearances& clearances, const Eigen::MatrixXd& jacobian_transposed,
+                                         Eigen::VectorXd& push) noexcept {
   push.setZero();
   fades_.setOnes();
   int deepest = -1;
@@ -66,8 +67,8 @@ int PenetrationRecoveryWorkspace::update(const PenetrationRecovery& settings, co
 }
 
 void PenetrationRecoveryWorkspace::solve_pullback(const PenetrationRecovery& settings, const Clearances& clearances,
-                                       const Eigen::MatrixXd& jacobian_transposed, const Eigen::VectorXd& curvatures,
-                                       GraphMetric& metric, Eigen::VectorXd& result) noexcept {
+                                                  const Eigen::MatrixXd& jacobian_transposed, const Eigen::VectorXd& curvatures,
+                                                  GraphMetric& metric, Eigen::VectorXd& result) noexcept {
   bool scaled = false;
   for (Eigen::Index k = 0; k < curvatures.size(); ++k) {
     double scale = fades_[k], curvature = curvatures[k];

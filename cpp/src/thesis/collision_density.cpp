@@ -13,9 +13,7 @@
 namespace sidestep {
 namespace {
 
-kernels::AddDensity add_density() noexcept {
-  return SIDESTEP_KERNEL_IN_USE(kernels::add_density);
-}
+kernels::AddDensity add_density() noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::add_density); }
 
 kernels::DensityPoints points_of(const Obstacles& obstacles, bool average) noexcept {
   return {static_cast<int>(obstacles.size()), average ? 1.0 / static_cast<double>(obstacles.size()) : 1.0,
@@ -66,8 +64,7 @@ struct CollisionDensity::Gaussians {
   std::vector<kernels::GaussianBlock> blocks;
 };
 
-CollisionDensity::CollisionDensity(const Robot& robot, const Body& body, bool average)
-    : Embedding(robot), average_(average) {
+CollisionDensity::CollisionDensity(const Robot& robot, const Body& body, bool average) : Embedding(robot), average_(average) {
   const auto frame_of = [&](int k) -> const Frame& {
     return robot.frames()[static_cast<std::size_t>(robot.frame_index(body.links[static_cast<std::size_t>(k)]))];
   };
@@ -96,8 +93,7 @@ CollisionDensity::CollisionDensity(const Robot& robot, const Body& body, bool av
   gaussians_ = std::move(gaussians);
 }
 
-void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
-                              const Obstacles& obstacles) const noexcept {
+void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept {
   if (obstacles.size() == 0) {
     return;
   }
@@ -115,8 +111,7 @@ void CollisionDensity::add_to(EmbeddingView out, const KinematicState& state,
     add(block, links, points, sums);
     for (int i = 0; i < block.num; ++i) {
       Vector6d wrench;
-      wrench << sums.moment[0][i], sums.moment[1][i], sums.moment[2][i], sums.force[0][i], sums.force[1][i],
-          sums.force[2][i];
+      wrench << sums.moment[0][i], sums.moment[1][i], sums.moment[2][i], sums.force[0][i], sums.force[1][i], sums.force[2][i];
       gradient.add(block.joints[i], wrench);
     }
   }

@@ -24,9 +24,8 @@ void check_size(const Eigen::VectorXd& vector, const char* name, int nv) {
 
 /// One step of the classical scheme; `a1` is the acceleration at (q, v, t). Leaves the obstacles and the goal at t +
 /// dt. A stage that falls back brakes; the status that is recorded is that of the step's own state.
-void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, Goal& goal,
-                   ObstaclesInMotion& obstacles, double dt, const Eigen::VectorXd& a1, Eigen::VectorXd& q,
-                   Eigen::VectorXd& v) {
+void runge_kutta_4(const GeometricSystem& system, GeometricSystem::Workspace& w, Goal& goal, ObstaclesInMotion& obstacles,
+                   double dt, const Eigen::VectorXd& a1, Eigen::VectorXd& q, Eigen::VectorXd& v) {
   const double half = 0.5 * dt;
   const auto stage = [&](const Eigen::VectorXd& stage_q, const Eigen::VectorXd& stage_v) -> Eigen::VectorXd {
     static_cast<void>(system.acceleration(stage_q, stage_v, goal, obstacles.now(), w));
@@ -58,14 +57,14 @@ void check_records(const GeometricSystem& system, const RolloutSettings& setting
   if (!std::isfinite(settings.period * settings.steps)) {
     throw std::invalid_argument("period times steps is not finite");
   }
-  const double numbers = 1.0 + 4.0 * system.robot().num_coordinates() + system.num_embedding_coordinates() +
-                         (settings.time_steps ? 1.0 : 0.0);
+  const double numbers =
+      1.0 + 4.0 * system.robot().num_coordinates() + system.num_embedding_coordinates() + (settings.time_steps ? 1.0 : 0.0);
   const double row = numbers * sizeof(double) + sizeof(StepStatus);
   const Eigen::Index most_steps = std::max<Eigen::Index>(most_rows(row, motions) - 1, 0);
   if (settings.steps > most_steps) {
     throw std::invalid_argument("steps is " + std::to_string(settings.steps) + ", must be at most " +
-                                std::to_string(most_steps) + " for " +
-                                std::to_string(motions) + " motions: their records may have 8 GiB");
+                                std::to_string(most_steps) + " for " + std::to_string(motions) +
+                                " motions: their records may have 8 GiB");
   }
 }
 
@@ -84,8 +83,8 @@ Rollout make_rollout(const GeometricSystem& system, const RolloutSettings& setti
   return result;
 }
 
-Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, const Eigen::VectorXd& start_velocity,
-                Goal goal, const Obstacles& start_obstacles, const RolloutSettings& settings) {
+Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& start, const Eigen::VectorXd& start_velocity, Goal goal,
+                const Obstacles& start_obstacles, const RolloutSettings& settings) {
   const int nv = system.robot().num_coordinates();
   check_size(start, "q", nv);
   check_size(start_velocity, "v", nv);

@@ -9,8 +9,7 @@
 namespace sidestep {
 namespace {
 
-void check(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-           const Eigen::MatrixXd& goals) {
+void check(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v, const Eigen::MatrixXd& goals) {
   const Eigen::Index nv = system.robot().num_coordinates();
   const auto require = [&q, nv](const Eigen::MatrixXd& matrix, const char* name) {
     if (matrix.rows() != q.rows() || matrix.cols() != nv) {
@@ -27,17 +26,16 @@ void check(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen:
 }  // namespace
 
 std::vector<Rollout> rollout_batch(const GeometricSystem& system, const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
-                                   const Eigen::MatrixXd& goals, const Obstacles& obstacles,
-                                   const RolloutSettings& settings, int threads) {
+                                   const Eigen::MatrixXd& goals, const Obstacles& obstacles, const RolloutSettings& settings,
+                                   int threads) {
   check(system, q, v, goals);
   check_records(system, settings, q.rows());
   std::vector<Rollout> result(static_cast<std::size_t>(q.rows()));
   share(q.rows(), threads, settings.interrupted, [&](Eigen::Index k, const Interrupted& halted) {
     RolloutSettings own = settings;
     own.interrupted = halted;
-    result[static_cast<std::size_t>(k)] =
-        rollout(system, q.row(k).transpose(), v.row(k).transpose(),
-                Goal(JointGoal(Eigen::VectorXd(goals.row(k).transpose()))), obstacles, own);
+    result[static_cast<std::size_t>(k)] = rollout(system, q.row(k).transpose(), v.row(k).transpose(),
+                                                  Goal(JointGoal(Eigen::VectorXd(goals.row(k).transpose()))), obstacles, own);
   });
   return result;
 }

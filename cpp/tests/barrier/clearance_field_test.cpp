@@ -70,8 +70,8 @@ Distance inside(const Eigen::Matrix3d& S, const Eigen::Vector3d& e, const Eigen:
 ClearanceSample sample(const BodyEllipsoid& ellipsoid, const KinematicState::Link& link, const Eigen::Vector3d& x,
                        const Eigen::Vector3d& x_dot, double radius) {
   const Eigen::Vector3d slip = x_dot - link.velocity.linear - link.velocity.angular.cross(x);
-  const Eigen::Vector3d slip_dot = -link.bias.linear - link.bias.angular.cross(x) -
-                                   link.velocity.angular.cross(x_dot) - link.velocity.angular.cross(slip);
+  const Eigen::Vector3d slip_dot =
+      -link.bias.linear - link.bias.angular.cross(x) - link.velocity.angular.cross(x_dot) - link.velocity.angular.cross(slip);
   const Eigen::Matrix3d R_LW = link.R_WL.transpose();
   const Eigen::Vector3d e = R_LW * (x - link.p_WL) - ellipsoid.mean;
   const Eigen::Vector3d e_dot = R_LW * slip, e_ddot = R_LW * slip_dot;
@@ -89,8 +89,8 @@ Body calibrated(const Body& body, Random& random) {
   return Body(body.links, body.weights, body.means, body.covariances, levels);
 }
 
-void compare(const Robot& robot, const Body& body, const KinematicState& state, const Obstacles& obstacles,
-             double reach, double horizon, double window = ClearanceField::default_window) {
+void compare(const Robot& robot, const Body& body, const KinematicState& state, const Obstacles& obstacles, double reach,
+             double horizon, double window = ClearanceField::default_window) {
   const ClearanceField field(robot, body, temperature, window);
   Clearances found(robot.num_coordinates(), field.size());
   // Beyond what can be closed within the horizon by as much as is looked at anyway: all that is within reach is found.
@@ -105,8 +105,8 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
     const auto after = [horizon](const ClearanceSample& at) { return at.value + horizon * at.rate; };
     double least = test::infinity, least_after = test::infinity;
     for (int n = 0; n < obstacles.size(); ++n) {
-      samples.push_back(sample(ellipsoid, link, obstacles.points().col(n), obstacles.velocities().col(n),
-                               obstacles.radii()[n]));
+      samples.push_back(
+          sample(ellipsoid, link, obstacles.points().col(n), obstacles.velocities().col(n), obstacles.radii()[n]));
       least = std::min(least, samples.back().value);
       least_after = std::min(least_after, after(samples.back()));
     }
@@ -153,8 +153,7 @@ void compare(const Robot& robot, const Body& body, const KinematicState& state, 
                  tolerance / temperature * scale * (1.0 + std::abs(approach.rate)));
       BOOST_TEST(std::abs(found.approach.curvatures[k] - approach.curvature) <=
                  tolerance / temperature * scale * (1.0 / temperature + std::abs(approach.curvature)));
-      BOOST_TEST((found.approach.gradients.col(k) - turned).norm() <=
-                 tolerance / temperature * scale * (1.0 + turned.norm()));
+      BOOST_TEST((found.approach.gradients.col(k) - turned).norm() <= tolerance / temperature * scale * (1.0 + turned.norm()));
     }
     ++k;
   }
@@ -435,8 +434,7 @@ BOOST_AUTO_TEST_CASE(a_point_at_the_centre_is_as_deep_as_the_shortest_axis) {
     for (const double offset : {0.0, 1e-300, 1e-30, 1e-15, 1e-9}) {
       const Eigen::Matrix3Xd at = X * Eigen::Vector3d(0.0, offset, 0.0);
       Clearances found(1, 1);
-      field.evaluate(state, Obstacles(at, Eigen::VectorXd::Zero(1), Eigen::Matrix3Xd::Zero(3, 1)), 0.1, {},
-                     found.view(0, 1));
+      field.evaluate(state, Obstacles(at, Eigen::VectorXd::Zero(1), Eigen::Matrix3Xd::Zero(3, 1)), 0.1, {}, found.view(0, 1));
       BOOST_TEST(std::abs(found.values[0] + 0.1) < 1e-7);
       BOOST_TEST(found.nearest[0] == 0);
     }

@@ -46,8 +46,9 @@ void check_derivatives(const Embedding& embedding, Random& random) {
     moved.advance(time);
     return evaluate(embedding, q + time * v, v, moved).values[0];
   };
-  const double curvature = (16.0 * (value_at(dt) + value_at(-dt)) - value_at(2.0 * dt) - value_at(-2.0 * dt) -
-                            30.0 * value_at(0.0)) / (12.0 * dt * dt);
+  const double curvature =
+      (16.0 * (value_at(dt) + value_at(-dt)) - value_at(2.0 * dt) - value_at(-2.0 * dt) - 30.0 * value_at(0.0)) /
+      (12.0 * dt * dt);
   const double scale = second.norm() * v.squaredNorm() + std::abs(curvature);
   BOOST_TEST(std::abs(result.curvatures[0] - curvature) <= tolerance * scale);
 }

@@ -53,7 +53,8 @@ std::vector<double> gaps(const Robot& robot, const Body& body, const Eigen::Vect
           return link.R_WL * S * link.R_WL.transpose();
         };
         values.push_back(ellipsoid_gap(second.p_WL + second.R_WL * b.mean - first.p_WL - first.R_WL * a.mean,
-                                       turned(first, a.shape), turned(second, b.shape)).value);
+                                       turned(first, a.shape), turned(second, b.shape))
+                             .value);
       }
     }
   }

@@ -91,8 +91,8 @@ BOOST_AUTO_TEST_CASE(any_choice_from_a_viable_state_stays_inside_for_ever) {
     const int habit = random.integer(0, 3);
     for (int k = 0; k < 100; ++k) {
       const AccelerationInterval bounds = acceleration_interval(q, v, limits, period);
-      const bool ordered = bounds.lower <= bounds.upper && -limits.acceleration <= bounds.lower &&
-                           bounds.upper <= limits.acceleration;
+      const bool ordered =
+          bounds.lower <= bounds.upper && -limits.acceleration <= bounds.lower && bounds.upper <= limits.acceleration;
       if (!ordered) {  // BOOST_REQUIRE takes longer than the rest of the loop
         BOOST_FAIL("trial " << trial << " step " << k << ": [" << bounds.lower << ", " << bounds.upper << "]");
       }
@@ -107,10 +107,10 @@ BOOST_AUTO_TEST_CASE(any_choice_from_a_viable_state_stays_inside_for_ever) {
       const double before = q, speed = v;
       step(q, v, a, period, integrator);
       if (!is_viable(q, v, limits, period, rounding * (1.0 + std::abs(v)))) {
-        BOOST_FAIL("trial " << trial << " step " << k << ": q = " << q << ", v = " << v << " after " << before << ", "
-                            << speed << " with a = " << a << " of [" << bounds.lower << ", " << bounds.upper
-                            << "]; limits " << limits.lower << ", " << limits.upper << ", " << limits.velocity << ", "
-                            << limits.acceleration << ", period " << period);
+        BOOST_FAIL("trial " << trial << " step " << k << ": q = " << q << ", v = " << v << " after " << before << ", " << speed
+                            << " with a = " << a << " of [" << bounds.lower << ", " << bounds.upper << "]; limits "
+                            << limits.lower << ", " << limits.upper << ", " << limits.velocity << ", " << limits.acceleration
+                            << ", period " << period);
       }
       if (integrator == Integrator::exact && speed * v < 0.0) {  // the turn between the samples
         const double peak = before - 0.5 * speed * speed / a;
@@ -183,8 +183,8 @@ BOOST_AUTO_TEST_CASE(from_outside_any_choice_comes_back_and_stays) {
       step(q, v, a, period, integrator);
       const bool viable = is_viable(q, v, limits, period, rounding);
       if (!ordered || (inside && !viable)) {
-        BOOST_FAIL("trial " << trial << " step " << k << (ordered ? " left again" : " has an empty interval") << ": q = "
-                            << q << ", v = " << v << " after [" << bounds.lower << ", " << bounds.upper << "]");
+        BOOST_FAIL("trial " << trial << " step " << k << (ordered ? " left again" : " has an empty interval") << ": q = " << q
+                            << ", v = " << v << " after [" << bounds.lower << ", " << bounds.upper << "]");
       }
       inside = viable;
     }
@@ -292,7 +292,10 @@ BOOST_AUTO_TEST_CASE(every_limit_is_kept_for_ever) {
       if (random.chance(0.01)) {
         way = -way;
       }
-      const double share = kind == 0 ? (way > 0.0 ? 1.0 : 0.0) : kind == 1 ? random.uniform(0.0, 1.0) : kind == 2 ? 1.0 : (n / 40) % 2;
+      const double share = kind == 0   ? (way > 0.0 ? 1.0 : 0.0)
+                           : kind == 1 ? random.uniform(0.0, 1.0)
+                           : kind == 2 ? 1.0
+                                       : (n / 40) % 2;
       const double x = smooth.lower + share * (smooth.upper - smooth.lower);
       worst_jerk = std::max(worst_jerk, std::abs(x - a) / (jerk * period) - 1.0);
       step(q, v, x, period, integrator);
@@ -301,8 +304,9 @@ BOOST_AUTO_TEST_CASE(every_limit_is_kept_for_ever) {
       worst_v = std::max(worst_v, std::abs(v) / limits.velocity - 1.0);
       worst_q = std::max({worst_q, q - limits.upper, limits.lower - q});
     }
-    BOOST_TEST_CONTEXT("case " << k << " period " << period << " A " << limits.acceleration << " V " << limits.velocity << " range "
-                               << limits.upper - limits.lower << " ramp [periods] " << limits.acceleration / jerk / period) {
+    BOOST_TEST_CONTEXT("case " << k << " period " << period << " A " << limits.acceleration << " V " << limits.velocity
+                               << " range " << limits.upper - limits.lower << " ramp [periods] "
+                               << limits.acceleration / jerk / period) {
       BOOST_TEST(worst_jerk < 1e-6);
       BOOST_TEST(worst_a < 1e-12);
       BOOST_TEST(worst_v < 1e-9);

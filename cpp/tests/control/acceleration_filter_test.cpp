@@ -147,13 +147,12 @@ BOOST_AUTO_TEST_CASE(whatever_comes_in_the_acceleration_is_finite_and_nothing_is
       case 3: clearances.approach.gradients.setConstant(not_a_number); break;
       default: break;
     }
-    BOOST_REQUIRE_EQUAL(
-        test::allocations_of([&] { static_cast<void>(filter.apply(q, v, a, &clearances, solution)); }), 0u);
+    BOOST_REQUIRE_EQUAL(test::allocations_of([&] { static_cast<void>(filter.apply(q, v, a, &clearances, solution)); }), 0u);
     BOOST_REQUIRE(solution.acceleration.allFinite());
     BOOST_REQUIRE((solution.acceleration.array().abs() <= limits.acceleration.array()).all());
   }
-  for (const TorqueStatus status : {TorqueStatus::ok, TorqueStatus::limited, TorqueStatus::relaxed_safety,
-                                    TorqueStatus::fallback_invalid_input}) {
+  for (const TorqueStatus status :
+       {TorqueStatus::ok, TorqueStatus::limited, TorqueStatus::relaxed_safety, TorqueStatus::fallback_invalid_input}) {
     BOOST_TEST(filter.count(status) > 0, name(status));
   }
   BOOST_TEST(filter.count(TorqueStatus::relaxed) == 0);

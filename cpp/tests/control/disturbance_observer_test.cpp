@@ -26,7 +26,8 @@ JointLimits limits_of_two() {
 /// Two joints, (M + J) v̇ + h = τ + d, that are sent what the observer's model makes of a wanted acceleration.
 struct Plant {
   Eigen::Matrix2d mass = (Eigen::Matrix2d() << 2.0, 0.4, 0.4, 0.5).finished();
-  Eigen::Vector2d bias{3.0, -1.0}, rotors = Eigen::Vector2d::Zero(), disturbance = Eigen::Vector2d::Zero(), friction = Eigen::Vector2d::Zero();
+  Eigen::Vector2d bias{3.0, -1.0}, rotors = Eigen::Vector2d::Zero(), disturbance = Eigen::Vector2d::Zero(),
+                                   friction = Eigen::Vector2d::Zero();
   Eigen::Matrix2d payload = Eigen::Matrix2d::Zero();
   double noise = 0.0;  // [rad/s] of measured velocities, uniform
   Eigen::VectorXd v = Eigen::Vector2d::Zero(), measured = v;
@@ -153,12 +154,12 @@ BOOST_AUTO_TEST_CASE(what_is_not_finite_changes_nothing_and_no_update_allocates)
   const Eigen::VectorXd good = Eigen::Vector2d(0.1, 0.2), bad = Eigen::Vector2d::Constant(test::not_a_number);
   const Eigen::MatrixXd mass = plant.mass, unknown = Eigen::Matrix2d::Constant(test::not_a_number);
   BOOST_TEST(test::allocations_of([&] {
-    observer.update(good, bad, good, good, mass, good);
-    observer.update(good, good, bad, good, mass, good);
-    observer.update(good, good, good, bad, mass, good);
-    observer.update(good, good, good, good, unknown, good);
-    observer.update(good, good, good, good, mass, bad);
-  }) == 0u);
+               observer.update(good, bad, good, good, mass, good);
+               observer.update(good, good, bad, good, mass, good);
+               observer.update(good, good, good, bad, mass, good);
+               observer.update(good, good, good, good, unknown, good);
+               observer.update(good, good, good, good, mass, bad);
+             }) == 0u);
   BOOST_TEST((observer.rotors() == rotors));
   BOOST_TEST((observer.disturbance() == disturbance));
   BOOST_TEST(test::allocations_of([&] { observer.update(good, good, good, good, mass, good); }) == 0u);

@@ -64,8 +64,8 @@ BOOST_AUTO_TEST_CASE(the_margin_is_kept_for_ever_and_without_hurry) {
       const bool outside = room >= -1e-12;  // rounding
       const bool stoppable = room_needed(closing, limits) <= room + 1e-9 * (1.0 + room);
       if (!comfortable || !outside || !stoppable) {  // BOOST_REQUIRE takes longer than the rest of the loop
-        BOOST_FAIL("trial " << trial << " step " << k << ": demand " << demand << " of " << limits.comfortable
-                            << ", room " << room << ", closing at " << closing);
+        BOOST_FAIL("trial " << trial << " step " << k << ": demand " << demand << " of " << limits.comfortable << ", room "
+                            << room << ", closing at " << closing);
       }
     }
   }
@@ -98,8 +98,7 @@ BOOST_AUTO_TEST_CASE(demands_by_value) {
   const double w = (0.01 - 0.5 * T * 0.1) / (0.1 + 0.5 * T);
   BOOST_TEST(demanded_deceleration(0.01, 0.1, limits, T) == 10.0 * 0.5 * (0.1 + w), boost::test_tools::tolerance(1e-9));
   // Too fast by 1 mm/s on the parabola: 2 + 0.5 * 0.001/T, and never above the hardest.
-  BOOST_TEST(demanded_deceleration(room_needed(u, limits), u + 0.001, limits, T) == 2.5,
-             boost::test_tools::tolerance(1e-9));
+  BOOST_TEST(demanded_deceleration(room_needed(u, limits), u + 0.001, limits, T) == 2.5, boost::test_tools::tolerance(1e-9));
   BOOST_TEST(demanded_deceleration(0.01, 1.0, limits, T) == 4.0);
   // Too fast by a half on the line, 10 * 0.15; by more than twice, u^2/2(s - uT).
   BOOST_TEST(demanded_deceleration(0.01, 0.15, limits, T) == 1.5, boost::test_tools::tolerance(1e-12));
@@ -296,8 +295,7 @@ BOOST_AUTO_TEST_CASE(the_most_critical_are_kept_in_order) {
     int more_urgent = 0;
     for (int k = 0; rows.size() > 0 && k < num; ++k) {
       const bool counts = clearances.nearest[k] >= 0 && clearances.gradients.col(k).norm() > 0.0;
-      more_urgent +=
-          counts && urgency(k) <= urgency(rows.coordinates[static_cast<std::size_t>(rows.size()) - 1]) ? 1 : 0;
+      more_urgent += counts && urgency(k) <= urgency(rows.coordinates[static_cast<std::size_t>(rows.size()) - 1]) ? 1 : 0;
     }
     BOOST_REQUIRE_EQUAL(more_urgent, rows.size());
   }
@@ -385,10 +383,10 @@ BOOST_AUTO_TEST_CASE(more_than_is_to_be_had_is_asked_for_only_where_room_runs_ou
   BOOST_TEST_REQUIRE(asked(0.4, 2.5, -2.0) > now);
   BOOST_TEST(lower(0.4, 2.5, -2.0) == now, close);  // it does
   BOOST_TEST_REQUIRE(asked(-0.02, -0.01, -4.0) > now);
-  BOOST_TEST(lower(-0.02, -0.01, -4.0) == now, close);                         // too near, but on its way out
+  BOOST_TEST(lower(-0.02, -0.01, -4.0) == now, close);  // too near, but on its way out
   BOOST_TEST_REQUIRE(asked(-0.02, 1e-9, -4.0) > now);
-  BOOST_TEST(lower(-0.02, 1e-9, -4.0) == now, close);          // what is asked for does not jump where closing ends
-  BOOST_TEST(lower(-0.02, 0.02, -4.0) == 0.5 * 0.02 / 0.001 - -4.0, close);  // the end of closing, not the way back
+  BOOST_TEST(lower(-0.02, 1e-9, -4.0) == now, close);  // what is asked for does not jump where closing ends
+  BOOST_TEST(lower(-0.02, 0.02, -4.0) == 0.5 * 0.02 / 0.001 - -4.0, close);     // the end of closing, not the way back
   BOOST_TEST(lower(-0.02, -0.01, -11.0) == asked(-0.02, -0.01, -11.0), close);  // as long as that lasts
 }
 

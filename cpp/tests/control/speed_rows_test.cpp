@@ -19,7 +19,6 @@ namespace {
 
 constexpr double speed_period = 0.001;
 
-
 /// The speed of a frame's origin.
 double speed_of(const Robot& robot, int frame, const Eigen::VectorXd& q, const Eigen::VectorXd& v) {
   KinematicState state(robot);
@@ -51,8 +50,9 @@ BOOST_AUTO_TEST_CASE(rows_are_the_change_of_the_speed_of_every_frame_that_moves)
       const int frame = rows.frames[static_cast<std::size_t>(i)];
       const double speed = speed_of(robot, frame, q, v);
       const Eigen::VectorXd drift = 0.5 * h * h * a;
-      const double change = (speed_of(robot, frame, q + h * v + drift, v + h * a) -
-                             speed_of(robot, frame, q - h * v + drift, v - h * a)) / (2.0 * h);
+      const double change =
+          (speed_of(robot, frame, q + h * v + drift, v + h * a) - speed_of(robot, frame, q - h * v + drift, v - h * a)) /
+          (2.0 * h);
       BOOST_TEST(std::abs(change_of(rows, i, a, speed, limit) - change) < 1e-5 * (1.0 + std::abs(change)));
       BOOST_TEST(std::abs(rows.normals.row(i).norm() - 1.0) < 1e-12);
       fastest = std::max(fastest, speed);
@@ -108,7 +108,9 @@ BOOST_AUTO_TEST_CASE(speed_gives_way_to_clearances_and_says_so) {
   BOOST_TEST((filter.apply(q, v, wanted, nullptr, {}, {}, solution, &rows) == TorqueStatus::limited));
   BOOST_TEST(solution.speed_frame == fastest.frame);
   BOOST_TEST(solution.speed_slack == 0.0);
-  const auto speed_after = [&] { return speed_of(robot, fastest.frame, q + speed_period * v, v + speed_period * solution.acceleration); };
+  const auto speed_after = [&] {
+    return speed_of(robot, fastest.frame, q + speed_period * v, v + speed_period * solution.acceleration);
+  };
   BOOST_TEST(speed_after() <= fastest.speed);
   BOOST_TEST((filter.apply(q, v, wanted, nullptr, {}, {}, solution) == TorqueStatus::ok));
   BOOST_TEST(speed_after() > fastest.speed + 1e-3);

@@ -29,9 +29,7 @@ struct Approach {
     return controller.solve(q, v, a, M, h, &clearances, solution);
   }
   /// What the clearance asks of joint 2 [/s²]: half of 0.5 · 10 m/s² is planned with.
-  double required() const {
-    return demanded_deceleration(0.005, 0.1, {2.5, 5.0, 20.0, 0.5}, 0.001) / 0.5;
-  }
+  double required() const { return demanded_deceleration(0.005, 0.1, {2.5, 5.0, 20.0, 0.5}, 0.001) / 0.5; }
 
   Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q, h = q;
   Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);

@@ -30,8 +30,8 @@ Input random_input(Random& random, const JointLimits& limits) {
   Input in;
   const double load = random.chance(0.2) ? 1.4 : 0.7;
   for (int i = 0; i < nv; ++i) {
-    in.q[i] = random.chance(0.3) ? limits.upper[i] - random.magnitude(1e-6, 0.1)
-                                 : random.uniform(limits.lower[i], limits.upper[i]);
+    in.q[i] =
+        random.chance(0.3) ? limits.upper[i] - random.magnitude(1e-6, 0.1) : random.uniform(limits.lower[i], limits.upper[i]);
     in.v[i] = random.uniform(-1.0, 1.0) * limits.velocity[i];
     in.h[i] = random.uniform(-load, load) * limits.effort[i];
   }
@@ -245,7 +245,7 @@ BOOST_AUTO_TEST_CASE(a_program_that_cannot_be_solved_gives_a_damped_stop) {
   TorqueSolution solution(nv);
   Input in;
   in.v[0] = 1.0;
-  in.a[2] = 1e300;    // finite, but the cost overflows
+  in.a[2] = 1e300;  // finite, but the cost overflows
   in.h[3] = 1e200;
   in.M *= 1e160;
   BOOST_TEST((solve(controller, in, solution) == TorqueStatus::fallback_solver));
@@ -291,8 +291,7 @@ BOOST_AUTO_TEST_CASE(settings_of_the_torque_controller_are_checked) {
   BOOST_TEST(message_of([](S& s) { s.torque_weight.setZero(); }).empty());
   BOOST_TEST(message_of([](S& s) { s.slack_weight = infinity; }).find("slack_weight") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.velocity_overrun = 0.9; }).find("velocity_overrun is 0.9") != std::string::npos);
-  BOOST_TEST(message_of([](S& s) { s.acceleration_overrun = infinity; }).find("acceleration_overrun") !=
-             std::string::npos);
+  BOOST_TEST(message_of([](S& s) { s.acceleration_overrun = infinity; }).find("acceleration_overrun") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.velocity_overrun = s.acceleration_overrun = 1.0; }).empty());
   BOOST_TEST(message_of([](S& s) { s.stop_time = -1.0; }).find("stop_time") != std::string::npos);
   BOOST_TEST(message_of([](S& s) { s.stop_damping = 0.0; }).find("stop_damping") != std::string::npos);

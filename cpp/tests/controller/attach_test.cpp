@@ -70,11 +70,13 @@ BOOST_AUTO_TEST_CASE(a_change_of_body_makes_no_step_in_acceleration) {
       }
       const Command& command = controller.step(q, v);
       fastest = k == 150 ? command.velocity.cwiseAbs().maxCoeff() : fastest;
-      jump = std::max(jump, ((command.acceleration - before).cwiseAbs().array() / controller.arm().robot().limits().jerk.array()).maxCoeff());
+      jump = std::max(
+          jump,
+          ((command.acceleration - before).cwiseAbs().array() / controller.arm().robot().limits().jerk.array()).maxCoeff());
       before = command.acceleration;
       move(command, q, v);
     }
-    BOOST_TEST(fastest > 0.1);             // it was under way
+    BOOST_TEST(fastest > 0.1);              // it was under way
     BOOST_TEST(jump < 0.001 * (1 + 1e-9));  // a period of the limit
     BOOST_TEST((q.array() - 0.4).abs().maxCoeff() < 1e-3);
   }

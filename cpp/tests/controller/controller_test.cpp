@@ -78,7 +78,8 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_everything_on_and_orders_from
           controller.set_goal(constant(0.8 * side));
         }
         controller.set_obstacles(ball({0.5, -0.6 * side, 0.9}, {0.0, 0.4 * side, 0.0}));
-      }).join();
+      })
+          .join();
     }
     count += test::allocations_of([&] {
       const Command& command = controller.step(q, v);

@@ -92,7 +92,8 @@ BOOST_AUTO_TEST_CASE(a_velocity_is_reached_scaled_to_the_limits_and_given_up_whe
     BOOST_TEST((model.step(controller).activity == Activity::moving));
   }
   BOOST_TEST((model.v - wanted).cwiseAbs().maxCoeff() < 1e-3);
-  const double most = controller.settings().speed * (1.0 - controller.settings().limit_margin) * arm.robot().limits().velocity[0];
+  const double most =
+      controller.settings().speed * (1.0 - controller.settings().limit_margin) * arm.robot().limits().velocity[0];
   wanted *= 100.0 * most;  // the direction stays
   for (int k = 0; k < 450; ++k) {
     controller.set_velocity(-wanted);
@@ -116,13 +117,18 @@ BOOST_AUTO_TEST_CASE(what_is_wrong_with_an_order_is_named_and_the_order_before_s
   const std::string joint = arm.robot().coordinate_names()[2];
   Eigen::VectorXd bad = wanted;
   bad[2] = test::not_a_number;
-  BOOST_TEST(refusal([&] { controller.set_velocity(bad); }).find("joint '" + joint + "' is nan, allowed: finite") != std::string::npos);
+  BOOST_TEST(refusal([&] { controller.set_velocity(bad); }).find("joint '" + joint + "' is nan, allowed: finite") !=
+             std::string::npos);
   BOOST_TEST(refusal([&] { controller.set_velocity(Eigen::VectorXd::Zero(2)); }).find("has 2 entries") != std::string::npos);
-  BOOST_TEST(refusal([&] { controller.set_twist("hand", Vector6d::Zero()); }).find("'hand'; its links are: link1") != std::string::npos);
-  BOOST_TEST(refusal([&] { controller.set_twist("tip", Vector6d::Constant(test::infinity)); }).find("inf") != std::string::npos);
+  BOOST_TEST(refusal([&] { controller.set_twist("hand", Vector6d::Zero()); }).find("'hand'; its links are: link1") !=
+             std::string::npos);
+  BOOST_TEST(refusal([&] { controller.set_twist("tip", Vector6d::Constant(test::infinity)); }).find("inf") !=
+             std::string::npos);
   Eigen::MatrixXd q = bent().replicate(1, 3);
-  BOOST_TEST(refusal([&] { controller.set_trajectory(q, Eigen::Vector3d(0.0, 0.1, 0.1)); }).find("time 2 is 0.1") != std::string::npos);
-  BOOST_TEST(refusal([&] { controller.set_trajectory(q, Eigen::Vector3d(-0.1, 0.1, 0.2)); }).find("time 0 is -0.1") != std::string::npos);
+  BOOST_TEST(refusal([&] { controller.set_trajectory(q, Eigen::Vector3d(0.0, 0.1, 0.1)); }).find("time 2 is 0.1") !=
+             std::string::npos);
+  BOOST_TEST(refusal([&] { controller.set_trajectory(q, Eigen::Vector3d(-0.1, 0.1, 0.2)); }).find("time 0 is -0.1") !=
+             std::string::npos);
   BOOST_TEST(refusal([&] { controller.set_trajectory(q, Eigen::Vector2d(0.0, 0.1)); }).find("3 samples") != std::string::npos);
   q(2, 1) = 100.0;
   const std::string said = refusal([&] { controller.set_trajectory(q, Eigen::Vector3d(0.0, 0.1, 0.2)); });
@@ -321,7 +327,8 @@ BOOST_AUTO_TEST_CASE(steer_goes_around_and_rejoins) {
     least = std::min(least, controller.command().clearance);
     ++steps;
   }
-  BOOST_TEST_MESSAGE("steer: " << steps << " steps, deviation " << most << ", clearance " << least << ", " << controller.explain());
+  BOOST_TEST_MESSAGE("steer: " << steps << " steps, deviation " << most << ", clearance " << least << ", "
+                               << controller.explain());
   BOOST_TEST((controller.command().activity == Activity::arrived));
   BOOST_TEST(most > 0.02);
   BOOST_TEST(least > 0.0);
@@ -352,7 +359,8 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_velocities_twists_and_traject
           controller.set_trajectory(q, times, kind == 2 ? TrajectoryBehaviour::keep_path : TrajectoryBehaviour::steer);
         }
         controller.set_obstacles(ball({0.5, 0.4, 1.2}, 0.05, {0.0, -0.1, 0.0}));
-      }).join();
+      })
+          .join();
     }
     allocations += test::allocations_of([&] { controller.step(model.q, model.v); });
     model.v += tick * controller.command().acceleration;

@@ -103,7 +103,8 @@ BOOST_AUTO_TEST_CASE(with_any_part_left_out_it_arrives_or_says_why_not) {
           settings.local_minimum.reset();
         }
         settings.local_activation = (parts & 8) == 0;
-        BOOST_TEST_CONTEXT("without " << parts << ", pose " << pose << ", torque " << (output == ControllerSettings::Output::torque)) {
+        BOOST_TEST_CONTEXT("without " << parts << ", pose " << pose << ", torque "
+                                      << (output == ControllerSettings::Output::torque)) {
           Controller controller(arm, settings);
           BOOST_TEST(controller.has_torque() == (output == ControllerSettings::Output::torque));
           controller.set_obstacles(in_the_way(robot, -0.1));

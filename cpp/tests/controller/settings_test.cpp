@@ -77,7 +77,8 @@ BOOST_AUTO_TEST_CASE(every_field_has_a_default_in_its_range_and_refuses_what_is_
   check_group<PlannerSettings>("controller: planner.search.", [](ControllerSettings& s) -> auto& { return s.planner->search; });
   check_group<TimedPathSettings>("controller: planner.route.", [](ControllerSettings& s) -> auto& { return s.planner->route; });
   check_group<LookAheadSettings>("controller: look_ahead.", [](ControllerSettings& s) -> auto& { return *s.look_ahead; });
-  check_group<LocalMinimumSettings>("controller: local_minimum.", [](ControllerSettings& s) -> auto& { return *s.local_minimum; });
+  check_group<LocalMinimumSettings>("controller: local_minimum.",
+                                    [](ControllerSettings& s) -> auto& { return *s.local_minimum; });
 }
 
 BOOST_AUTO_TEST_CASE(what_a_controller_cannot_do_is_refused_with_name_value_and_range) {
@@ -93,9 +94,8 @@ BOOST_AUTO_TEST_CASE(what_a_controller_cannot_do_is_refused_with_name_value_and_
   limits.effort.setConstant(test::infinity);
   settings = {};
   settings.output = ControllerSettings::Output::torque;
-  BOOST_CHECK_EXCEPTION(Controller(test::covered_arm(limits), settings), std::invalid_argument, [](const auto& error) {
-    return std::string(error.what()).find("effort limit") != std::string::npos;
-  });
+  BOOST_CHECK_EXCEPTION(Controller(test::covered_arm(limits), settings), std::invalid_argument,
+                        [](const auto& error) { return std::string(error.what()).find("effort limit") != std::string::npos; });
   settings = {};
   settings.position_margin = 0.99;
   limits = test::arm_limits(test::nv);
@@ -118,7 +118,8 @@ BOOST_AUTO_TEST_CASE(goals_that_cannot_be_followed_are_refused_and_the_one_befor
   outside[3] = 2.6;
   BOOST_CHECK_EXCEPTION(controller.set_goal(outside), std::invalid_argument, [](const auto& error) {
     const std::string text = error.what();
-    return text.find("joint4") != std::string::npos && text.find("2.6") != std::string::npos && text.find("2.5") != std::string::npos;
+    return text.find("joint4") != std::string::npos && text.find("2.6") != std::string::npos &&
+           text.find("2.5") != std::string::npos;
   });
   BOOST_CHECK_THROW(controller.set_goal(Eigen::VectorXd(goal.head(3))), std::invalid_argument);
   Eigen::Isometry3d nowhere = Eigen::Isometry3d::Identity();

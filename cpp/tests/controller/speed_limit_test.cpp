@@ -36,7 +36,7 @@ Frames frames_at(const Robot& robot, const Eigen::VectorXd& q, const Eigen::Vect
 }
 
 struct Motion {
-  double largest_excess = -test::infinity;  // of speed over the limit [m/s]
+  double largest_excess = -test::infinity;   // of speed over the limit [m/s]
   double fastest = 0.0, fastest_near = 0.0;  // near: within 0.2 m
   double nearest = test::infinity, least_clearance = test::infinity;
   int relaxed = 0, slowed = 0;
@@ -46,8 +46,8 @@ struct Motion {
 };
 
 /// Moves past the obstacles to the goal, or without one, and looks at every sample.
-Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& start, const std::optional<Eigen::VectorXd>& goal,
-            const Obstacles& obstacles, int steps) {
+Motion move(const Arm& arm, ControllerSettings settings, const Eigen::VectorXd& start,
+            const std::optional<Eigen::VectorXd>& goal, const Obstacles& obstacles, int steps) {
   settings.planner.reset();
   settings.look_ahead.reset();
   settings.local_minimum.reset();
@@ -109,7 +109,8 @@ BOOST_AUTO_TEST_CASE(the_limit_of_speed_is_held_at_every_sample_past_an_obstacle
   const Arm arm = covered_arm(test::arm_limits(nv));
   const Eigen::Vector3d tip = frames_at(arm.robot(), turned(0.0), Eigen::VectorXd::Zero(nv)).tip;
   const Eigen::Vector3d beside = tip + Eigen::Vector3d(0.15, 0.0, 0.0);
-  for (const auto output : {ControllerSettings::Output::torque, ControllerSettings::Output::acceleration, ControllerSettings::Output::position}) {
+  for (const auto output :
+       {ControllerSettings::Output::torque, ControllerSettings::Output::acceleration, ControllerSettings::Output::position}) {
     BOOST_TEST_CONTEXT(static_cast<int>(output)) {
       ControllerSettings settings;
       settings.output = output;
@@ -124,16 +125,17 @@ BOOST_AUTO_TEST_CASE(the_limit_of_speed_is_held_at_every_sample_past_an_obstacle
       BOOST_TEST(free.fastest_near > 1.0);
       BOOST_TEST(limited.arrived);
       BOOST_TEST(limited.largest_excess <= 0.0);
-      BOOST_TEST(limited.fastest > 0.9);       // where it is far
+      BOOST_TEST(limited.fastest > 0.9);  // where it is far
       BOOST_TEST(limited.nearest < 0.15);
       BOOST_TEST(limited.fastest_near < 0.56);  // V(0.2 m) = 0.55
       BOOST_TEST(limited.slowed > 100);
       BOOST_TEST(limited.relaxed == 0);
       BOOST_TEST(limited.allocations == 0U);
       BOOST_TEST(limited.words.find("slowed by the speed limit: '") != std::string::npos, limited.words);
-      BOOST_TEST_MESSAGE("excess " << limited.largest_excess << " fastest " << limited.fastest << " near " << limited.fastest_near << " free "
-                                   << free.fastest_near << " nearest " << limited.nearest << " slowed " << limited.slowed << " relaxed "
-                                   << limited.relaxed << " free relaxed " << free.relaxed << " words " << limited.words);
+      BOOST_TEST_MESSAGE("excess " << limited.largest_excess << " fastest " << limited.fastest << " near "
+                                   << limited.fastest_near << " free " << free.fastest_near << " nearest " << limited.nearest
+                                   << " slowed " << limited.slowed << " relaxed " << limited.relaxed << " free relaxed "
+                                   << free.relaxed << " words " << limited.words);
     }
   }
 }
@@ -151,11 +153,12 @@ BOOST_AUTO_TEST_CASE(speed_limits_give_way_to_what_comes_at_the_arm) {
       settings.speed_limits.reset();
       const Motion free = move(arm, settings, turned(0.0), std::nullopt, comes, 1400);
       BOOST_TEST(motion.least_clearance > settings.safety.margin - 2e-4);  // barriers, which begin earlier, give way
-      BOOST_TEST(motion.largest_excess > 0.2);  // it has to be as fast as the ball
+      BOOST_TEST(motion.largest_excess > 0.2);                             // it has to be as fast as the ball
       BOOST_TEST(motion.relaxed > free.relaxed + 100);
       BOOST_TEST(motion.allocations == 0U);
-      BOOST_TEST_MESSAGE("clearance " << motion.least_clearance << " excess " << motion.largest_excess << " relaxed " << motion.relaxed << " free " << free.least_clearance << " " << free.relaxed
-                                      << " words " << motion.words);
+      BOOST_TEST_MESSAGE("clearance " << motion.least_clearance << " excess " << motion.largest_excess << " relaxed "
+                                      << motion.relaxed << " free " << free.least_clearance << " " << free.relaxed << " words "
+                                      << motion.words);
     }
   }
 }

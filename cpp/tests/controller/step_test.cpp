@@ -111,7 +111,8 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
           case 3: controller.clear_goal(); break;
           default: controller.set_goal(q); break;
         }
-        if (k % 5 == 0) {  // comes from afar at the middle of the arm where it will be, too large and too fast for it to back off
+        if (k % 5 ==
+            0) {  // comes from afar at the middle of the arm where it will be, too large and too fast for it to back off
           const KinematicState there = state_at(arm.robot(), k % 2 == 0 ? left : right);
           const Eigen::Vector3d at = frame_pose(arm.robot(), there, arm.robot().frame_index("link4")).translation();
           controller.set_obstacles(test::ball(at + Eigen::Vector3d(0.0, 3.0, 0.0), 0.25, {0.0, -3.0, 0.0}));
@@ -124,7 +125,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
     Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
     std::size_t allocations = 0, avoided = 0, on_path = 0;
     for (int k = 0; k < 40000 && (k < 2500 || avoided == 0 || on_path == 0); ++k) {  // however slow the machine is
-      const bool broken = k % 500 == 250;  // a sensor that fails now and then
+      const bool broken = k % 500 == 250;                                            // a sensor that fails now and then
       const Eigen::VectorXd seen = broken ? Eigen::VectorXd::Constant(nv, test::not_a_number) : q;
       allocations += test::allocations_of([&] { controller.step(seen, v); });
       const Command& command = controller.command();
@@ -250,7 +251,7 @@ BOOST_AUTO_TEST_CASE(status_and_clearance_tell_the_truth_about_the_covering_body
     BOOST_REQUIRE((command.clearance < 0.0) == (least < 0.0));
     if (least < settings.barriers.self_activation) {
       BOOST_REQUIRE(std::abs(command.clearance - least) < 1e-9);  // [m] rounding of two ways to compute it
-    } else {  // pairs of links are looked at no farther than that
+    } else {                                                      // pairs of links are looked at no farther than that
       BOOST_REQUIRE(command.clearance >= least - 1e-9);
     }
     (least < 0.0 ? touched : apart) += 1;
@@ -273,7 +274,7 @@ BOOST_AUTO_TEST_CASE(points_that_outweigh_the_one_that_touches_hide_nothing) {
   const Command& command = controller.step(Eigen::VectorXd::Zero(nv), Eigen::VectorXd::Zero(nv));
   BOOST_TEST(to_string(command.status) == "clearance_lost");
   BOOST_TEST(command.point == 17);
-  BOOST_TEST(std::abs(command.clearance + 1e-4) < 1e-6);  // [m] of first order inside
+  BOOST_TEST(std::abs(command.clearance + 1e-4) < 1e-6);                           // [m] of first order inside
   BOOST_TEST(controller.workspace().clearances.values[command.coordinate] > 0.0);  // the mean, which is smooth
 }
 
@@ -284,7 +285,8 @@ BOOST_AUTO_TEST_CASE(a_state_that_is_unusable_stops_the_arm_and_is_said) {
   Eigen::VectorXd goal = Eigen::VectorXd::Constant(nv, 0.4);
   controller.set_goal(goal);
   const Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.1), v = Eigen::VectorXd::Constant(nv, 0.2);
-  for (const Eigen::VectorXd& bad : {Eigen::VectorXd(Eigen::VectorXd::Constant(nv, test::not_a_number)), Eigen::VectorXd(q.head(3))}) {
+  for (const Eigen::VectorXd& bad :
+       {Eigen::VectorXd(Eigen::VectorXd::Constant(nv, test::not_a_number)), Eigen::VectorXd(q.head(3))}) {
     const Command& command = controller.step(bad, v);  // the first one too
     BOOST_TEST(to_string(command.status) == "stopping");
     BOOST_TEST(command.torque.allFinite());

@@ -61,7 +61,8 @@ BOOST_AUTO_TEST_CASE(velocities_lead_the_arm_back_to_the_reference) {
   q[2] += 0.05;  // it has drifted
   const Command& command = controller.step(q, rest);
   BOOST_TEST((command.position - from).norm() < 1e-12);
-  BOOST_TEST((command.velocity + controller.settings().tracking.drift_gain * 0.05 * Eigen::VectorXd::Unit(nv, 2)).norm() < 1e-12);
+  BOOST_TEST((command.velocity + controller.settings().tracking.drift_gain * 0.05 * Eigen::VectorXd::Unit(nv, 2)).norm() <
+             1e-12);
   BOOST_TEST(std::abs(command.tracking_error - 0.05) < 1e-12);
 }
 

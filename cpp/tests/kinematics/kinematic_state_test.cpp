@@ -44,8 +44,7 @@ BOOST_AUTO_TEST_CASE(jacobian_is_the_derivative_of_the_pose) {
       const Eigen::MatrixXd jacobian = frame_jacobian(robot, state, frame);
       for (int i = 0; i < q.size(); ++i) {
         const Eigen::VectorXd h = step * Eigen::VectorXd::Unit(q.size(), i);
-        const Vector6d expected =
-            twist_between(pose_at(robot, q - h, frame), pose_at(robot, q + h, frame), 2.0 * step);
+        const Vector6d expected = twist_between(pose_at(robot, q - h, frame), pose_at(robot, q + h, frame), 2.0 * step);
         BOOST_TEST((jacobian.col(i) - expected).norm() < tolerance);
       }
     }

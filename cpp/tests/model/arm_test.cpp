@@ -124,9 +124,7 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(sha256_of_the_standards_examples) {
-  const auto hash = [](const std::string& text) {
-    return hexadecimal(sha256(std::as_bytes(std::span<const char>(text))));
-  };
+  const auto hash = [](const std::string& text) { return hexadecimal(sha256(std::as_bytes(std::span<const char>(text)))); };
   BOOST_TEST(hash("") == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   BOOST_TEST(hash("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   BOOST_TEST(hash("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq") ==

@@ -70,7 +70,8 @@ BOOST_AUTO_TEST_CASE(mass_matrix_and_bias_are_sums_over_bodies) {
       const Eigen::Matrix3d R = state.link(i).R_WL;
       const Eigen::Matrix3d inertia = R * body.inertia * R.transpose();
       const Eigen::Vector3d omega = J.bottomRows(3) * v;
-      expected_mass += body.mass * J.topRows(3).transpose() * J.topRows(3) + J.bottomRows(3).transpose() * inertia * J.bottomRows(3);
+      expected_mass +=
+          body.mass * J.topRows(3).transpose() * J.topRows(3) + J.bottomRows(3).transpose() * inertia * J.bottomRows(3);
       expected_force += J.topRows(3).transpose() * body.mass * (acceleration.head<3>() - gravity) +
                         J.bottomRows(3).transpose() * (inertia * acceleration.tail<3>() + omega.cross(inertia * omega));
     }
@@ -163,10 +164,10 @@ BOOST_AUTO_TEST_CASE(dynamics_allocate_nothing) {
   KinematicState state(robot);
   state.update(robot, q, v);
   BOOST_TEST(test::allocations_of([&] {
-    dynamics.mass_matrix(q, workspace, mass);
-    dynamics.bias(q, v, workspace, force);
-    dynamics.gravity(state, workspace, force);
-  }) == 0U);
+               dynamics.mass_matrix(q, workspace, mass);
+               dynamics.bias(q, v, workspace, force);
+               dynamics.gravity(state, workspace, force);
+             }) == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(point_masses_fold_to_valid_inertias) {
@@ -188,9 +189,8 @@ BOOST_AUTO_TEST_CASE(wrong_inertias_are_refused) {
   const auto refuses = [&](auto change, const std::string& what) {
     auto inertials = good;
     change(inertials);
-    BOOST_CHECK_EXCEPTION(RigidBodyDynamics(robot, inertials), std::invalid_argument, [&](const auto& error) {
-      return std::string(error.what()).find(what) != std::string::npos;
-    });
+    BOOST_CHECK_EXCEPTION(RigidBodyDynamics(robot, inertials), std::invalid_argument,
+                          [&](const auto& error) { return std::string(error.what()).find(what) != std::string::npos; });
   };
   refuses([](auto& all) { all.pop_back(); }, "4 joints and 3 inertias");
   refuses([](auto& all) { all[1].mass = -0.5; }, "inertia of joint 'joint1': mass is -0.5");

@@ -106,7 +106,8 @@ BOOST_AUTO_TEST_CASE(clearances_of_points_are_distances_from_ellipsoids) {
       BodyClearance::Workspace w(checked);
       const int num = random.integer(1, 400);
       const double spread = random.magnitude(0.05, 3.0);
-      const Obstacles obstacles(spread * random.matrix(3, num), 0.01 * random.vector(num).cwiseAbs(), Eigen::Matrix3Xd::Zero(3, num));
+      const Obstacles obstacles(spread * random.matrix(3, num), 0.01 * random.vector(num).cwiseAbs(),
+                                Eigen::Matrix3Xd::Zero(3, num));
       const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
       KinematicState state(robot);
       state.update(robot, q, Eigen::VectorXd::Zero(robot.num_coordinates()));
@@ -118,8 +119,10 @@ BOOST_AUTO_TEST_CASE(clearances_of_points_are_distances_from_ellipsoids) {
         }
         const Eigen::Isometry3d X = frame_pose(robot, state, frame);
         for (int n = 0; n < num; ++n) {
-          const double distance = distance_to_ellipsoid(X.inverse() * Eigen::Vector3d(obstacles.points().col(n)) - body.means.col(k),
-                                                        body.covariances[static_cast<std::size_t>(k)]) - obstacles.radii()[n];
+          const double distance =
+              distance_to_ellipsoid(X.inverse() * Eigen::Vector3d(obstacles.points().col(n)) - body.means.col(k),
+                                    body.covariances[static_cast<std::size_t>(k)]) -
+              obstacles.radii()[n];
           least = std::min(least, distance);
         }
       }
@@ -365,10 +368,12 @@ BOOST_AUTO_TEST_CASE(what_moves_is_nearer_than_it_is_said_to_be) {
     const Eigen::Matrix3Xd points = 2.0 * random.matrix(3, 2);
     const Eigen::VectorXd radii = Eigen::Vector2d(0.1, 0.2);
     Eigen::Matrix3Xd velocities = Eigen::Matrix3Xd::Zero(3, 2);
-    BOOST_TEST(body.nearest_moving(q, Obstacles(points, radii, velocities), time, w) == std::numeric_limits<double>::infinity());
+    BOOST_TEST(body.nearest_moving(q, Obstacles(points, radii, velocities), time, w) ==
+               std::numeric_limits<double>::infinity());
     velocities(1, 1) = speed;
     const Obstacles obstacles(points, radii, velocities);
-    const double distance = body.nearest(q, Obstacles(points.rightCols(1), radii.tail(1), Eigen::Matrix3Xd::Zero(3, 1)), far, w).clearance;
+    const double distance =
+        body.nearest(q, Obstacles(points.rightCols(1), radii.tail(1), Eigen::Matrix3Xd::Zero(3, 1)), far, w).clearance;
     double found = 0.0;
     BOOST_TEST(test::allocations_of([&] { found = body.nearest_moving(q, obstacles, time, w); }) == 0);
     BOOST_TEST(found <= distance - time * speed + 1e-6);  // rounding of distances in single precision

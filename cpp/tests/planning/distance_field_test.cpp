@@ -13,7 +13,7 @@ using test::Random;
 namespace {
 
 constexpr double coarsest = 0.07;  // [m] diagonal of a fine cell, 4 cm wide
-constexpr double rounding = 3e-5;   // [m] of distances of some metres in single precision
+constexpr double rounding = 3e-5;  // [m] of distances of some metres in single precision
 
 double scanned(const Obstacles& obstacles, const Eigen::Vector3d& x) {
   double least = std::numeric_limits<double>::infinity();

@@ -19,8 +19,8 @@ Eigen::MatrixXd corner() {
 
 PathTiming timed(const RoundedPath& path, double begin = 0.0) {
   const Eigen::VectorXd stations = path.stations(0.01);
-  return time_path(path, stations, Eigen::VectorXd::Constant(stations.size(), 1e9),
-                   Eigen::VectorXd::Ones(stations.size()), limits, begin);
+  return time_path(path, stations, Eigen::VectorXd::Constant(stations.size(), 1e9), Eigen::VectorXd::Ones(stations.size()),
+                   limits, begin);
 }
 
 /// Largest share of the limits that samples ask for.
@@ -107,8 +107,8 @@ BOOST_AUTO_TEST_CASE(corners_hold_the_limits_at_every_sample) {
     check_limits(m);
     // Derivatives are those of the positions.
     for (Eigen::Index k = 1; k + 1 < m.station.size(); ++k) {
-      BOOST_TEST(((m.q.col(k + 1) - m.q.col(k - 1)) / (2.0 * m.period) - m.v.col(k)).norm() < 3e-3);   // jerk h²/6
-      BOOST_TEST(((m.v.col(k + 1) - m.v.col(k - 1)) / (2.0 * m.period) - m.a.col(k)).norm() < 1.0);    // and half a kink
+      BOOST_TEST(((m.q.col(k + 1) - m.q.col(k - 1)) / (2.0 * m.period) - m.v.col(k)).norm() < 3e-3);  // jerk h²/6
+      BOOST_TEST(((m.v.col(k + 1) - m.v.col(k - 1)) / (2.0 * m.period) - m.a.col(k)).norm() < 1.0);   // and half a kink
     }
   }
 }

@@ -275,28 +275,26 @@ BOOST_AUTO_TEST_CASE(a_closed_way_ends_with_the_budget) {
   PlannerSettings settings;
   settings.max_iterations = 500;
   RrtConnect planner(body, settings);
-  const Plan plan = planner.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5),
-                                 at(points, 0.02), 0);
+  const Plan plan = planner.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5), at(points, 0.02), 0);
   BOOST_TEST(name(plan.status) == "no_path");
   BOOST_TEST(plan.path.size() == 0);
   BOOST_TEST(plan.iterations == 500);
   settings.max_iterations = 2000000000;
   settings.max_checks = 5000;
   RrtConnect bounded(body, settings);
-  const Plan ended = bounded.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5),
-                                  at(points, 0.02), 0);
+  const Plan ended = bounded.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5), at(points, 0.02), 0);
   BOOST_TEST(name(ended.status) == "no_path");
   BOOST_TEST(ended.iterations < 100000);
   BOOST_TEST(ended.checks > 5000);
   BOOST_TEST(ended.checks < 5500);
-  const Plan again = bounded.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5),
-                                  at(points, 0.02), 0);
+  const Plan again = bounded.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5), at(points, 0.02), 0);
   BOOST_TEST(again.iterations == ended.iterations);
   BOOST_TEST(again.checks == ended.checks);
   settings.max_seconds = 1e-9;
   RrtConnect hurried(body, settings);
-  BOOST_TEST(name(hurried.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5),
-                               at(points, 0.02), 0).status) == "timeout");
+  BOOST_TEST(
+      name(hurried.plan(Eigen::VectorXd::Constant(1, 1.5), Eigen::VectorXd::Constant(1, -1.5), at(points, 0.02), 0).status) ==
+      "timeout");
   settings.floor = 0.1;
   BOOST_CHECK_THROW(RrtConnect(body, settings), std::invalid_argument);
 }

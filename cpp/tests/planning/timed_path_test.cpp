@@ -26,7 +26,8 @@ Eigen::MatrixXd line() {
 TimedPath route_of(const Eigen::MatrixXd& path, const Obstacles& obstacles, const Eigen::Vector2d& v = Eigen::Vector2d::Zero(),
                    bool measured = true) {
   BodyClearance::Workspace w(body);
-  return make_route(RoundedPath(path, body, obstacles, Margins{}, w), v, body, obstacles, settings, SafetySettings{}, w, measured);
+  return make_route(RoundedPath(path, body, obstacles, Margins{}, w), v, body, obstacles, settings, SafetySettings{}, w,
+                    measured);
 }
 
 }  // namespace
@@ -69,7 +70,8 @@ BOOST_AUTO_TEST_CASE(a_clearance_closes_no_faster_than_safety_rows_let_it) {
                          std::max(1e-12, route.motion.station[k] - route.motion.station[k - 1]);
     if (h < 0.1 && slope > 0.05) {
       const double u = slope * route.motion.v(0, k), room = h - safety.margin, most = A * slope;
-      const double needed = u <= most / safety.rate ? u / safety.rate : 0.5 * (u * u / most + most / (safety.rate * safety.rate));
+      const double needed =
+          u <= most / safety.rate ? u / safety.rate : 0.5 * (u * u / most + most / (safety.rate * safety.rate));
       BOOST_TEST(needed <= 1.05 * room + 0.001);  // clearances are looked at 0.05 rad apart
     }
   }
@@ -140,7 +142,7 @@ BOOST_AUTO_TEST_CASE(the_reference_waits_for_the_arm_within_the_limits_and_goes_
     }
   };
   move(200, true);
-  move(2000, false);  // the arm is held
+  move(2000, false);                                                             // the arm is held
   BOOST_TEST((position - q).norm() <= settings.lead + 1.9 * 1.9 / (2.0 * 9.5));  // and what it takes to stop within the limits
   BOOST_TEST((position - q).norm() > 0.5 * settings.lead);
   BOOST_TEST(velocity.norm() < 1e-6);
@@ -176,7 +178,8 @@ BOOST_AUTO_TEST_CASE(a_path_asks_no_more_of_the_motors_than_they_have) {
     const RigidBodyDynamics dynamics(robot, {link, link}, Eigen::Vector3d(0.0, pull, 0.0));
     BodyClearance::Workspace w(body);
     const RoundedPath path(line(), body, Obstacles::none(), Margins{}, w);
-    const TimedPath route = make_route(path, Eigen::Vector2d::Zero(), body, Obstacles::none(), settings, SafetySettings{}, w, true, &dynamics);
+    const TimedPath route =
+        make_route(path, Eigen::Vector2d::Zero(), body, Obstacles::none(), settings, SafetySettings{}, w, true, &dynamics);
     RigidBodyDynamics::Workspace dynamic(dynamics);
     Eigen::MatrixXd mass(2, 2);
     Eigen::VectorXd gravity(2), last = Eigen::VectorXd::Zero(2);

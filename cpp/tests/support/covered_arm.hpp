@@ -36,8 +36,8 @@ inline Arm covered_arm(JointLimits limits, bool has_pairs = true, bool has_dynam
   Body body(links, Eigen::VectorXd::Ones(nv), means, std::vector<Eigen::Matrix3d>(links.size(), shape),
             Eigen::VectorXd::Ones(nv));
   const Inertial inertial{0.3, {0.0, 0.0, 0.15}, Eigen::Vector3d(3e-3, 3e-3, 1e-3).asDiagonal()};
-  return Arm(Robot("covered_arm", bare.joints(), std::move(frames), bare.coordinate_names(), bare.limits()),
-             std::move(body), std::move(pairs), {},
+  return Arm(Robot("covered_arm", bare.joints(), std::move(frames), bare.coordinate_names(), bare.limits()), std::move(body),
+             std::move(pairs), {},
              has_dynamics ? std::vector<Inertial>(static_cast<std::size_t>(nv), inertial) : std::vector<Inertial>{});
 }
 

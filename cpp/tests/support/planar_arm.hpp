@@ -27,7 +27,8 @@ inline BodyClearance planar_arm_body() {
   Eigen::Matrix3Xd means = Eigen::Matrix3Xd::Zero(3, 2);
   means.row(0).setConstant(0.15);
   const Eigen::Matrix3d shape = Eigen::Vector3d(0.16 * 0.16, 0.02 * 0.02, 0.02 * 0.02).asDiagonal();
-  return BodyClearance(planar_arm(), Body({"link", "tip"}, Eigen::VectorXd::Ones(2), means, {shape, shape}, Eigen::VectorXd::Ones(2)));
+  return BodyClearance(planar_arm(),
+                       Body({"link", "tip"}, Eigen::VectorXd::Ones(2), means, {shape, shape}, Eigen::VectorXd::Ones(2)));
 }
 
 }  // namespace sidestep::test

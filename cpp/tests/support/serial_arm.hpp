@@ -40,8 +40,8 @@ inline Robot serial_arm(JointLimits limits) {
     names.push_back(joint.name);
     joints.push_back(std::move(joint));
   }
-  return Robot("serial_arm", std::move(joints), {Frame{"tip", nv - 1, Eigen::Isometry3d::Identity()}},
-               std::move(names), std::move(limits));
+  return Robot("serial_arm", std::move(joints), {Frame{"tip", nv - 1, Eigen::Isometry3d::Identity()}}, std::move(names),
+               std::move(limits));
 }
 
 /// A random mass matrix with the spread of an arm's: about 1 kg m^2 at the base, 0.05 at the tip.

@@ -26,8 +26,7 @@ std::vector<Embeddings> lists_of_embeddings(Random& random, const Robot& robot) 
 }
 
 GeometricSystemSettings settings_of(int nv, DampingForm form, Switch combination) {
-  return {2.0 * Eigen::MatrixXd::Identity(nv, nv), 1.5 * Eigen::MatrixXd::Identity(nv, nv), form,
-          std::move(combination)};
+  return {2.0 * Eigen::MatrixXd::Identity(nv, nv), 1.5 * Eigen::MatrixXd::Identity(nv, nv), form, std::move(combination)};
 }
 
 std::vector<Switch> switches(int nv, bool with_distances) {
@@ -88,10 +87,9 @@ BOOST_AUTO_TEST_CASE(no_step_allocates) {
         const GeometricSystem system(robot, embeddings, settings_of(nv, form, combination));
         GeometricSystem::Workspace w(system);
         StepStatus status{};
-        const auto check = [&](const Eigen::VectorXd& at, const Eigen::VectorXd& velocity,
-                               const Eigen::VectorXd& target, const Obstacles& around, StepStatus expected) {
-          const auto count =
-              test::allocations_of([&] { status = system.acceleration(at, velocity, target, around, w); });
+        const auto check = [&](const Eigen::VectorXd& at, const Eigen::VectorXd& velocity, const Eigen::VectorXd& target,
+                               const Obstacles& around, StepStatus expected) {
+          const auto count = test::allocations_of([&] { status = system.acceleration(at, velocity, target, around, w); });
           BOOST_TEST(count == 0u);
           BOOST_TEST((status == expected));
           BOOST_TEST(w.acceleration.allFinite());
@@ -120,8 +118,7 @@ BOOST_AUTO_TEST_CASE(the_guard_would_see_a_step_that_allocates) {
   Random random(3);
   const Robot robot = test::random_tree(random, 4);
   const int nv = robot.num_coordinates();
-  const GeometricSystem system(robot, lists_of_embeddings(random, robot)[1],
-                               settings_of(nv, DampingForm::plain, Unswitched{}));
+  const GeometricSystem system(robot, lists_of_embeddings(random, robot)[1], settings_of(nv, DampingForm::plain, Unswitched{}));
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(nv);
   // a workspace made inside the loop is the mistake that the guard is for
   const auto careless = [&] {

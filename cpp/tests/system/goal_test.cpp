@@ -55,8 +55,7 @@ BOOST_AUTO_TEST_CASE(gradients_are_those_of_the_potential) {
     for (int j = 0; j < nv; ++j) {
       constexpr double step = 1e-6;
       const Eigen::VectorXd dq = step * Eigen::VectorXd::Unit(nv, j);
-      const double slope =
-          (pull_of(robot, goal, q + dq).potential - pull_of(robot, goal, q - dq).potential) / (2.0 * step);
+      const double slope = (pull_of(robot, goal, q + dq).potential - pull_of(robot, goal, q - dq).potential) / (2.0 * step);
       // central differences: step² times third derivatives, and rounding of U over the step
       BOOST_TEST(std::abs(pull.gradient[j] - slope) < 1e-7 * (1.0 + pull.potential));
     }

@@ -36,8 +36,7 @@ Robot planar() {
 GeometricSystem system_of(const Robot& robot, bool limits = false) {
   const Body body({"tip"}, Eigen::VectorXd::Ones(1), Eigen::Matrix3Xd::Zero(3, 1),
                   {sphere * sphere * Eigen::Matrix3d::Identity()}, Eigen::VectorXd::Ones(1));
-  std::vector<std::shared_ptr<const Embedding>> embeddings = {
-      std::make_shared<ClearanceBarrier>(robot, body, barrier)};
+  std::vector<std::shared_ptr<const Embedding>> embeddings = {std::make_shared<ClearanceBarrier>(robot, body, barrier)};
   if (limits) {
     embeddings.push_back(std::make_shared<JointLimitBarrier>(robot, BarrierFunction{0.1, 0.02, 2.0, 0.002}));
   }
@@ -103,8 +102,8 @@ BOOST_AUTO_TEST_CASE(the_push_begins_at_zero_and_smoothly) {
   double pushes[3];
   const double depths[3] = {-1e-9, 1e-6, 1e-5};
   for (int i = 0; i < 3; ++i) {
-    static_cast<void>(system.acceleration(q, Eigen::VectorXd::Zero(2), q,
-                                          point_at(tip(0.3, 0.8), -0.5, 1.0, barrier.floor - depths[i]), w));
+    static_cast<void>(
+        system.acceleration(q, Eigen::VectorXd::Zero(2), q, point_at(tip(0.3, 0.8), -0.5, 1.0, barrier.floor - depths[i]), w));
     pushes[i] = w.recovery.norm();
   }
   BOOST_TEST(pushes[0] == 0.0);
@@ -229,8 +228,8 @@ BOOST_AUTO_TEST_CASE(states_are_told_apart) {
   // The obstacle on the goal.
   const Obstacles on_goal = point_at(tip(0.6, 0.5), 0.3, -1.0, -0.08 - 0.02);
   const Rollout motion = rollout(system, Eigen::Vector2d(0.0, 0.5), rest, Eigen::Vector2d(0.6, 0.5), on_goal, {0.002, 20000});
-  d = system.diagnose(motion.q.row(20000).transpose(), motion.v.row(20000).transpose(),
-                      JointGoal(Eigen::Vector2d(0.6, 0.5)), on_goal, w);
+  d = system.diagnose(motion.q.row(20000).transpose(), motion.v.row(20000).transpose(), JointGoal(Eigen::Vector2d(0.6, 0.5)),
+                      on_goal, w);
   BOOST_TEST((d.state == MotionState::blocked_at_goal), name(d.state) << ", " << words(d) << ", " << d.blocked);
 
   // A pose that no configuration has.

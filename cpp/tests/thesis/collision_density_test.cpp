@@ -34,12 +34,12 @@ Sums plain_sum(const Robot& robot, const Body& body, const KinematicState& state
       const Eigen::Matrix3d P = S.inverse();
       const Eigen::Vector3d x = obstacles.points().col(n), x_dot = obstacles.velocities().col(n);
       const Eigen::Vector3d slip = x_dot - link.velocity.linear - link.velocity.angular.cross(x);
-      const Eigen::Vector3d slip_dot = -link.bias.linear - link.bias.angular.cross(x) -
-                                       link.velocity.angular.cross(x_dot) - link.velocity.angular.cross(slip);
+      const Eigen::Vector3d slip_dot = -link.bias.linear - link.bias.angular.cross(x) - link.velocity.angular.cross(x_dot) -
+                                       link.velocity.angular.cross(slip);
       const Eigen::Vector3d e = x - mean, t = P * e;
       const double two_pi = 2.0 * std::numbers::pi;
-      const double density = body.weights[k] * std::exp(-0.5 * e.dot(t)) /
-                             std::sqrt(two_pi * two_pi * two_pi * S.determinant());
+      const double density =
+          body.weights[k] * std::exp(-0.5 * e.dot(t)) / std::sqrt(two_pi * two_pi * two_pi * S.determinant());
       const double slope = t.dot(slip), bend = slip.dot(P * slip), pull = t.dot(slip_dot);
       sums.value += density;
       sums.curvature += density * (slope * slope - bend - pull);

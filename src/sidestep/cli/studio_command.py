@@ -99,6 +99,7 @@ def studio(
         window = Window.from_text(size)
         take_pictures(
             chosen,
+            to_and_fro=scenario is None,
             method=method,
             ellipsoids=ellipsoids,
             duration=duration,

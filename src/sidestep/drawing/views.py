@@ -88,7 +88,7 @@ class ArmViews:
             pose = item.pose if self._poses is None else pose_matrix(self._poses[0, i])
             solids.append(moved(np.array(item.surface().triangles, dtype=float), pose))
         triangles = np.concatenate(solids)
-        hidden = [float(_hidden(points, triangles, direction(*side)).mean()) for side in SIDES]
+        hidden = [float(hidden(points, triangles, direction(*side)).mean()) for side in SIDES]
         best = int(np.argmin(hidden))
         return SIDES[best] if hidden[best] < hidden[0] - BETTER else SIDES[0]
 
@@ -177,7 +177,7 @@ def fit_view(ax: Any, points: Array, *, size: tuple[int, int]) -> None:
     show(zoom)
 
 
-def _hidden(points: Array, triangles: Array, towards: Array) -> npt.NDArray[np.bool_]:
+def hidden(points: Array, triangles: Array, towards: Array) -> npt.NDArray[np.bool_]:
     """Which points (N, 3) have a triangle (F, 3, 3) between them and a viewer in a direction (3,) far away.
 
     Source: Möller and Trumbore (1997).

@@ -143,6 +143,7 @@ def go_to(page: Page, address: str) -> None:
 def take_pictures(
     scenario: Scenario,
     *,
+    to_and_fro: bool = False,
     method: str,
     ellipsoids: int | None,
     duration: float,
@@ -160,7 +161,7 @@ def take_pictures(
 
     check_files(screenshot, video)
     check_browser()
-    with Studio(scenario, method=method, port=0, ellipsoids=ellipsoids) as studio:
+    with Studio(scenario, to_and_fro=to_and_fro, method=method, port=0, ellipsoids=ellipsoids) as studio:
         studio.wait_ready(BODY_TIME)
         studio.send(m.Restart(until=0.0))  # a moving scene would leave little time to load the page
         if hasattr(os, "nice"):

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from sidestep.distance import SceneObject
 from sidestep.obstacles import merge_in_voxels
-from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
+from sidestep.robot.pose import from_roll_pitch_yaw, moved, pose_at
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import solids
 from sidestep.scenario.perception import View, cloud_balls, view_of
@@ -129,6 +129,13 @@ class SceneObstacle:
         return float(
             np.linalg.norm(self.offsets - self.middle, axis=1).max() + self.solids[0].bounding_radius
         )
+
+    @property
+    def triangles(self) -> Array:
+        """Of its surface where it starts (F, 3, 3) [m]; none of a cloud, which one can look through."""
+        if self.cloud is not None:
+            return np.zeros((0, 3, 3))
+        return moved(np.array(self.solids[0].surface().triangles, dtype=float), self.start)
 
     def at(self, pose: Array) -> SceneObstacle:
         """The same thing, starting at another pose (4, 4), at rest."""

@@ -27,7 +27,7 @@ struct BarrierFunction {
     }
     const double at = h < floor ? floor : h;
     const double base = activation / at - 1.0;
-    const double slope = -activation / (at * at);       // d base / dh
+    const double slope = -activation / (at * at);  // d base / dh
     const double bend = 2.0 * activation / (at * at * at);
     const double p2 = std::pow(base, power - 2.0);
     const double p1 = p2 * base;

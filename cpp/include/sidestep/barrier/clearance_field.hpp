@@ -72,7 +72,7 @@ class ClearanceField {
     int first, size;
     Eigen::Vector3d centre;
     double radius;
-    double inner_radius;  // of one around the balls inside them
+    double inner_radius;                       // of one around the balls inside them
     Eigen::Matrix<float, most, 16> principal;  // of every ellipsoid, as inner loops read it
   };
 

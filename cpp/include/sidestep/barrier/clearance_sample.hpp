@@ -28,11 +28,11 @@ struct ClearanceSample {
 };
 
 /// Writes a sample as entry k, its wrenches on the links of two joints; -1: on none, or the world.
-void write(const ClearanceSample& sample, const KinematicState& state, int first_joint, int second_joint,
-           Eigen::Index k, ClearanceStateView& out) noexcept;
+void write(const ClearanceSample& sample, const KinematicState& state, int first_joint, int second_joint, Eigen::Index k,
+           ClearanceStateView& out) noexcept;
 
 /// The same of a sample, and of what approaches, with wrenches on the link of one joint.
-void write(const ClearanceSample& sample, const ClearanceSample& approach, const KinematicState& state, int joint, Eigen::Index k,
-           ClearanceView& out) noexcept;
+void write(const ClearanceSample& sample, const ClearanceSample& approach, const KinematicState& state, int joint,
+           Eigen::Index k, ClearanceView& out) noexcept;
 
 }  // namespace sidestep

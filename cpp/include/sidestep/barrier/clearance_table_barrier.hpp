@@ -20,8 +20,7 @@ class ClearanceTableBarrier final : public Barrier {
   /// Clearances are given up to `reach` [m], at least to the activation distance, as in ClearanceBarrier. Throws
   /// std::invalid_argument if there is no table, a link is unknown, or a table or a setting is at fault, which it
   /// names.
-  ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables, BarrierFunction barrier,
-                        double reach = 0.0);
+  ClearanceTableBarrier(const Robot& robot, std::vector<ClearanceTable> tables, BarrierFunction barrier, double reach = 0.0);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;

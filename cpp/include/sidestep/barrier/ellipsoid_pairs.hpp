@@ -5,9 +5,9 @@ namespace sidestep {
 /// Where a frame b is in a frame a, and how it moves there. Plain arrays, for the kernels.
 struct RelativeMotion {
   double rotation[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};  // R_AB, by columns
-  double position[3] = {};                                               // p_AB [m]
-  double angular[3] = {}, linear[3] = {};            // spatial velocity at the origin of a
-  double bias_angular[3] = {}, bias_linear[3] = {};  // its time derivative at q̈ = 0
+  double position[3] = {};                                             // p_AB [m]
+  double angular[3] = {}, linear[3] = {};                              // spatial velocity at the origin of a
+  double bias_angular[3] = {}, bias_linear[3] = {};                    // its time derivative at q̈ = 0
 };
 
 /// Pairs of an ellipsoid of a and one of b, side by side, and the gaps between them (see ellipsoid_gap.hpp). Symmetric

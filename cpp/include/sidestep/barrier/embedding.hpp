@@ -34,10 +34,10 @@ struct CoordinateLabel {
     joint_limit,  ///< a joint against a position limit; the clearance is in the joint's unit
   };
   Kind kind = Kind::potential;
-  std::string name = {};   ///< of the link, or of the coordinate for a joint limit
-  std::string other = {};  ///< the second link of a pair; "lower" or "upper" for a joint limit
+  std::string name = {};                                    ///< of the link, or of the coordinate for a joint limit
+  std::string other = {};                                   ///< the second link of a pair; "lower" or "upper" for a joint limit
   double floor = -std::numeric_limits<double>::infinity();  ///< below this clearance the arm counts as inside
-  bool slides = false;     ///< a limit of a sliding joint: the clearance is in m, not in rad
+  bool slides = false;                                      ///< a limit of a sliding joint: the clearance is in m, not in rad
 };
 
 /// Extra coordinates ψ(q, t) that embed the joint space in R^(nv + m) as the graph q ↦ (q, ψ(q, t)).
@@ -97,7 +97,6 @@ EmbeddingEvaluation evaluate(const Embedding& embedding, const Eigen::VectorXd& 
 
 /// Hessians ∂²ψ_i/∂q² (m of nv × nv), exact: the curvature at zero obstacle velocity is the quadratic form vᵀ H v,
 /// read off by polarisation. For tests and plots; nv(nv+1)/2 evaluations.
-std::vector<Eigen::MatrixXd> hessians(const Embedding& embedding, const Eigen::VectorXd& q,
-                                      const Obstacles& obstacles);
+std::vector<Eigen::MatrixXd> hessians(const Embedding& embedding, const Eigen::VectorXd& q, const Obstacles& obstacles);
 
 }  // namespace sidestep

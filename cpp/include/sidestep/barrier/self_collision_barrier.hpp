@@ -33,7 +33,7 @@ class SelfCollisionBarrier final : public Barrier {
     int joint;
     std::vector<BodyEllipsoid> ellipsoids;
     std::vector<EllipsoidRow> rows;  // the same, side by side
-    Eigen::Vector3d centre;  // of a ball around them
+    Eigen::Vector3d centre;          // of a ball around them
     double radius;
   };
   struct Pair {
@@ -52,8 +52,7 @@ class PlaneBarrier final : public Barrier {
   /// point (3) [m] on the plane and normal (3) pointing to the free side, in the world; `links` to keep off it, each
   /// moved by a joint. Throws std::invalid_argument that names what is wrong.
   PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
-               const std::vector<std::string>& links, BarrierFunction barrier, double temperature = 0.002,
-               double reach = 0.0);
+               const std::vector<std::string>& links, BarrierFunction barrier, double temperature = 0.002, double reach = 0.0);
 
   void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
   CoordinateLabel label(int k) const override;

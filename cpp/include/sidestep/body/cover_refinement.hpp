@@ -29,15 +29,15 @@ struct SolidEllipsoids {
 
 /// How `refine_cover` descends.
 struct CoverRefinement {
-  int steps;               ///< of the descent (Adam)
-  double first_rate;       ///< length of the first steps [m]
-  double last_rate;        ///< of the last; geometric in between [m]
-  double stiffness;        ///< of the augmented Lagrangian, per squared depth in `unit`
-  int multiplier_steps;    ///< steps between two updates of the multipliers
-  double margin;           ///< by which points should lie inside [m]
-  double unit;             ///< overshoot at which its mean and its peaks count alike [m]
-  double area;             ///< of the surface [m^2]: overshoot is counted per area
-  double slimness;         ///< least shortest over longest semi-axis
+  int steps;             ///< of the descent (Adam)
+  double first_rate;     ///< length of the first steps [m]
+  double last_rate;      ///< of the last; geometric in between [m]
+  double stiffness;      ///< of the augmented Lagrangian, per squared depth in `unit`
+  int multiplier_steps;  ///< steps between two updates of the multipliers
+  double margin;         ///< by which points should lie inside [m]
+  double unit;           ///< overshoot at which its mean and its peaks count alike [m]
+  double area;           ///< of the surface [m^2]: overshoot is counted per area
+  double slimness;       ///< least shortest over longest semi-axis
 };
 
 /// Moves and bends ellipsoids so that their union holds points of a surface and overshoots the surface little.
@@ -50,9 +50,8 @@ struct CoverRefinement {
 /// points (3 × N) [m]; directions: sets of unit vectors, used in turn, at which the boundary is felt; multipliers (N,)
 /// of the points, updated. The proof of the cover is made elsewhere: nothing here is a guarantee. Throws Interruption
 /// if interrupted, which is asked before every step; ellipsoids and multipliers are then those of the step before.
-void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points,
-                  const std::vector<Eigen::Matrix3Xd>& directions, const CoverRefinement& settings,
-                  SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers,
+void refine_cover(const DistanceGrid& grid, const Eigen::Matrix3Xd& points, const std::vector<Eigen::Matrix3Xd>& directions,
+                  const CoverRefinement& settings, SolidEllipsoids& ellipsoids, Eigen::VectorXd& multipliers,
                   const Interrupted& interrupted = never_interrupted);
 
 }  // namespace sidestep

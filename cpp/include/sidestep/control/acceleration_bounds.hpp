@@ -104,13 +104,13 @@ bool is_viable(double q, double v, const ScalarLimits& limits, double period, do
 AccelerationInterval acceleration_interval(double q, double v, const ScalarLimits& limits, double period) noexcept;
 
 /// Its part within `jerk` [/s^3] of the acceleration `before` of the last period; never empty.
-SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval, const ScalarLimits& limits,
-                               double jerk, double period) noexcept;
+SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval,
+                               const ScalarLimits& limits, double jerk, double period) noexcept;
 
 /// How the bounds of all joints are drawn in.
 struct LimitMargins {
-  double position = 0.0;        ///< position limits are moved inwards by this much [rad | m]
-  double jerk_share = 1.0;      ///< of the jerk limits
+  double position = 0.0;             ///< position limits are moved inwards by this much [rad | m]
+  double jerk_share = 1.0;           ///< of the jerk limits
   double acceleration_factor = 1.0;  ///< acceleration limits are exceeded up to this, but not counted on for braking
 };
 

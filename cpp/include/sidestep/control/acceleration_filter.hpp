@@ -9,7 +9,7 @@ struct AccelerationFilterSettings {
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop q̈ = -v/stop_time [s]
   SafetySettings safety = {};
-  int max_speed_rows = 0;        ///< see TorqueControllerSettings
+  int max_speed_rows = 0;  ///< see TorqueControllerSettings
 };
 
 /// The acceleration nearest to a wanted one within the limits of joints and clearances, for motion without torque:
@@ -22,17 +22,15 @@ class AccelerationFilter {
   explicit AccelerationFilter(const Robot& robot, AccelerationFilterSettings settings = {});
 
   /// Writes `solution`, of which `acceleration` is the result; always finite. Clearances: none if null. No allocation.
-  [[nodiscard]] TorqueStatus apply(ConstVectorRef q,
-                                   ConstVectorRef v,
-                                   ConstVectorRef acceleration, const Clearances* clearances,
-                                   TorqueSolution& solution) noexcept {
+  [[nodiscard]] TorqueStatus apply(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration,
+                                   const Clearances* clearances, TorqueSolution& solution) noexcept {
     return apply(q, v, acceleration, clearances, {}, {}, solution);
   }
 
   /// The same near the last command, with the clearances at another state and limits of Cartesian speed.
-  [[nodiscard]] TorqueStatus apply(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration, const Clearances* clearances,
-                                   const SecondState& second, const LastCommand& last, TorqueSolution& solution,
-                                   const SpeedRows* speed = nullptr) noexcept {
+  [[nodiscard]] TorqueStatus apply(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration,
+                                   const Clearances* clearances, const SecondState& second, const LastCommand& last,
+                                   TorqueSolution& solution, const SpeedRows* speed = nullptr) noexcept {
     return controller_.solve(q, v, acceleration, unit_mass_, no_bias_, clearances, second, last, solution, speed);
   }
 

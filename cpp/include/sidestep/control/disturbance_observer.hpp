@@ -38,7 +38,7 @@ class DisturbanceObserver {
   const Eigen::VectorXd& rotors() const noexcept { return rotors_; }            ///< J (nv) [kg m² | kg]
 
  private:
-  static constexpr int num_terms = 5;                     // v̇, z, sign(v), v, 1
+  static constexpr int num_terms = 5;  // v̇, z, sign(v), v, 1
   using Terms = Eigen::Matrix<double, num_terms, 1>;
   using Seen = Eigen::Matrix<double, num_terms + 1, 1>;  // and what is missing
   struct Joint {

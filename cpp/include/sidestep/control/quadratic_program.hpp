@@ -23,11 +23,11 @@ const char* name(QuadraticProgramStatus status) noexcept;
 struct QuadraticProgramData {
   QuadraticProgramData(int num_variables, int num_rows);
 
-  Eigen::MatrixXd H;                     ///< (n, n), symmetric positive definite; the lower triangle is read
-  Eigen::VectorXd g;                     ///< (n)
-  Eigen::VectorXd lower, upper;          ///< (n)
+  Eigen::MatrixXd H;             ///< (n, n), symmetric positive definite; the lower triangle is read
+  Eigen::VectorXd g;             ///< (n)
+  Eigen::VectorXd lower, upper;  ///< (n)
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> A;  ///< (m, n)
-  Eigen::VectorXd row_lower, row_upper;  ///< (m)
+  Eigen::VectorXd row_lower, row_upper;                                      ///< (m)
 };
 
 /// A dense strictly convex quadratic program of fixed size, solved by the dual active-set method.
@@ -87,13 +87,13 @@ class QuadraticProgram {
   int n_, m_;
   int num_active_ = 0;
   int iterations_ = 0;
-  std::vector<Active> active_;     // (n), first num_active_ in use
-  std::vector<char> is_active_;    // (n + m)
-  Eigen::MatrixXd cholesky_;       // L of the coupled part, H = L L'
-  Eigen::MatrixXd J_;              // L^-T times an orthogonal matrix, so J' H J = I; J' N = [R; 0]
-  Eigen::MatrixXd R_;              // upper triangular, (num_active_, num_active_) in use; N: active normals
+  std::vector<Active> active_;   // (n), first num_active_ in use
+  std::vector<char> is_active_;  // (n + m)
+  Eigen::MatrixXd cholesky_;     // L of the coupled part, H = L L'
+  Eigen::MatrixXd J_;            // L^-T times an orthogonal matrix, so J' H J = I; J' N = [R; 0]
+  Eigen::MatrixXd R_;            // upper triangular, (num_active_, num_active_) in use; N: active normals
   Eigen::VectorXd x_, multipliers_;
-  int num_coupled_ = 0;            // H is diagonal from here on
+  int num_coupled_ = 0;  // H is diagonal from here on
   // (m, n) where rows of A in use are not zero
   Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> supports_;
   Eigen::VectorXi support_sizes_;  // (m)

@@ -179,14 +179,14 @@ class SafetyRows {
   const SafetySettings& settings() const noexcept { return settings_; }
 
   using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  RowMatrix normals;                ///< (max, nv), the first size() in use
-  Eigen::VectorXd lower;            ///< (max) [rad/s²]: required/length
-  Eigen::VectorXd lengths;          ///< (max) |∇h| [m/rad]
-  std::vector<int> coordinates;     ///< (max) which clearance a row belongs to, most critical first
-  std::vector<int> nearest;         ///< (max) its nearest obstacle point
-  Eigen::VectorXd depths;           ///< (max) [m] how far below zero the clearance is, else 0: that of what approaches
-  std::vector<char> along_path;     ///< (max) whether a row asks for a stop along the path
-  int helpless = -1;                ///< a clearance that asks for something and that no joint changes; -1: none
+  RowMatrix normals;             ///< (max, nv), the first size() in use
+  Eigen::VectorXd lower;         ///< (max) [rad/s²]: required/length
+  Eigen::VectorXd lengths;       ///< (max) |∇h| [m/rad]
+  std::vector<int> coordinates;  ///< (max) which clearance a row belongs to, most critical first
+  std::vector<int> nearest;      ///< (max) its nearest obstacle point
+  Eigen::VectorXd depths;        ///< (max) [m] how far below zero the clearance is, else 0: that of what approaches
+  std::vector<char> along_path;  ///< (max) whether a row asks for a stop along the path
+  int helpless = -1;             ///< a clearance that asks for something and that no joint changes; -1: none
 
  private:
   /// τ [s], see above.
@@ -199,18 +199,19 @@ class SafetyRows {
                          const Eigen::VectorXd& row_lower, const Eigen::VectorXd& row_upper, double otherwise) noexcept;
 
   /// What a row asks for where jerk is limited, see above: more early, or less where a smooth stop at A fits into the room.
-  static double smoothed(double required, double room, double closing_speed, double curvature, double A, ConstVectorRef gradient,
-                         const LastMotion& last, const AccelerationBounds& bounds, const JointLimits& limits, double period) noexcept;
+  static double smoothed(double required, double room, double closing_speed, double curvature, double A,
+                         ConstVectorRef gradient, const LastMotion& last, const AccelerationBounds& bounds,
+                         const JointLimits& limits, double period) noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
-  Eigen::VectorXd urgency_;  // (max) predicted room of the rows chosen, ascending
-  Eigen::VectorXd response_; // (nv) M v
-  RowMatrix responses_;      // (nv, max) M⁻¹ ∇h of the rows chosen
-  Eigen::VectorXd least_;    // (nv) −(acceleration limits)
+  Eigen::VectorXd urgency_;                      // (max) predicted room of the rows chosen, ascending
+  Eigen::VectorXd response_;                     // (nv) M v
+  RowMatrix responses_;                          // (nv, max) M⁻¹ ∇h of the rows chosen
+  Eigen::VectorXd least_;                        // (nv) −(acceleration limits)
   Eigen::VectorXd effort_lower_, effort_upper_;  // (nv) of M q̈
   QuadraticProgramData reach_data_;
-  QuadraticProgram reach_;   // what a direction can have within accelerations and torques
+  QuadraticProgram reach_;  // what a direction can have within accelerations and torques
 };
 
 }  // namespace sidestep

@@ -29,10 +29,10 @@ namespace sidestep {
 // acceleration meets all rows. Where clearances or torque limits do not let it, rows give way together.
 
 struct SpeedLimitSettings {
-  double near_speed = 0.25;     ///< V₀ [m/s], kept at near_distance and nearer
-  double near_distance = 0.1;   ///< d₀ [m]
-  double far_speed = 1.5;       ///< V₁ [m/s], kept at far_distance and farther
-  double far_distance = 1.0;    ///< d₁ [m]
+  double near_speed = 0.25;    ///< V₀ [m/s], kept at near_distance and nearer
+  double near_distance = 0.1;  ///< d₀ [m]
+  double far_speed = 1.5;      ///< V₁ [m/s], kept at far_distance and farther
+  double far_distance = 1.0;   ///< d₁ [m]
 
   /// V [m/s] at a distance [m].
   double allowed(double distance) const noexcept;
@@ -64,8 +64,8 @@ class SpeedRows {
   int max_size() const noexcept { return static_cast<int>(frames_.size()); }
 
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> normals;  ///< (max, nv), the first size() in use
-  Eigen::VectorXd upper;    ///< (max) [rad/s²]
-  Eigen::VectorXd lengths;  ///< (max) |n·J| [m/rad]
+  Eigen::VectorXd upper;                                                           ///< (max) [rad/s²]
+  Eigen::VectorXd lengths;                                                         ///< (max) |n·J| [m/rad]
   std::vector<int> frames;  ///< (max) which frame of the robot a row belongs to
 
  private:

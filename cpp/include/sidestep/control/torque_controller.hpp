@@ -48,19 +48,19 @@ struct TorqueSolution {
 
   TorqueStatus status = TorqueStatus::ok;
   TorqueFault fault = TorqueFault::none;
-  Eigen::VectorXd torque;                          ///< [Nm | N], within the effort limits, always finite
-  Eigen::VectorXd acceleration;                    ///< M^-1 (torque - bias) [/s^2]; NaN where M or bias is unusable
-  Eigen::VectorXd slack;                           ///< acceleration beyond its bounds [/s^2], signed; 0 unless relaxed
-  Eigen::VectorXd lower, upper;                    ///< the acceleration bounds used [/s^2]; NaN if q or v is unusable
-  std::vector<Limit> active;                       ///< the limits in the way of each joint
-  std::vector<SafetyRow> safety;                   ///< the first num_safety_rows, most critical first
+  Eigen::VectorXd torque;         ///< [Nm | N], within the effort limits, always finite
+  Eigen::VectorXd acceleration;   ///< M^-1 (torque - bias) [/s^2]; NaN where M or bias is unusable
+  Eigen::VectorXd slack;          ///< acceleration beyond its bounds [/s^2], signed; 0 unless relaxed
+  Eigen::VectorXd lower, upper;   ///< the acceleration bounds used [/s^2]; NaN if q or v is unusable
+  std::vector<Limit> active;      ///< the limits in the way of each joint
+  std::vector<SafetyRow> safety;  ///< the first num_safety_rows, most critical first
   int num_safety_rows = 0;
-  int dominant = -1;                               ///< the entry of `safety` that bends the motion most; -1 if none
-  int speed_frame = -1;                            ///< the frame whose speed limit bends the motion most; -1: none
-  double speed_slack = 0.0;                        ///< how far its row is missed [m/s²]; 0 unless limits of speed gave way
+  int dominant = -1;         ///< the entry of `safety` that bends the motion most; -1 if none
+  int speed_frame = -1;      ///< the frame whose speed limit bends the motion most; -1: none
+  double speed_slack = 0.0;  ///< how far its row is missed [m/s²]; 0 unless limits of speed gave way
   /// The least of all clearances given [m], exact, also without a row; inf: none.
   double least_clearance = std::numeric_limits<double>::infinity();
-  int least_coordinate = -1, least_nearest = -1;   ///< which clearance that is, and its nearest point; -1: none
+  int least_coordinate = -1, least_nearest = -1;  ///< which clearance that is, and its nearest point; -1: none
 };
 
 /// What the last period's command was, where jerk and torque rate are to keep their limits; null leaves a limit out.
@@ -158,33 +158,25 @@ class TorqueController {
 
   /// q [rad | m], v [/s], wanted acceleration [/s^2], mass matrix M (nv, nv, symmetric), bias h [Nm | N]. A wrong size
   /// counts as invalid input. Writes all of `solution`, which must have been made for the same number of coordinates.
-  [[nodiscard]] TorqueStatus solve(ConstVectorRef q,
-                                   ConstVectorRef v,
-                                   ConstVectorRef acceleration,
-                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                   ConstVectorRef bias, TorqueSolution& solution) noexcept {
+  [[nodiscard]] TorqueStatus solve(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix, ConstVectorRef bias,
+                                   TorqueSolution& solution) noexcept {
     return solve(q, v, acceleration, mass_matrix, bias, nullptr, solution);
   }
 
   /// The same with the clearances at (q, v), for example those of a GeometricSystem::Workspace; none if null.
-  [[nodiscard]] TorqueStatus solve(ConstVectorRef q,
-                                   ConstVectorRef v,
-                                   ConstVectorRef acceleration,
-                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                   ConstVectorRef bias, const Clearances* clearances,
-                                   TorqueSolution& solution) noexcept {
+  [[nodiscard]] TorqueStatus solve(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix, ConstVectorRef bias,
+                                   const Clearances* clearances, TorqueSolution& solution) noexcept {
     return solve(q, v, acceleration, mass_matrix, bias, clearances, {}, {}, solution);
   }
 
   /// The same near the last command, with the clearances at another state, and limits of Cartesian speed, of which no more
   /// than max_speed_rows are kept; none if null.
-  [[nodiscard]] TorqueStatus solve(ConstVectorRef q,
-                                   ConstVectorRef v,
-                                   ConstVectorRef acceleration,
-                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix,
-                                   ConstVectorRef bias, const Clearances* clearances, const SecondState& second,
-                                   const LastCommand& last, TorqueSolution& solution,
-                                   const SpeedRows* speed = nullptr) noexcept;
+  [[nodiscard]] TorqueStatus solve(ConstVectorRef q, ConstVectorRef v, ConstVectorRef acceleration,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& mass_matrix, ConstVectorRef bias,
+                                   const Clearances* clearances, const SecondState& second, const LastCommand& last,
+                                   TorqueSolution& solution, const SpeedRows* speed = nullptr) noexcept;
 
   const TorqueControllerSettings& settings() const noexcept { return settings_; }
   int num_coordinates() const noexcept { return nv_; }
@@ -234,7 +226,8 @@ class TorqueController {
   /// Writes what is to be allowed, and an acceleration that falls short by no more.
   bool find_least_shortfalls(TorqueSolution& solution) noexcept;
   /// Joint i has these multipliers at its bounds and its torque.
-  void add_active(int i, double at_upper, double at_lower, double at_effort, bool smooth, TorqueSolution& solution) const noexcept;
+  void add_active(int i, double at_upper, double at_lower, double at_effort, bool smooth,
+                  TorqueSolution& solution) const noexcept;
   void report_clearance(const Clearances* clearances, TorqueSolution& solution) const noexcept;
   bool accept(TorqueSolution& solution) noexcept;
   void report_safety(TorqueSolution& solution) noexcept;
@@ -250,27 +243,27 @@ class TorqueController {
   Eigen::VectorXd tracking_weight_, torque_cost_;  // Q; R / effort limit^2
   AccelerationBounds bounds_;
   SafetyRows rows_;
-  const SpeedRows* speed_ = nullptr;               // of the solve under way
+  const SpeedRows* speed_ = nullptr;  // of the solve under way
   QuadraticProgramData hard_data_;
   QuadraticProgram hard_;
-  std::vector<int> rows_used_;                     // of rows_, in the programs after the first
+  std::vector<int> rows_used_;  // of rows_, in the programs after the first
   int num_rows_used_ = 0;
-  int num_slacks_;                                 // of the bounds, and one of speed rows where there may be any
-  QuadraticProgramData comfort_data_;              // over (q̈, slacks)
+  int num_slacks_;                     // of the bounds, and one of speed rows where there may be any
+  QuadraticProgramData comfort_data_;  // over (q̈, slacks)
   QuadraticProgram comfort_;
-  QuadraticProgramData widening_data_;             // over (q̈, what it is outside the box)
+  QuadraticProgramData widening_data_;  // over (q̈, what it is outside the box)
   QuadraticProgram widening_;
-  std::vector<LeastShortfall> least_;              // by number of rows, so that the usual few stay cheap
-  Eigen::VectorXd allowed_;                        // shortfalls of the rows used
-  Eigen::VectorXd row_multipliers_;                // of rows_, >= 0
-  Eigen::VectorXd speed_multipliers_;              // of *speed_, >= 0
-  Eigen::VectorXd wide_lower_, wide_upper_;        // box of the programs after the first
+  std::vector<LeastShortfall> least_;        // by number of rows, so that the usual few stay cheap
+  Eigen::VectorXd allowed_;                  // shortfalls of the rows used
+  Eigen::VectorXd row_multipliers_;          // of rows_, >= 0
+  Eigen::VectorXd speed_multipliers_;        // of *speed_, >= 0
+  Eigen::VectorXd wide_lower_, wide_upper_;  // box of the programs after the first
   // Where torques keep a rate, of the programs after the first too, left only where bounds or torques do not reach it; else infinite.
   Eigen::VectorXd jerk_lower_, jerk_upper_;
   Eigen::MatrixXd mass_, mass_cholesky_;
-  Eigen::VectorXd weighted_;                       // a column of the mass matrix, by the cost of torques
-  Eigen::VectorXd velocity_, wanted_, bias_;       // usable copies of the input
-  Eigen::VectorXd rate_lower_, rate_upper_;        // of the torque less the bias, by effort and rate
+  Eigen::VectorXd weighted_;                  // a column of the mass matrix, by the cost of torques
+  Eigen::VectorXd velocity_, wanted_, bias_;  // usable copies of the input
+  Eigen::VectorXd rate_lower_, rate_upper_;   // of the torque less the bias, by effort and rate
   std::int64_t counts_[7] = {};
 };
 

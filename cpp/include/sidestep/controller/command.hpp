@@ -41,17 +41,17 @@ struct Command {
 
   SafetyStatus status = SafetyStatus::stopping;
   Activity activity = Activity::no_goal;
-  Eigen::VectorXd torque;        ///< (nv) [Nm | N], gravity included; zero where the output is not torque
+  Eigen::VectorXd torque;                  ///< (nv) [Nm | N], gravity included; zero where the output is not torque
   Eigen::VectorXd torque_without_gravity;  ///< (nv) the same for arms that hold themselves; NaN where the arm has no inertias
-  Eigen::VectorXd wanted;        ///< (nv) acceleration that was asked for, before any limit [rad/s² | m/s²]
-  Eigen::VectorXd acceleration;  ///< (nv) of the arm: the reference's with feedback [rad/s² | m/s²]
-  Eigen::VectorXd velocity;      ///< (nv) of the reference after this period [rad/s | m/s]
-  Eigen::VectorXd position;      ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
-  Eigen::VectorXd disturbance;   ///< (nv) force that the observer makes up for, of torque outputs [Nm | N]
-  Eigen::VectorXd rotors;        ///< (nv) inertia that it found and the model lacks [kg m² | kg]
-  double tracking_error = 0.0;   ///< largest |q_r − q| [rad | m]
-  double deviation = 0.0;        ///< of the reference from a trajectory, largest |q_r − q*| [rad | m]
-  double delay = 0.0;            ///< how far the trajectory's clock is behind [s]
+  Eigen::VectorXd wanted;                  ///< (nv) acceleration that was asked for, before any limit [rad/s² | m/s²]
+  Eigen::VectorXd acceleration;            ///< (nv) of the arm: the reference's with feedback [rad/s² | m/s²]
+  Eigen::VectorXd velocity;                ///< (nv) of the reference after this period [rad/s | m/s]
+  Eigen::VectorXd position;                ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
+  Eigen::VectorXd disturbance;             ///< (nv) force that the observer makes up for, of torque outputs [Nm | N]
+  Eigen::VectorXd rotors;                  ///< (nv) inertia that it found and the model lacks [kg m² | kg]
+  double tracking_error = 0.0;             ///< largest |q_r − q| [rad | m]
+  double deviation = 0.0;                  ///< of the reference from a trajectory, largest |q_r − q*| [rad | m]
+  double delay = 0.0;                      ///< how far the trajectory's clock is behind [s]
 
   /// the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
   /// unknown
@@ -62,11 +62,11 @@ struct Command {
   /// to the nearest obstacle [m], exact up to speed_limits.far_distance; inf: farther, or without these settings; NaN: the
   /// state is unknown
   double distance = std::numeric_limits<double>::infinity();
-  double speed = 0.0;  ///< of the arm's fastest frame [m/s]; NaN: unknown
+  double speed = 0.0;                                            ///< of the arm's fastest frame [m/s]; NaN: unknown
   double speed_limit = std::numeric_limits<double>::infinity();  ///< for every frame [m/s]; inf: none; NaN: unknown
-  std::vector<Limit> limits;  ///< (nv) the limits in the way of each joint
+  std::vector<Limit> limits;                                     ///< (nv) the limits in the way of each joint
 
-  StepStatus system = StepStatus::invalid_state;  ///< of the geometric system
+  StepStatus system = StepStatus::invalid_state;                ///< of the geometric system
   TorqueStatus program = TorqueStatus::fallback_invalid_input;  ///< of the quadratic program
   bool avoiding = false;  ///< follows a trajectory of the look-ahead, out of the way of what moves
   bool on_path = false;   ///< follows a path of the planner

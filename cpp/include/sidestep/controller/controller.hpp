@@ -155,14 +155,14 @@ class Controller {
 
   const ControllerSettings settings_;
   Command command_;
-  std::unique_ptr<Impl> impl_;             // of the thread of `step`
-  std::atomic<Impl*> next_{nullptr};       // which it takes over in the next step
-  std::atomic<Impl*> retired_{nullptr};    // those before, for another thread to destroy
+  std::unique_ptr<Impl> impl_;           // of the thread of `step`
+  std::atomic<Impl*> next_{nullptr};     // which it takes over in the next step
+  std::atomic<Impl*> retired_{nullptr};  // those before, for another thread to destroy
   mutable std::mutex setters_;
-  Impl* newest_;                           // of those that step, which setters tell
-  Impl* lifted_ = nullptr;                 // the one that newest_ goes over to, which they tell too
-  mutable std::mutex changes_;             // of what follows; held while a body is prepared
-  Arm whole_;                              // without what is attached
+  Impl* newest_;                // of those that step, which setters tell
+  Impl* lifted_ = nullptr;      // the one that newest_ goes over to, which they tell too
+  mutable std::mutex changes_;  // of what follows; held while a body is prepared
+  Arm whole_;                   // without what is attached
   std::vector<Held> held_;
   bool has_torque_;
   std::atomic<bool> in_use_{false};

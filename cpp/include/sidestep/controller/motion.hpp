@@ -16,10 +16,10 @@ struct MotionRecord {
   Eigen::MatrixXd q, v, acceleration;  ///< (steps, nv)
   std::vector<SafetyStatus> statuses;
   std::vector<Activity> activities;
-  Eigen::VectorXd clearance;      ///< (steps) [m], of the covering body
-  Eigen::VectorXd step_seconds;   ///< (steps) [s] that each step took
-  Eigen::VectorXd last_q, last_v; ///< the state after the last step
-  bool arrived = false;           ///< every joint came within the tolerance of the goal, which ended the motion
+  Eigen::VectorXd clearance;       ///< (steps) [m], of the covering body
+  Eigen::VectorXd step_seconds;    ///< (steps) [s] that each step took
+  Eigen::VectorXd last_q, last_v;  ///< the state after the last step
+  bool arrived = false;            ///< every joint came within the tolerance of the goal, which ended the motion
 };
 
 /// Moves a model that does exactly what it is told, by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every

@@ -25,36 +25,38 @@ struct BarrierSettings {
 
 /// When a goal counts as reached.
 struct ArrivalSettings {
-  double joint = 0.01;        ///< largest joint error [rad]
-  double sliding = 0.001;     ///< the same of sliding joints [m]
-  double position = 0.001;    ///< of a pose goal [m]
-  double rotation = 0.0087;   ///< of a pose goal [rad]: half a degree
-  double speed = 0.05;        ///< largest joint speed [rad/s | m/s]
+  double joint = 0.01;       ///< largest joint error [rad]
+  double sliding = 0.001;    ///< the same of sliding joints [m]
+  double position = 0.001;   ///< of a pose goal [m]
+  double rotation = 0.0087;  ///< of a pose goal [rad]: half a degree
+  double speed = 0.05;       ///< largest joint speed [rad/s | m/s]
 };
 
 /// The planner that runs beside the loop, see OnlinePlanner.
 struct OnlinePlannerSettings {
   PlannerSettings search = {};
   TimedPathSettings route = {};
-  double period = 0.02;    ///< between two looks at the scene [s]
-  double patience = 1.0;   ///< without progress until it plans again [s]
-  double retry = 1.0;      ///< until a failed search is repeated in the same scene [s]
+  double period = 0.02;   ///< between two looks at the scene [s]
+  double patience = 1.0;  ///< without progress until it plans again [s]
+  double retry = 1.0;     ///< until a failed search is repeated in the same scene [s]
 };
 
 /// How the arm is kept on the controller's reference, see Controller: q̈ = a_r + ω² (q_r − q) + 2 ζ ω (v_r − v), with what the
 /// disturbance observer found. Not for outputs of position and velocity, which the arm's own drives track.
 struct TrackingSettings {
-  double frequency = 60.0;       ///< ω [1/s]
-  double damping = 1.0;          ///< ζ [-]: rotors that the model does not know lower it
-  double velocity_filter = 0.004; ///< time constant by which measured velocities are drawn to [s]: prediction takes its place within
-  double observer_time = 0.05;   ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
-  double observer_share = 0.8;   ///< of the effort limits that it may make up for [-]
-  double largest_error = 0.2;    ///< |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m]
-  double servo_lag = 1.0;        ///< the same where the arm's own drives track the reference [rad]
+  double frequency = 60.0;  ///< ω [1/s]
+  double damping = 1.0;     ///< ζ [-]: rotors that the model does not know lower it
+  /// Time constant by which measured velocities are drawn to [s]: prediction takes its place within.
+  double velocity_filter = 0.004;
+  double observer_time = 0.05;  ///< time constant of the observer of friction, payload and wrong gravity [s]; inf: none
+  double observer_share = 0.8;  ///< of the effort limits that it may make up for [-]
+  /// |q_r − q| from which the reference begins anew at the arm [rad]; of sliding joints a fifth [m].
+  double largest_error = 0.2;
+  double servo_lag = 1.0;  ///< the same where the arm's own drives track the reference [rad]
   /// κ of an impedance around the reference, for arms that are moved by torque: K_j = κ (effort limit)_j [1/rad]; of sliding joints
   /// five times as much [1/m]. 0: none.
   double stiffness = 0.0;
-  double drift_gain = 2.0;       ///< of the output of velocity: v = v_r + gain (q_r − q) [1/s]
+  double drift_gain = 2.0;  ///< of the output of velocity: v = v_r + gain (q_r − q) [1/s]
 };
 
 /// How velocities, twists and trajectories are followed, see Controller.
@@ -63,7 +65,8 @@ struct InputSettings {
   double timeout = 0.25;    ///< age from which a velocity or a twist counts as zero [s]
   double singular = 0.05;   ///< singular value of a frame's Jacobian below which its direction is damped [m and rad]
   double frequency = 10.0;  ///< ω of the return to a trajectory or path, ω² e + 2 ω de/dt [1/s]
-  double lead = 0.1;        ///< |q_r − q*| from which a trajectory slows down; it waits at twice as much [rad]; of sliding joints a fifth [m]
+  /// |q_r − q*| from which a trajectory slows down; it waits at twice as much [rad]; of sliding joints a fifth [m].
+  double lead = 0.1;
 };
 
 /// All settings of a Controller. Every part but speed_limits is on by default; an empty optional leaves a part out.
@@ -72,10 +75,11 @@ struct ControllerSettings {
   /// velocity by the arm's own drives. Automatic: torque where the arm has inertias and effort limits, else acceleration.
   enum class Output { automatic, torque, acceleration, velocity, position };
 
-  double period = 0.001;         ///< between two calls of `step` [s]
+  double period = 0.001;  ///< between two calls of `step` [s]
   Output output = Output::automatic;
-  double speed = 1.0;            ///< share of the velocity and acceleration limits that motions use
-  double limit_margin = 0.02;    ///< share of the limits of velocity, acceleration, jerk and torque rate that is left for noise, delay and rounding
+  double speed = 1.0;  ///< share of the velocity and acceleration limits that motions use
+  /// Share of the limits of velocity, acceleration, jerk and torque rate that is left for noise, delay and rounding.
+  double limit_margin = 0.02;
   double effort_margin = 0.05;   ///< share of the effort limits that is left for what the model lacks
   double position_margin = 0.0;  ///< position limits are moved inwards by this much [rad | m]
   double stop_time = 0.1;        ///< time constant of the damped stop [s]

@@ -59,7 +59,6 @@ Eigen::VectorXd geodesic_acceleration(const Eigen::MatrixXd& jacobian, const Eig
 ///     Γᵏ_ij = ½ G^kl (∂_i G_lj + ∂_j G_li − ∂_l G_ij),   ∂_k G_ij = Σ_a (H_a,ki J_aj + J_ai H_a,kj),
 ///
 /// with every tensor dense. The slow second implementation: −Γᵏ_ij vⁱ vʲ must equal `geodesic_acceleration`.
-std::vector<Eigen::MatrixXd> christoffel_symbols(const Eigen::MatrixXd& jacobian,
-                                                 const std::vector<Eigen::MatrixXd>& hessians);
+std::vector<Eigen::MatrixXd> christoffel_symbols(const Eigen::MatrixXd& jacobian, const std::vector<Eigen::MatrixXd>& hessians);
 
 }  // namespace sidestep

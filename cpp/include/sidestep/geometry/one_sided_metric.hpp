@@ -22,8 +22,7 @@ class OneSidedMetric {
   OneSidedMetric(int nv, int m);
 
   /// x ← argmin as above, J as its transpose (nv × m). No allocation.
-  void solve_in_place(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed,
-                      Eigen::Ref<Eigen::VectorXd> x) noexcept;
+  void solve_in_place(const Eigen::Ref<const Eigen::MatrixXd>& jacobian_transposed, Eigen::Ref<Eigen::VectorXd> x) noexcept;
 
  private:
   GraphMetric metric_;

@@ -21,12 +21,12 @@ enum class JointType { revolute, prismatic };
 struct Joint {
   std::string name;
   JointType type = JointType::revolute;
-  int parent = -1;                                              ///< index of the parent joint, -1 for the base
-  Eigen::Isometry3d X_PJ = Eigen::Isometry3d::Identity();       ///< placement at zero motion, in the parent's frame
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();              ///< unit axis in the joint frame
-  int coordinate = 0;                                           ///< which entry of q drives the joint
-  double multiplier = 1.0;                                      ///< of a mimic joint
-  double offset = 0.0;                                          ///< of a mimic joint, [rad] or [m]
+  int parent = -1;                                         ///< index of the parent joint, -1 for the base
+  Eigen::Isometry3d X_PJ = Eigen::Isometry3d::Identity();  ///< placement at zero motion, in the parent's frame
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();         ///< unit axis in the joint frame
+  int coordinate = 0;                                      ///< which entry of q drives the joint
+  double multiplier = 1.0;                                 ///< of a mimic joint
+  double offset = 0.0;                                     ///< of a mimic joint, [rad] or [m]
 };
 
 /// A named frame (a URDF link) rigidly attached to the child of a joint, or to the world when `joint` is -1.
@@ -60,8 +60,8 @@ struct JointLimits {
 class Robot {
  public:
   /// Throws std::invalid_argument that names the joint, frame or limit at fault.
-  Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> frames,
-        std::vector<std::string> coordinate_names, JointLimits limits);
+  Robot(std::string name, std::vector<Joint> joints, std::vector<Frame> frames, std::vector<std::string> coordinate_names,
+        JointLimits limits);
 
   const std::string& name() const noexcept { return name_; }
   int num_coordinates() const noexcept { return static_cast<int>(coordinate_names_.size()); }

@@ -71,13 +71,14 @@ class LookAhead {
   /// followed, if there is one. What is to be followed from `delay` on: a trajectory, or the system to the goal where
   /// it is empty, as it is if nothing moves or the state is unusable. Allocates.
   std::optional<AvoidanceTrajectory> look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                             const Obstacles& obstacles, const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
-                             const Leader& leader = {});
+                                          const Obstacles& obstacles,
+                                          const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
+                                          const Leader& leader = {});
 
   /// The trajectory to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every
   /// `delay`, and follows what the look before found.
-  const AvoidanceTrajectory* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles,
-                       double period, const Leader& leader = {});
+  const AvoidanceTrajectory* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                    const Obstacles& obstacles, double period, const Leader& leader = {});
   /// Whether the next `pursue` looks.
   bool is_due(double period) const noexcept { return !(until_look_ > 0.5 * period); }
   /// Before another motion is pursued: what was found is forgotten.
@@ -110,7 +111,7 @@ class LookAhead {
   struct Stepper {
     double period;
     std::variant<AccelerationFilter, TorqueController> limiter;  // the latter where the dynamics are given
-    int steps = 0;                            // integrated so far
+    int steps = 0;                                               // integrated so far
 
     Stepper(const Robot& robot, double period, bool by_torque);
   };

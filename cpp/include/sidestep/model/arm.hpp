@@ -37,8 +37,8 @@ struct Provenance {
 
 /// What an arm knows besides the quantities that control needs.
 struct ArmDetails {
-  std::vector<CoverProof> proof;                                     ///< one per covered link
-  std::vector<std::pair<std::string, std::string>> allowed_pairs;    ///< links that may touch
+  std::vector<CoverProof> proof;                                   ///< one per covered link
+  std::vector<std::pair<std::string, std::string>> allowed_pairs;  ///< links that may touch
   Provenance provenance;
 };
 
@@ -52,8 +52,8 @@ class Arm {
   /// `inertials`: one per joint in the frame of the joint's child, or empty for an arm without dynamics.
   /// Throws std::invalid_argument that names what is wrong: a body that is not calibrated, an unknown link, a table or
   /// an inertia that does not suit the robot.
-  Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<ClearanceTable> tables,
-      std::vector<Inertial> inertials, ArmDetails details = {});
+  Arm(Robot robot, Body body, std::vector<LinkPair> pairs, std::vector<ClearanceTable> tables, std::vector<Inertial> inertials,
+      ArmDetails details = {});
 
   /// Reads an `.arm` file. Throws std::system_error if the file cannot be read, and std::invalid_argument that names
   /// the file, what is wrong with it and what to do: not an arm file, cut off, damaged, of a newer version,

@@ -20,7 +20,7 @@ struct Attachment {
   SolidEllipsoids cover;                                   ///< ellipsoids that hold all of it, in its own frame
   Inertial inertial;                                       ///< in its own frame; mass 0: unknown, or none
   std::vector<std::string> may_touch;                      ///< links that get no clearance from it, as the fingers
-  std::vector<std::string> rests_on;                       ///< names of obstacles that it stands on, until it is lifted; or `anything`
+  std::vector<std::string> rests_on;  ///< names of obstacles that it stands on, until it is lifted; or `anything`
 
   static constexpr const char* anything = "*";
 };
@@ -47,7 +47,8 @@ struct RestingObject {
 /// {c − (1 − β)/2 A w + A (√a I + (a − √a) w wᵀ) u}, a = (1 + β)/2: it touches the plane, and the ellipsoid on the other side.
 /// Throws std::invalid_argument that names the object and an obstacle: one that there is not, or that it is more than
 /// `deepest_rest` [m] deep in.
-RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles, double room);
+RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles,
+                      double room);
 
 constexpr double deepest_rest = 0.02;
 

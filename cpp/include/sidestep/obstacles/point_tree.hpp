@@ -35,7 +35,7 @@ class PointTree {
   int size() const noexcept { return static_cast<int>(order_.size()); }
   bool moves() const noexcept { return fastest_ > 0.0; }
   double common_radius() const noexcept { return common_radius_; }  ///< [m] of all points; negative where they differ
-  double fastest() const noexcept { return fastest_; }  ///< speed of any point [m/s], at most
+  double fastest() const noexcept { return fastest_; }              ///< speed of any point [m/s], at most
   const std::vector<int>& order() const noexcept { return order_; }
 
   /// Coordinates [m], radii [m] and velocities [m/s] in tree order; points that fill up the last leaf lie at `padding`.
@@ -103,8 +103,8 @@ class PointTree {
 
     explicit Level(int count);
     Boxes boxes() const noexcept {
-      return {centre[0].data(), centre[1].data(), centre[2].data(), half[0].data(), half[1].data(), half[2].data(),
-              largest.data()};
+      return {centre[0].data(), centre[1].data(), centre[2].data(), half[0].data(),
+              half[1].data(),   half[2].data(),   largest.data()};
     }
     Balls balls() const noexcept { return {centre[0].data(), centre[1].data(), centre[2].data(), radius.data()}; }
     Ball ball(int node) const noexcept {

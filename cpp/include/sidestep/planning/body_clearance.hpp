@@ -40,10 +40,10 @@ struct Margins {
     Eigen::VectorXd deficits;  ///< δ of every item [m], zero where the margin holds
   };
 
-  double margin = 0.02;   ///< [m]
-  double slack = 0.002;   ///< [m], positive: smaller costs more
-  double fade = 0.3;      ///< [m], positive
-  std::vector<End> ends;  ///< those with a deficit
+  double margin = 0.02;       ///< [m]
+  double slack = 0.002;       ///< [m], positive: smaller costs more
+  double fade = 0.3;          ///< [m], positive
+  std::vector<End> ends;      ///< those with a deficit
   double pair_margin = 0.02;  ///< of two links at most [m]: neighbours are never far apart
 };
 
@@ -104,7 +104,7 @@ class BodyClearance {
     std::vector<Pose> poses_;
     std::vector<Eigen::Vector3d> centres_;  // of the balls around the links
     std::vector<Interval> intervals_;
-    std::vector<std::uint64_t> open_;  // items that are not decided on an interval, a bit each: `words()` of each interval
+    std::vector<std::uint64_t> open_;       // items that are not decided on an interval, a bit each: `words()` of each interval
     Eigen::VectorXd motions_, curvatures_;  // of the items along an edge
     Eigen::VectorXd lengths_, products_;    // |Δq_i|, |Δq_i| |Δq_j|
     DistanceField field_;
@@ -124,8 +124,7 @@ class BodyClearance {
   Nearest nearest(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
 
   /// The same of one item.
-  Nearest nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap,
-                  Workspace& w) const noexcept;
+  Nearest nearest(int item, ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
 
   /// The same of the obstacles alone, without planes and pairs.
   Nearest nearest_obstacle(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w) const noexcept;
@@ -136,8 +135,7 @@ class BodyClearance {
 
   /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls
   /// around the links; infinity where all are at rest.
-  double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time,
-                        Workspace& w) const noexcept;
+  double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept;
 
   /// What `margins` ask of an item away from the ends [m].
   double margin(int item, const Margins& margins) const noexcept {
@@ -145,12 +143,11 @@ class BodyClearance {
   }
 
   /// Whether every item keeps its margin at q. Ends at the first that does not.
-  bool free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins,
-            Workspace& w) const noexcept;
+  bool free(ConstVectorRef q, const Obstacles& obstacles, const Margins& margins, Workspace& w) const noexcept;
 
   /// Whether every item keeps its margin, less the slack, everywhere on the straight edge from a to b.
-  bool edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles,
-                 const Margins& margins, Workspace& w) const noexcept;
+  bool edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacles& obstacles, const Margins& margins,
+                 Workspace& w) const noexcept;
 
   /// How far a point of `item` can move, relative to what it keeps off, for a displacement of the joints [m].
   double motion(int item, ConstVectorRef displacement) const noexcept {
@@ -158,8 +155,7 @@ class BodyClearance {
   }
 
   /// The same from q on, by the smaller of the two bounds.
-  double motion(int item, ConstVectorRef q, ConstVectorRef displacement,
-                Workspace& w) const noexcept;
+  double motion(int item, ConstVectorRef q, ConstVectorRef displacement, Workspace& w) const noexcept;
 
   /// R of every coordinate, of the item that moves most: (nv) [m], or 1 for a prismatic joint.
   const Eigen::VectorXd& reach() const noexcept { return reach_; }
@@ -185,13 +181,13 @@ class BodyClearance {
         : label(std::move(what)), link(on), reach(Eigen::VectorXd::Zero(nv)), bend(Eigen::MatrixXd::Zero(nv, nv)) {}
 
     CoordinateLabel label;
-    int link, other = -1;    // links_; other: of a pair; both -1 for a table
-    int plane = -1;          // planes_
-    int table = -1;          // tables_
-    int base = -1;           // joint that moves both of a pair alike
-    Eigen::VectorXd reach;   // R of every coordinate
-    Eigen::MatrixXd bend;    // R of the later one of two, row by row in bends_
-    double contact = 0.0;    // of a pair [m]
+    int link, other = -1;   // links_; other: of a pair; both -1 for a table
+    int plane = -1;         // planes_
+    int table = -1;         // tables_
+    int base = -1;          // joint that moves both of a pair alike
+    Eigen::VectorXd reach;  // R of every coordinate
+    Eigen::MatrixXd bend;   // R of the later one of two, row by row in bends_
+    double contact = 0.0;   // of a pair [m]
   };
   struct Plane {
     Eigen::Vector3d normal;

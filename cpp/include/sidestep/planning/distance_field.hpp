@@ -30,9 +30,9 @@ class DistanceField {
   double bound(const Eigen::Vector3d& x, double enough, const Obstacles& obstacles) noexcept;
 
  private:
-  static constexpr double block_edge = 0.16;    // [m]
-  static constexpr int divisions = 4;           // of it into fine cells
-  static constexpr int most_blocks = 4096;      // what lies outside them is measured each time
+  static constexpr double block_edge = 0.16;  // [m]
+  static constexpr int divisions = 4;         // of it into fine cells
+  static constexpr int most_blocks = 4096;    // what lies outside them is measured each time
   static constexpr std::uint32_t slots = 2 * most_blocks;
   using Block = std::array<float, 1 + divisions * divisions * divisions>;  // the coarse cell is the block
   struct Slot {

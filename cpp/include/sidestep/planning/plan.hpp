@@ -39,9 +39,9 @@ struct Plan {
   double margin = 0.0;   ///< [m] that it keeps, but for the ends, see Margins
   Obstruction obstruction;
   // The budget spent.
-  int nodes = 0;         ///< of both trees
+  int nodes = 0;  ///< of both trees
   int iterations = 0;
-  std::int64_t checks = 0;  ///< see PlannerSettings; improvement included
+  std::int64_t checks = 0;           ///< see PlannerSettings; improvement included
   double search_seconds = 0.0;       ///< until a path was found
   double improvement_seconds = 0.0;  ///< to look for a wider one, and to make it short
 };

@@ -15,22 +15,22 @@
 namespace sidestep {
 
 struct PlannerSettings {
-  double margin = 0.06;     ///< clearance of a wide way, on which barriers hardly act [m]
-  double floor = 0.005;     ///< clearance that the first way keeps, and every one [m]
+  double margin = 0.06;  ///< clearance of a wide way, on which barriers hardly act [m]
+  double floor = 0.005;  ///< clearance that the first way keeps, and every one [m]
   /// how deep an ellipsoid, larger than its link, may be in something at start or goal [m]
   double allowance = 0.02;
   double pair_allowance = 0.02;  ///< how far below its contact (see LinkPair) the gap of two links may be there [m]
-  double slack = 0.002;     ///< see Margins, at least; else a quarter of the margin [m]
-  double fade = 0.3;        ///< see Margins [m]
+  double slack = 0.002;          ///< see Margins, at least; else a quarter of the margin [m]
+  double fade = 0.3;             ///< see Margins [m]
   /// longest edge of the trees, in joints that count by how far they reach, see RrtConnect [rad | m]
   double range = 1.0;
-  int max_nodes = 10000;    ///< of both trees
+  int max_nodes = 10000;  ///< of both trees
   int max_iterations = 40000;
   /// The work of a whole plan, some 2 s on any machine: clearances of single items; a thousand nodes looked through count
   /// as one.
   int max_checks = 2000000;
   double max_seconds = std::numeric_limits<double>::infinity();
-  int shortcuts = 100;      ///< attempts to shorten a path
+  int shortcuts = 100;  ///< attempts to shorten a path
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
@@ -83,8 +83,7 @@ class RrtConnect {
 
   /// Lets a path (nv × W) begin `here`: straight to its last waypoint, from `first` on, that is seen. False where none
   /// is.
-  bool enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here,
-             const Obstacles& obstacles);
+  bool enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here, const Obstacles& obstacles);
 
  private:
   enum class Growth { trapped, advanced, reached };
@@ -95,8 +94,8 @@ class RrtConnect {
   int nearest(SearchTree& tree, const Eigen::VectorXd& q);
   void connect(double margin, int iterations, const Eigen::VectorXd& start, const Eigen::VectorXd& goal,
                const Obstacles& obstacles, double deadline, RandomStream& random, Plan& plan);
-  void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles,
-              const Margins& margins, int iterations, double deadline, RandomStream& random, Plan& plan);
+  void search(const Eigen::VectorXd& start, const Eigen::VectorXd& goal, const Obstacles& obstacles, const Margins& margins,
+              int iterations, double deadline, RandomStream& random, Plan& plan);
   /// Draws sample_ between low and high and returns the node of the tree that is nearest to it.
   int draw_sample(const Eigen::VectorXd& low, const Eigen::VectorXd& high, SearchTree& tree, RandomStream& random);
   /// Grows from a node on until the target is reached or no step is free; `trapped` where not even one was.

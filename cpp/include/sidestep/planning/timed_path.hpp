@@ -68,7 +68,8 @@ struct TimedPathFollower {
   static constexpr Eigen::Index most_places = 5;
   /// The narrow places between the reference and as far behind it as the arm may be, or every second, third, … of them:
   /// writes them into the columns of (nv × most_places), and says how many they are.
-  Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings, Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
+  Eigen::Index narrow(const TimedPath& route, const TimedPathSettings& settings,
+                      Eigen::Ref<Eigen::MatrixXd> places) const noexcept;
 
   /// Moves on for `duration` [s]; writes the reference, its velocity and its acceleration (nv). The pace r follows
   ///

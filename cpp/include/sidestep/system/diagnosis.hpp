@@ -51,9 +51,9 @@ struct Diagnosis {
   int coordinate = -1;  ///< the dominating embedding coordinate, see GeometricSystem::labels; -1: none
   int point = -1;       ///< its nearest obstacle point; -1: none
   double clearance = std::numeric_limits<double>::infinity();  ///< of it [m | rad], where it has one
-  double share = 0.0;   ///< its share of what is held back; of several opposed ones it can exceed 1
-  double blocked = 0.0; ///< 1 − |G⁻¹ ∂U| / |∂U|, the part of the goal's pull that is held back
-  double speed = 0.0;   ///< |v| [rad/s]
+  double share = 0.0;    ///< its share of what is held back; of several opposed ones it can exceed 1
+  double blocked = 0.0;  ///< 1 − |G⁻¹ ∂U| / |∂U|, the part of the goal's pull that is held back
+  double speed = 0.0;    ///< |v| [rad/s]
   // How far the goal is, as in GoalPull; NaN where it has no such part.
   double joint_error = nan, position_error = nan, rotation_error = nan;
   bool slides = false;  ///< the joint of `joint_error` slides, so that it is in m

@@ -22,12 +22,12 @@ enum class DampingForm { plain, metric };
 enum class PullForm { metric, one_sided };
 
 struct GeometricSystemSettings {
-  Eigen::MatrixXd stiffness;                      ///< K (nv × nv) [1/s²], symmetric positive semi-definite
-  Eigen::MatrixXd damping;                        ///< D (nv × nv) [1/s], the same
+  Eigen::MatrixXd stiffness;  ///< K (nv × nv) [1/s²], symmetric positive semi-definite
+  Eigen::MatrixXd damping;    ///< D (nv × nv) [1/s], the same
   DampingForm damping_form = DampingForm::plain;
   Switch combination = Unswitched{};
-  double fallback_rate = 10.0;                    ///< [1/s] the damped stop of the fallback is q̈ = −rate v
-  PenetrationRecovery recovery = {};                         ///< what a barrier does with an arm inside it
+  double fallback_rate = 10.0;        ///< [1/s] the damped stop of the fallback is q̈ = −rate v
+  PenetrationRecovery recovery = {};  ///< what a barrier does with an arm inside it
   PullForm pull_form = PullForm::metric;
 };
 
@@ -59,8 +59,7 @@ constexpr bool is_fallback(StepStatus status) noexcept {
 class GeometricSystem {
  public:
   /// Throws std::invalid_argument that names the setting at fault.
-  GeometricSystem(Robot robot, std::vector<std::shared_ptr<const Embedding>> embeddings,
-                  GeometricSystemSettings settings);
+  GeometricSystem(Robot robot, std::vector<std::shared_ptr<const Embedding>> embeddings, GeometricSystemSettings settings);
 
   /// The result of a step, and the room it needs.
   class Workspace {
@@ -77,9 +76,10 @@ class GeometricSystem {
     Eigen::MatrixXd jacobian_transposed;  ///< (nv × m)
     Clearances clearances;                ///< of the coordinates that are barriers of clearances (m)
     Eigen::VectorXd activations;          ///< input: their activation distances (m), at first the system's
-    double horizon = Horizon::of_obstacles;  ///< input: τ [s] at least by which obstacles that approach are looked for, see Horizon
+    /// Input: τ [s] at least by which obstacles that approach are looked for, see Horizon.
+    double horizon = Horizon::of_obstacles;
     GraphMetric metric;
-    GoalPull pull;                        ///< ∂U, v* and the way left
+    GoalPull pull;  ///< ∂U, v* and the way left
 
     /// Positions and velocities of the links at the last step.
     const KinematicState& state() const noexcept { return state_; }
@@ -98,32 +98,28 @@ class GeometricSystem {
   /// One step at (q, v) [rad, rad/s] towards `goal` [rad]. Never throws, never allocates; the status must be read.
   /// After a fallback only `workspace.acceleration` is of this step and, unless the state is invalid, what `embed`
   /// writes.
-  [[nodiscard]] StepStatus acceleration(ConstVectorRef q, ConstVectorRef v,
-                                        ConstVectorRef goal, const Obstacles& obstacles,
+  [[nodiscard]] StepStatus acceleration(ConstVectorRef q, ConstVectorRef v, ConstVectorRef goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
 
   /// The same towards any goal, see goal.hpp.
-  [[nodiscard]] StepStatus acceleration(ConstVectorRef q, ConstVectorRef v,
-                                        const Goal& goal, const Obstacles& obstacles,
+  [[nodiscard]] StepStatus acceleration(ConstVectorRef q, ConstVectorRef v, const Goal& goal, const Obstacles& obstacles,
                                         Workspace& workspace) const noexcept;
 
   /// The embedding alone, without a goal: coordinates and clearances of `workspace`. False, and nothing is written,
   /// where q or v is not finite. No allocation.
-  [[nodiscard]] bool embed(ConstVectorRef q, ConstVectorRef v,
-                           const Obstacles& obstacles, Workspace& workspace) const noexcept;
+  [[nodiscard]] bool embed(ConstVectorRef q, ConstVectorRef v, const Obstacles& obstacles, Workspace& workspace) const noexcept;
 
   /// Whether the body at q, finite, reaches deeper than `depth` [m] into an obstacle, see Embedding: quick, and may
   /// miss it. No allocation.
-  bool touches(ConstVectorRef q, const Obstacles& obstacles, double depth,
-               Workspace& workspace) const noexcept;
+  bool touches(ConstVectorRef q, const Obstacles& obstacles, double depth, Workspace& workspace) const noexcept;
 
   /// Why the motion of the step that `workspace` holds is what it is, see diagnosis.hpp. No allocation.
   Diagnosis diagnose(const Workspace& workspace) const noexcept;
 
   /// The same, and whether a stop is because the goal itself is blocked. Takes a step at the goal too, so not for every
   /// step of a loop. A pose may be reached in many configurations and is not examined.
-  Diagnosis diagnose(ConstVectorRef q, ConstVectorRef v, const Goal& goal,
-                     const Obstacles& obstacles, Workspace& workspace) const noexcept;
+  Diagnosis diagnose(ConstVectorRef q, ConstVectorRef v, const Goal& goal, const Obstacles& obstacles,
+                     Workspace& workspace) const noexcept;
 
   /// Lowers activation distances (m) so that barriers leave a configuration (nv) [rad | m] free, see Barrier. What the
   /// workspace says of its last step is lost. False, and nothing changes, where the configuration is not finite. No
@@ -144,8 +140,8 @@ class GeometricSystem {
  private:
   // `nv` is from with_size (vectors.hpp).
   template <class Size>
-  StepStatus step(ConstVectorRef q, ConstVectorRef v,
-                  const Goal& goal, const Obstacles& obstacles, Workspace& workspace, Size nv) const noexcept;
+  StepStatus step(ConstVectorRef q, ConstVectorRef v, const Goal& goal, const Obstacles& obstacles, Workspace& workspace,
+                  Size nv) const noexcept;
   template <class Size>
   void combine(const Obstacles& obstacles, Workspace& workspace, Size nv) const noexcept;
   StepStatus fall_back(StepStatus status, ConstVectorRef v, Workspace& workspace) const noexcept;

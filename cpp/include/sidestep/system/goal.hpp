@@ -34,11 +34,11 @@ struct JointGoal {
 };
 
 struct PoseGoalSettings {
-  bool position_only = false;           ///< leave the orientation free
-  double position_stiffness = 4.0;      ///< k_p [1/(m s)²], so that J'J k_p is a stiffness of the joints [1/s²]
-  double orientation_stiffness = 0.5;   ///< k_R [1/s²]
-  Eigen::VectorXd rest;                 ///< q_rest (nv) that the free joints are drawn to; empty: none
-  double posture_stiffness = 0.0;       ///< k_0 [1/s²] of that pull
+  bool position_only = false;          ///< leave the orientation free
+  double position_stiffness = 4.0;     ///< k_p [1/(m s)²], so that J'J k_p is a stiffness of the joints [1/s²]
+  double orientation_stiffness = 0.5;  ///< k_R [1/s²]
+  Eigen::VectorXd rest;                ///< q_rest (nv) that the free joints are drawn to; empty: none
+  double posture_stiffness = 0.0;      ///< k_0 [1/s²] of that pull
 };
 
 /// A pose of a frame, in the world. With p, R the frame's and φ = log(R*ᵀ R) the rotation vector between them,
@@ -65,8 +65,8 @@ struct PoseGoal {
   /// stiffness of `other` do not count. Throws std::invalid_argument on a goal of another robot and a frame that has one.
   PoseGoal& add(PoseGoal other);
 
-  Eigen::Isometry3d pose;     ///< X_WF* in the world
-  Vector6d twist;             ///< how it moves, in the world: velocity of its origin [m/s], angular velocity [rad/s]
+  Eigen::Isometry3d pose;  ///< X_WF* in the world
+  Vector6d twist;          ///< how it moves, in the world: velocity of its origin [m/s], angular velocity [rad/s]
   PoseGoalSettings settings;
   std::vector<PoseGoal> others;  ///< see `add`; without others of their own
 
@@ -118,9 +118,9 @@ struct GoalPull {
   /// No goal: nothing pulls, and damping brings the arm to rest where it is. No allocation.
   void release() noexcept;
 
-  double potential = 0.0;      ///< U, without the posture pull
-  Eigen::VectorXd gradient;    ///< ∂U/∂q − a* (nv), posture pull included
-  Eigen::VectorXd velocity;    ///< v* (nv)
+  double potential = 0.0;    ///< U, without the posture pull
+  Eigen::VectorXd gradient;  ///< ∂U/∂q − a* (nv), posture pull included
+  Eigen::VectorXd velocity;  ///< v* (nv)
   // How far the goal is, the farthest of its frames; NaN where the goal has no such part.
   double joint_error = nan;     ///< largest |q − q*| [rad | m]
   double position_error = nan;  ///< |p − p*| [m]

@@ -36,10 +36,10 @@ namespace sidestep {
 //    joints. Both in the geodesic term and in what bends the push, J_k of one inside is shortened to (1 − w_k)/w_k at
 // most.
 struct PenetrationRecovery {
-  double speed = 0.1;    ///< with which an arm leaves a barrier [m/s | rad/s]
-  double rate = 20.0;    ///< with which it takes up that speed [1/s]; 0: no push
-  double margin = 0.005; ///< depth below the floor at which the push is full [m | rad]
-  double rebound = 1.0;  ///< largest joint speed that a barrier gives back [rad/s]
+  double speed = 0.1;     ///< with which an arm leaves a barrier [m/s | rad/s]
+  double rate = 20.0;     ///< with which it takes up that speed [1/s]; 0: no push
+  double margin = 0.005;  ///< depth below the floor at which the push is full [m | rad]
+  double rebound = 1.0;   ///< largest joint speed that a barrier gives back [rad/s]
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;
@@ -58,8 +58,8 @@ class PenetrationRecoveryWorkspace {
   /// Writes G⁻¹ Jᵀ c (nv) with the coordinates scaled as in 2 and 3, after `update`; `metric` is G without scaling and
   /// serves where there is none. No allocation.
   void solve_pullback(const PenetrationRecovery& settings, const Clearances& clearances,
-                      const Eigen::MatrixXd& jacobian_transposed, const Eigen::VectorXd& curvatures,
-                      GraphMetric& metric, Eigen::VectorXd& result) noexcept;
+                      const Eigen::MatrixXd& jacobian_transposed, const Eigen::VectorXd& curvatures, GraphMetric& metric,
+                      Eigen::VectorXd& result) noexcept;
 
  private:
   GraphMetric metric_;

@@ -19,7 +19,7 @@ struct RolloutSettings {
   double period = 0.001;  ///< dt [s]
   int steps = 1000;
   Integrator integrator = Integrator::semi_implicit_euler;
-  bool time_steps = false;  ///< measure the acceleration of each step
+  bool time_steps = false;                      ///< measure the acceleration of each step
   Interrupted interrupted = never_interrupted;  ///< asked before every step
 };
 
@@ -37,8 +37,8 @@ struct Rollout {
 /// clearances. What has to keep them is a Controller, see `integrate`.
 /// Throws std::invalid_argument on sizes, a period or number of steps that is not positive, and a record of more than
 /// 8 GiB; Interruption if interrupted.
-Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                Goal goal, const Obstacles& obstacles, const RolloutSettings& settings);
+Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, Goal goal,
+                const Obstacles& obstacles, const RolloutSettings& settings);
 inline Rollout rollout(const GeometricSystem& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                        const Eigen::VectorXd& goal, const Obstacles& obstacles, const RolloutSettings& settings) {
   return rollout(system, q, v, Goal(JointGoal(goal)), obstacles, settings);

@@ -42,9 +42,9 @@ struct Measured {
     const Singles across = larger((1.0f + 2.0f * measure_error) * squared_speed - towards * towards, Singles{});
     const Singles growth = distance * apart * (0.5f - measure_error) * rough_inverse(radius) +
                            (1.0f + measure_error) * horizon * smaller(towards, Singles{});
-    room = ((apart > 0.0f) & (growth > 0.0f))
-               ? apart - horizon * (towards + more) - (0.25f + measure_error) * horizon * horizon * across * rough_inverse(growth)
-               : all(-__builtin_inff());
+    room = ((apart > 0.0f) & (growth > 0.0f)) ? apart - horizon * (towards + more) -
+                                                    (0.25f + measure_error) * horizon * horizon * across * rough_inverse(growth)
+                                              : all(-__builtin_inff());
   }
 
   /// As bits, see ClearanceKernel::measure.
@@ -61,8 +61,8 @@ struct Measured {
 /// Where squares overflow, as beyond 1e19 m, nothing is known: what is near may be in the same node.
 Singles known(Singles bound) noexcept { return larger(bound, all(-__builtin_inff())); }
 
-unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count,
-                 const Limits& within, const Limits& beyond, float* bounds) noexcept {
+unsigned measure(const MovingBall& cluster, const Balls& balls, const Boxes& boxes, int first, int count, const Limits& within,
+                 const Limits& beyond, float* bounds) noexcept {
   unsigned bits = 0;
   for (int n = 0; n < count; n += singles) {
     const int from = first + n;
@@ -89,7 +89,8 @@ unsigned measure_points(const MovingBall& cluster, const Points& points, int fir
   unsigned bits = 0;
   for (int n = 0; n < count; n += singles) {
     const int from = first + n;
-    const Singles offset[3] = {narrow(points.position[0] + from, cluster.centre[0]), narrow(points.position[1] + from, cluster.centre[1]),
+    const Singles offset[3] = {narrow(points.position[0] + from, cluster.centre[0]),
+                               narrow(points.position[1] + from, cluster.centre[1]),
                                narrow(points.position[2] + from, cluster.centre[2])};
     const Singles ball = narrow(points.radius + from);
     const Measured measured(cluster, offset, ball);

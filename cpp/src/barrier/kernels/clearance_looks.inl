@@ -3,7 +3,7 @@
 // Errors of single precision and of rough reciprocals: of clearances relative to distances, and of directions.
 constexpr float distance_error = 3.0f * rough_error, direction_error = 6.0f * rough_error;
 constexpr float most_turn = 0.6f;  // up to where t is near what it is at the centre of a leaf, and as it changes there
-constexpr int loose_steps = 2;  // of Newton's iteration, from where nothing is known
+constexpr int loose_steps = 2;     // of Newton's iteration, from where nothing is known
 constexpr float least_height = 1e-9f, tiny = 1e-30f;  // stand for nothing, as divisors
 
 /// What does not depend on leaves, for all ellipsoids: their principal axes in the world, and how they move.
@@ -341,14 +341,16 @@ struct LeafBounds {
     Singles turning_box = {};
     for (int j = 0; j < 3; ++j) {
       const int l = (j + 1) % 3, m = (j + 2) % 3;
-      const Singles swept = n[l] * static_cast<float>(group.link->angular[m]) - n[m] * static_cast<float>(group.link->angular[l]);
+      const Singles swept =
+          n[l] * static_cast<float>(group.link->angular[m]) - n[m] * static_cast<float>(group.link->angular[l]);
       turning_box += half[j] * magnitude(n[j] - share * (v[j] - along * n[j]) - horizon * swept);
     }
     // What points beside the centre have of the link's turn is in `turning_box` as n has it at the centre.
     const Singles swirl = static_cast<float>(group.link->turning) * diagonal;
     const Singles rest = more - swirl + swirl * smaller(bend * diagonal + plane.tilt, all(2.0f));
     const Singles turned = share * diagonal * (across + bend * diagonal * larger(-along, Singles{}));
-    const Singles in_motion = plane.height - turning_box - turned - horizon * (along + (plane.tilt + plane.tilt) * speed + rest);
+    const Singles in_motion =
+        plane.height - turning_box - turned - horizon * (along + (plane.tilt + plane.tilt) * speed + rest);
     const auto outside = lowest > at.margin;
     store(least + i, outside ? lowest - at.margin : at.apart);
     store(after + i, outside ? larger(in_motion, lowest - at.stopped) - at.margin : all(-__builtin_inff()));
@@ -487,7 +489,8 @@ struct Look {
     }
     Query& query = group.queries[k];
     lower(query.near, group.near[k], group.near_leaf[k], least[0], most[0], kept, group.reach, group.window);
-    lower(query.approached, group.ahead[k], group.ahead_leaf[k], least[1], most[1], kept, group.reach_ahead, group.window_ahead);
+    lower(query.approached, group.ahead[k], group.ahead_leaf[k], least[1], most[1], kept, group.reach_ahead,
+          group.window_ahead);
     Candidates& candidates = query.candidates;
     if (candidates.size + singles > most_candidates) {
       sum_candidates(group, k, points);

@@ -35,8 +35,8 @@ void begin_sums(QueryGroup& group, int k) noexcept {
   const LinkMotion& link = *group.link;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {  // axes_T R_WLᵀ
-      query.axes[3 * i + j] = axes_T[i] * link.rotation[j] + axes_T[3 + i] * link.rotation[3 + j] +
-                              axes_T[6 + i] * link.rotation[6 + j];
+      query.axes[3 * i + j] =
+          axes_T[i] * link.rotation[j] + axes_T[3 + i] * link.rotation[3 + j] + axes_T[6 + i] * link.rotation[6 + j];
     }
     query.squared_axes[i] = group.semi_axes[k][i] * group.semi_axes[k][i];
     query.precision[i] = 1.0 / query.squared_axes[i];
@@ -207,7 +207,7 @@ struct Samples {
   Lanes h, after, rate, g[3];  // h + τ h', h', and ∂h in principal axes
   // its moment about the centre, (A_j − A_l) times which it is along axis i, in cyclic order
   Lanes twist[3];
-  Lanes curvature;             // h'' without what the bias of the link makes, which is linear in ∂h and its moment
+  Lanes curvature;  // h'' without what the bias of the link makes, which is linear in ∂h and its moment
 };
 
 /// How samples are found: in steps, each for several registers. The chain of operations of one is long, and the next
@@ -316,9 +316,7 @@ class Approach {
   }
 
  private:
-  bool are_far(Lanes S, double within) const noexcept {
-    return (below(all(within), magnitude(S - 1.0)) & ~are_inside_) != 0;
-  }
+  bool are_far(Lanes S, double within) const noexcept { return (below(all(within), magnitude(S - 1.0)) & ~are_inside_) != 0; }
   void move(Lanes step) noexcept {
     t_ = larger(t_ + step, Lanes{});
     if constexpr (!outside) {

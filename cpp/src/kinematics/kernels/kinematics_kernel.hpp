@@ -14,9 +14,9 @@ struct JointModel {
   double child[3][4];          // the child's frame in (x, y, axis), once these have turned
   double multiplier, offset;   // of the coordinate
   int coordinate;
-  int parent;                  // -1: the base
-  bool slides;                 // a prismatic joint: along its axis
-  bool straight;               // (x, y, axis) is the child's frame
+  int parent;     // -1: the base
+  bool slides;    // a prismatic joint: along its axis
+  bool straight;  // (x, y, axis) is the child's frame
 };
 
 /// Joints at a time whose sines and cosines are taken together.
@@ -28,7 +28,6 @@ using UpdateLinks = void (*)(const JointModel* joints, int num, const double* q,
 
 void update_links_baseline(const JointModel* joints, int num, const double* q, const double* v, double* links,
                            int stride) noexcept;
-void update_links_avx2(const JointModel* joints, int num, const double* q, const double* v, double* links,
-                       int stride) noexcept;
+void update_links_avx2(const JointModel* joints, int num, const double* q, const double* v, double* links, int stride) noexcept;
 
 }  // namespace sidestep::kernels

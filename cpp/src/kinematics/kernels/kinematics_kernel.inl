@@ -104,8 +104,7 @@ void turn_joints(const JointModel* joints, int num, const double* q, double* lin
   }
 }
 
-void update_links(const JointModel* joints, int num, const double* q, const double* v, double* links,
-                  int stride) noexcept {
+void update_links(const JointModel* joints, int num, const double* q, const double* v, double* links, int stride) noexcept {
   turn_joints(joints, num, q, links, stride);
   Link link = base();  // of the joint before, then of this one
   for (int i = 0; i < num; ++i) {
@@ -114,8 +113,7 @@ void update_links(const JointModel* joints, int num, const double* q, const doub
     if (joint.parent != i - 1) {
       link = joint.parent < 0 ? base() : read(links + joint.parent * stride);
     }
-    const Motion<Vector> screw =
-        follow(link.pose, joint, numbers + turned_x, numbers + turned_y, position(joint, q));
+    const Motion<Vector> screw = follow(link.pose, joint, numbers + turned_x, numbers + turned_y, position(joint, q));
     follow(link.rates, screw, v[joint.coordinate]);
     write(link, screw, numbers);
   }

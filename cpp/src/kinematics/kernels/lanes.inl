@@ -296,7 +296,8 @@ inline void compress(int* p, const int* from, unsigned lanes) noexcept {
 inline void compress(int* p, int first, unsigned lanes) noexcept {
 #if defined(__AVX512F__)
   const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  const __m512i x = _mm512_maskz_compress_epi32(static_cast<__mmask16>(lanes), _mm512_add_epi32(lane, _mm512_set1_epi32(first)));
+  const __m512i x =
+      _mm512_maskz_compress_epi32(static_cast<__mmask16>(lanes), _mm512_add_epi32(lane, _mm512_set1_epi32(first)));
   __builtin_memcpy(p, &x, sizeof x);
 #else
   for (; lanes != 0; lanes &= lanes - 1) {
@@ -342,7 +343,6 @@ inline Lanes widen(const float* p) noexcept {
   __builtin_memcpy(&x, p, sizeof x);
   return __builtin_convertvector(x, Lanes);
 }
-
 
 /// Halves against each other, down to one number.
 template <int size>
@@ -398,8 +398,14 @@ inline Lanes exponential(Lanes x) noexcept {
   const Lanes q2 = rest * (1.0 / 6.0) + 0.5, q4 = rest * (1.0 / 120.0) + 1.0 / 24.0;
   const Lanes q6 = rest * (1.0 / 5040.0) + 1.0 / 720.0 + rest2 * (1.0 / 40320.0);
   const Lanes more = rest + rest2 * (q2 + rest2 * (q4 + rest2 * q6));
-  const Lanes powers = {1.0, 0x1.172b83c7d517bp+0, 0x1.306fe0a31b715p+0, 0x1.4bfdad5362a27p+0,
-                        0x1.6a09e667f3bcdp+0, 0x1.8ace5422aa0dbp+0, 0x1.ae89f995ad3adp+0, 0x1.d5818dcfba487p+0};
+  const Lanes powers = {1.0,
+                        0x1.172b83c7d517bp+0,
+                        0x1.306fe0a31b715p+0,
+                        0x1.4bfdad5362a27p+0,
+                        0x1.6a09e667f3bcdp+0,
+                        0x1.8ace5422aa0dbp+0,
+                        0x1.ae89f995ad3adp+0,
+                        0x1.d5818dcfba487p+0};
   Bits number, power_bits;
   __builtin_memcpy(&number, &eighths, sizeof number);
   const Lanes power_of_two = _mm512_maskz_permutexvar_pd(0xff, reinterpret_cast<__m512i>(number), powers);

@@ -4,8 +4,6 @@
 
 namespace sidestep::kernels {
 
-Distances distances() noexcept {
-  return SIDESTEP_KERNEL_IN_USE(distances)();
-}
+Distances distances() noexcept { return SIDESTEP_KERNEL_IN_USE(distances)(); }
 
 }  // namespace sidestep::kernels

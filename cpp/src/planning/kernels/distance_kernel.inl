@@ -4,10 +4,10 @@
 namespace sidestep::kernels {
 namespace {
 
-constexpr int refinements = 2;           // a median error of 10⁻⁴ of the distance for axes 1 : 6
-constexpr float inside = -0.999f;        // of the least square: t stays above its pole
-constexpr float tiny = 1e-20f;           // in place of zero, below a fraction line
-constexpr float centre_offset = 1e-6f;   // [m] stands for the centre, where no direction is the nearest
+constexpr int refinements = 2;          // a median error of 10⁻⁴ of the distance for axes 1 : 6
+constexpr float inside = -0.999f;       // of the least square: t stays above its pole
+constexpr float tiny = 1e-20f;          // in place of zero, below a fraction line
+constexpr float centre_offset = 1e-6f;  // [m] stands for the centre, where no direction is the nearest
 
 /// `count` numbers side by side.
 template <class T, int count>
@@ -29,9 +29,13 @@ inline F load(const double* from, double less = 0.0) noexcept {
 }
 
 template <class F>
-inline F all(float x) noexcept { return x - F{}; }
+inline F all(float x) noexcept {
+  return x - F{};
+}
 template <class F>
-inline F larger(F a, F b) noexcept { return a > b ? a : b; }
+inline F larger(F a, F b) noexcept {
+  return a > b ? a : b;
+}
 template <class F>
 inline F root(F x) noexcept {
   F y;
@@ -79,7 +83,7 @@ inline unsigned below(F x, float limit) noexcept {
 /// The best is among n_i = e_i / (a_i² + t), at the root of |a_i n_i| = 1 (the secular equation). t = 0 gives the
 /// first-order distance; Newton's steps on 1/|a_i n_i| − 1, which is concave, come to the root from below.
 unsigned distances_to_balls(const PlacedEllipsoid& ellipsoid, const Balls& balls, int first, int count, double limit,
-                      float* distances) noexcept {
+                            float* distances) noexcept {
   using Floats = Floats<most_balls>;
   const Floats offset[3] = {load<Floats>(balls.x + first, ellipsoid.centre[0]),
                             load<Floats>(balls.y + first, ellipsoid.centre[1]),

@@ -13,8 +13,8 @@ struct GaussianBlock {
   alignas(64) double mean[3][most_lanes] = {};
   double precision[6][most_lanes] = {}, scale[most_lanes] = {};  // of points without radius: scale · exp(−½ eᵀ P e)
   double weight[most_lanes] = {};
-  double variances[3][most_lanes];                               // eigenvalues of the covariance, 1 in unused lanes,
-  double projections[3][6][most_lanes] = {};                     // and a aᵀ of the unit vectors a along them
+  double variances[3][most_lanes];            // eigenvalues of the covariance, 1 in unused lanes,
+  double projections[3][6][most_lanes] = {};  // and a aᵀ of the unit vectors a along them
 
   GaussianBlock() noexcept {
     for (auto& axis : variances) {

@@ -10,7 +10,7 @@ namespace {
 #include "../../kinematics/kernels/vectors.inl"
 
 constexpr double inverse_two_pi_cubed = 1.0 / 248.05021344239853;  // 1/(2π)³
-constexpr double least_exponent = -700.0;  // below it a density is no normal number: taken as zero
+constexpr double least_exponent = -700.0;                          // below it a density is no normal number: taken as zero
 
 /// Gaussians of a block side by side, from one on.
 struct SideBySide {
@@ -130,10 +130,10 @@ struct Peak {
 /// A point as Gaussians see it. It is found out in steps, each for several points: the chain of operations of one is
 /// long, and the next one's runs beside it.
 struct Seen {
-  Vectors x, drag;            // the point, and −R ÿ for q̈ = 0 and ẍ = 0
-  Vectors t;                  // P e
-  Lanes exponent, scale;      // of the density
-  Lanes slope, bend;          // eᵀ P ẏ and ẏᵀ P ẏ
+  Vectors x, drag;        // the point, and −R ÿ for q̈ = 0 and ẍ = 0
+  Vectors t;              // P e
+  Lanes exponent, scale;  // of the density
+  Lanes slope, bend;      // eᵀ P ẏ and ẏᵀ P ẏ
 
   void place(const GatheredLinks& link, const Vectors& mean, const SideBySide& gaussians, const DensityPoints& points,
              int n) noexcept {

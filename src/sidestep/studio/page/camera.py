@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.drawing.views import hidden
+
 Array = npt.NDArray[np.float64]
 
-VIEW = np.array([-0.63, 0.50, -0.59]) / np.linalg.norm([-0.63, 0.50, -0.59])  # forwards, in the world
+VIEW = np.array([-0.63, 0.50, -0.59]) / np.linalg.norm(
+    [-0.63, 0.50, -0.59]
+)  # forwards, in the world, if nothing hides
+VIEWS = tuple(
+    VIEW * turn for turn in ([1, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1])
+)  # from the four corners
+BETTER = 0.05  # share of hidden points by which another view than the first has to be better
 RIGHT = np.cross(VIEW, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(VIEW, [0.0, 0.0, 1.0]))
 UP = np.cross(RIGHT, VIEW)
 HALF = float(np.tan(0.5 * np.deg2rad(75.0)))  # of viser's angle of view, upwards
@@ -23,25 +32,38 @@ ROUNDS = 30  # by then the distance changes by less than a part in a thousand
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """A camera at `position` (3,) that looks along `VIEW` at `target` (3,) [m], and at nothing beyond `far` [m]."""
+    """A camera at `position` (3,) that looks along `view` (3,) at `target` (3,) [m], and at nothing beyond `far`."""
 
     position: Array
     target: Array
     far: float
+    view: Array
+
+    @property
+    def right(self) -> Array:
+        """The direction (3,) to the right in its window."""
+        return axes_of(self.view)[0]
+
+    @property
+    def up(self) -> Array:
+        """The direction (3,) upwards in its window."""
+        return axes_of(self.view)[1]
 
     @classmethod
-    def of(cls, places: Array) -> Viewpoint:
-        """Points (n, 3) [m] fill the room between `LOW` and `HIGH`."""
+    def of(cls, places: Array, view: Array = VIEW) -> Viewpoint:
+        """Points (n, 3) [m] fill the room between `LOW` and `HIGH`, seen along `view` (3,)."""
+        right, up = axes_of(view)
         target = 0.5 * (places.min(axis=0) + places.max(axis=0))
         distance = size = float(np.linalg.norm(places - target, axis=1).max())
         for _ in range(ROUNDS):
-            depth = np.maximum(distance + (places - target) @ VIEW, 0.1 * size)
-            seen = (places - target) @ np.array([RIGHT, UP]).T / (HALF * depth[:, None])
+            depth = np.maximum(distance + (places - target) @ view, 0.1 * size)
+            seen = (places - target) @ np.array([right, up]).T / (HALF * depth[:, None])
             low, high = seen.min(axis=0), seen.max(axis=0)
             off = 0.5 * (low + high - LOW - HIGH)
-            target = target + distance * HALF * (off[0] * RIGHT + off[1] * UP)
+            target = target + distance * HALF * (off[0] * right + off[1] * up)
             distance *= float(((high - low) / (HIGH - LOW)).max()) ** 0.5
-        return cls(target - distance * VIEW, target, float(((places - target) @ VIEW).max()) + distance)
+        far = float(((places - target) @ view).max()) + distance
+        return cls(target - distance * view, target, far, view)
 
     def corner(self, side: float) -> Array:
         """The pose (4, 4) of a square of edge `side` [m] in the upper left, behind what is looked at.
@@ -49,8 +71,26 @@ class Viewpoint:
         Its x axis points to the right in the window, its y axis away and upwards, its z axis to the camera and upwards.
         """
         depth = max(side / (CORNER_SIDE * HALF), self.far)
-        normal = np.sin(LEAN) * UP - np.cos(LEAN) * VIEW
+        view, right, up = self.view, self.right, self.up
+        normal = np.sin(LEAN) * up - np.cos(LEAN) * view
         pose = np.eye(4)
-        pose[:3, :3] = np.column_stack([RIGHT, np.cross(normal, RIGHT), normal])
-        pose[:3, 3] = self.position + depth * (VIEW + HALF * (CORNER[0] * RIGHT + CORNER[1] * UP))
+        pose[:3, :3] = np.column_stack([right, np.cross(normal, right), normal])
+        pose[:3, 3] = self.position + depth * (view + HALF * (CORNER[0] * right + CORNER[1] * up))
         return pose
+
+
+def axes_of(view: Array) -> tuple[Array, Array]:
+    """The directions (3,) to the right and upwards in a window that looks along `view` (3,)."""
+    right: Array = np.cross(view, [0.0, 0.0, 1.0])
+    right = right / np.linalg.norm(right)
+    return right, np.cross(right, view)
+
+
+def clear_view(places: Array, solids: Sequence[Array]) -> Array:
+    """Of `VIEWS` the one in which solids, triangles (F, 3, 3) each, hide least of points (n, 3); the first where it is
+    as good as any."""
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *solids])
+    shares = [float(hidden(places, triangles, -view).mean()) for view in VIEWS]
+    best = int(np.argmin(shares))
+    chosen: Array = VIEWS[best] if shares[best] < shares[0] - BETTER else VIEW
+    return chosen

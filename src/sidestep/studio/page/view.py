@@ -24,7 +24,7 @@ from sidestep.studio.gallery import ends_of
 from sidestep.studio.methods import method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, BodyView, link_meshes, reach
-from sidestep.studio.page.camera import Viewpoint
+from sidestep.studio.page.camera import Viewpoint, clear_view
 from sidestep.studio.page.compare_panel import ComparePanel
 from sidestep.studio.page.goal import GoalControl
 from sidestep.studio.page.marks import Marks
@@ -39,7 +39,7 @@ from sidestep.studio.page.surface import Surface
 from sidestep.studio.page.tuning import TuningPanel
 from sidestep.studio.page.why import Why
 from sidestep.studio.page.words import begun, in_box, stamped
-from sidestep.studio.scene_obstacle import SceneObstacle, thing_of
+from sidestep.studio.scene_obstacle import SceneObstacle, thing_of, things_of
 from sidestep.studio.systems import Recipe, make_body, numbers_of, recipe_of
 
 if TYPE_CHECKING:
@@ -305,7 +305,8 @@ class View:
         places = [robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames]
         beside = [np.array(item.position) for item in scenario.obstacles]
         near = [place for place in beside if np.linalg.norm(place) < NEAR * reach(robot)]
-        self._viewpoint = Viewpoint.of(np.array([*places, *near]))
+        view = clear_view(np.array(places), [thing.triangles for thing in things_of(scenario)])
+        self._viewpoint = Viewpoint.of(np.array([*places, *near]), view)
         point_cameras(self._server, self._viewpoint)
 
     def _add_switches(self) -> None:
