@@ -199,7 +199,10 @@ def test_a_shape_that_would_take_billions_of_points_is_refused(
 
 def test_other_bad_input(invoke: Invoke, capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke("run", "nothing") == 2
-    assert "no such file; shipped scenarios are planar-" in capsys.readouterr().err
+    assert (
+        "no such file; shipped scenarios are bookshelf, box, cage, kitchen, planar-"
+        in capsys.readouterr().err
+    )
     assert invoke("run", "small.yaml", "--mode", "magic") == 2
     capsys.readouterr()
     Path("file").write_text("")

@@ -52,10 +52,13 @@ def method_or_file(text: str) -> Method | Path:
 
     Raises:
         ValueError: it is neither.
+        FileNotFoundError: there is no such file.
     """
     if text in list(Method):
         return Method(text)
     if text.endswith(".py"):
+        if not Path(text).is_file():
+            raise FileNotFoundError(f"--method: there is no file '{text}'")
         return Path(text)
     raise ValueError(f"--method is {text!r}; allowed: {', '.join(Method)}, or a Python file (.py)")
 
