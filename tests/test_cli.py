@@ -11,8 +11,10 @@ from pathlib import Path
 import jsonschema
 import pytest
 import typer
+from rich.console import Console
 
 from sidestep import cli
+from sidestep.cli.bench_output import figures_table
 from sidestep.cli.run_command import parse_switch
 
 Invoke = Callable[..., int]
@@ -197,7 +199,10 @@ def test_a_shape_that_would_take_billions_of_points_is_refused(
 
 def test_other_bad_input(invoke: Invoke, capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke("run", "nothing") == 2
-    assert "no such file; shipped scenarios are planar-" in capsys.readouterr().err
+    assert (
+        "no such file; shipped scenarios are bookshelf, box, cage, kitchen, planar-"
+        in capsys.readouterr().err
+    )
     assert invoke("run", "small.yaml", "--mode", "magic") == 2
     capsys.readouterr()
     Path("file").write_text("")
@@ -316,3 +321,19 @@ def test_a_diverging_run_is_one_line_and_exit_code_1(
     monkeypatch.setattr("sidestep.cli.run_command.run_and_show", diverge)
     assert invoke("run", "small.yaml", "-q", "--no-report") == 1
     assert capsys.readouterr().err == "failed: the integration diverged near 1.0 s\n"
+
+
+def test_tables_print_the_units_of_their_columns() -> None:
+    console = Console(width=80)
+    with console.capture() as captured:
+        console.print(figures_table("one step [us]", "clearance [mm]"))
+    assert "one step [us]" in captured.get()
+    assert "clearance [mm]" in captured.get()
+
+
+def test_reach_prints_the_unit_of_a_step(invoke: Invoke, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        invoke("bench", "reach", "--robot", "planar2", "--obstacles", "0", "--problems", "1", "--jobs", "1")
+        == 0
+    )
+    assert "step [us]" in capsys.readouterr().out

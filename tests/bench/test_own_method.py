@@ -57,6 +57,11 @@ def test_what_is_wrong_is_named(tmp_path: Path) -> None:
     path.write_text("x = 1\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"defines no function method\(robot, problem\)"):
         OwnMover.from_file(path, robot)
+    path.write_text("def method(robot):\n    return lambda time, q, v: 0.0 * q\n", encoding="utf-8")
+    with pytest.raises(
+        ValueError, match=r"method must take \(robot, problem\): too many positional arguments"
+    ):
+        OwnMover.from_file(path, robot)
     path.write_text("def method(robot, problem):\n    return lambda time, q, v: [1.0]\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"empty\.py: step gave \[1\.0\] in problem 0, must be 3 finite"):
         run_bench(settings(path))
@@ -64,3 +69,5 @@ def test_what_is_wrong_is_named(tmp_path: Path) -> None:
         run_bench(settings(path, torque=True))
     with pytest.raises(ValueError, match=r"--method is 'foo'; allowed: controller, .* or a Python file"):
         method_or_file("foo")
+    with pytest.raises(FileNotFoundError, match=r"there is no file 'none\.py'"):
+        method_or_file("none.py")  # before the robot is prepared

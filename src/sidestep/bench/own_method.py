@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import runpy
 import time
 from collections.abc import Callable
@@ -42,13 +43,17 @@ class OwnMover:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: it defines no such function.
+            ValueError: it defines no such function, or one that takes other arguments.
         """
         if not path.is_file():
             raise FileNotFoundError(f"--method: there is no file '{path}'")
         start = runpy.run_path(str(path)).get(FUNCTION)
         if not callable(start):
             raise ValueError(f"--method: '{path}' defines no function {FUNCTION}(robot, problem)")
+        try:
+            inspect.signature(start).bind(robot, None)
+        except TypeError as error:
+            raise ValueError(f"--method: '{path}': {FUNCTION} must take (robot, problem): {error}") from error
         return cls(robot, start, path.name)
 
     def move(self, problem: Problem, settings: MotionSettings) -> Motion:

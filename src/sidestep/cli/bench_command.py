@@ -147,6 +147,8 @@ def reach(
 
 
 def _table(document: dict[str, Any]) -> object:
+    from rich.markup import escape
+
     table = figures_table("", "", show_header=False)
     table.columns[0].no_wrap = False
     count = document["problems"]
@@ -163,5 +165,5 @@ def _table(document: dict[str, Any]) -> object:
         )
     times = "  ".join(f"{name} {value}" for name, value in document["step_us"].items())
     table.add_row("steps", f"{document['steps']}")
-    table.add_row("step [us]", times)
+    table.add_row(escape("step [us]"), times)
     return table

@@ -52,10 +52,13 @@ def method_or_file(text: str) -> Method | Path:
 
     Raises:
         ValueError: it is neither.
+        FileNotFoundError: there is no such file.
     """
     if text in list(Method):
         return Method(text)
     if text.endswith(".py"):
+        if not Path(text).is_file():
+            raise FileNotFoundError(f"--method: there is no file '{text}'")
         return Path(text)
     raise ValueError(f"--method is {text!r}; allowed: {', '.join(Method)}, or a Python file (.py)")
 
@@ -100,12 +103,13 @@ def with_status(terminal: Console, run: Callable[[Callable[..., None]], Result])
 
 
 def figures_table(first: str, *figures: str, **options: Any) -> Table:
-    """A table with a column of names, which is not wrapped, and columns of figures."""
+    """A table with a column of names, which is not wrapped, and columns of figures; units in brackets are printed."""
     from rich import box
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=box.SIMPLE, pad_edge=False, **options)
-    table.add_column(first, no_wrap=True)
+    table.add_column(escape(first), no_wrap=True)
     for name in figures:
-        table.add_column(name, justify="right")
+        table.add_column(escape(name), justify="right")
     return table

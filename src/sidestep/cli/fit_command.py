@@ -104,6 +104,7 @@ def _fit_with_progress(
 
 def _table(body: Body) -> object:
     from rich import box
+    from rich.markup import escape
     from rich.table import Table
 
     from sidestep.body.report import fit_table
@@ -116,7 +117,7 @@ def _table(body: Body) -> object:
         "mean distance to a mean",
         "EM",
     )
-    table = Table(*heads, box=box.SIMPLE, pad_edge=False)
+    table = Table(*map(escape, heads), box=box.SIMPLE, pad_edge=False)
     for column in table.columns[1:5]:
         column.justify = "right"
     for row in fit_table(body):
