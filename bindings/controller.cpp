@@ -31,12 +31,14 @@ void describe_fields(nb::list& rows, const std::string& group, bool optional = f
   }
 }
 
-/// A part that may be left out, as a property.
+/// A part that may be left out, as a property; what is written to a part of it counts.
 template <class Class, class Owner, class Value>
-void optional_part(Class& c, const char* name, std::optional<Value> Owner::*member) {
+void optional_part(Class& c, const char* name, const char* type, std::optional<Value> Owner::*member) {
+  const std::string get = std::string("def ") + name + "(self) -> " + type + " | None";
   c.def_prop_rw(
-      name, [member](const Owner& s) { return s.*member; },
-      [member](Owner& s, std::optional<Value> value) { s.*member = std::move(value); }, nb::arg("value").none());
+      name, [member](Owner& s) -> Value* { return s.*member ? &*(s.*member) : nullptr; },
+      [member](Owner& s, std::optional<Value> value) { s.*member = std::move(value); }, nb::arg("value").none(),
+      nb::for_getter(nb::sig(get.c_str())));
 }
 
 void bind_settings_tree(nb::module_& m) {
@@ -89,10 +91,10 @@ void bind_settings_tree(nb::module_& m) {
       .def_rw("output", &S::output)
       .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.")
       .def("__copy__", [](const S& s) { return S(s); });
-  optional_part(c, "speed_limits", &ControllerSettings::speed_limits);
-  optional_part(c, "planner", &ControllerSettings::planner);
-  optional_part(c, "look_ahead", &ControllerSettings::look_ahead);
-  optional_part(c, "local_minimum", &ControllerSettings::local_minimum);
+  optional_part(c, "speed_limits", "SpeedLimitSettings", &ControllerSettings::speed_limits);
+  optional_part(c, "planner", "OnlinePlannerSettings", &ControllerSettings::planner);
+  optional_part(c, "look_ahead", "LookAheadSettings", &ControllerSettings::look_ahead);
+  optional_part(c, "local_minimum", "LocalMinimumSettings", &ControllerSettings::local_minimum);
 
   m.def(
       "controller_settings_fields",

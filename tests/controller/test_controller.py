@@ -502,3 +502,13 @@ def test_a_running_controller_loads_neither_physics_nor_exact_distances(arm: ss.
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_what_is_written_to_an_optional_part_counts() -> None:
+    tree = ss.ControllerSettings()
+    tree.planner.search.margin = 0.033
+    assert tree.planner.search.margin == 0.033
+    assert ss.ControllerSettings().planner.search.margin != 0.033
+    tree.planner = None
+    assert tree.planner is None
+    assert tree.speed_limits is None
