@@ -223,7 +223,7 @@ def test_ways_of_sliding_joints_are_in_millimetres(tmp_path: Path, monkeypatch: 
     assert result.stop is not None
     assert f"{1000 * left:.1f} mm from the goal" in result.stop
     rows = {name: (value, note) for name, value, note in summary_rows(result)}
-    assert rows["goal reached"][1] == "error under 2 mm at the end"
+    assert rows["goal reached"][1] == "error under 0.2 mm at the end"  # a tenth of the angle
     assert rows["tracking error"][0].endswith(" m/s²")
     assert rows["largest force"][0].endswith(" % of its limit")
     assert not [row for row in rows.values() if re.search(r"\brad\b", " ".join(row))]
