@@ -77,7 +77,8 @@ def test_the_file_beside_a_urdf_is_found_and_another_can_be_given(tmp_path: Path
     held = Robot.from_urdf(urdf, locked={"x": "half"})
     assert (held.held, held.coordinate_names) == ({"x": 0.5}, ["y"])
     with pytest.raises(
-        ValueError, match=r"'x' is 'up', and no posture .*; allowed: a number, two: a range, or one of: home, half"
+        ValueError,
+        match=r"'x' is 'up', and no posture .*; allowed: a number, two: a range, or one of: home, half",
     ):
         Robot.from_urdf(urdf, locked={"x": "up"})
     given = tmp_path / "given.srdf"
