@@ -27,9 +27,10 @@ from sidestep.cli.limit_options import (
     EffortLimitOption,
     JerkLimitOption,
     LockedOption,
+    PackageDirOption,
+    TipOption,
     VelocityLimitOption,
-    by_joint,
-    locked_by_joint,
+    reading_options,
 )
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 
@@ -52,10 +53,8 @@ def reach(
             help="A name from `sidestep robots`, robot_descriptions or mujoco_menagerie, or a URDF, xacro or MJCF file."
         ),
     ] = "fr3",
-    package_dir: Annotated[
-        list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
-    ] = None,
-    tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    package_dir: PackageDirOption = None,
+    tip: TipOption = None,
     locked: LockedOption = None,
     effort_limit: EffortLimitOption = None,
     velocity_limit: VelocityLimitOption = None,
@@ -106,15 +105,9 @@ def reach(
         write_problems,
     )
 
-    options = {
-        "package_dirs": package_dir,
-        "tip": tip,
-        "locked": locked_by_joint(locked),
-        "effort_limits": by_joint(effort_limit, "--effort-limit"),
-        "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
-        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
-        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
-    }
+    options = reading_options(
+        package_dir, tip, locked, effort_limit, velocity_limit, acceleration_limit, jerk_limit
+    )
     given = None if problems_file is None else read_problems(problems_file)
     settings = BenchSettings(
         problems=ProblemSettings(
@@ -122,7 +115,7 @@ def reach(
             obstacles=obstacles,
             seed=seed,
             moving=moving,
-            options={name: value for name, value in options.items() if value},
+            options=options,
         ),
         count=problems,
         method=method_or_file(method),

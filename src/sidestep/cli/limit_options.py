@@ -1,8 +1,9 @@
-"""Joints on the command line, JOINT=VALUE: their limits, and where they are held."""
+"""How a robot is read from a file, on the command line: its packages, tip, and joints, JOINT=VALUE."""
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
 
 import typer
 
@@ -15,6 +16,10 @@ LockedOption: TypeAlias = Annotated[
         "range; of a file; may be repeated."
     ),
 ]
+PackageDirOption: TypeAlias = Annotated[
+    list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
+]
+TipOption: TypeAlias = Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")]
 EffortLimitOption: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(help="JOINT=VALUE [Nm or N], in place of the file's; of a file; may be repeated."),
@@ -79,3 +84,29 @@ def locked_by_joint(texts: list[str] | None) -> dict[str, Locked]:
         except ValueError:
             values[joint] = value
     return values
+
+
+def reading_options(
+    package_dir: list[Path] | None,
+    tip: str | None,
+    locked: list[str] | None,
+    effort_limit: list[str] | None,
+    velocity_limit: list[str] | None,
+    acceleration_limit: list[str] | None,
+    jerk_limit: list[str] | None,
+) -> dict[str, Any]:
+    """What was given of these, as arguments of `Robot.from_urdf` and `Arm.load`.
+
+    Raises:
+        ValueError: names the option, what was written and what is allowed.
+    """
+    options = {
+        "package_dirs": package_dir,
+        "tip": tip,
+        "locked": locked_by_joint(locked),
+        "effort_limits": by_joint(effort_limit, "--effort-limit"),
+        "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
+        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
+        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
+    }
+    return {name: value for name, value in options.items() if value}

@@ -12,9 +12,10 @@ from sidestep.cli.limit_options import (
     EffortLimitOption,
     JerkLimitOption,
     LockedOption,
+    PackageDirOption,
+    TipOption,
     VelocityLimitOption,
-    by_joint,
-    locked_by_joint,
+    reading_options,
 )
 from sidestep.cli.output import QuietOption, console
 
@@ -22,10 +23,8 @@ from sidestep.cli.output import QuietOption, console
 def prepare(
     source: Annotated[str, typer.Argument(help="A name from `sidestep robots`, or a URDF or xacro file.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Arm file to write (.arm).")],
-    package_dir: Annotated[
-        list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
-    ] = None,
-    tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    package_dir: PackageDirOption = None,
+    tip: TipOption = None,
     locked: LockedOption = None,
     effort_limit: EffortLimitOption = None,
     velocity_limit: VelocityLimitOption = None,
@@ -62,16 +61,9 @@ def prepare(
     def show(stage: str, item: str, done: int, in_all: int) -> None:
         terminal.print(f"{stage}: {item} ({done} of {in_all})", highlight=False, soft_wrap=True)
 
-    options = {
-        "package_dirs": package_dir,
-        "tip": tip,
-        "locked": locked_by_joint(locked),
-        "effort_limits": by_joint(effort_limit, "--effort-limit"),
-        "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
-        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
-        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
-    }
-    given = {name: value for name, value in options.items() if value}
-    arm = Arm.load(source, draft=draft, cache=cache, progress=show, **given)  # type: ignore[arg-type]
+    given = reading_options(
+        package_dir, tip, locked, effort_limit, velocity_limit, acceleration_limit, jerk_limit
+    )
+    arm = Arm.load(source, draft=draft, cache=cache, progress=show, **given)
     arm.save(out)
     terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)

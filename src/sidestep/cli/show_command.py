@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -13,9 +12,10 @@ from sidestep.cli.limit_options import (
     EffortLimitOption,
     JerkLimitOption,
     LockedOption,
+    PackageDirOption,
+    TipOption,
     VelocityLimitOption,
-    by_joint,
-    locked_by_joint,
+    reading_options,
 )
 from sidestep.cli.output import JsonOption, console, write_json
 
@@ -29,10 +29,8 @@ def show(
             "mujoco_menagerie.",
         ),
     ],
-    package_dir: Annotated[
-        list[Path] | None, typer.Option(help="Folder searched for package:// addresses; may be repeated.")
-    ] = None,
-    tip: Annotated[str | None, typer.Option(help="Last link that is kept; of a file.")] = None,
+    package_dir: PackageDirOption = None,
+    tip: TipOption = None,
     locked: LockedOption = None,
     effort_limit: EffortLimitOption = None,
     velocity_limit: VelocityLimitOption = None,
@@ -49,16 +47,10 @@ def show(
     """
     from sidestep.studio.show.reading import read
 
-    options: dict[str, Any] = {
-        "package_dirs": package_dir,
-        "tip": tip,
-        "locked": locked_by_joint(locked),
-        "effort_limits": by_joint(effort_limit, "--effort-limit"),
-        "velocity_limits": by_joint(velocity_limit, "--velocity-limit"),
-        "acceleration_limits": by_joint(acceleration_limit, "--acceleration-limit"),
-        "jerk_limits": by_joint(jerk_limit, "--jerk-limit"),
-    }
-    reading = read(source, {name: value for name, value in options.items() if value})
+    given = reading_options(
+        package_dir, tip, locked, effort_limit, velocity_limit, acceleration_limit, jerk_limit
+    )
+    reading = read(source, given)
     if json is not None:
         from sidestep.studio.show.document import document_with_touching
 

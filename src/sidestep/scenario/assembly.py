@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -181,16 +181,22 @@ def load_robot(scenario: Scenario) -> Robot:
         if extras:
             raise ValueError(f"{', '.join(extras)} go with 'urdf', not with a named robot")
         return Robot.named(choice.name)
-    assert choice.urdf is not None  # the schema asks for one of the two
-    return Robot.from_urdf(
-        scenario.file(choice.urdf),
-        package_dirs=[scenario.file(folder) for folder in choice.package_dirs],
-        tip=choice.tip,
-        locked=choice.locked,
-        base_pose=None if choice.base is None else pose_of(choice.base),
-        effort_limits=choice.effort_limits,
-        velocity_limits=choice.velocity_limits,
-    )
+    file, options = description_of(scenario)
+    return Robot.from_urdf(file, **options)
+
+
+def description_of(scenario: Scenario) -> tuple[Path, dict[str, Any]]:
+    """The description file of a scenario's robot, which goes by no name, and the arguments to read it with."""
+    choice = scenario.robot
+    assert choice.urdf is not None  # the schema asks for a name or a file
+    return scenario.file(choice.urdf), {
+        "package_dirs": [scenario.file(folder) for folder in choice.package_dirs],
+        "tip": choice.tip,
+        "locked": choice.locked,
+        "base_pose": None if choice.base is None else pose_of(choice.base),
+        "effort_limits": choice.effort_limits,
+        "velocity_limits": choice.velocity_limits,
+    }
 
 
 def check_torque(scenario: Scenario, robot: Robot) -> None:

@@ -21,6 +21,7 @@ from sidestep.scenario.scenario import (
     StraightMove,
     Vector3,
 )
+from sidestep.studio.archive import unpack
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
 from sidestep.studio.mover import STILL
@@ -170,16 +171,7 @@ def unpacked_scenario(name: str, content: bytes, folder: Path, place: Path) -> S
     if not name.lower().endswith(".zip"):
         text = content.decode("utf-8", errors="replace")
         return Scenario.from_text(text, file=name, folder=folder)
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-            if size > MOST_UNPACKED:
-                raise ValueError(
-                    f"{name} holds {size / 2**20:.0f} MiB; allowed: {MOST_UNPACKED / 2**20:.0f} MiB"
-                )
-            archive.extractall(place)
-    except zipfile.BadZipFile as error:
-        raise ValueError(f"{name} is not a zip file: {error}") from error
+    unpack(name, content, place, most=MOST_UNPACKED)
     files = sorted(place.glob("*.yaml"))
     if len(files) != 1:
         raise ValueError(f"{name} holds {len(files)} scenarios (.yaml) at its top; allowed: one")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from pathlib import Path
 
 from sidestep.scenario import Scenario
 from sidestep.scenario.scenario import RobotConfig
+from sidestep.studio.archive import unpack
 from sidestep.studio.start import scenario_of
 
 SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
@@ -23,7 +22,7 @@ def scenario_of_upload(name: str, content: bytes, place: Path) -> Scenario:
     """
     suffix = Path(name).suffix.lower()
     if suffix == ".zip":
-        _unpack(name, content, place)
+        unpack(name, content, place, most=MOST_UNPACKED)
         file = _description(name, place)
     elif suffix in SUFFIXES:
         file = place / Path(name).name
@@ -31,19 +30,6 @@ def scenario_of_upload(name: str, content: bytes, place: Path) -> Scenario:
     else:
         raise ValueError(f"{name}: allowed are {', '.join((*SUFFIXES, '.zip'))}")
     return scenario_of(RobotConfig(urdf=str(file), package_dirs=() if _is_mjcf(file) else (str(place),)))
-
-
-def _unpack(name: str, content: bytes, place: Path) -> None:
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-            if size > MOST_UNPACKED:
-                raise ValueError(
-                    f"{name} holds {size / 2**20:.0f} MiB; allowed: {MOST_UNPACKED / 2**20:.0f} MiB"
-                )
-            archive.extractall(place)
-    except zipfile.BadZipFile as error:
-        raise ValueError(f"{name} is not a zip file: {error}") from error
 
 
 def _description(name: str, place: Path) -> Path:

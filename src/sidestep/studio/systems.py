@@ -12,7 +12,7 @@ from sidestep.arm import Arm
 from sidestep.body import Body
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
-from sidestep.scenario.assembly import pose_of
+from sidestep.scenario.assembly import description_of
 from sidestep.scenario.config import controller_settings_of
 from sidestep.scenario.scenario import BodyConfig, MethodChoice
 from sidestep.studio.methods import METHODS
@@ -71,19 +71,8 @@ def make_body(robot: Robot, recipe: Recipe, progress: Callable[[str, int, int], 
 
 def draft_arm(scenario: Scenario, progress: Progress | None = None) -> Arm:
     """The arm of a description file, prepared in seconds; the fine one where it is in the cache."""
-    choice = scenario.robot
-    assert choice.urdf is not None
-    return Arm.load(
-        scenario.file(choice.urdf),
-        package_dirs=[scenario.file(folder) for folder in choice.package_dirs],
-        tip=choice.tip,
-        locked=choice.locked,
-        base_pose=None if choice.base is None else pose_of(choice.base),
-        effort_limits=choice.effort_limits,
-        velocity_limits=choice.velocity_limits,
-        draft=True,
-        progress=progress,
-    )
+    file, options = description_of(scenario)
+    return Arm.load(file, draft=True, progress=progress, **options)
 
 
 def fit_arguments(choice: BodyConfig) -> dict[str, Any]:
