@@ -236,6 +236,9 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
     return room - std::max(u, next) * period >= jerk_braking_distance(next, std::max(-slowing, -A), A, share * jerk);
   };
   const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
+  if (room <= 0.0 && u <= 0.0) {  // nothing closes: the way back can wait for the jerk
+    return std::min(required, alone);
+  }
   const bool enough = stops(shared, of_jerk);
   if (required > shared) {
     return enough ? shared : stops(alone, of_jerk_alone) ? std::min(required, alone) : required;
