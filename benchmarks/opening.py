@@ -64,7 +64,9 @@ def open_arm(path: str, started: float) -> Row:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("files", nargs="+", metavar="FILE", help="a URDF, xacro or MJCF file")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
     parser.add_argument("--one", type=float, metavar="STARTED", help=argparse.SUPPRESS)
@@ -85,7 +87,9 @@ def opened(file: str) -> Row:
     with tempfile.TemporaryDirectory() as cache:
         command = [sys.executable, __file__, file, "--one", str(time.time())]
         environment = {**os.environ, "SIDESTEP_CACHE_DIR": cache}
-        done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, timeout=LIMIT, check=True, text=True)
+        done = subprocess.run(
+            command, env=environment, stdout=subprocess.PIPE, timeout=LIMIT, check=True, text=True
+        )
     row: Row = json.loads(done.stdout.splitlines()[-1])
     print(row, file=sys.stderr)
     return row

@@ -210,6 +210,19 @@ AccelerationBounds::AccelerationBounds(int num_coordinates)
       position_lower(lower),
       position_upper(upper) {}
 
+/// From outside of a position limit, and not on the way farther out, the way back can wait for the jerk: by `step` a period.
+static void return_smoothly(AccelerationInterval& interval, double q, double v, double before, const ScalarLimits& limits,
+                            double step, double period) noexcept {
+  if (q < limits.lower && v >= 0.0) {
+    interval.lower = std::min(interval.lower, std::max(before + step, -v / period));
+    interval.position_lower = std::min(interval.position_lower, interval.lower);
+  }
+  if (q > limits.upper && v <= 0.0) {
+    interval.upper = std::max(interval.upper, std::min(before - step, -v / period));
+    interval.position_upper = std::max(interval.position_upper, interval.upper);
+  }
+}
+
 void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, ConstVectorRef v, double period,
                                 const LimitMargins& margins, const Eigen::VectorXd* before) noexcept {
   for (Eigen::Index i = 0; i < lower.size(); ++i) {
@@ -219,6 +232,10 @@ void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, Con
     if (margins.acceleration_factor > 1.0) {
       widen(interval, q[i], v[i], joint, margins.acceleration_factor, period);
     }
+    const double jerk = before == nullptr ? infinity : margins.jerk_share * limits.jerk[i];
+    if (before != nullptr) {
+      return_smoothly(interval, q[i], v[i], (*before)[i], joint, jerk * period, period);
+    }
     const auto at = static_cast<std::size_t>(i);
     lower[i] = interval.lower;
     upper[i] = interval.upper;
@@ -226,7 +243,6 @@ void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, Con
     position_upper[i] = interval.position_upper;
     lower_limit[at] = interval.lower_limit;
     upper_limit[at] = interval.upper_limit;
-    const double jerk = before == nullptr ? infinity : margins.jerk_share * limits.jerk[i];
     const SmoothInterval smooth =
         smooth_interval(q[i], v[i], before == nullptr ? 0.0 : (*before)[i], interval, joint, jerk, period);
     smooth_lower[i] = smooth.lower;

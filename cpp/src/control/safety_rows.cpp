@@ -50,6 +50,26 @@ double hardness_of_stop(double room, double u, double c, double stop_time) noexc
   return (linear + std::sqrt(linear * linear + 4.0 * bent * room)) / (2.0 * room);
 }
 
+/// Whether a stop that begins at a closing speed u, slowing by `slowing` now, fits into the room: by at most A, with jerk J.
+bool smooth_stop_fits(double room, double u, double slowing, double A, double J, double period) noexcept {
+  const double next = u - slowing * period;
+  return room - std::max(u, next) * period >= jerk_braking_distance(next, std::max(-slowing, -A), A, J);
+}
+
+/// The least x in [low, high], but for rounding, that fits; `high` does.
+template <class Fits>
+double least_that_fits(double low, double high, const Fits& fits) noexcept {
+  if (low >= high || fits(low)) {
+    return low;
+  }
+  constexpr int halvings = 12;
+  for (int n = 0; n < halvings; ++n) {
+    const double middle = 0.5 * (low + high);
+    (fits(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
 /// The largest direction·a with lower <= a <= upper; a joint that does not count may be without limits.
 template <class Direction, class Lower, class Upper>
 double largest_product(const Direction& direction, const Lower& lower, const Upper& upper) noexcept {
@@ -110,7 +130,9 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
       depths(Eigen::VectorXd::Zero(normals.rows())),
       along_path(static_cast<std::size_t>(normals.rows())),
       settings_(settings),
-      urgency_(Eigen::VectorXd::Zero(normals.rows())),
+      reserves_(static_cast<std::size_t>(normals.rows())),
+      asked_(Eigen::VectorXd::Zero(normals.rows())),
+      urgency_(asked_),
       response_(Eigen::VectorXd::Zero(num_coordinates)),
       responses_(RowMatrix::Zero(num_coordinates, normals.rows())),
       least_(response_),
@@ -231,10 +253,7 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   const double most = largest_product(gradient, bounds.smooth_lower, bounds.smooth_upper);  // joints at a limit give no more
   const auto raised = [&](double share) { return std::min(before + share * std::max(most - before, 0.0), most); };
   const double lasting = last.early ? std::min(c, 0.0) : c;
-  const auto stops = [&](double x, double share) {
-    const double slowing = x + lasting, next = u - slowing * period;
-    return room - std::max(u, next) * period >= jerk_braking_distance(next, std::max(-slowing, -A), A, share * jerk);
-  };
+  const auto stops = [&](double x, double share) { return smooth_stop_fits(room, u, x + lasting, A, share * jerk, period); };
   const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
   if (room <= 0.0 && u <= 0.0) {  // nothing closes: the way back can wait for the jerk
     return std::min(required, alone);
@@ -248,18 +267,43 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   }
   const double part = enough ? of_jerk : of_jerk_alone;
   double low = enough ? std::max(required, least) : shared, high = enough ? shared : alone;
-  if (low >= high || stops(low, part)) {
-    return low;
-  }
-  if (!stops(high, part)) {
+  if (low < high && !stops(low, part) && !stops(high, part)) {
     return high;
   }
-  constexpr int halvings = 12;
-  for (int n = 0; n < halvings; ++n) {
-    const double middle = 0.5 * (low + high);
-    (stops(middle, part) ? high : low) = middle;
+  return least_that_fits(low, high, [&](double x) { return stops(x, part); });
+}
+
+bool SafetyRows::draw_on_reserves(double period) noexcept {
+  bool any = false;
+  for (int row = 0; row < size_; ++row) {
+    const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
+    const double asked = lower[row] * lengths[row];
+    const auto fits = [&](double x) {
+      const double slowing = x + reserve.curvature;
+      return reserve.room > 0.0
+                 ? smooth_stop_fits(reserve.room, reserve.closing_speed, slowing, reserve.hardest, reserve.jerk, period)
+                 : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= 0.0;
+    };
+    asked_[row] = lower[row];
+    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk == 0.0 || !fits(asked)) {
+      continue;
+    }
+    const double least = std::min(reserve.before - reserve.jerk * period, asked);
+    lower[row] = std::min(lower[row], least_that_fits(least, asked, fits) / lengths[row]);
+    any = true;
   }
-  return high;
+  return any;
+}
+
+bool SafetyRows::ask_for_ways_back() noexcept {
+  bool any = false;
+  for (int row = 0; row < size_; ++row) {
+    if (reserves_[static_cast<std::size_t>(row)].room <= 0.0 && lower[row] < asked_[row]) {
+      lower[row] = asked_[row];
+      any = true;
+    }
+  }
+  return any;
 }
 
 void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
@@ -358,8 +402,13 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
       required = std::min(required, std::max(now, settings_.correction * u / period - c));
     }
     bool smooth = false;
+    Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
+    reserve.jerk = 0.0;
     if (last != nullptr) {
-      const double asked = required;
+      const double asked = required, jerk = last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
+      if (jerk < infinity) {
+        reserve = {room, u, c, hardest, of_jerk_alone * jerk, gradient.dot(last->acceleration)};
+      }
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
       smooth = required < asked;
       if (rates != nullptr && required == asked && asked > last->acceleration.dot(gradient)) {

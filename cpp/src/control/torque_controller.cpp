@@ -252,7 +252,11 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
     }
     const LastCommand without_rate{nullptr, nullptr, last.gravity};
     write_cost();
-    bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true;
+    bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true, back = false;
+    if (!solved && smooth && rows_.draw_on_reserves(settings_.period)) {
+      solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution);
+      back = solved && rows_.ask_for_ways_back();
+    }
     if (!solved && smooth) {
       // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of
       // a state that noise and disturbances change faster than torque may. The torque's rate stays, since motors take no other, until a
@@ -272,7 +276,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
         solved = solve_within_bounds(bounds_.lower, bounds_.upper, false, solution);
       }
     }
-    if (solved && !presses_for_lost()) {
+    if (solved && !back && !presses_for_lost()) {
       const bool free =
           std::all_of(solution.active.begin(), solution.active.end(), [](Limit limit) { return limit == Limit::none; });
       status = !kept                                                                    ? TorqueStatus::relaxed
@@ -282,8 +286,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       if (!rates) {
         write_torque_rows(without_rate);
       }
-      kept = kept && !smooth;
-      status = solve_relaxed(solution);
+      status = solve_relaxed(solved && kept, solution);  // a way out of what is lost, within jerk limits where they leave one
+      kept = kept && (solved || !smooth);
       if (status < TorqueStatus::relaxed && !kept) {
         status = TorqueStatus::relaxed;
       }

@@ -194,8 +194,13 @@ bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noe
   return accept(solution);
 }
 
-TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept {
-  widen_bounds();
+TorqueStatus TorqueController::solve_relaxed(bool smooth, TorqueSolution& solution) noexcept {
+  if (smooth) {
+    wide_lower_ = bounds_.smooth_lower;
+    wide_upper_ = bounds_.smooth_upper;
+  } else {
+    widen_bounds();
+  }
   collect_rows();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   allowed_.setZero();

@@ -243,6 +243,32 @@ BOOST_AUTO_TEST_CASE(update_applies_the_margin_and_allocates_nothing) {
 
 BOOST_AUTO_TEST_SUITE(smooth_bounds)
 
+BOOST_AUTO_TEST_CASE(the_way_back_into_a_position_limit_waits_for_the_jerk) {
+  // As measured by an encoder that rounds: back at once would take 2 · 3e-6 m / T² = 6 m/s².
+  JointLimits limits = JointLimits::unlimited(2);
+  limits.lower << -1.0, -1.0;
+  limits.upper << 1.0, 1.0;
+  limits.velocity.setConstant(2.0);
+  limits.acceleration.setConstant(10.0);
+  limits.jerk.setConstant(1000.0);
+  Eigen::VectorXd q = Eigen::Vector2d(-1.0 - 3e-6, 1.0 + 3e-6), v = Eigen::Vector2d::Zero(), a = Eigen::Vector2d::Zero();
+  AccelerationBounds bounds(2);
+  for (int k = 0; k < 100; ++k) {
+    bounds.update(limits, q, v, 0.001, {}, &a);
+    if (k == 0) {
+      BOOST_TEST(bounds.lower[0] == 1.0, tolerance(1e-9));
+      BOOST_TEST(bounds.upper[1] == -1.0, tolerance(1e-9));
+    }
+    const Eigen::Vector2d next(bounds.smooth_lower[0], bounds.smooth_upper[1]);  // farthest out
+    BOOST_REQUIRE(((next - a).cwiseAbs().array() <= 1.0 + 1e-9).all());
+    a = next;
+    q += 0.001 * v + 0.5e-6 * a;
+    v += 0.001 * a;
+    BOOST_REQUIRE((q[0] >= -1.0 - 3.1e-6 && q[1] <= 1.0 + 3.1e-6));
+  }
+  BOOST_TEST((q[0] >= -1.0 - 1e-9 && q[1] <= 1.0 + 1e-9));
+}
+
 // The way of the smooth profile, against its own integration in small steps.
 BOOST_AUTO_TEST_CASE(the_way_to_rest_is_that_of_the_profile) {
   Random random(71);

@@ -49,7 +49,10 @@ class Arm(_core.Arm):
         """
         super().__init__(arm)
         self._description = description
-        self._request: tuple[str | Path, Mapping[str, Any]] | None = None
+        self._request: tuple[str | Path, Mapping[str, Any]] | None = (
+            None  # what it can be prepared from again
+        )
+        self._is_draft = False
 
     @classmethod
     def load(
@@ -70,6 +73,7 @@ class Arm(_core.Arm):
         xacro_arguments: Mapping[str, str] | None = None,
         srdf: str | Path | None = None,
         allowed: Sequence[tuple[str, str]] = (),
+        components: Mapping[str, int] | None = None,
         draft: bool = False,
         progress: Progress | None = None,
         cache: bool = True,
@@ -89,6 +93,8 @@ class Arm(_core.Arm):
             acceleration_limits, velocity_limits, effort_limits, jerk_limits, effort_rate_limits: as there.
             xacro_arguments, srdf: as there.
             allowed: pairs of links that may touch, beside those of the description: they get no clearance.
+            components: ellipsoids of links that work close to things, {link: number}, such as {"hand": 24}: they
+                overshoot less than by default, and cost more. A draft does without.
             draft: prepare in seconds what serves until the fine body is there, see `Refinement`: proven to cover the
                 arm like the fine one, with fewer ellipsoids, which are larger, so that the arm keeps farther off. Where
                 the user's cache has the fine arm, it is taken.
@@ -122,7 +128,8 @@ class Arm(_core.Arm):
         text = isinstance(source, str) and source.lstrip().startswith("<")
         path = Path("URDF text" if text else source)
         if not text and path.suffix.lower() == SUFFIX:
-            if refused := [*given, *(["allowed"] if allowed else [])]:
+            also = [*(["allowed"] if allowed else []), *(["components"] if components else [])]
+            if refused := [*given, *also]:
                 raise ValueError(f"{refused[0]} cannot be given for arm file '{path}', which is prepared")
             return cls(_core.Arm.read(path))
 
@@ -131,10 +138,12 @@ class Arm(_core.Arm):
 
             return robot_from(source, given)
 
-        shipped = None if given or allowed else shipped_file(str(source))
+        shipped = None if given or allowed or components else shipped_file(str(source))
         if shipped is not None and not path.is_file():
-            return cls(_core.Arm.read(shipped), description=describe)
-        how = _How(tuple(allowed), draft, progress, cache)
+            arm = cls(_core.Arm.read(shipped), description=describe)
+            arm._request = source, given
+            return arm
+        how = _How(tuple(allowed), dict(components or {}), draft, progress, cache)
         return cls._prepared(describe, path.name, how, (source, given))
 
     @classmethod
@@ -169,7 +178,7 @@ class Arm(_core.Arm):
     @property
     def is_draft(self) -> bool:
         """Whether it was prepared in seconds, and a `Refinement` makes a finer one."""
-        return self._request is not None
+        return self._is_draft
 
     @property
     def robot(self) -> _core.Robot:
@@ -243,17 +252,28 @@ class Arm(_core.Arm):
 
         robot = describe()
         allowed = tuple(dict.fromkeys((*robot.allowed_pairs, *how.allowed)))
-        draft = how.draft and not (how.cache and arm_path(robot, allowed, label).exists())
+        fine = arm_path(robot, allowed, label, components=how.components)
+        draft = how.draft and not (how.cache and fine.exists())
 
         def make() -> _core.Arm:
             return prepare(
-                robot, allowed=allowed, source=label, draft=draft, cached=how.cache, progress=how.progress
+                robot,
+                allowed=allowed,
+                source=label,
+                draft=draft,
+                components=None if draft else how.components,
+                cached=how.cache,
+                progress=how.progress,
             )
 
-        made = stored_or_made(arm_path(robot, allowed, label, draft), make) if how.cache else make()
+        made = (
+            stored_or_made(arm_path(robot, allowed, label, draft) if draft else fine, make)
+            if how.cache
+            else make()
+        )
         arm = cls(made, description=lambda: robot)
-        if draft:
-            arm._request = request[0], {**request[1], "allowed": how.allowed}
+        arm._request = request[0], {**request[1], "allowed": how.allowed, "components": how.components}
+        arm._is_draft = draft
         return arm
 
 
@@ -262,6 +282,7 @@ class _How:
     """How an arm is prepared, see `Arm.load`."""
 
     allowed: tuple[tuple[str, str], ...]
+    components: Mapping[str, int]
     draft: bool
     progress: Progress | None
     cache: bool

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,13 @@ from sidestep.robot import Robot
 FORMAT_VERSION = 1  # to be raised with the version of the file format (cpp/src/model/arm_file.cpp)
 
 
-def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str, draft: bool = False) -> Path:
+def arm_path(
+    robot: Robot,
+    allowed: Sequence[tuple[str, str]],
+    source: str,
+    draft: bool = False,
+    components: Mapping[str, int] | None = None,
+) -> Path:
     """The file of one arm; its name is a hash of what it is made from and of the algorithms that make it."""
     digest = hashlib.sha256()
 
@@ -26,6 +32,8 @@ def arm_path(robot: Robot, allowed: Sequence[tuple[str, str]], source: str, draf
         for item in items:
             digest.update((item.tobytes() if isinstance(item, np.ndarray) else repr(item).encode()) + b"\n")
 
+    if components:
+        add(sorted(components.items()))
     add(FORMAT_VERSION, source, robot.name, sorted(sorted(pair) for pair in allowed))
     add(body_cache.cache_path(robot, CoverSettings(effort="draft" if draft else "fine")).name)
     pairs, tables = link_pairs, clearance_tables

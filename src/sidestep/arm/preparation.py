@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -33,6 +33,7 @@ def prepare(
     allowed: Sequence[Pair] = (),
     source: str = "",
     draft: bool = False,
+    components: Mapping[str, int] | None = None,
     cached: bool = True,
     progress: Progress | None = None,
 ) -> _core.Arm:
@@ -45,6 +46,7 @@ def prepare(
         source: what the provenance calls the description; the robot's name by default.
         draft: with fewer ellipsoids, which are larger, and tables and pairs by fewer samples; so it is with a body that
             is a draft.
+        components: ellipsoids of links that get a finer cover than the others, {link: number}.
         cached: whether parts are taken from shipped arms and the user's cache, and kept there.
         progress: called as progress(stage, item, done, in_all).
 
@@ -64,6 +66,8 @@ def prepare(
         raise ValueError(
             "the body does not cover its links (it has no levels); Body.cover(robot) makes one that does"
         )
+    if components:
+        body = body.finer(robot, components, progress=_of_stage("cover", progress), cache=cached)
     draft = draft or (isinstance(body.settings, CoverSettings) and body.settings.effort == "draft")
     check = SelfCollision(robot)
     tables, pairs = tables_and_pairs(

@@ -1,4 +1,4 @@
-"""The fine body of an arm that was prepared in seconds, made beside the loop."""
+"""Finer bodies of an arm, made beside the loop."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING, Any
 from sidestep import _core
 from sidestep._core import Controller
 from sidestep.arm.arm import Arm
+from sidestep.arm.tight_places import tight_links
 
 if TYPE_CHECKING:  # imported where they are needed
     from multiprocessing.connection import Connection
 
     from sidestep.arm.preparation import Progress
+
+LOOK = 0.5  # [s] between two looks at what controllers plan
 
 
 class Refinement:
@@ -30,39 +33,50 @@ class Refinement:
         controller = ss.Controller(arm)
         refinement = sidestep.arm.Refinement(arm, controller)
 
+    Covering ellipsoids are larger than links. So a planner may find a goal blocked, or no path, where the meshes are
+    free. With `watch` the links that may be why get finer covers, which controllers take over in the same way: 24
+    ellipsoids, then 48 (`tight_links`). That takes up to a minute of one core for every link, once.
+
     Args:
-        arm: of `Arm.load(..., draft=True)`; one that is fine already is done at once.
-        controllers: of this arm, that are to have the fine body.
+        arm: of `Arm.load`. One that is fine already is done at once.
+        controllers: of this arm, that are to have the finer bodies.
+        watch: goes on after the fine body, until `cancel`.
         progress: called, by a thread, as progress(stage, item, done, in_all), see `Arm.load`.
+
+    Raises:
+        ValueError: to watch an arm that was read from an `.arm` file, which has no meshes.
     """
 
-    def __init__(self, arm: Arm, *controllers: Controller, progress: Progress | None = None) -> None:
+    def __init__(
+        self, arm: Arm, *controllers: Controller, watch: bool = False, progress: Progress | None = None
+    ) -> None:
         self._controllers = controllers
         self._progress = progress
         self._arm = arm
         self._error: str | None = None
         self._done = threading.Event()
+        self._cancelled = threading.Event()
         self._process: multiprocessing.process.BaseProcess | None = None
-        if arm._request is None:
+        self._thread: threading.Thread | None = None
+        if watch and arm._request is None:
+            raise ValueError(
+                f"arm {arm.name!r} was read from an .arm file or made from a robot, so that there is nothing to make a "
+                "finer body from; load its description to watch it"
+            )
+        if not arm.is_draft:
             self._done.set()
-            return
-        source, options = arm._request
-        context = multiprocessing.get_context("spawn")
-        messages, sending = context.Pipe(duplex=False)
-        self._process = context.Process(target=_prepare, args=(source, options, sending), daemon=True)
-        self._process.start()
-        sending.close()  # so that the pipe ends with the process
-        self._thread = threading.Thread(target=self._hand_over, args=(messages,), daemon=True)
-        self._thread.start()
+        if arm.is_draft or watch:
+            self._thread = threading.Thread(target=self._work, args=(watch,), daemon=True)
+            self._thread.start()
 
     @property
     def is_done(self) -> bool:
-        """Whether it ended: with the fine arm, or an error, or because it was cancelled."""
+        """Whether the fine body is there, or failed with an error, or was cancelled."""
         return self._done.is_set()
 
     @property
     def arm(self) -> Arm:
-        """The fine arm when it is done, the draft until then."""
+        """The finest arm that is done: the draft at first."""
         return self._arm
 
     def wait(self, timeout: float | None = None) -> Arm:
@@ -81,24 +95,63 @@ class Refinement:
         return self._arm
 
     def cancel(self) -> None:
-        """Ends the preparation; controllers keep the draft."""
-        if self._process is not None and self._process.is_alive():
+        """Ends the preparation and the watch; controllers keep the body that they have."""
+        if not self._done.is_set():
             self._error = "it was cancelled"
-            self._process.terminate()
-        self._done.wait()
+        self._cancelled.set()
+        process = self._process
+        if process is not None and process.is_alive():
+            process.terminate()
+        if self._thread is not None:
+            self._thread.join()
 
-    def _hand_over(self, messages: Connection[Any, Any]) -> None:
-        assert self._process is not None
+    def _work(self, watch: bool) -> None:
+        """Of the thread."""
         try:
-            fine = Arm(self._received(messages), description=self._arm._description)
-            for controller in self._controllers:
-                controller.set_arm(fine)
-            self._arm = fine
+            if self._arm.is_draft:
+                self._hand_over({})
         except Exception as error:  # told by `wait`: a thread has nobody else to tell
             self._error = self._error or str(error)
         finally:
             self._done.set()
+        try:
+            while watch and self._error is None and not self._cancelled.wait(LOOK):
+                if wanted := self._tight():
+                    self._hand_over(wanted)
+        except Exception as error:
+            if not self._cancelled.is_set():
+                warnings.warn(f"arm {self._arm.name!r}: no finer body: {error}", RuntimeWarning, stacklevel=1)
+
+    def _tight(self) -> dict[str, int]:
+        """How many ellipsoids links are to have for what controllers plan."""
+        found: dict[str, int] = {}
+        for controller in self._controllers:
+            for link, number in tight_links(
+                controller.plan, self._arm, controller.settings.safety.margin
+            ).items():
+                found[link] = max(number, found.get(link, 0))
+        return found
+
+    def _hand_over(self, components: Mapping[str, int]) -> None:
+        """Prepares the arm with so many ellipsoids of these links, and tells controllers."""
+        assert self._arm._request is not None
+        source, options = self._arm._request
+        options = {**options, "components": {**options.get("components", {}), **components}}
+        context = multiprocessing.get_context("spawn")
+        messages, sending = context.Pipe(duplex=False)
+        self._process = context.Process(target=_prepare, args=(source, options, sending), daemon=True)
+        self._process.start()
+        sending.close()  # so that the pipe ends with the process
+        try:
+            if self._cancelled.is_set():
+                self._process.terminate()
+            finer = Arm(self._received(messages), description=self._arm._description)
+        finally:
             self._process.join()
+        finer._request = source, options
+        for controller in self._controllers:
+            controller.set_arm(finer)
+        self._arm = finer
 
     def _received(self, messages: Connection[Any, Any]) -> _core.Arm:
         """The arm that the process prepares."""

@@ -18,6 +18,7 @@ from sidestep._core import (
     PlanStatus,
     integrate,
 )
+from sidestep.arm.tight_places import tight_links
 from sidestep.bench.problem import Problem, poses_over
 from sidestep.robot import Robot, tip_of
 from sidestep.robot.tolerance import tolerances
@@ -76,6 +77,7 @@ class Motion:
         ended: what the controller was about at the end, see `Activity`; empty without a controller.
         safe: clearances bound every command, as the controller's do.
         pose_error: at the end, of a pose goal: [m] and [rad].
+        tight: where it did not arrive, links that may need a finer cover, and how many ellipsoids: `tight_links`.
     """
 
     q: Array
@@ -91,6 +93,7 @@ class Motion:
     ended: str = ""
     safe: bool = False
     pose_error: tuple[float, float] | None = None
+    tight: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def first_motion_seconds(self) -> float:
@@ -138,7 +141,7 @@ class ControllerMover:
         if settings.torque:
             driver = ControllerDriver(controller, _Changing(problem))
             motion = under_torque(self.robot, driver, problem, settings, pose)
-            return _told(motion, _planned(controller), controller, pose)
+            return self._told(motion, _planned(controller), controller, pose)
         columns = Columns(self.robot, problem, settings)
         q, v = problem.start, np.zeros_like(problem.start)
         seen = _Changing(problem)
@@ -155,7 +158,27 @@ class ControllerMover:
             if planned is None:
                 planned = _planned(controller)
         motion = columns.motion(problem)
-        return _told(motion, planned, controller, pose)
+        return self._told(motion, planned, controller, pose)
+
+    def _told(
+        self,
+        motion: Motion,
+        planned: tuple[float, float] | None,
+        controller: Controller,
+        pose: PoseTarget | None = None,
+    ) -> Motion:
+        """A motion with what its controller knows of it."""
+        first, improved = (None, None) if planned is None else planned
+        margin = controller.settings.safety.margin
+        return replace(
+            motion,
+            first_path_seconds=first,
+            planning_seconds=improved,
+            ended="arrived" if motion.arrived else controller.command.activity.name,
+            safe=True,
+            pose_error=None if pose is None else pose.errors(motion.q[-1]),
+            tight={} if motion.arrived else tight_links(controller.plan, self.arm, margin),
+        )
 
 
 def _at_pose(pose: PoseTarget, q: Array) -> npt.NDArray[np.bool_]:
@@ -175,24 +198,6 @@ def _planned(controller: Controller) -> tuple[float, float] | None:
     if plan.status != PlanStatus.found:
         return None
     return plan.search_seconds, plan.search_seconds + plan.improvement_seconds
-
-
-def _told(
-    motion: Motion,
-    planned: tuple[float, float] | None,
-    controller: Controller,
-    pose: PoseTarget | None = None,
-) -> Motion:
-    """A motion with what its controller knows of it."""
-    first, improved = (None, None) if planned is None else planned
-    return replace(
-        motion,
-        first_path_seconds=first,
-        planning_seconds=improved,
-        ended="arrived" if motion.arrived else controller.command.activity.name,
-        safe=True,
-        pose_error=None if pose is None else pose.errors(motion.q[-1]),
-    )
 
 
 class _Changing:

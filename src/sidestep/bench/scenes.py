@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
 
@@ -39,6 +39,8 @@ class SceneSettings:
         spacing: no point of a surface is farther than this from one that the controller sees [m].
         point_radius: of those points [m].
         only_clearances: measure start and goal and move nothing.
+        finer: where the arm does not arrive, and touches nothing, it is run again with finer covers of the links that
+            may be why, see `tight_links`: twice at most.
         time_ratio: of the motions that arrive, see `ratio_to_optimum`; needs the package toppra.
         jerk_time_ratio: of the same motions, see `ratio_to_jerk_limited_optimum`; needs casadi as well.
 
@@ -53,6 +55,7 @@ class SceneSettings:
     spacing: float = SPACING
     point_radius: float = POINT_RADIUS
     only_clearances: bool = False
+    finer: bool = False
     time_ratio: bool = False
     jerk_time_ratio: bool = False
 
@@ -101,6 +104,8 @@ class SceneOutcome:
         ended: what the guide said at the end; empty without a guide.
         time_ratio: see `ratio_to_optimum`; None where it was not asked for or there is none.
         jerk_time_ratio: see `ratio_to_jerk_limited_optimum`; None where it was not asked for, NaN where none is found.
+        tight: links that may need a finer cover, and how many ellipsoids, see `Motion`. finer: those of this run,
+            beyond what the body has.
     """
 
     set: str
@@ -120,11 +125,19 @@ class SceneOutcome:
     ended: str = ""
     time_ratio: float | None = None
     jerk_time_ratio: float | None = None
+    tight: Mapping[str, int] = field(default_factory=dict)
+    finer: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def solved(self) -> bool:
         """Arrived where it should, touched nothing, broke no limit."""
         return not self.reasons()
+
+    @property
+    def only_short_of_goal(self) -> bool:
+        """Did not arrive, and nothing else went wrong."""
+        outcome = self.outcome
+        return outcome is not None and outcome.late and not outcome.limits
 
     def reasons(self) -> list[str]:
         """What went wrong, a sentence each; empty when the problem is solved."""
@@ -180,6 +193,12 @@ class SceneResult:
                 {"set": item.set, "index": item.index, "reasons": item.reasons()}
                 for item in self.outcomes
                 if item.reasons()
+            ]
+        if self.settings.finer:
+            document["finer"] = [
+                {"set": item.set, "index": item.index, "links": dict(item.finer), "solved": item.solved}
+                for item in self.outcomes
+                if item.finer
             ]
         return document
 
@@ -284,12 +303,23 @@ class _Worker:
 
     def __init__(self, settings: SceneSettings) -> None:
         self.settings = settings
-        body = build_body(settings.method, load_robot(settings.robot))
-        self._arms = Arms(settings.robot, settings.method, body)
+        self._robot = load_robot(settings.robot)
+        self._body = build_body(settings.method, self._robot)
+        self._arms = Arms(settings.robot, settings.method, self._body)
 
     def run(self, task: MotionBenchMakerProblem) -> tuple[SceneOutcome, StepTimes]:
-        settings = self.settings
-        arm = self._arms.of(task)
+        outcome, times = self._run(task, self._arms)
+        body, finer = self._body, dict[str, int]()
+        while self.settings.finer and outcome.tight and outcome.only_short_of_goal:
+            finer |= outcome.tight
+            body = body.finer(self._robot, outcome.tight)
+            settings = self.settings
+            outcome, times = self._run(task, Arms(settings.robot, settings.method, body))
+            outcome = replace(outcome, finer=dict(finer))
+        return outcome, times
+
+    def _run(self, task: MotionBenchMakerProblem, arms: Arms) -> tuple[SceneOutcome, StepTimes]:
+        settings, arm = self.settings, arms.of(task)
         problem, goal = arm.problem(task, spacing=settings.spacing, point_radius=settings.point_radius)
         return judged(arm, problem, settings, set=task.set, goal=goal)
 
@@ -336,5 +366,6 @@ def judged(
         ended="" if motion is None else motion.ended,
         time_ratio=ratio,
         jerk_time_ratio=jerk_ratio,
+        tight={} if motion is None else motion.tight,
     )
     return outcome, StepTimes() if motion is None else times_of(motion)

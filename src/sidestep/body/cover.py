@@ -133,11 +133,15 @@ def cover_links(
     progress: CoverProgress | None = None,
     *,
     cached: bool = False,
+    only: Sequence[str] | None = None,
 ) -> tuple[tuple[LinkCover, Ellipsoids], ...]:
-    """Covers all links with geometry; shares the ellipsoids so that the worst link is as good as possible.
+    """Covers links with geometry; shares the ellipsoids so that the worst link is as good as possible.
 
     The cover of a link depends on its surface, on the settings, and on whether it moves: of another robot with the same
     link it is taken from the user's cache.
+
+    Args:
+        only: these links; by default all.
 
     Raises:
         ValueError: if the settings do not suit the robot.
@@ -149,7 +153,7 @@ def cover_links(
     store = CoverStore(settings, enabled=cached)
     twins: dict[tuple[bytes, float], LinkProblem] = {}
     problems: dict[str, LinkProblem] = {}
-    for link in links_with_geometry(robot):
+    for link in links_with_geometry(robot) if only is None else only:
         allowance = 1.0 if moves[link] else FIXED_ALLOWANCE
         known = store.read(link, _mesh(robot, link), allowance)
         triangles = _triangles(robot, link)
@@ -309,10 +313,11 @@ def cover_mixtures(
     progress: CoverProgress | None = None,
     *,
     cached: bool = False,
+    only: Sequence[str] | None = None,
 ) -> tuple[tuple[LinkFit, Mixture, Array, LinkCover], ...]:
-    """The covers of all links as mixtures of solid ellipsoids, with the levels of their boundaries (K,)."""
+    """The covers of links as mixtures of solid ellipsoids, with the levels of their boundaries (K,)."""
     results = []
-    for cover, ellipsoids in cover_links(robot, settings, progress, cached=cached):
+    for cover, ellipsoids in cover_links(robot, settings, progress, cached=cached, only=only):
         volumes = np.abs(np.linalg.det(ellipsoids.shapes))
         covariances = ellipsoids.shapes @ ellipsoids.shapes.transpose(0, 2, 1) / SOLID_LEVEL
         fit, mixture = density_fit(

@@ -54,6 +54,13 @@ def motion_bench_maker(
         int | None, typer.Option(min=1, help="Only so many of each set, the first ones.")
     ] = None,
     only: Annotated[list[str] | None, typer.Option(help="Only this set; may be repeated.")] = None,
+    finer: Annotated[
+        bool,
+        typer.Option(
+            "--finer",
+            help="Where the arm does not arrive, and touches nothing, run again with finer covers of links.",
+        ),
+    ] = False,
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Measure starts and goals only, move nothing.")
     ] = False,
@@ -92,7 +99,9 @@ def motion_bench_maker(
     motion = {"period": period, "duration": duration, "tolerance": tolerance, "torque": torque}
     points = {"spacing": spacing, "point_radius": point_radius}
     ratios = {"time_ratio": True, "jerk_time_ratio": optimum}
-    settings = _settings(robot, method, jobs, motion, **points, **ratios, only_clearances=clearances)
+    settings = _settings(
+        robot, method, jobs, motion, **points, **ratios, only_clearances=clearances, finer=finer
+    )
     run_and_report(
         settings,
         lambda show: run_scenes(settings, chosen, progress=show),

@@ -87,6 +87,9 @@ struct ClosingLimits {
 //     S(u, −(∇h·a + c)) at a share of the jerk J = Σ |∂h/∂q_j| J_j and at three quarters of the hardest deceleration,
 // fits into the room, S of acceleration_bounds.hpp. The share is one half, so that two rows can rise together; where that is not
 // enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
+// Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw on their
+// reserves: each asks for no more than after which the stop at the hardest deceleration and all but a twentieth of the jerk fits;
+// without room, only for what keeps it from closing. Ways back then share what jerk leaves, as if nothing were enough.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
 // it asks for the least after which the smooth stop fits (or for the most, where none fits), without a curvature that helps, which
 // may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
@@ -171,6 +174,12 @@ class SafetyRows {
   void add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, const AccelerationBounds& bounds,
            double period, const BrakingTorque* torque = nullptr, const LastMotion* last = nullptr) noexcept;
 
+  /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, `lower` and
+  /// `lengths` as it left them or less.
+  bool draw_on_reserves(double period) noexcept;
+  /// After it: asks again in full where there is no room, and only the way back was put off; false where that is nowhere.
+  bool ask_for_ways_back() noexcept;
+
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
   bool satisfied_within(int k, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) const noexcept;
 
@@ -203,8 +212,16 @@ class SafetyRows {
                          ConstVectorRef gradient, const LastMotion& last, const AccelerationBounds& bounds,
                          const JointLimits& limits, double period) noexcept;
 
+  /// What the stop of a row can count on: in [m], [m/s], [m/s²], [m/s³]; no jerk [m/s³]: nothing is known of it.
+  struct Reserve {
+    double room = 0.0, closing_speed = 0.0, curvature = 0.0, hardest = 0.0, jerk = 0.0;
+    double before = 0.0;  ///< ∇h·a of the last period
+  };
+
   SafetySettings settings_;
   int size_ = 0;
+  std::vector<Reserve> reserves_;                // (max)
+  Eigen::VectorXd asked_;                        // (max) before reserves are drawn on
   Eigen::VectorXd urgency_;                      // (max) predicted room of the rows chosen, ascending
   Eigen::VectorXd response_;                     // (nv) M v
   RowMatrix responses_;                          // (nv, max) M⁻¹ ∇h of the rows chosen

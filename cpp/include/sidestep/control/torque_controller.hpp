@@ -210,7 +210,8 @@ class TorqueController {
   /// The first program; smooth: within the limits of jerk and torque rate.
   bool solve_within_bounds(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth,
                            TorqueSolution& solution) noexcept;
-  TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
+  /// The other programs; smooth: within the limits of jerk, which leave a solution.
+  TorqueStatus solve_relaxed(bool smooth, TorqueSolution& solution) noexcept;
   void widen_bounds() noexcept;
   void collect_rows() noexcept;
   /// Whether a clearance below zero bends the last solution. Then the third program has its say also where all could be
