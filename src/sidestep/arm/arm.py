@@ -89,14 +89,14 @@ class Arm(_core.Arm):
             acceleration_limits, velocity_limits, effort_limits, jerk_limits, effort_rate_limits: as there.
             xacro_arguments, srdf: as there.
             allowed: pairs of links that may touch, beside those of the description: they get no clearance.
-            draft: prepare a draft body in seconds, until the fine body is there, see `Refinement`. It is proven to cover
-                the arm like the fine one, but has fewer and larger ellipsoids, so the arm keeps farther away. If the
-                user's cache has the fine arm, that is used.
+            draft: prepare a draft body in seconds, until the fine body is there, see `Refinement`. It is proven to
+                cover the arm like the fine one, but has fewer and larger ellipsoids, so the arm keeps farther away. If
+                the user's cache has the fine arm, that is used.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
                 "tables" or "pairs", the item a link or a pair of links.
-            cache: whether to read prepared parts from the user's cache and write them there (SIDESTEP_CACHE_DIR overrides
-                its place): the arm, the cover of each link, and the table and contact of each pair of links. Other arms
-                share them.
+            cache: whether to read prepared parts from the user's cache and write them there (SIDESTEP_CACHE_DIR
+                overrides its place): the arm, the cover of each link, and the table and contact of each pair of links.
+                Other arms share them.
 
         Raises:
             FileNotFoundError: there is no such file, or a named robot's package is not installed.
