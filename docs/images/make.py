@@ -1,9 +1,10 @@
 """Makes the pictures of README and site: python docs/images/make.py [NAME ...], by default all of them.
 
-demo, studio; in figures.py those of concepts and theory; in table.py that of the first screen. That of the studio
-needs Chromium and `pip install 'sidestep[headless]'`.
+demo, studio; in figures.py those of the concepts, in theory_figures.py those of the theory; in table.py that of the
+first screen. That of the studio needs Chromium and `pip install 'sidestep[headless]'`.
 """
 
+import importlib
 import os
 import subprocess
 import sys
@@ -38,17 +39,23 @@ def keep(source: Path, target: Path) -> None:
 
 
 MAKERS: dict[str, Callable[[Path], None]] = {"demo": demo, "studio": studio}
-FIGURES = (
-    *("loop", "barriers", "planner", "look-ahead", "body", "guarantees"),  # of the concepts
-    *("geometry", "control", "clearances", "timed-path"),  # of the theory
-)
+FIGURES = {
+    "figures": ("loop", "barriers", "planner", "look-ahead", "body", "guarantees"),
+    "theory_figures": ("density", "geometry", "systems", "control", "clearances", "timed-path"),
+}
+
+
+def drawn_in(module: str, name: str) -> None:
+    """Draws the figure of this name in a module beside this file."""
+    getattr(importlib.import_module(module), name.replace("-", "_"))()
+
 
 if __name__ == "__main__":
     os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo draws without a display; or osmesa
-    import figures
     import table
 
-    MAKERS |= {name: lambda _, name=name: getattr(figures, name.replace("-", "_"))() for name in FIGURES}
+    for module, names in FIGURES.items():
+        MAKERS |= {name: lambda _, module=module, name=name: drawn_in(module, name) for name in names}
     MAKERS["table"] = lambda _: table.table()
     wrong = [name for name in sys.argv[1:] if name not in MAKERS]
     if wrong:

@@ -15,16 +15,21 @@ IMAGES = Path(__file__).parents[2] / "docs" / "images"
 def figures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     monkeypatch.syspath_prepend(str(IMAGES))
     import figures
+    import theory_figures
 
     monkeypatch.setattr(figures, "HERE", tmp_path)
-    yield figures
-    sys.modules.pop("figures")
+    yield figures, theory_figures
+    for name in ("figures", "theory_figures"):
+        sys.modules.pop(name)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["barriers", "planner", "geometry", "control", "timed_path"])
+@pytest.mark.parametrize(
+    "name", ["barriers", "planner", "density", "geometry", "systems", "control", "timed_path"]
+)
 def test_figure_is_drawn(figures, tmp_path: Path, name: str) -> None:
-    getattr(figures, name)()
+    module = next(module for module in figures if hasattr(module, name))
+    getattr(module, name)()
     (path,) = tmp_path.glob("*.png")
     picture = np.asarray(Image.open(path).convert("L"))
     assert picture.shape[1] == 990  # 9 inches at 110 dots
@@ -34,7 +39,7 @@ def test_figure_is_drawn(figures, tmp_path: Path, name: str) -> None:
 
 
 def test_diagram_of_the_loop_is_the_committed_one(figures, tmp_path: Path) -> None:
-    figures.loop()
+    figures[0].loop()
     assert (tmp_path / "loop.svg").read_text(encoding="utf-8") == (IMAGES / "loop.svg").read_text(
         encoding="utf-8"
     )

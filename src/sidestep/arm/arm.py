@@ -24,9 +24,9 @@ if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without 
 
 
 class Arm(_core.Arm):
-    """Everything that is made once for a robot, in one object and one file that C++ reads alone.
+    """Everything that is prepared once for a robot, in one object and one file that C++ can read without Python.
 
-    Make one with `load` or `from_robot`; `save` writes it. It does not change.
+    Make one with `load` or `from_robot`; `save` writes it. It is immutable.
 
     Attributes:
         name: of the robot. num_coordinates: joint coordinates nv.
@@ -80,9 +80,9 @@ class Arm(_core.Arm):
     ) -> Arm:
         """An arm by the name of a shipped robot, from an `.arm` file, or from a robot description.
 
-        A shipped name without options is read from the file that comes with Sidestep: milliseconds, and no robot
-        package needed. A description, or a name with options, is prepared on first use, which takes minutes, and kept
-        in the user's cache.
+        A shipped name without options is read from the file that comes with Sidestep, in milliseconds and without any
+        robot package. A description, or a name with options, is prepared on first use. That takes minutes; the user's
+        cache keeps the result.
 
         Args:
             source: a name of `sidestep.robots()`, the path of an `.arm` file, or a URDF, xacro or MJCF file
@@ -95,14 +95,14 @@ class Arm(_core.Arm):
             allowed: pairs of links that may touch, beside those of the description: they get no clearance.
             components: ellipsoids of links that work close to things, {link: number}, such as {"hand": 24}: they
                 overshoot less than by default, and cost more. A draft does without.
-            draft: prepare in seconds what serves until the fine body is there, see `Refinement`: proven to cover the
-                arm like the fine one, with fewer ellipsoids, which are larger, so that the arm keeps farther off. Where
-                the user's cache has the fine arm, it is taken.
+            draft: prepare a draft body in seconds, until the fine body is there, see `Refinement`. It is proven to
+                cover the arm like the fine one, but has fewer and larger ellipsoids, so the arm keeps farther away. If
+                the user's cache has the fine arm, that is used.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
                 "tables" or "pairs", the item a link or a pair of links.
-            cache: whether what is prepared is read from and written to the user's cache (SIDESTEP_CACHE_DIR overrides
-                its place): the arm, and the cover of each link, the table and the contact of each pair of links, which
-                other arms share.
+            cache: whether to read prepared parts from the user's cache and write them there (SIDESTEP_CACHE_DIR
+                overrides its place): the arm, the cover of each link, and the table and contact of each pair of links.
+                Other arms share them.
 
         Raises:
             FileNotFoundError: there is no such file, or a named robot's package is not installed.

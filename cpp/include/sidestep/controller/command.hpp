@@ -13,7 +13,7 @@ namespace sidestep {
 /// How safe a command is, by severity. Every command may be sent.
 enum class SafetyStatus {
   ok,              ///< the motion is what the goal asks for
-  limited,         ///< a limit of the arm or a clearance bends it
+  limited,         ///< a limit of the arm or a clearance changes it
   relaxed,         ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position
                    ///< or torque limits
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
@@ -21,13 +21,13 @@ enum class SafetyStatus {
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
 };
 
-/// What a controller is about.
+/// What a controller is doing.
 enum class Activity {
-  no_goal,  ///< none was given, or no velocity for a while: the arm comes to rest, and evades
-  moving,   ///< on the way to its goal, or as it is told
-  waiting,  ///< it holds on until a posture is found, or a trajectory that it keeps to is free
+  no_goal,  ///< no goal, or no velocity for a while: the arm comes to rest, and avoids moving obstacles
+  moving,   ///< on the way to its goal, or at the commanded velocity
+  waiting,  ///< until a posture is found, or until its trajectory is free
   arrived,  ///< the goal is reached
-  blocked,  ///< no way leads to the goal now, see `explain`
+  blocked,  ///< no path leads to the goal now, see `explain`
   stale,    ///< the obstacles are older than `obstacle_timeout`: the arm stops
 };
 
@@ -35,32 +35,32 @@ enum class Activity {
 const char* to_string(SafetyStatus status) noexcept;
 const char* to_string(Activity activity) noexcept;
 
-/// What one step gives. Made once, written by every step.
+/// The result of one step. Each step overwrites it.
 struct Command {
   explicit Command(int num_coordinates);
 
   SafetyStatus status = SafetyStatus::stopping;
   Activity activity = Activity::no_goal;
   Eigen::VectorXd torque;                  ///< (nv) [Nm | N], gravity included; zero where the output is not torque
-  Eigen::VectorXd torque_without_gravity;  ///< (nv) the same for arms that hold themselves; NaN where the arm has no inertias
-  Eigen::VectorXd wanted;                  ///< (nv) acceleration that was asked for, before any limit [rad/s² | m/s²]
+  Eigen::VectorXd torque_without_gravity;  ///< (nv) for arms that compensate gravity; NaN where the arm has no inertias
+  Eigen::VectorXd wanted;                  ///< (nv) acceleration after barriers, before any limit [rad/s² | m/s²]
   Eigen::VectorXd acceleration;            ///< (nv) of the arm: the reference's with feedback [rad/s² | m/s²]
   Eigen::VectorXd velocity;                ///< (nv) of the reference after this period [rad/s | m/s]
   Eigen::VectorXd position;                ///< (nv) of the reference after this period [rad | m]; NaN until a state was known
-  Eigen::VectorXd disturbance;             ///< (nv) force that the observer makes up for, of torque outputs [Nm | N]
-  Eigen::VectorXd rotors;                  ///< (nv) inertia that it found and the model lacks [kg m² | kg]
+  Eigen::VectorXd disturbance;             ///< (nv) force that the observer compensates, for torque output [Nm | N]
+  Eigen::VectorXd rotors;                  ///< (nv) estimated inertia that the model lacks [kg m² | kg]
   double tracking_error = 0.0;             ///< largest |q_r − q| [rad | m]
   double deviation = 0.0;                  ///< of the reference from a trajectory, largest |q_r − q*| [rad | m]
   double delay = 0.0;                      ///< how far the trajectory's clock is behind [s]
 
-  /// the least of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
+  /// least clearance of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
   /// unknown
   double clearance = std::numeric_limits<double>::infinity();
   int coordinate = -1;  ///< whose clearance that is, see Controller::labels; -1: none within reach
   int point = -1;       ///< the obstacle point, where it is one
   int bound_by = -1;    ///< the coordinate whose clearance row bends the motion most; -1: none
-  /// to the nearest obstacle [m], exact up to speed_limits.far_distance; inf: farther, or without these settings; NaN: the
-  /// state is unknown
+  /// distance to the nearest obstacle [m], exact up to speed_limits.far_distance; inf: farther, or without these settings;
+  /// NaN: the state is unknown
   double distance = std::numeric_limits<double>::infinity();
   double speed = 0.0;                                            ///< of the arm's fastest frame [m/s]; NaN: unknown
   double speed_limit = std::numeric_limits<double>::infinity();  ///< for every frame [m/s]; inf: none; NaN: unknown
@@ -68,8 +68,8 @@ struct Command {
 
   StepStatus system = StepStatus::invalid_state;                ///< of the geometric system
   TorqueStatus program = TorqueStatus::fallback_invalid_input;  ///< of the quadratic program
-  bool avoiding = false;  ///< follows a trajectory of the look-ahead, out of the way of what moves
-  bool on_path = false;   ///< follows a path of the planner
+  bool avoiding = false;                                        ///< follows an avoidance trajectory of the look-ahead
+  bool on_path = false;                                         ///< follows a path of the planner
 };
 
 }  // namespace sidestep

@@ -20,32 +20,31 @@
 
 namespace sidestep {
 
-/// The controller: state in, safe command out, once a period.
+/// The controller turns the arm's state into a safe command, once per period.
 ///
-///   1. Reference: the goal; or a point that runs ahead on the planner's path; or a sub-goal out of a local minimum.
-///   2. Geometric system: a damped spring to the reference on the graph of the barriers, see GeometricSystem. Barriers
-/// are
-///      lowered where the arm has to come near what rests: at its goal and in narrow places of the path.
-///   3. Look-ahead: where what moves would come too near on that way, a trajectory out of its way is followed instead.
-///   4. Quadratic program: the nearest acceleration within every limit and clearance, as torque or acceleration.
+///   1. Reference: the goal, a point ahead of the arm on the planner's path, or a sub-goal out of a local minimum.
+///   2. Geometric system: a damped spring to the reference on the graph of the barriers, see GeometricSystem. Activation
+///      distances shrink among resting obstacles at the goal and in narrow places of the path.
+///   3. Look-ahead: if a moving obstacle would come too near, the arm follows an avoidance trajectory instead.
+///   4. Quadratic program: the nearest acceleration within all limits and clearances, as torque or acceleration.
 ///
-/// Clearances bound every command: no setting, goal or fault takes them away while the state is known.
+/// Clearances bound every command. No setting, goal or fault switches them off while the state is known.
 ///
-/// `step` belongs to one thread, allocates nothing, takes no lock and never throws. Goals and obstacles may be set from
-/// other threads. Planner, look-ahead and posture search run in threads of their own; with `synchronous` inside `step`,
-/// which may then allocate, and repeats a motion bit for bit.
+/// Call `step` from one thread. It allocates nothing, takes no lock and never throws. You may set goals and obstacles from
+/// other threads. Planner, look-ahead and posture search run in their own threads. With `synchronous` they run inside
+/// `step`, which may then allocate, and motions repeat bit for bit.
 class Controller {
  public:
-  /// Throws std::invalid_argument that names the setting at fault, or what the arm lacks.
+  /// Throws std::invalid_argument that names the wrong setting, or what the arm lacks.
   explicit Controller(Arm arm, ControllerSettings settings = {});
   ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// Holds a controller for one thread or run: for programs whose parts might both call `step`, which does not ask.
+  /// Reserves a controller for one thread or run, in programs where two parts might call `step`; `step` does not check.
   class Use {
    public:
-    /// Throws std::runtime_error if it is held already.
+    /// Throws std::runtime_error if it is reserved already.
     explicit Use(Controller& controller);
     Use(const Use&) = delete;
     Use& operator=(const Use&) = delete;
@@ -60,79 +59,78 @@ class Controller {
     Controller* controller_;
   };
 
-  /// From the next step on: a configuration (nv) [rad | m] within the limits, of joints without limits at the nearest
-  /// turn. Throws std::invalid_argument that names the joint, its value and what is allowed; the goal before stays.
+  /// A configuration (nv) [rad | m] within the limits, from the next step on. Joints without limits go to the nearest full
+  /// turn. Throws std::invalid_argument that names the joint, its value and what is allowed; the previous goal stays.
   void set_goal(const Eigen::VectorXd& position);
-  /// The same for a configuration that moves, or a pose of a frame. A goal that moves is followed without planner. A
-  /// posture for a pose is looked for near its `rest`, or near the arm where it has none.
+  /// A moving configuration, or the pose of a frame. A moving goal is followed without planner. The posture for a pose is
+  /// searched near its `rest`, or near the arm if it has none.
   void set_goal(Goal goal);
-  // Each of these takes the place of the goal or order before, and needs none. They too throw std::invalid_argument, and the
-  // order before stays.
+  // Each of these replaces the previous goal or order. They too throw std::invalid_argument, and the previous order then stays.
 
-  /// Wanted joint velocities (nv) [rad/s | m/s], as a whole scaled down to the limits. Obstacles steer the arm around them
-  /// and stop it. After `inputs.timeout` without another order the arm stops.
+  /// Wanted joint velocities (nv) [rad/s | m/s]; one factor scales them down to the limits. The arm slides along obstacles or
+  /// stops at them. After `inputs.timeout` without another order the arm stops.
   void set_velocity(const Eigen::VectorXd& v);
-  /// The same for the twist of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of the world
-  /// or, `local`, its own; rows as in frame_jacobian. Joint velocities by least squares: exact away from singular
-  /// configurations and limits, along which the arm slides.
+  /// The wanted twist of a frame: velocity of its origin [m/s] and angular velocity [rad/s], in world axes or, with `local`, in
+  /// the frame's axes; rows as in frame_jacobian. Least squares gives the joint velocities. They are exact away from singular
+  /// configurations and limits; along these the arm slides.
   void set_twist(const std::string& frame, const Vector6d& twist, bool local = false);
-  /// Joint positions q (nv × K) at times (K) [s] from the step that takes them over, see JointTrajectory. A first time after
-  /// zero leaves that long to get to the first sample, which need not be where the arm is.
+  /// Joint positions q (nv × K) at times (K) [s] after the step that receives them, see JointTrajectory. If the first time is
+  /// after zero, the arm has that long to reach the first sample, which may differ from its present state.
   void set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times,
                       TrajectoryBehaviour behaviour = TrajectoryBehaviour::keep_path);
 
-  /// The arm comes to rest where it is, and goes on evading.
+  /// The arm comes to rest where it is, and still avoids moving obstacles.
   void clear_goal();
 
-  /// From the next step on. Points move on by their velocities until they are set again.
+  /// Replaces all obstacles, from the next step on. Points move on by their velocities until the next call.
   void set_obstacles(Obstacles obstacles);
 
-  // Each of these prepares another body beside the loop, which takes a few tenths of a second, and returns; steps go on, and the
-  // next one takes it over. Goals are planned for anew, from where the arm is.
+  // Each of these prepares another body while steps go on, in a few tenths of a second, and returns. The next step uses the new
+  // body. The planner plans again, from where the arm is.
 
-  /// Another body, inertias and pairs for the same joints and limits, as a finer cover that is ready later. Objects stay
-  /// attached. Throws std::invalid_argument that says what differs.
+  /// Another body, inertias and pairs for the same joints and limits, for example a finer cover. Objects stay attached. Throws
+  /// std::invalid_argument that says what differs.
   void set_arm(Arm arm);
-  /// An object that a link holds from now on, see sidestep::attach; at the arm's last configuration it is taken to be apart from
-  /// all links. What rests on obstacles there (Attachment::rests_on) may stay as near to them as it is, see sidestep::resting, until
-  /// its whole cover is `lifted_room` off all obstacles. Throws std::invalid_argument that names what is wrong, such as an object that
-  /// rests before the first step; nothing changes then.
+  /// A link holds this object from now on, see sidestep::attach. At the arm's last configuration it counts as apart from all
+  /// links. An object that rests on obstacles there (Attachment::rests_on) may stay as near to them as it is, see
+  /// sidestep::resting, until its whole cover is `lifted_room` away from all obstacles. Throws std::invalid_argument that names
+  /// what is wrong, for example an object that rests before the first step; then nothing changes.
   void attach(const Attachment& object);
-  /// Lets it go. Throws std::invalid_argument that lists what is attached.
+  /// Releases an object. Throws std::invalid_argument that lists the attached objects.
   void detach(const std::string& name);
-  /// The names of what is attached.
+  /// Names of the attached objects.
   std::vector<std::string> attached() const;
 
-  /// One period at q [rad | m] and v [/s] (nv). A size that is wrong, or a value that is not finite, gives a damped
-  /// stop with the status `stopping`.
+  /// Computes the command of one period at q [rad | m] and v [rad/s | m/s] (nv). A wrong size or a value that is not finite
+  /// gives a damped stop with the status `stopping`.
   const Command& step(ConstVectorRef q, ConstVectorRef v) noexcept;
   /// The same with the arm's own mass matrix (nv × nv) and bias (nv) [Nm | N] there; for torque output.
   const Command& step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
                       ConstVectorRef bias) noexcept;
 
-  /// Of the last step; the same object all the time.
+  /// The command of the last step; always the same object.
   const Command& command() const noexcept { return command_; }
-  /// What the last step saw; its name_of(command().point) is the name of what is nearest. For the thread of `step`.
+  /// The obstacles of the last step; name_of(command().point) names the nearest. Only for the thread of `step`.
   const Obstacles& obstacles() const noexcept;
-  /// One sentence: what the last command does and why, and what to do about it. For the thread of `step`; allocates.
+  /// One sentence: what the last command does, why, and what to do about it. Only for the thread of `step`; allocates.
   std::string explain() const;
 
   int num_coordinates() const noexcept { return static_cast<int>(command_.position.size()); }
-  // References of what follows hold until the next change of the arm.
+  // The references below are valid until the next change of the arm.
 
-  /// With what is attached; from the step after a change on.
+  /// The arm with its attached objects; a change shows from the next step on.
   Arm arm() const;
   const ControllerSettings& settings() const noexcept;
-  /// What the clearances are of (m).
+  /// What each embedding coordinate belongs to (m).
   const std::vector<CoordinateLabel>& labels() const noexcept;
   const GeometricSystem& system() const noexcept;
   const GeometricSystem::Workspace& workspace() const noexcept;
-  /// The program's solution of the last step.
+  /// The quadratic program's solution of the last step.
   const TorqueSolution& solution() const noexcept;
-  /// The configuration that the arm is led to: the goal, or the posture of a pose goal; empty if none is known. For the
-  /// thread of `step`; allocates.
+  /// The target configuration: the goal, or the posture of a pose goal; empty if none is known. Only for the thread of
+  /// `step`; allocates.
   Eigen::VectorXd target() const;
-  /// What the planner found last, and how often it searched. Not for the loop.
+  /// The planner's last plan, and how often it searched. Not for use in the loop.
   Plan last_plan() const;
   OnlinePlanner::Counts planner_counts() const;
   bool has_torque() const noexcept;

@@ -7,9 +7,9 @@
 
 namespace sidestep {
 
-/// What a Controller does with a trajectory where something is in the way.
+/// What a Controller does where an obstacle blocks a trajectory.
 enum class TrajectoryBehaviour {
-  keep_path,  ///< stay on the path: slow down and wait before what blocks it, go on when it is free
+  keep_path,  ///< stay on the path: slow down and wait in front of the obstacle, go on when the path is free
   steer,      ///< go around, and rejoin
 };
 
@@ -29,8 +29,8 @@ class JointTrajectory {
   JointTrajectory(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::VectorXd& times, const Eigen::VectorXd& velocity,
                   const Eigen::VectorXd& acceleration);
 
-  /// Where and how the arm moves when the clock begins: joints without limits take the nearest turn, and a first sample
-  /// after zero is led to from there. No allocation.
+  /// The arm's state when the clock starts. Joints without limits take the nearest full turn. If the first sample is after zero,
+  /// the trajectory starts from this state. No allocation.
   void begin_at(ConstVectorRef q, ConstVectorRef v) noexcept;
 
   double duration() const noexcept { return times_[times_.size() - 1]; }

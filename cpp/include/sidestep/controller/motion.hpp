@@ -11,7 +11,7 @@ namespace sidestep {
 /// Which coordinates turn without limits, so that a configuration is the same a turn further (nv).
 std::vector<bool> unlimited_joints(const Robot& robot);
 
-/// A motion of a controller without physics: row k is what step k began with and gave.
+/// A motion of a controller without physics: row k is the state before step k and the result of step k.
 struct MotionRecord {
   Eigen::MatrixXd q, v, acceleration;  ///< (steps, nv)
   std::vector<SafetyStatus> statuses;
@@ -22,8 +22,8 @@ struct MotionRecord {
   bool arrived = false;            ///< every joint came within the tolerance of the goal, which ended the motion
 };
 
-/// Moves a model that does exactly what it is told, by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every
-/// joint is within `tolerance` [rad], a sliding one within a tenth of it [m], of `goal` (nv), which may be empty. Throws
+/// Moves a perfect model by semi-implicit Euler: v ← v + a T, q ← q + v T. Ends when every joint is
+/// within `tolerance` [rad], a sliding one within a tenth of it [m], of `goal` (nv), which may be empty. Throws
 /// std::invalid_argument on sizes, states that are not finite, less than one step, and a controller that is not
 /// synchronous, whose threads keep the machine's time; Interruption where `interrupted` says so before a step.
 MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const Eigen::VectorXd& v, int steps,

@@ -32,20 +32,20 @@ struct ArmState {
   Eigen::VectorXd q, v;
 };
 
-/// A Controller at its period by the machine's clock, in a thread of its own: step k is due at (k + 1) periods after
-/// the start, and what is late is not left out. The arm does what it is told: v ← v + a T, q ← q + v T. Meanwhile other
-/// threads may set the controller's goal and obstacles.
+/// Runs a Controller at its period by the machine's clock, in its own thread. Step k is due at (k + 1) periods after the
+/// start; late steps are not skipped. A perfect model replaces the arm: v ← v + a T, q ← q + v T. Meanwhile other threads
+/// may set the controller's goal and obstacles.
 class RealTimeRun {
  public:
-  /// Starts. Throws std::invalid_argument on wrong sizes, values that are not finite and settings at fault, and
-  /// std::runtime_error if the controller is in use. It is used by this run alone until the run has ended.
+  /// Starts. Throws std::invalid_argument on wrong sizes, values that are not finite and wrong settings, and
+  /// std::runtime_error if the controller is in use. The run reserves the controller until it has ended.
   RealTimeRun(Controller& controller, ArmState start, RealTimeSettings settings = {});
-  /// Stops, and waits for the step at hand.
+  /// Stops, and waits for the present step.
   ~RealTimeRun();
   RealTimeRun(const RealTimeRun&) = delete;
   RealTimeRun& operator=(const RealTimeRun&) = delete;
 
-  /// Asks for the end after the step at hand; waits for nothing.
+  /// Ends the run after the present step; does not wait.
   void stop() noexcept { stop_.store(true, std::memory_order_relaxed); }
   bool running() const noexcept { return running_.load(std::memory_order_acquire); }
   /// The state before the next step; for one thread.

@@ -19,9 +19,9 @@ class Erratum:
     Attributes:
         number: by which other pages refer to it.
         place: equation or section.
-        wrong: what stands there.
-        right: what should.
-        effect: what follows from it.
+        wrong: what is printed.
+        right: the correct form.
+        effect: its consequence.
         test: in tests/thesis/reproduce/test_errata_*.py.
     """
 
@@ -40,11 +40,12 @@ ERRATA: tuple[Erratum, ...] = (
     Erratum(
         1,
         "T3.8, T4.6, T4.16, and the example R₂ = Rₓ(q₂)Rₓ(q₁)",
-        "Rotations are multiplied from tip to base, over i + 1 factors, without the fixed placements of the "
-        "joints; T4.16 keeps a stray ∂/∂q_p and leaves out p < q.",
+        "The product of rotations goes from tip to base, over i + 1 factors, without the fixed placements "
+        "of the joints. T4.16 has a stray ∂/∂q_p and omits p < q.",
         "Rᵢ = F₁A₁(q₁) F₂A₂(q₂) … FᵢAᵢ(qᵢ), from base to tip, Fₙ the fixed rotation of joint n. "
         "∂²Rᵢ/∂q_p∂q_q puts S beside A_p and beside A_q, for every p and q.",
-        "The example has parallel axes, where the order does not show. On a real arm poses come out wrong.",
+        "The example has parallel axes, so the order does not matter there. On a real arm the poses are "
+        "wrong.",
         f"{_CHAIN}::test_rotations_multiply_from_base_to_tip",
     ),
     Erratum(
@@ -103,15 +104,15 @@ ERRATA: tuple[Erratum, ...] = (
         "T6.2",
         "-σ(G⁻¹K(q + q*) - Dq').",
         "-σ(G⁻¹K(q - q*) + Dq').",
-        "As printed the goal is -q* and damping drives. T5.4 and T5.6 are right in the text we have; the "
-        "brace in T5.4 leaves the leading minus outside.",
+        "As printed the goal is -q*, and damping accelerates. T5.4 and T5.6 are right in the text we have; "
+        "in T5.4 the leading minus is outside the brace.",
         f"{_SYSTEM}::test_signs_of_the_switched_system",
     ),
     Erratum(
         9,
         "T5.7, T5.11",
-        "ζ takes the vector q in scalar functions. In T5.11 the exponent 4 of the first denominator stands "
-        "at its numerator, and one factor of the second has q⁺ for q⁻.",
+        "Scalar functions in ζ take the vector q. In T5.11 the exponent 4 of the first denominator is at "
+        "its numerator, and one factor of the second has q⁺ instead of q⁻.",
         "ζ is a sum over joints. With s the sigmoid of slope α, each step adds α² s(1-s)(1-2s) to the "
         "diagonal of the Hessian.",
         "The printed T5.11 is wrong by orders of magnitude away from the limit. T5.10 is right.",
@@ -120,32 +121,30 @@ ERRATA: tuple[Erratum, ...] = (
     Erratum(
         10,
         "T6.3",
-        "M q'' = q'ᵀC q' + τ + ζ without gravity; W is 6 × 6; ζ is the slack here and the potential in T5.7; "
-        "q⁻ ≤ q ≤ q⁺ bounds what the program does not decide.",
+        "M q'' = q'ᵀC q' + τ + ζ lacks gravity. W is 6 × 6. ζ is the slack here and the potential in T5.7. "
+        "q⁻ ≤ q ≤ q⁺ bounds a variable that the program does not have.",
         "M q'' + C q' + g = τ (+ slack), W of size d × d, and limits of position and velocity as bounds "
         "on q''.",
-        "With the printed sign and without gravity the arm does not have the acceleration that the "
-        "program gives.",
+        "With the printed sign and without gravity, the arm's acceleration differs from that of the program.",
         f"{_SYSTEM}::test_equation_of_motion",
     ),
     Erratum(
         11,
         "Section 5.5.1",
         "The equations are said to stay the same while an obstacle moves.",
-        "ψ then depends on time: ψ'' has terms with the velocity of the obstacle, also when the arm "
-        "stands still.",
+        "ψ then depends on time: ψ'' has terms with the velocity of the obstacle, even for an arm at rest.",
         "The geodesic term lags behind; the avoidance of an approaching obstacle is too weak.",
         f"{_SYSTEM}::test_a_moving_obstacle_changes_the_equations",
     ),
     Erratum(
         12,
         "Sections 1 (contribution) and 5.3",
-        "Avoidance without being susceptible to local minima; T5.4 comes to a stop in front of the obstacle.",
-        "T5.4 has no point of rest but the goal, since the geodesic term vanishes at rest and G is positive "
-        "definite. But the way over the hill takes a time that grows with |∇ψ|²: motions from different "
-        "starts gather at one point in front of the obstacle and stay there for all practical purposes, "
-        "although a free way exists. With the switch of T5.6 every configuration with ψ > κ is a point of "
-        "rest.",
+        "The method is said to avoid obstacles without local minima; T5.4 is said to stop in front of the "
+        "obstacle.",
+        "The goal is the only equilibrium of T5.4, since the geodesic term vanishes at rest and G is "
+        "positive definite. But the time over the hill grows with |∇ψ|². Motions from different starts "
+        "gather at one point in front of the obstacle and practically stay there, although a free path "
+        "exists. With the switch of T5.6 every configuration with ψ > κ is an equilibrium.",
         "Either the motion goes through the hill (contact), or it stalls. See figure 5.4 and the test: 600 "
         "s, 0.92 rad from the goal, 3·10⁻⁵ rad/s. Reactive avoidance needs global guidance.",
         f"{_SYSTEM}::test_the_unswitched_system_stalls_although_a_way_exists",
@@ -156,53 +155,54 @@ ERRATA: tuple[Erratum, ...] = (
         "The last term has g_μν x''^μ where the free index is λ. The symbols of the second kind contract "
         "g^λm with derivatives that carry λ, not m.",
         "g_μλ x''^μ; Γ^λ_μν = ½ g^λm (∂_ν g_mμ + ∂_μ g_mν - ∂_m g_μν).",
-        "Taken literally the second kind is the first kind times the row sums of G⁻¹.",
+        "As printed, the second kind is the first kind times the row sums of G⁻¹.",
         f"{_GEOMETRY}::test_second_kind_contracts_the_inner_index",
     ),
     Erratum(
         14,
         "Section 5.4, figure 5.6",
-        "ζ of T5.7 is called a border that the system does not cross.",
-        "ζ is bounded, so its wall has a finite length in the metric. A geodesic at normal speed u climbs a "
-        "wall of height H in a time of about H / u, passes, and has its old speed back.",
-        "Joint limits hold only as long as the climb takes. The torque controller must keep them.",
+        "ζ of T5.7 is said to be a border that the system does not cross.",
+        "ζ is bounded, so its wall has a finite length in the metric. A geodesic with speed u normal to a "
+        "wall of height H climbs it in a time of about H / u. Behind it, it has its old speed again.",
+        "Joint limits hold only during the climb. The torque controller must keep them.",
         f"{_SYSTEM}::test_a_bounded_wall_only_delays_a_geodesic",
     ),
     Erratum(
         15,
         "Sections 3.3.4 and 5.2",
         "The higher the probability, the greater the curvature.",
-        "Curvature follows the second derivatives of ψ: K = det(∇²ψ) / (1 + |∇ψ|²)². It is positive on top "
-        "of a hill, zero where the slope is steepest, negative on the foot; a constant added to ψ changes "
-        "nothing.",
-        "Where two obstacles meet, ψ is high and its slope can be zero: nothing bends a motion there.",
+        "Curvature depends on the second derivatives of ψ: K = det(∇²ψ) / (1 + |∇ψ|²)². It is positive on "
+        "top of a hill, zero where the slope is steepest, and negative at the foot. A constant added to ψ "
+        "changes nothing.",
+        "Between two obstacles ψ is high but its slope can be zero: nothing bends a motion there.",
         f"{_GEOMETRY}::test_curvature_does_not_follow_height",
     ),
     Erratum(
         16,
         "Appendix A",
         "ψᵢⱼ adds ψ of links i and j, as functions of the two joints, to a sum over all configurations.",
-        "ψ of a link depends on all joints below it. Over a pair of joints take the mean of ψ over the "
+        "ψ of a link depends on all joints below it. For a plot over two joints, take the mean of ψ over "
+        "the others.",
+        "The sum grows with the number of configurations, and weights links i and j differently from the "
         "others.",
-        "The sum grows with the number of configurations and counts links i and j by another measure.",
         f"{_CHAIN}::test_a_link_depends_on_all_joints_below_it",
     ),
     Erratum(
         17,
         "T5.6, and the claim of stability in section 1",
-        "The switch is held to be free of side effects but for its abruptness.",
-        "Where the spring acts (ψ ≤ κ) ψ has a slope, and without the geodesic term vᵀGv changes; where the "
-        "switch opens, the geodesic keeps the higher value. Each passage can add energy.",
-        "Bursts of velocity, as in the thesis's figures 6.3 and 6.5; a smoother switch does not cure them. "
-        "T2.12 dissipates: ½(vᵀGv + Kx²) never grows.",
+        "The switch is said to have no side effects except that it is abrupt.",
+        "Where the spring acts (ψ ≤ κ), ψ has a slope, and without the geodesic term vᵀGv changes. Beyond "
+        "the switch the geodesic keeps the higher value. Each passage can add energy.",
+        "Bursts of velocity, as in the thesis's figures 6.3 and 6.5; a smoother switch does not prevent "
+        "them. T2.12 dissipates: ½(vᵀGv + Kx²) never grows.",
         f"{_SYSTEM}::test_the_switch_adds_energy",
     ),
     Erratum(
         18,
         "Section 2.3",
         "A manifold of dimension d is said to have an embedded representation in R^(d+1).",
-        "Not in general: the graph of one ψ gives only metrics with G - I of rank one. Several obstacles "
-        "are better served by several extra coordinates, G = I + JᵀJ.",
+        "Not in general: the graph of one ψ gives only metrics with G - I of rank one. For several "
+        "obstacles use several extra coordinates, G = I + JᵀJ.",
         "The sphere of the example is no graph either; half of it is.",
         f"{_GEOMETRY}::test_a_graph_has_a_metric_of_rank_one_beyond_the_identity",
     ),
@@ -219,7 +219,7 @@ ERRATA: tuple[Erratum, ...] = (
         "Section 6.2.1",
         "q + q'dt + ½q''dt² is called the Euler method.",
         "It is the Taylor step of second order; section 5.1 uses semi-implicit Euler, q + (q' + q''dt)dt.",
-        "The two differ by ½q''dt² a step. Both are offered by name.",
+        "The two differ by ½q''dt² per step. Sidestep has both.",
         f"{_SYSTEM}::test_the_update_is_not_eulers",
     ),
     Erratum(
@@ -230,7 +230,7 @@ ERRATA: tuple[Erratum, ...] = (
         "semi-definiteness; ∇ψ up to q_n; ϕ for ψ.",
         "A stationary point of the action; the index raised by g; R = I; the covariance in the link's frame; "
         "Σ⁻¹(x-μ) by symmetry, and Σ positive definite so that Σ⁻¹ exists; up to q_d; ψ.",
-        "Of wording; T4.9's result is right.",
+        "Only the wording is wrong; T4.9's result is right.",
         f"{_GAUSS}::test_derivative_by_the_mean",
     ),
 )
@@ -248,7 +248,7 @@ def errata(_: Settings) -> Iterator[Item]:
             differs="Items 1 to 12 were known before; 2, 8 and 12 are stated more narrowly here than they "
             "were, after checking; 13 to 21 were found on the way.",
         ),
-        columns=("no.", "where", "what stands there", "what should", "effect", "test"),
+        columns=("no.", "where", "in print", "correct", "effect", "test"),
         rows=tuple((str(e.number), e.place, e.wrong, e.right, e.effect, e.test) for e in ERRATA),
     )
 
@@ -259,19 +259,17 @@ def markdown() -> str:
         "# Errata of the thesis",
         "",
         "Errors in the text of B. Bosc, *Geometric Dynamical Systems for Obstacle Avoidance in Manipulator",
-        "Configuration Space* (2024). Equations are written T5.4. Every item has a test that shows that "
-        "the printed",
-        "form is wrong and the corrected one right; the tests are in `tests/thesis/reproduce/`, and the same "
-        "list stands in",
-        "the report of `sidestep reproduce`. This page is written by `python -m sidestep.thesis.reproduce.errata`.",
+        "Configuration Space* (2024). Equations are written T5.4. Every item has a test in",
+        "`tests/thesis/reproduce/`. It shows that the printed form is wrong and the corrected one right. The report of",
+        "`sidestep reproduce` has the same list. `python -m sidestep.thesis.reproduce.errata` writes this page.",
         "",
     ]
     for e in ERRATA:
         lines += [
             f"## {e.number}. {e.place}",
             "",
-            f"- **Stands there:** {e.wrong}",
-            f"- **Should be:** {e.right}",
+            f"- **In print:** {e.wrong}",
+            f"- **Correct:** {e.right}",
             f"- **Effect:** {e.effect}",
             f"- **Test:** `{e.test}`",
             "",
