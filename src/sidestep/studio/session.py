@@ -393,7 +393,7 @@ class Session:
         """Begins to make the fine body of a draft, or takes it over when it is there."""
         name = str(Covering(None))
         if self._refinement is None:
-            self._refining = "begins"
+            self._refining = "just begun"
             self._refinement = Refinement(self._arms[name], progress=self._hear)
             return
         if not self._refinement.is_done or self._refining == FAILED:

@@ -70,6 +70,7 @@ class StartPanel:
         self._changed: set[str] = set()
         self._timer: threading.Timer | None = None
         self._numbers: Numbers = {}
+        self._there = True  # whether the scene has the ball
 
     def add_mouse(self, server: viser.ViserServer) -> None:
         """The hidden field of the mouse, where it is called: outside of tabs, which are not always there."""
@@ -79,6 +80,9 @@ class StartPanel:
         """Shows what the loop has."""
         if bool(snapshot.visited) != self._turns.value:
             self._turns.value = bool(snapshot.visited)
+        there = MOUSE_BALL in (thing.name for thing in snapshot.things)
+        if there != self._there:
+            self._there = self._follows.value = there
         numbers = snapshot.numbers[snapshot.method]
         if numbers == self._numbers:
             return
