@@ -21,7 +21,16 @@ from sidestep.scenario import Scenario
 from sidestep.scenario.runner import run_scenario
 from sidestep.studio import messages as m
 from sidestep.studio.gallery import GALLERY
-from sidestep.studio.headless import Window, browser, driver, go_to, new_page, picture, run_until
+from sidestep.studio.headless import (
+    CLOSE_NOTICE,
+    Window,
+    browser,
+    driver,
+    go_to,
+    new_page,
+    picture,
+    run_until,
+)
 from sidestep.studio.scene_obstacle import box
 from sidestep.studio.show.reading import read
 from sidestep.studio.show.show import Show
@@ -205,7 +214,7 @@ def show(camera: Photographer) -> None:
             page.goto(shown.address, timeout=1e3 * PATIENCE)
             page.wait_for_selector("canvas", timeout=1e3 * PATIENCE)
             page.wait_for_timeout(2000.0)
-            page.evaluate("drawn().then(drawn).then(drawn)")
+            page.evaluate(f"{CLOSE_NOTICE}; drawn().then(drawn).then(drawn)")
             page.screenshot(
                 path=camera.folder / f"show-{window.width}x{window.height}.png", timeout=1e3 * PATIENCE
             )

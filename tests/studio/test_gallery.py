@@ -199,7 +199,7 @@ def test_a_scenario_from_a_file_has_a_draft_that_moves_at_once(
             session.step()
         assert session.snapshot().draft  # it goes on with the draft until the finer one is there
         session._hear("cover", "link1", 1, 3)
-        assert session.snapshot().refining == "cover, link1 (1 of 3)"
+        assert session.snapshot().refining == "ellipsoids around link1 (1 of 3)"
         Done.is_done = True
         for _ in range(20):
             session.step()

@@ -59,6 +59,12 @@ def with_mouse_ball(scenario: Scenario, place: tuple[float, float, float] = MOUS
     return dataclasses.replace(scenario, obstacles=(*scenario.obstacles, ball))
 
 
+def with_following_ball(scenario: Scenario) -> Scenario:
+    """The scenario, with its first obstacle as the ball that follows the mouse."""
+    first, *others = scenario.obstacles
+    return dataclasses.replace(scenario, obstacles=(dataclasses.replace(first, name=MOUSE_BALL), *others))
+
+
 def ends_of(scenario: Scenario, robot: Robot) -> tuple[Array, ...]:
     """Goal and start (nv,), between which an arm can go to and fro; none where the goal is a pose without posture."""
     end = scenario.goal if isinstance(scenario.goal, JointState) else scenario.goal.posture

@@ -13,7 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.studio import messages as m
-from sidestep.studio.gallery import GALLERY, MOUSE_BALL, MOUSE_BALL_PLACE, MOUSE_BALL_RADIUS, ends_of
+from sidestep.studio.gallery import (
+    GALLERY,
+    MOUSE_BALL,
+    MOUSE_BALL_PLACE,
+    MOUSE_BALL_RADIUS,
+    ends_of,
+    with_following_ball,
+)
 from sidestep.studio.methods import method_named
 from sidestep.studio.page.mouse import DROP, MouseBall
 from sidestep.studio.page.note import add_note
@@ -155,4 +162,5 @@ class StartPanel:
         file = event.target.value
         with self._view.telling(event.client):
             place = Path(tempfile.mkdtemp(dir=self._folder))
-            self._view.load(scenario_of_upload(file.name, file.content, place), to_and_fro=True)
+            scenario = scenario_of_upload(file.name, file.content, place)
+            self._view.load(with_following_ball(scenario), to_and_fro=True)
