@@ -21,6 +21,7 @@ from mkdocs.structure.files import File, Files
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
 RUNS = ROOT / "build" / "runs"  # of record_runs.py
+TO_BE_MADE = "[Recorded runs: how to make them](how-to/studio.md#pages-of-recorded-runs)"  # in index.md
 MAKE = runpy.run_path(str(DOCS / "make_reference.py"))
 log = logging.getLogger("mkdocs.hooks.sidestep")
 outside = re.compile(r"\[([^\]]+)\]\(((?:\.\./)+[^)#]+)(?:#[^)]*)?\)")
@@ -68,8 +69,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         markdown = "".join(parts)
 
     if source == Path("index.md") and (RUNS / "index.html").is_file():
-        runs = '| watch recorded runs in the browser | <a href="runs/index.html">Recorded runs</a> |'
-        markdown = markdown.replace("| see it move", f"{runs}\n| see it move", 1)
+        markdown = markdown.replace(TO_BE_MADE, '<a href="runs/index.html">Recorded runs</a>')
     if source == Path("reference/cpp.md") and shutil.which("doxygen") is None:
         left_out = "This copy of the site was made without Doxygen, so it has no pages of classes."
         markdown = re.sub(r"<p>By Doxygen:.*?</p>", left_out, markdown, flags=re.DOTALL)

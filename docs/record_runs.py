@@ -19,11 +19,12 @@ from sidestep.studio import messages as m
 from sidestep.studio.gallery import GALLERY, MOUSE_BALL, ends_of
 from sidestep.studio.guard import Guard
 from sidestep.studio.page import colours
-from sidestep.studio.page.arm import ArmView, link_meshes
-from sidestep.studio.page.camera import Viewpoint, clear_view
+from sidestep.studio.page.arm import ArmView, link_meshes, reach
+from sidestep.studio.page.camera import Viewpoint, clear_view, extent
 from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacles import ObstacleViews
 from sidestep.studio.page.scene import point_cameras, set_up_scene
+from sidestep.studio.page.view import NEAR
 from sidestep.studio.page.why import Why
 from sidestep.studio.server import HOST, guarded_server
 from sidestep.studio.session import Session
@@ -59,14 +60,10 @@ def record(label: str, seconds: float) -> tuple[str, str]:
         obstacles = ObstacleViews(server, lambda _: None, lambda _: None)
         obstacles.set_things(session.snapshot().things)
         ends = [coordinates(scenario.start, robot, "start"), *goals]
-        places = [robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames]
-        point_cameras(
-            server,
-            Viewpoint.of(
-                np.array([*places, *(item.position for item in scenario.obstacles)]),
-                clear_view(np.array(places), [thing.triangles for thing in session.snapshot().things]),
-            ),
-        )
+        frames = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
+        solids = [thing.triangles for thing in session.snapshot().things]
+        places = extent(robot, meshes, ends, solids, NEAR * reach(robot))
+        point_cameras(server, Viewpoint.of(places, clear_view(frames, solids)))
         serializer = server.get_scene_serializer()
         moves = MOUSE_BALL in {item.name for item in scenario.obstacles}
         for _ in range(round(seconds / FRAME)):

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[1]
 SITE, TARGET = ROOT / "build" / "site", ROOT / "build" / "screenshots"
+PATIENCE = 120_000.0  # [ms] for one page, on a machine under load
 WINDOW = {"width": 1280, "height": 800}
 BROKEN = "() => [...document.images].filter(i => i.complete && i.naturalWidth === 0).map(i => i.src)"
 TOO_WIDE = "() => document.documentElement.scrollWidth > window.innerWidth"
@@ -79,7 +80,7 @@ def main() -> int:
         page.on("request", lambda request: asked.append(request.url))
         for path in pages(sys.argv[1:]):
             asked.clear()
-            page.goto(address + path.relative_to(SITE).as_posix(), wait_until="load")
+            page.goto(address + path.relative_to(SITE).as_posix(), wait_until="load", timeout=PATIENCE)
             page.wait_for_timeout(300)  # [ms] what fades in
             name = path.relative_to(SITE).with_suffix(".png")
             (TARGET / name).parent.mkdir(parents=True, exist_ok=True)

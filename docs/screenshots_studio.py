@@ -13,16 +13,28 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from sidestep.report import write_report
 from sidestep.scenario import Scenario
 from sidestep.scenario.runner import run_scenario
-from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio import messages as m
 from sidestep.studio.gallery import GALLERY
-from sidestep.studio.headless import Window, browser, driver, go_to, new_page, picture, run_until
-from sidestep.studio.start import scenario_of, starting_scenario
+from sidestep.studio.headless import (
+    CLOSE_NOTICE,
+    Window,
+    browser,
+    driver,
+    go_to,
+    new_page,
+    picture,
+    run_until,
+)
+from sidestep.studio.scene_obstacle import box
+from sidestep.studio.show.reading import read
+from sidestep.studio.show.show import Show
+from sidestep.studio.start import starting_scenario
 from sidestep.studio.studio import Studio
 
 SMALL, LARGE = Window(1280, 800), Window(1920, 1080)
@@ -30,6 +42,10 @@ PLANAR = Path(__file__).parents[1] / "examples" / "planar3.urdf"
 ADVANCED = ("Method", "Show", "Scenario")  # tabs inside of this tab
 READY, PATIENCE = 600.0, 120.0  # [s] at most
 MOMENT = 0.8  # [s] of simulated time at which the arm is on its way
+NUM_THINGS = len(starting_scenario().obstacles)
+DROPPED = (
+    "([text, name]) => { const all = new DataTransfer(); all.items.add(new File([text], name)); return all; }"
+)
 TABS = ("Start", "Goal", "Obstacles", "Compare", *ADVANCED)
 
 
@@ -65,6 +81,10 @@ class Photographer:
         page.screenshot(path=self._folder / f"{name}.png", full_page=whole)
         page.close()
         print(f"{name}.png", flush=True)
+
+    @property
+    def chromium(self) -> Any:
+        return self._chromium
 
     @property
     def folder(self) -> Path:
@@ -124,6 +144,11 @@ def comparison(camera: Photographer) -> None:
         studio.view.send(m.SetRunning(False))
         clock.sleep(1.0)
         camera.keep(studio, page, "comparison")
+        studio.view.send(m.SetRunning(True))
+        until(lambda: 6.0 < other.last.time < 60.0, "six seconds")  # type: ignore[union-attr]
+        studio.view.send(m.SetRunning(False))
+        clock.sleep(1.0)
+        camera.keep(studio, page, "comparison-at-the-end")
 
 
 def goals(camera: Photographer) -> None:
@@ -143,10 +168,58 @@ def goals(camera: Photographer) -> None:
             camera.keep(studio, page, f"goal-{name}")
 
 
+def obstacles(camera: Photographer) -> None:
+    """A new box with three sides of its own."""
+    with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
+        studio.view.send(
+            m.AddObstacle(box("new box", np.array([0.75, 0.25, 0.5]), np.array([0.05, 0.3, 0.2])))
+        )
+        until(
+            lambda: studio.snapshot is not None and len(studio.snapshot.things) == NUM_THINGS + 1, "the box"
+        )
+        studio.view.obstacle_panel.select("new box")
+        choose(page, "Obstacles")
+        camera.keep(studio, page, "obstacles-box")
+
+
+def curved_space(camera: Photographer) -> None:
+    """The curved space in its corner, with body and metric."""
+    with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
+        choose(page, "Show")
+        for label in ("curved space", "body", "metric"):
+            page.get_by_label(label, exact=True).first.check()
+        until(lambda: studio.view.surface.heights is not None, "the curved space")
+        camera.keep(studio, page, "advanced-curved-space")
+
+
 def own_robot(camera: Photographer) -> None:
-    """A robot of a file, with its draft body."""
-    with camera.studio(SMALL, scenario_of(RobotConfig(urdf=str(PLANAR))), to_and_fro=True) as (studio, page):
-        camera.keep(studio, page, "own-robot")
+    """A robot of a file that is dropped on the page, with its draft body: URDF and MJCF."""
+    mujoco.mj_saveLastXML(str(camera.folder / "planar3.xml"), mujoco.MjModel.from_xml_path(str(PLANAR)))
+    for file in (PLANAR, camera.folder / "planar3.xml"):
+        with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
+            content = file.read_text(encoding="utf-8")
+            dropped = page.evaluate_handle(DROPPED, [content, file.name])
+            page.dispatch_event("canvas", "drop", {"dataTransfer": dropped})
+            until(lambda studio=studio: studio.view.robot.num_coordinates == 3, "its picture")  # type: ignore[misc]
+            run_until(studio, MOMENT)
+            camera.keep(studio, page, f"own-robot-{file.suffix[1:]}")
+
+
+def show(camera: Photographer) -> None:
+    """What `sidestep show` says of a robot."""
+    for window in (SMALL, LARGE):
+        with Show(read("fr3", {}), port=0) as shown:
+            shown.wait_ready()
+            page = new_page(camera.chromium, window)
+            page.goto(shown.address, timeout=1e3 * PATIENCE)
+            page.wait_for_selector("canvas", timeout=1e3 * PATIENCE)
+            page.wait_for_timeout(2000.0)
+            page.evaluate(f"{CLOSE_NOTICE}; drawn().then(drawn).then(drawn)")
+            page.screenshot(
+                path=camera.folder / f"show-{window.width}x{window.height}.png", timeout=1e3 * PATIENCE
+            )
+            page.close()
+            print(f"show-{window.width}x{window.height}.png", flush=True)
 
 
 def report(camera: Photographer) -> None:
@@ -158,7 +231,7 @@ def report(camera: Photographer) -> None:
 
 MAKERS = {
     maker.__name__.replace("_", "-"): maker
-    for maker in (opening, tabs, gallery, comparison, goals, own_robot, report)
+    for maker in (opening, tabs, gallery, comparison, goals, obstacles, curved_space, own_robot, show, report)
 }
 
 

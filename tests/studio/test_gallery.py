@@ -20,9 +20,11 @@ from sidestep.studio.clearance_monitor import solid_poses
 from sidestep.studio.comparison import Tally, changes
 from sidestep.studio.gallery import GALLERY, MOUSE_BALL, OPENING, ends_of
 from sidestep.studio.methods import METHODS
-from sidestep.studio.page.camera import HALF, Viewpoint, clear_view
+from sidestep.studio.page.arm import link_meshes, reach
+from sidestep.studio.page.camera import HALF, Viewpoint, clear_view, extent
 from sidestep.studio.page.mouse import on_plane, within_reach
 from sidestep.studio.page.obstacles import box_edges
+from sidestep.studio.page.view import NEAR
 from sidestep.studio.page.why import PATH_POINTS, PATH_STEP, along
 from sidestep.studio.robot_file import scenario_of_upload
 from sidestep.studio.scene_obstacle import ball, box, things_of
@@ -55,15 +57,23 @@ def test_start_and_goal_of_a_scene_are_free_and_in_view(label: str) -> None:
         assert exact.distance(q, poses).distance > CLEAR
         assert SelfCollision(robot).distance(q).distance > 0.0
     places = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
-    beside = [np.array(item.position) for item in scenario.obstacles]
-    direction = clear_view(places, [thing.triangles for thing in things])
-    view = Viewpoint.of(np.array([*places, *beside]), direction)
-    offsets = places - view.position
+    solids = [thing.triangles for thing in things]
+    direction = clear_view(places, solids)
+    whole = extent(robot, link_meshes(robot), ends, solids, NEAR * reach(robot))
+    view = Viewpoint.of(whole, direction)
+    offsets = whole - view.position
     shown = offsets @ np.array([view.right, view.up]).T / (HALF * (offsets @ view.view))[:, None]
     assert (np.abs(shown) < FREE).all()
-    solids = np.concatenate([thing.triangles for thing in things])
-    assert hidden(places, solids, -direction).mean() < 0.5  # links are wider than their frames
-    assert MOUSE_BALL in {thing.name for thing in things}
+    assert (
+        hidden(places, np.concatenate(solids), -direction).mean() < 0.5
+    )  # links are wider than their frames
+    (ball,) = (thing for thing in things if thing.name == MOUSE_BALL)
+    others = np.concatenate([thing.triangles for thing in things if thing is not ball])
+    middle = ball.start[:3, 3]
+    assert not hidden(middle[None], others, -direction).any()
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), 500)  # of points all over each triangle
+    apart = np.linalg.norm(np.einsum("wk,fkd->fwd", weights, others) - middle, axis=2).min()
+    assert apart > ball.size + 0.05
 
 
 def test_the_studio_opens_with_the_table() -> None:
@@ -189,7 +199,7 @@ def test_a_scenario_from_a_file_has_a_draft_that_moves_at_once(
             session.step()
         assert session.snapshot().draft  # it goes on with the draft until the finer one is there
         session._hear("cover", "link1", 1, 3)
-        assert session.snapshot().refining == "cover, link1 (1 of 3)"
+        assert session.snapshot().refining == "ellipsoids around link1 (1 of 3)"
         Done.is_done = True
         for _ in range(20):
             session.step()

@@ -23,7 +23,7 @@ from sidestep.studio.mover import ControllerMover
 from sidestep.studio.page import colours, obstacle_panel
 from sidestep.studio.page import surface as surface_module
 from sidestep.studio.page.arm import reach, short_names
-from sidestep.studio.page.camera import HALF, HIGH, LOW, RIGHT, UP, VIEW, Viewpoint
+from sidestep.studio.page.camera import HALF, HIGH, LOW, RIGHT, UNDER_CORNER, UP, VIEW, Viewpoint
 from sidestep.studio.page.marks import GAP, METRIC_SIZE, Marks, metric_ellipsoid
 from sidestep.studio.page.obstacle_panel import ObstaclePanel
 from sidestep.studio.page.obstacles import FASTEST_THROW, throw_velocity
@@ -213,7 +213,7 @@ def test_a_window_shows_arm_goal_and_obstacles_and_the_surface_beside_them() -> 
     rng = np.random.default_rng(0)
     for size in (0.1, 1.0, 3.0):
         places = size * rng.uniform(-1.0, 1.0, (12, 3)) * [1.0, 0.5, 0.3] + [0.5, 0.0, 0.3]
-        view = Viewpoint.of(places)
+        view = Viewpoint.of(places, high=UNDER_CORNER)
 
         def seen(points: np.ndarray, view: Viewpoint = view) -> np.ndarray:
             away = points - view.position
@@ -221,7 +221,7 @@ def test_a_window_shows_arm_goal_and_obstacles_and_the_surface_beside_them() -> 
 
         found = seen(places)
         assert (found > LOW - 0.02).all()  # found by rounds, up to some thousandths
-        assert (found < HIGH + 0.02).all()
+        assert (found < UNDER_CORNER + 0.02).all()
         pose = view.corner(SIDE)
         np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-12)
         square = np.array([[x, y, 0.0] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) * SIDE
@@ -229,9 +229,14 @@ def test_a_window_shows_arm_goal_and_obstacles_and_the_surface_beside_them() -> 
         inside = seen(corners)
         assert (inside[:, 0] > -0.77).all()  # half the width that 1280 x 800 leaves between the panels
         assert (inside[:, 1] < 1.0).all()
-        assert (inside[:, 1] > HIGH[1]).all()  # above the arm
+        assert (inside[:, 1] > UNDER_CORNER[1]).all()  # above the arm
         assert ((corners - view.position) @ VIEW > 0.5 * view.far).all()
         assert pose[:3, 2] @ (view.position - pose[:3, 3]) > 0.0  # its upper side is seen
+        near = Viewpoint.of(places)  # without the surface they are larger, and fill the window
+        found = seen(places, near)
+        assert (found > LOW - 0.02).all()
+        assert (found < HIGH + 0.02).all()
+        assert ((np.ptp(found, axis=0) / (HIGH - LOW)).max()) > 0.97
 
 
 def test_joints_are_named_by_what_tells_them_apart() -> None:

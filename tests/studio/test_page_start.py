@@ -164,6 +164,7 @@ def test_a_robot_is_dropped_on_the_page(studio: Studio, looker: Looker) -> None:
     until(lambda: last(studio).scenario.robot.urdf is not None, "the robot")
     until(lambda: studio.view.robot.num_coordinates == 3, "its picture")
     assert len(last(studio).visited) == 2  # it moves at once
+    assert [thing.name for thing in last(studio).things] == [MOUSE_BALL]
     studio.send(m.SetRunning(False))
 
 

@@ -43,7 +43,7 @@ def wait_for(loop: SessionProcess, condition: Callable[[m.Snapshot], bool]) -> m
 
 
 @pytest.mark.slow
-def test_a_loop_runs_answers_and_ends(scenario: Scenario) -> None:
+def test_a_loop_runs_answers_and_ends(scenario: Scenario, capfd: pytest.CaptureFixture[str]) -> None:
     loop = SessionProcess(Beginning(scenario, "unswitched", {}, 2))
     try:
         first = wait_for(loop, lambda _: True)
@@ -72,6 +72,7 @@ def test_a_loop_runs_answers_and_ends(scenario: Scenario) -> None:
     finally:
         loop.stop()
     until(lambda: loop.ended, "the end")
+    assert capfd.readouterr().err == ""  # its end leaves nothing on the terminal
 
 
 def test_a_loop_that_cannot_start_says_why(scenario: Scenario) -> None:

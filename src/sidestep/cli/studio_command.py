@@ -78,6 +78,7 @@ def studio(
     Without a scenario the arm goes to and fro; without a robot either, it is an FR3 at a table. Ends with Ctrl-C. A
     robot of a file is prepared in seconds, and its finer body takes over while it moves; the page says how far that is.
     """
+    from sidestep.studio.gallery import with_following_ball
     from sidestep.studio.start import starting_scenario
     from sidestep.studio.systems import numbers_of
 
@@ -89,6 +90,8 @@ def studio(
         effort_limits=by_joint(effort_limit, "--effort-limit"),
         velocity_limits=by_joint(velocity_limit, "--velocity-limit"),
     )
+    if robot is not None or urdf is not None:
+        chosen = with_following_ball(chosen)
     if method is None:
         method = numbers_of(chosen)[0]
     if not headless and (screenshot or video):

@@ -23,6 +23,7 @@ Array = npt.NDArray[np.float64]
 JOINT_STYLES = ("-", "--", "-.", ":")
 DPI = 120
 MOST_CURVES = 6  # of barriers: more cannot be told apart
+SEEN = 0.01  # of the strongest barrier: a weaker one is a line at zero
 LIMIT_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": (0, (1, 1)), "linewidth": 1.2}
 
 
@@ -130,10 +131,12 @@ def psi_figure(result: ScenarioResult) -> Figure | None:
     values = np.nan_to_num(result.run.values)
     names = np.array(result.embedding_names, dtype=str)
     curves = {name: values[:, names == name].max(axis=1) for name in dict.fromkeys(result.embedding_names)}
-    active = [name for name, curve in curves.items() if curve.max() > 0.0]
+    written = result.scenario.method == "custom"
+    largest = max((float(curve.max()) for curve in curves.values()), default=0.0)
+    least = 0.0 if written else SEEN * largest
+    active = [name for name, curve in curves.items() if curve.max() > least]
     if not active:
         return None
-    written = result.scenario.method == "custom"
     shown = active if written else sorted(active, key=lambda name: -curves[name].mean())[:MOST_CURVES]
     title = "Embedding"
     if not written:

@@ -26,7 +26,7 @@ _CAPTIONS = {
     "clearance.png": "Exact clearance between arm and obstacles",
     "position.png": "Joint positions",
     "velocity.png": "Joint velocities",
-    "acceleration.png": "Joint accelerations: wanted by the dynamical system, achieved by the arm",
+    "acceleration.png": "Joint accelerations: wanted by the method, achieved by the arm",
     "torque.png": "Joint torques",
     "switch.png": "Switch weights",
     "psi.png": "What bent the motion: barriers that were active, by part of the arm and what it kept off",

@@ -64,10 +64,10 @@ def summary_rows(result: ScenarioResult) -> list[tuple[str, str, str]]:
         where = f"exact meshes, {evaluation.clearance_pair} at {evaluation.clearance_time_s:.2f} s"
         rows.append(("smallest clearance", f"{1000.0 * evaluation.min_clearance_m:.1f} mm", where))
     if evaluation.contacts is not None and result.run.objects:
-        pushed = ", ".join(evaluation.moved_objects) or "no obstacle"
-        rows.append(("contact points", str(evaluation.contacts), f"pushed away: {pushed}"))
+        pushed = ", ".join(evaluation.moved_objects) or "none"
+        rows.append(("contact points", str(evaluation.contacts), f"obstacles pushed away: {pushed}"))
     if isinstance(result.run, SimulationRun):
-        rows += _physics(result.run)
+        rows += _physics(result.run, followed=result.scenario.method == "custom")
     rows += [
         ("limits exceeded", _limits(result), "at samples"),
         (_step_words(result.scenario)[0], _counts(evaluation.system_status), "steps"),
@@ -86,15 +86,22 @@ def _step_words(scenario: Scenario) -> tuple[str, str]:
     return ("system", "torque program") if scenario.method == "custom" else ("activity", "safety")
 
 
-def _physics(run: SimulationRun) -> list[tuple[str, str, str]]:
-    """How well the arm followed, and how much of its torque that took."""
+def _physics(run: SimulationRun, *, followed: bool) -> list[tuple[str, str, str]]:
+    """How far the arm was from the wanted acceleration, and how much of its torque that took.
+
+    `followed`: the arm tracks what is wanted; else limits and clearances change it first.
+    """
     robot, rows = run.robot, []
     errors = np.nan_to_num(np.abs(run.achieved - run.wanted)).max(axis=0)
     joint = int(errors.argmax())
     unit = robot.coordinate_units[joint]
     note = f"largest, of {robot.coordinate_names[joint]}, achieved against wanted acceleration"
+    if not followed:
+        note = f"largest, of {robot.coordinate_names[joint]}: limits and clearances change what is wanted"
     if np.isfinite(run.achieved - run.wanted).any():
-        rows.append(("tracking error", f"{errors[joint]:.2g} {unit}/s²", note))
+        rows.append(
+            ("tracking error" if followed else "largest correction", f"{errors[joint]:.2g} {unit}/s²", note)
+        )
     ratios = (np.abs(run.torque) / robot.limits.effort).max(axis=0)
     joint = int(ratios.argmax())
     name = {"rad": "largest torque", "m": "largest force"}[robot.coordinate_units[joint]]

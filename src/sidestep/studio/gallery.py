@@ -20,6 +20,7 @@ FILES = Path(__file__).parent / "scenes"
 MOUSE_BALL = "mouse ball"  # the obstacle that follows the mouse
 MOUSE_BALL_RADIUS = 0.06  # [m]
 MOUSE_BALL_PLACE = (0.75, 0.45, 0.75)  # [m] beside the way of the arm, in sight
+BEFORE_A_WALL = (0.30, -0.60, 0.80)  # [m] the same where shelves or a cupboard would hide it
 
 
 @dataclass(frozen=True)
@@ -29,21 +30,22 @@ class GalleryScene:
     label: str
     scenario: str | Path
     to_and_fro: bool = True
+    ball: tuple[float, float, float] = MOUSE_BALL_PLACE
 
     def load(self) -> Scenario:
         """The scenario, with the ball that follows the mouse where the arm goes to and fro."""
         scenario = Scenario.load(self.scenario)
-        return with_mouse_ball(scenario) if self.to_and_fro else scenario
+        return with_mouse_ball(scenario, self.ball) if self.to_and_fro else scenario
 
 
 GALLERY: dict[str, GalleryScene] = {
     scene.label: scene
     for scene in (
         GalleryScene("Table", "table"),
-        GalleryScene("Bookshelf", "bookshelf"),
+        GalleryScene("Bookshelf", "bookshelf", ball=BEFORE_A_WALL),
         GalleryScene("Cage", "cage"),
         GalleryScene("Boxes", "box"),
-        GalleryScene("Kitchen", "kitchen"),
+        GalleryScene("Kitchen", "kitchen", ball=BEFORE_A_WALL),
         GalleryScene("Two arms", FILES / "two-arms.yaml"),
         GalleryScene("Thesis 6.2.3", "thesis-6.2.3", to_and_fro=False),
     )
@@ -51,12 +53,16 @@ GALLERY: dict[str, GalleryScene] = {
 OPENING = "Table"
 
 
-def with_mouse_ball(scenario: Scenario) -> Scenario:
-    """The scenario and one ball more."""
-    ball = Obstacle(
-        Shape("sphere", radius=MOUSE_BALL_RADIUS), MOUSE_BALL_PLACE, name=MOUSE_BALL, points="ball"
-    )
+def with_mouse_ball(scenario: Scenario, place: tuple[float, float, float] = MOUSE_BALL_PLACE) -> Scenario:
+    """The scenario and one ball more, at a place [m]."""
+    ball = Obstacle(Shape("sphere", radius=MOUSE_BALL_RADIUS), place, name=MOUSE_BALL, points="ball")
     return dataclasses.replace(scenario, obstacles=(*scenario.obstacles, ball))
+
+
+def with_following_ball(scenario: Scenario) -> Scenario:
+    """The scenario, with its first obstacle as the ball that follows the mouse."""
+    first, *others = scenario.obstacles
+    return dataclasses.replace(scenario, obstacles=(dataclasses.replace(first, name=MOUSE_BALL), *others))
 
 
 def ends_of(scenario: Scenario, robot: Robot) -> tuple[Array, ...]:

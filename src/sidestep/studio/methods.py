@@ -26,7 +26,7 @@ METHODS: dict[str, Method] = {
         Method(
             "controller",
             "controller (recommended)",
-            "Everything: a path that is searched beside the loop, barriers for each part of the body, each joint limit "
+            "All parts: a planner beside the loop, barriers for each part of the body, each joint limit "
             "and each pair of links, a look ahead at what moves, and a program that keeps clearances and limits.",
             (
                 *BARRIERS,

@@ -37,6 +37,11 @@ Draft = Callable[[Scenario], Arm]
 
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 LOOK_EVERY = 10  # steps between two looks for events
+STAGES = {  # of a preparation, in words for the page
+    "cover": "ellipsoids around",
+    "tables": "clearances between",
+    "pairs": "which links can touch:",
+}
 FAILED = "failed, see the events"  # of a fine body: the draft stays
 REST = 0.5  # [s] at a goal before the next one of several
 PATIENCE = 6.0  # [s] for which a goal of several may be out of reach before the next one is tried
@@ -393,7 +398,7 @@ class Session:
         """Begins to make the fine body of a draft, or takes it over when it is there."""
         name = str(Covering(None))
         if self._refinement is None:
-            self._refining = "begins"
+            self._refining = "just begun"
             self._refinement = Refinement(self._arms[name], progress=self._hear)
             return
         if not self._refinement.is_done or self._refining == FAILED:
@@ -413,7 +418,7 @@ class Session:
 
     def _hear(self, stage: str, item: str, done: int, total: int) -> None:
         """How far the fine body is, from a thread of its own."""
-        self._refining = f"{stage}, {item} ({done} of {total})"
+        self._refining = in_words(stage, item, done, total)
 
     def stop(self) -> None:
         """Ends what runs beside the loop."""
@@ -453,3 +458,8 @@ def finite(values: npt.ArrayLike, what: str) -> Array:
     if not np.isfinite(array).all():
         raise ValueError(f"{what} is {array.tolist()}; allowed: finite numbers")
     return array
+
+
+def in_words(stage: str, item: str, done: int, total: int) -> str:
+    """How far a preparation is, for the page."""
+    return f"{STAGES.get(stage, stage)} {item} ({done} of {total})"

@@ -29,7 +29,7 @@ from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
 from sidestep.studio.command_queue import CommandQueue, add
-from sidestep.studio.session import Session
+from sidestep.studio.session import Session, in_words
 from sidestep.studio.systems import Covering, Recipe, draft_arm, make_body
 
 Array = npt.NDArray[np.float64]
@@ -183,11 +183,11 @@ def serve(connection: Connection[Any, Any]) -> None:
 
     def draft(scenario: Scenario) -> Arm:
         def progress(stage: str, item: str, done: int, total: int) -> None:
-            connection.send(m.Preparing(f"{stage}: {item} ({done} of {total})"))
+            connection.send(m.Preparing(in_words(stage, item, done, total)))
 
         return draft_arm(scenario, progress)
 
-    connection.send(m.Preparing(f"loading {beginning.scenario.name}"))
+    connection.send(m.Preparing("loading robot and scene"))
     try:
         session = Session(
             beginning.scenario,
@@ -207,6 +207,7 @@ def serve(connection: Connection[Any, Any]) -> None:
         _Pacer(session, connection).run()
     finally:
         session.stop()
+        gc.unfreeze()  # else the core says at the end of the process that its objects were left
 
 
 class _Pacer:

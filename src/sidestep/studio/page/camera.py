@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep.drawing.views import hidden
+from sidestep.robot import Robot
+
+if TYPE_CHECKING:
+    import trimesh
 
 Array = npt.NDArray[np.float64]
 
@@ -24,10 +29,11 @@ UP = np.cross(RIGHT, VIEW)
 HALF = float(np.tan(0.5 * np.deg2rad(75.0)))  # of viser's angle of view, upwards
 # Places in a window, in halves of its height from its middle: right and up. A window of 1280 x 800 pixels shows 0.77 to
 # either side between the panels.
-LOW, HIGH = np.array([-0.55, -0.60]), np.array([0.58, 0.30])  # of what is looked at
+LOW, HIGH = np.array([-0.64, -0.76]), np.array([0.62, 0.70])  # of what is looked at
+UNDER_CORNER = np.array([0.62, 0.34])  # in place of `HIGH` where something stands in the corner
 CORNER, CORNER_SIDE = (-0.36, 0.68), 0.50  # middle and edge of what stands in the upper left
 LEAN = 0.75  # [rad] between its normal and the view: hills on it are seen from the side
-ROUNDS = 30  # by then the distance changes by less than a part in a thousand
+NEAREST = 0.05  # [m] from the camera to what is looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,20 +56,19 @@ class Viewpoint:
         return axes_of(self.view)[1]
 
     @classmethod
-    def of(cls, places: Array, view: Array = VIEW) -> Viewpoint:
-        """Points (n, 3) [m] fill the room between `LOW` and `HIGH`, seen along `view` (3,)."""
+    def of(cls, places: Array, view: Array = VIEW, high: Array = HIGH) -> Viewpoint:
+        """Points (n, 3) [m] fill the room between `LOW` and `high` (2,), seen along `view` (3,)."""
         right, up = axes_of(view)
-        target = 0.5 * (places.min(axis=0) + places.max(axis=0))
-        distance = size = float(np.linalg.norm(places - target, axis=1).max())
-        for _ in range(ROUNDS):
-            depth = np.maximum(distance + (places - target) @ view, 0.1 * size)
-            seen = (places - target) @ np.array([right, up]).T / (HALF * depth[:, None])
-            low, high = seen.min(axis=0), seen.max(axis=0)
-            off = 0.5 * (low + high - LOW - HIGH)
-            target = target + distance * HALF * (off[0] * right + off[1] * up)
-            distance *= float(((high - low) / (HIGH - LOW)).max()) ** 0.5
-        far = float(((places - target) @ view).max()) + distance
-        return cls(target - distance * view, target, far, view)
+        depth = places @ view
+        # Left and right, or lower and upper, ends of what a camera at depth 0 would have to hold: (2,) each.
+        seen = places @ np.array([right, up]).T
+        most = (seen - HALF * high * depth[:, None]).max(axis=0)
+        least = (seen - HALF * LOW * depth[:, None]).min(axis=0)
+        back = min(float((-(most - least) / (HALF * (high - LOW))).min()), float(depth.min()) - NEAREST)
+        middle = 0.5 * (most + least + back * HALF * (high + LOW))
+        position = back * view + middle[0] * right + middle[1] * up
+        distance = 0.5 * float(depth.min() + depth.max()) - back
+        return cls(position, position + distance * view, float(depth.max()) - back, view)
 
     def corner(self, side: float) -> Array:
         """The pose (4, 4) of a square of edge `side` [m] in the upper left, behind what is looked at.
@@ -84,6 +89,25 @@ def axes_of(view: Array) -> tuple[Array, Array]:
     right: Array = np.cross(view, [0.0, 0.0, 1.0])
     right = right / np.linalg.norm(right)
     return right, np.cross(right, view)
+
+
+def extent(
+    robot: Robot,
+    meshes: Mapping[str, trimesh.Trimesh],
+    postures: Sequence[Array],
+    solids: Sequence[Array],
+    near: float,
+) -> Array:
+    """Points (n, 3) [m] that a window should show: the arm in each posture (nv,), and what solids, triangles (F, 3, 3)
+    each, have within `near` [m] of the base."""
+    corners = {link: np.asarray(mesh.bounding_box.vertices) for link, mesh in meshes.items()}
+    places = [robot.pose(q, frame.name)[None, :3, 3] for q in postures for frame in robot.frames]
+    for q in postures:
+        for link, box in corners.items():
+            pose = robot.pose(q, link)
+            places.append(box @ pose[:3, :3].T + pose[:3, 3])
+    beside = np.concatenate([np.zeros((0, 3)), *(triangles.reshape(-1, 3) for triangles in solids)])
+    return np.concatenate([*places, beside[np.linalg.norm(beside, axis=1) < near]])
 
 
 def clear_view(places: Array, solids: Sequence[Array]) -> Array:

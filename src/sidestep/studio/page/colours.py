@@ -28,7 +28,7 @@ def batched(colour: Rgb) -> Rgb:
 OBSTACLE = palette.VERMILLION
 FURNITURE = palette.FURNITURE  # of an obstacle that is large: it would drown everything else
 EDGE = "#7A4A2B"  # of boxes
-LARGE = 0.25  # [m] radius of a ball that holds it
+LARGE = 0.18  # [m] radius of a ball that holds it: walls of boxes and bars of cages, but not what is handled
 GOAL = palette.BLUE
 NEAR = palette.PURPLE  # of a link that is close to an obstacle, and of the nearest line
 TRAIL = palette.GREEN
@@ -54,7 +54,7 @@ LEGEND = (
         "both on the exact meshes",
     ),
     (OBSTACLE, "obstacle"),
-    (FURNITURE, "obstacle that is larger than 50 cm"),
+    (FURNITURE, f"obstacle larger than {200 * LARGE:.0f} cm"),
     (LIT, "link and obstacle point that bend the motion most now"),
     (PATH, "path of the tip that is planned"),
     (PULL, "arrow: how the goal or the path pulls at the tip"),

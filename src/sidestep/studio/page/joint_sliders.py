@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 STEP_DEGREES, STEP_METRES = 0.1, 0.001
-DECIMALS = 3  # that are shown
+DECIMALS_DEGREES, DECIMALS_METRES = 1, 3  # that are shown: more do not fit the field
 FEWEST_STEPS = 20  # of a slider: a stroke of some millimetres gets finer ones
 
 
@@ -38,6 +38,9 @@ class JointSliders:
         self._factors = np.array(
             [180.0 / np.pi if k in turning else 1.0 for k in range(robot.num_coordinates)]
         )
+        self._decimals = [
+            DECIMALS_DEGREES if k in turning else DECIMALS_METRES for k in range(len(self._factors))
+        ]
         self._q = np.array(robot.neutral)
         self._sliders: list[Any] = []
         lower, upper = robot._finite_interval()
@@ -52,7 +55,7 @@ class JointSliders:
                 min=low,
                 max=high,
                 step=step,
-                initial_value=float(np.clip(round(rest, DECIMALS), low, high)),
+                initial_value=float(np.clip(round(rest, self._decimals[k]), low, high)),
                 hint=f"{hint} {name}",
             )
             slider.on_update(self._moved)
@@ -61,8 +64,8 @@ class JointSliders:
     def show(self, q: Array) -> None:
         """Puts the sliders where q (nv,) is, whoever set it."""
         self._q = np.array(q)
-        for slider, value in zip(self._sliders, self._factors * q, strict=True):
-            shown = float(np.clip(round(float(value), DECIMALS), slider.min, slider.max))
+        for slider, value, decimals in zip(self._sliders, self._factors * q, self._decimals, strict=True):
+            shown = float(np.clip(round(float(value), decimals), slider.min, slider.max))
             if slider.value != shown:  # the one that is being moved is left alone
                 slider.value = shown
 

@@ -58,14 +58,14 @@ class ObstaclePanel:
         gui.add_button("Add").on_click(self._add)
         add_note(
             gui,
-            "A ball of this radius, a box with these sides along x, y, z, or a plate of points of this edge: near the "
-            "goal, where it is free.",
+            "A ball of this radius, a box with these sides along x, y, z, or a square plate of points with this edge. "
+            "It is put near the goal, where there is room.",
         )
         gui.add_upload_button("Add a point cloud file …").on_upload(self._upload)
         add_note(
             gui,
-            "A .ply, .pcd, .npy, .npz or text file, thinned to balls that hold its points; where it says, if it is "
-            "free there.",
+            "A .ply, .pcd, .npy, .npz or text file, thinned to balls that hold its points. It stays at its own "
+            "coordinates if the arm is clear of it there.",
         )
         self._folder = Path(tempfile.mkdtemp(prefix="sidestep-studio-"))
         atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
@@ -79,7 +79,7 @@ class ObstaclePanel:
         self._box.on_update(self._resized)
         self._speed = gui.add_slider("speed [m/s]", min=0.1, max=2.0, step=0.1, initial_value=0.5)
         gui.add_button("Throw at the arm").on_click(self._throw)
-        add_note(gui, "From where it is towards the tip.")
+        add_note(gui, "Throws it from where it is, towards the tip of the arm.")
         remove = gui.add_button("Remove")
         remove.on_click(self._remove)
         self._chosen.on_update(self._chose)

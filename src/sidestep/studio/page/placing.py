@@ -19,7 +19,7 @@ DIRECTIONS = 40  # that are tried around a point
 SHELLS, SHELL = 8, 0.08  # half balls that are tried, and how much each is larger [m]
 SIGHT = 0.01  # [m] radius of the line of sight that is free of the arm
 # In halves of a window's height from its middle, right and up: what lies between the panels of 1280 x 800 pixels.
-LOW, HIGH = np.array([-0.70, -0.80]), np.array([0.52, 0.80])
+LOW, HIGH = np.array([-0.70, -0.85]), np.array([0.70, 0.85])
 
 
 class Camera:
@@ -48,7 +48,7 @@ def free_place(
     posture (nv,), and of the other balls.
 
     It is looked for around the gizmo, above and before it first, where it neither hides gizmo, balls or arm (in the
-    first posture) nor is hidden by them; in sight or not, where there is none. `first`: places tried before those.
+    first posture) nor is hidden by them; else between the panels, else anywhere. `first`: places tried before those.
 
     Raises:
         ValueError: there is none.
@@ -79,7 +79,7 @@ def free_place(
         if clear(place):
             return place
     tried = list(around(gizmo[0], gizmo[1] + size + CLEAR, camera))
-    for wanted in (in_sight, lambda _: True):
+    for wanted in (in_sight, camera.sees, lambda _: True):
         for place in tried:
             if wanted(place) and clear(place):
                 return place

@@ -13,7 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.studio import messages as m
-from sidestep.studio.gallery import GALLERY, MOUSE_BALL, MOUSE_BALL_PLACE, MOUSE_BALL_RADIUS, ends_of
+from sidestep.studio.gallery import (
+    GALLERY,
+    MOUSE_BALL,
+    MOUSE_BALL_PLACE,
+    MOUSE_BALL_RADIUS,
+    ends_of,
+    with_following_ball,
+)
 from sidestep.studio.methods import method_named
 from sidestep.studio.page.mouse import DROP, MouseBall
 from sidestep.studio.page.note import add_note
@@ -70,6 +77,7 @@ class StartPanel:
         self._changed: set[str] = set()
         self._timer: threading.Timer | None = None
         self._numbers: Numbers = {}
+        self._there = True  # whether the scene has the ball
 
     def add_mouse(self, server: viser.ViserServer) -> None:
         """The hidden field of the mouse, where it is called: outside of tabs, which are not always there."""
@@ -79,6 +87,9 @@ class StartPanel:
         """Shows what the loop has."""
         if bool(snapshot.visited) != self._turns.value:
             self._turns.value = bool(snapshot.visited)
+        there = MOUSE_BALL in (thing.name for thing in snapshot.things)
+        if there != self._there:
+            self._there = self._follows.value = there
         numbers = snapshot.numbers[snapshot.method]
         if numbers == self._numbers:
             return
@@ -151,4 +162,5 @@ class StartPanel:
         file = event.target.value
         with self._view.telling(event.client):
             place = Path(tempfile.mkdtemp(dir=self._folder))
-            self._view.load(scenario_of_upload(file.name, file.content, place), to_and_fro=True)
+            scenario = scenario_of_upload(file.name, file.content, place)
+            self._view.load(with_following_ball(scenario), to_and_fro=True)

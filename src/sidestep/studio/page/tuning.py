@@ -43,8 +43,8 @@ class TuningPanel:
         gui.add_button("Recommended values").on_click(self._reset)
         add_note(
             gui,
-            "Of what the folders below hold, but for the body, which takes time to make. Every method has "
-            "numbers of its own.",
+            "Sets every number below, except those of the body, which takes time to make. Each method keeps its own "
+            "numbers.",
         )
         gui.add_divider()
 

@@ -24,9 +24,9 @@ from sidestep.studio.gallery import ends_of
 from sidestep.studio.methods import method_named
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, BodyView, link_meshes, reach
-from sidestep.studio.page.camera import Viewpoint, clear_view
+from sidestep.studio.page.camera import HIGH, UNDER_CORNER, Viewpoint, clear_view, extent
 from sidestep.studio.page.compare_panel import ComparePanel
-from sidestep.studio.page.goal import GoalControl
+from sidestep.studio.page.goal import GIZMO_SIZE, GoalControl
 from sidestep.studio.page.marks import Marks
 from sidestep.studio.page.obstacle_panel import ObstaclePanel
 from sidestep.studio.page.obstacles import ObstacleViews
@@ -43,10 +43,11 @@ from sidestep.studio.scene_obstacle import SceneObstacle, thing_of, things_of
 from sidestep.studio.systems import Recipe, make_body, numbers_of, recipe_of
 
 if TYPE_CHECKING:
+    import trimesh
     import viser
 
 WORDS_EVERY = 0.15  # [s] nobody reads faster
-NEAR = 2.0  # of the arm's reach: obstacles farther off need not be in the window as it opens
+NEAR = 2.0  # of the arm's reach: what is farther off need not be in the window as it opens
 MAIN_WIDTH, PLOT_WIDTH = 365, 290  # [px]
 
 
@@ -270,7 +271,9 @@ class View:
         speed = f"{snapshot.timing.real_time:.2f} × real time" if snapshot.running else "paused"
         least = f" (least so far {1e3 * self.least_clearance:.0f} mm)"
         state = f"{touch} · {snapshot.time:.1f} s · {speed}"
-        coarse = [f"coarse body; the finer one: {html.escape(snapshot.refining)}"] if snapshot.draft else []
+        coarse = (
+            [f"coarse body; the fine one is made: {html.escape(snapshot.refining)}"] if snapshot.draft else []
+        )
         facts = [*self._nearest_facts(snapshot.things, least), state, *status, *coarse]
         self._tell(now, begun(snapshot.words), facts, snapshot.events)
 
@@ -298,15 +301,24 @@ class View:
         if content != self._words.content:
             self._words.content = content
 
-    def _point_cameras(self, scenario: Scenario, robot: Robot) -> None:
-        """Where all windows look from, those to come as well: arm, goal and obstacles fill them."""
+    def _look_at(self, scenario: Scenario, meshes: dict[str, trimesh.Trimesh]) -> None:
+        """What the window shows, arm, goal and obstacles, and from where they are seen best."""
+        robot = self.robot
         start = coordinates(scenario.start, robot, "start")
         ends = start, goal_posture(scenario, robot, start).q
-        places = [robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames]
-        beside = [np.array(item.position) for item in scenario.obstacles]
-        near = [place for place in beside if np.linalg.norm(place) < NEAR * reach(robot)]
-        view = clear_view(np.array(places), [thing.triangles for thing in things_of(scenario)])
-        self._viewpoint = Viewpoint.of(np.array([*places, *near]), view)
+        solids = [thing.triangles for thing in things_of(scenario)]
+        arrows = robot.pose(ends[1], self.tip)[:3, 3] + GIZMO_SIZE * reach(robot) * np.vstack(
+            [np.eye(3), -np.eye(3)]
+        )
+        self._places = np.vstack([extent(robot, meshes, ends, solids, NEAR * reach(robot)), arrows])
+        frames = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
+        self._view = clear_view(frames, solids)
+        self._point_cameras()
+
+    def _point_cameras(self) -> None:
+        """Points all windows, those to come as well, at the scene; the curved space has the upper left."""
+        high = UNDER_CORNER if self._curved.value else HIGH
+        self._viewpoint = Viewpoint.of(self._places, self._view, high)
         point_cameras(self._server, self._viewpoint)
 
     def _add_switches(self) -> None:
@@ -318,6 +330,7 @@ class View:
         self._trail = gui.add_checkbox("trail", True)
         self._metric = gui.add_checkbox("metric", False)
         self._curved = gui.add_checkbox("curved space", False)
+        self._curved.on_update(lambda _: self._point_cameras())
         self._first: Any = gui.add_dropdown("over", ("-",))
         self._second: Any = gui.add_dropdown("and", ("-",))
         gui.add_html(colours.legend_html())
@@ -326,11 +339,11 @@ class View:
 
     def _set_robot(self, scenario: Scenario, robot: Robot) -> None:
         self.robot, self.tip = robot, tip_of(robot)
-        self._point_cameras(scenario, robot)
+        meshes = link_meshes(robot)
+        self._look_at(scenario, meshes)
         names = tuple(robot.coordinate_names)
         self._first.options = self._second.options = names
         self._first.value, self._second.value = names[0], names[min(1, len(names) - 1)]
-        meshes = link_meshes(robot)
         self.arm = ArmView(self._server, robot, meshes, "/arm")
         self.marks = Marks(self._server, robot, self.tip)
         self.why = Why(self._server, robot, self.tip)
