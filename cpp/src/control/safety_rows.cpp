@@ -22,6 +22,7 @@ constexpr double slow = 0.01;
 constexpr double smallest_deceleration = 1e-6;
 // What accelerations and torques leave together is looked for where so small a share of what they leave alone would matter.
 constexpr double scarce = 0.05;
+constexpr double at_rest = 1e-6;              // [rad/s | m/s], or slower
 constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
 constexpr double largest_acceleration = 1e3;  // stands for what has no limit [/s²]
 // Of the jerk limits that one row takes, leaving some to others, and takes where that is not enough; of the hardest deceleration, that
@@ -285,7 +286,7 @@ bool SafetyRows::draw_on_reserves(double period) noexcept {
                  : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= 0.0;
     };
     asked_[row] = lower[row];
-    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk == 0.0 || !fits(asked)) {
+    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk <= 0.0 || !fits(asked)) {
       continue;
     }
     const double least = std::min(reserve.before - reserve.jerk * period, asked);
@@ -352,6 +353,8 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     return std::min(asked, largest_by_both(direction, rates->acceleration_lower, rates->acceleration_upper, rates->torque_lower,
                                            rates->torque_upper, asked));
   };
+  // [1/s²] Of v: the jerk of a stop along the path.
+  const double stop_jerk = last == nullptr ? 0.0 : (limits.jerk.array() / v.array().abs().max(at_rest)).minCoeff();
   double hardest_stop = 0.0;
   int hardest_row = -1;  // that a stop along the path is for
   for (int row = first; row < size_; ++row) {
@@ -405,9 +408,11 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
     reserve.jerk = 0.0;
     if (last != nullptr) {
-      const double asked = required, jerk = last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
-      if (jerk < infinity) {
-        reserve = {room, u, c, hardest, of_jerk_alone * jerk, gradient.dot(last->acceleration)};
+      const double asked = required;
+      if (last->jerk_share * gradient.cwiseAbs().dot(limits.jerk) < infinity) {
+        const double jerk =
+            of_jerk_alone * last->jerk_share * (room > 0.0 ? of_arm * stop_jerk : gradient.cwiseAbs().dot(limits.jerk));
+        reserve = {room, u, c, tau > 0.0 ? of_arm / tau : 0.0, jerk, gradient.dot(last->acceleration)};
       }
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
       smooth = required < asked;

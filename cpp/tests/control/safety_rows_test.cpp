@@ -240,12 +240,13 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   JointLimits limits = JointLimits::unlimited(1);
   limits.acceleration << 10.0;
   limits.jerk << 1000.0;
-  const Eigen::VectorXd v = Eigen::VectorXd::Zero(1), still = v;
+  const Eigen::VectorXd still = Eigen::VectorXd::Zero(1);
   const LastMotion last{still, 1.0};
   AccelerationBounds bounds(1);
-  bounds.update(limits, Eigen::VectorXd::Zero(1), v, 0.001, {}, &still);
   SafetyRows rows(1, {});
-  const auto ask = [&](double room, double closing) {
+  const auto ask = [&](double room, double closing, double of_arm) {
+    const Eigen::VectorXd v = Eigen::VectorXd::Constant(1, -of_arm);
+    bounds.update(limits, still, v, 0.001, {}, &still);
     Clearances clearances(1, 1);
     clearances.nearest << 0;
     clearances.values[0] = room + rows.settings().margin;
@@ -255,14 +256,14 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
     rows.update(clearances, v, limits, bounds, 0.001, nullptr, &last);
     BOOST_REQUIRE(rows.size() == 1);
   };
-  // With 5 m/s² and half of the jerk the stop from 0.4 m/s takes 22 mm; with 10 m/s² and all of it 10.2 mm.
-  ask(0.022, 0.4);
+  // With 5 m/s² and half of the jerk the stop from 0.4 m/s takes 22 mm; the arm's own, with 10 m/s² and all jerk, 10.2 mm.
+  ask(0.022, 0.4, 0.4);
   BOOST_TEST(rows.lower[0] == 0.5, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(rows.draw_on_reserves(0.001));
   BOOST_TEST(rows.lower[0] == -0.95, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(!rows.ask_for_ways_back());
 
-  ask(0.0107, 0.4);
+  ask(0.0107, 0.4, 0.4);
   const double asked = rows.lower[0];
   BOOST_TEST(rows.draw_on_reserves(0.001));
   const double least = rows.lower[0];
@@ -274,15 +275,17 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   BOOST_TEST((way(least) <= 0.0107 && way(least - 0.01) > 0.0107));
 
   // Without room and without closing the way back asks for what jerk allows; as a reserve, for nothing.
-  ask(-0.03, 0.0);
+  ask(-0.03, 0.0, 0.0);
   BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(rows.draw_on_reserves(0.001));
   BOOST_TEST(std::abs(rows.lower[0]) < 1e-3);
   BOOST_TEST(rows.ask_for_ways_back());
   BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
 
-  // What closes in without room has no reserve.
-  ask(-0.003, 0.1);
+  // What closes in without room has no reserve, nor has what the arm's own stop does not stop.
+  ask(-0.003, 0.1, 0.1);
+  BOOST_TEST(!rows.draw_on_reserves(0.001));
+  ask(0.022, 0.4, 0.0);
   BOOST_TEST(!rows.draw_on_reserves(0.001));
 }
 

@@ -88,8 +88,8 @@ struct ClosingLimits {
 // fits into the room, S of acceleration_bounds.hpp. The share is one half, so that two rows can rise together; where that is not
 // enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
 // Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw on their
-// reserves: each asks for no more than after which the stop at the hardest deceleration and all but a twentieth of the jerk fits;
-// without room, only for what keeps it from closing. Ways back then share what jerk leaves, as if nothing were enough.
+// reserves: each asks for no more than after which the arm's stop along its path fits, with −v/τ and all but a twentieth of the jerk,
+// which is one stop for all rows; without room, only for what keeps it from closing. Ways back then share what jerk leaves, as if nothing were enough.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
 // it asks for the least after which the smooth stop fits (or for the most, where none fits), without a curvature that helps, which
 // may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
