@@ -3,7 +3,9 @@
 #include <nanobind/stl/string.h>
 
 #include <cmath>
+#include <cstdio>
 #include <optional>
+#include <string>
 #include <utility>
 
 namespace sidestep::python {
@@ -62,6 +64,20 @@ std::optional<double> as_scalar(nb::handle value, const char* name) {
 }
 
 }  // namespace
+
+std::string in_short(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", number);
+  return text;
+}
+
+std::string in_short(const Eigen::VectorXd& numbers) {
+  std::string text;
+  for (const double number : numbers) {
+    text += (text.empty() ? "" : ", ") + in_short(number);
+  }
+  return "[" + text + "]";
+}
 
 nb::object real_array(nb::handle value, const char* name) {
   const nb::module_ numpy = nb::module_::import_("numpy");

@@ -32,6 +32,11 @@ nb::object real_array(nb::handle value, const char* name);
 using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 Array as_array(nb::handle value, const char* name);
 
+/// A number for a `__repr__`, such as "0.0312", "inf" or "nan".
+std::string in_short(double number);
+/// Numbers for a `__repr__`, such as "[0.1, -0.524]".
+std::string in_short(const Eigen::VectorXd& numbers);
+
 /// A vector argument of `size` entries (any size if -1); raises ValueError with the shape got and the shape allowed.
 Eigen::VectorXd as_vector(nb::handle value, const char* name, Eigen::Index size = -1);
 

@@ -187,6 +187,7 @@ void bind_arm(nb::module_& m) {
       .def_prop_ro("provenance", [](const Arm& arm) { return arm.provenance(); }, "Where the arm comes from.")
       .def_prop_ro("content_hash", &Arm::content_hash,
                    "SHA-256 (64 hex digits) of everything but the provenance: equal arms have equal hashes.")
+      .def("__repr__", [](const Arm& arm) { return "Arm('" + arm.name() + "', " + std::to_string(arm.num_coordinates()) + " coordinates)"; })
       .def_prop_ro("neutral", [](const Arm& arm) { return to_numpy(arm.neutral()); },
                    "A configuration (nv,) inside the limits: the middle of each interval, 0 without limits.");
 
@@ -221,7 +222,10 @@ void bind_arm(nb::module_& m) {
       .def_prop_ro("num_ellipsoids", [](const Attachment& a) { return a.cover.size(); })
       .def_ro("inertial", &Attachment::inertial)
       .def_ro("may_touch", &Attachment::may_touch)
-      .def_ro("rests_on", &Attachment::rests_on);
+      .def_ro("rests_on", &Attachment::rests_on)
+      .def("__repr__", [](const Attachment& a) {
+        return "Attachment('" + a.name + "' on link '" + a.link + "', " + std::to_string(a.cover.size()) + " ellipsoids)";
+      });
 }
 
 }  // namespace sidestep::python

@@ -4,6 +4,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <set>
+#include <string>
+
 #include "arguments.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
@@ -120,6 +123,11 @@ void bind_body(nb::module_& m) {
           nb::arg("levels") = nb::none(),
           "links (K,): frame of each component; weights (K,), sum 1 per link; means (K, 3) [m];\n"
           "covariances (K, 3, 3) [m^2]; levels (K,) of a calibrated body. Raises ValueError that names the component at fault.")
+      .def("__repr__", [](const Body& b) {
+        const std::set<std::string> links(b.links.begin(), b.links.end());
+        return "Body(" + std::to_string(links.size()) + " links, " + std::to_string(b.num_components()) +
+               (b.levels.size() ? " ellipsoids)" : " Gaussians)");
+      })
       .def_prop_ro("num_components", &Body::num_components, "Number of Gaussians or ellipsoids K.")
       .def_prop_ro("links", [](const Body& b) { return b.links; }, "(K,) The link that carries each.")
       .def_prop_ro("weights", [](const Body& b) { return to_numpy(b.weights); }, "(K,) Weights; of a link they add up to 1.")

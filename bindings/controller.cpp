@@ -82,7 +82,8 @@ void bind_settings_tree(nb::module_& m) {
        part("planner", "OnlinePlannerSettings | None", &S::planner),
        part("look_ahead", "LookAheadSettings | None", &S::look_ahead),
        part("local_minimum", "LocalMinimumSettings | None", &S::local_minimum),
-       {"output", "Output | str", [](S& s, nb::handle value) { s.output = as_enum<S::Output>(value, "output"); }}});
+       {"output", "Output | str", [](S& s, nb::handle value) { s.output = as_enum<S::Output>(value, "output"); },
+        [](const S& s) { return nb::object(nb::cast(s.output).attr("name")); }}});
   c.def_rw("barriers", &S::barriers)
       .def_rw("safety", &S::safety)
       .def_rw("arrival", &S::arrival)
@@ -172,7 +173,11 @@ void bind_command(nb::module_& m) {
       .def_ro("system", &Command::system, "StepStatus of the geometric system.")
       .def_ro("program", &Command::program, "TorqueStatus of the quadratic program.")
       .def_ro("avoiding", &Command::avoiding, "Follows a trajectory out of the way of what moves.")
-      .def_ro("on_path", &Command::on_path, "Follows a path of the planner.");
+      .def_ro("on_path", &Command::on_path, "Follows a path of the planner.")
+      .def("__repr__", [](const Command& c) {
+        return std::string("Command(") + to_string(c.status) + ", " + to_string(c.activity) + ", clearance=" + in_short(c.clearance) +
+               " m, speed=" + in_short(c.speed) + " m/s)";
+      });
 }
 
 /// What the thread of `step` alone may read, refused while another one has the controller.
@@ -345,7 +350,10 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("plan", [](const Controller& self) { return self.last_plan(); }, "What the planner found last.")
       .def_prop_ro("searches", [](const Controller& self) { return self.planner_counts().searches; },
                    "How often a path was looked for.")
-      .def_prop_ro("has_torque", &Controller::has_torque, "Whether the commands hold torque.");
+      .def_prop_ro("has_torque", &Controller::has_torque, "Whether the commands hold torque.")
+      .def("__repr__", [](const Controller& self) {
+        return "Controller(arm '" + self.arm().name() + "', " + std::to_string(self.num_coordinates()) + " coordinates)";
+      });
 
   m.def("unlimited_joints", &unlimited_joints, nb::arg("robot"),
         "(nv) Which coordinates turn without limits, so that a configuration is the same a turn further.");
@@ -359,7 +367,12 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("step_seconds", [](const MotionRecord& r) { return to_numpy(r.step_seconds); }, "(steps,) [s].")
       .def_prop_ro("last_q", [](const MotionRecord& r) { return to_numpy(r.last_q); }, "(nv,) after the last step.")
       .def_prop_ro("last_v", [](const MotionRecord& r) { return to_numpy(r.last_v); }, "(nv,) after the last step.")
-      .def_ro("arrived", &MotionRecord::arrived, "Every joint came within the tolerance of the goal, which ended the motion.");
+      .def_ro("arrived", &MotionRecord::arrived, "Every joint came within the tolerance of the goal, which ended the motion.")
+      .def("__repr__", [](const MotionRecord& r) {
+        const std::string least = r.clearance.size() == 0 ? "nan" : in_short(r.clearance.minCoeff());
+        return "MotionRecord(" + std::to_string(r.q.rows()) + " steps, " + (r.arrived ? "arrived, " : "") + "least clearance=" + least +
+               " m)";
+      });
   m.def(
       "integrate",
       [](Controller& controller, const ArrayLike& q, const ArrayLike& v, int steps, nb::handle goal, double tolerance) {

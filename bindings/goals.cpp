@@ -71,7 +71,8 @@ void bind_goals(nb::module_& m) {
                   "acceleration: numpy.typing.ArrayLike | None = None) -> None"))
       .def_prop_ro("position", [](const JointGoal& g) { return to_numpy(g.position); })
       .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); })
-      .def_prop_ro("acceleration", [](const JointGoal& g) { return to_numpy(g.acceleration); });
+      .def_prop_ro("acceleration", [](const JointGoal& g) { return to_numpy(g.acceleration); })
+      .def("__repr__", [](const JointGoal& g) { return "JointGoal(" + in_short(g.position) + (is_moving(g) ? ", moves)" : ")"); });
 
   nb::class_<PoseGoal>(
       m, "PoseGoal",
@@ -104,7 +105,11 @@ void bind_goals(nb::module_& m) {
                   "numpy.typing.ArrayLike | None = None) -> None"))
       .def_prop_ro("frame", [](const PoseGoal& g) { return g.frame().name; })
       .def_prop_ro("pose", [](const PoseGoal& g) { return to_numpy_matrix(g.pose.matrix()); }, "(4, 4) in the world.")
-      .def_prop_ro("position_only", [](const PoseGoal& g) { return g.settings.position_only; });
+      .def_prop_ro("position_only", [](const PoseGoal& g) { return g.settings.position_only; })
+      .def("__repr__", [](const PoseGoal& g) {
+        return "PoseGoal('" + g.frame().name + "' at " + in_short(g.pose.translation()) + " m" +
+               (g.settings.position_only ? ", position_only" : "") + (is_moving(g) ? ", moves)" : ")");
+      });
 
   m.def(
       "find_posture",

@@ -98,6 +98,7 @@ void bind_kinematics(nb::module_& m) {
       .def(nb::init<std::string, std::vector<Joint>, std::vector<Frame>, std::vector<std::string>, JointLimits>(),
            nb::arg("name"), nb::kw_only(), nb::arg("joints"), nb::arg("frames"), nb::arg("coordinate_names"),
            nb::arg("limits"))
+      .def("__repr__", [](const Robot& r) { return "Robot('" + r.name() + "', " + std::to_string(r.num_coordinates()) + " coordinates)"; })
       .def_prop_ro("name", &Robot::name, "What messages call the arm.")
       .def_prop_ro("num_coordinates", &Robot::num_coordinates, "Number of joint coordinates nv (= nq).")
       .def_prop_ro("joints", [](const Robot& r) { return r.joints(); }, "Every joint, parents first.")

@@ -3,6 +3,11 @@
 NB_MODULE(_core, m) {
   m.doc() = "C++ core of sidestep. Use the names re-exported by the sidestep package.";
   m.attr("__version__") = SIDESTEP_VERSION;
+#ifdef NDEBUG
+  // A thread of the user's that does not end with the program, as one that a camera feeds, holds its controller until exit. Python
+  // frees nothing of such threads, which is no leak that a user should be told of. Debug builds tell.
+  nanobind::set_leak_warnings(false);
+#endif
   sidestep::python::bind_kinematics(m);
   sidestep::python::bind_body(m);
   sidestep::python::bind_obstacles(m);

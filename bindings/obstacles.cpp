@@ -15,6 +15,26 @@
 #include "module.hpp"
 
 namespace sidestep::python {
+namespace {
+
+constexpr std::size_t most_names = 4;
+
+/// For example "Obstacles(1012 points, of 'table', 'cup')".
+std::string in_words(const Obstacles& obstacles) {
+  std::string names;
+  std::size_t num = 0;
+  for (const auto& [name, count] : obstacles.groups()) {
+    if (!name.empty() && ++num <= most_names) {
+      names += (names.empty() ? ", of '" : ", '") + std::string(name) + "'";
+    }
+  }
+  if (num > most_names) {
+    names += " and " + std::to_string(num - most_names) + " more";
+  }
+  return "Obstacles(" + std::to_string(obstacles.size()) + (obstacles.size() == 1 ? " point" : " points") + names + ")";
+}
+
+}  // namespace
 
 void bind_obstacles(nb::module_& m) {
   m.def(
@@ -40,6 +60,7 @@ void bind_obstacles(nb::module_& m) {
           "Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).")
       .def_static("none", &Obstacles::none, "A workspace that is known to be free.")
       .def("__len__", &Obstacles::size)
+      .def("__repr__", [](const Obstacles& o) { return in_words(o); })
       .def_prop_ro("points", [](const Obstacles& o) { return to_numpy_points(o.points()); })
       .def_prop_ro("radii", [](const Obstacles& o) { return to_numpy(o.radii()); }, "(N,) [m].")
       .def_prop_ro("velocities", [](const Obstacles& o) { return to_numpy_points(o.velocities()); }, "(N, 3) [m/s] in the world.")

@@ -67,7 +67,10 @@ void bind_plan(nb::module_& m) {
       .def_prop_ro("other", [](const Obstruction& o) { return o.label.other; })
       .def_ro("point", &Obstruction::point)
       .def_ro("depth", &Obstruction::depth)
-      .def("__str__", [](const Obstruction& o) { return describe(o); });
+      .def("__str__", [](const Obstruction& o) { return describe(o); })
+      .def("__repr__", [](const Obstruction& o) {
+        return o.label.name.empty() ? std::string("Obstruction()") : "Obstruction(" + describe(o) + ")";
+      });
 
   nb::class_<Plan>(m, "Plan", "A path, or why there is none.")
       .def_ro("status", &Plan::status, "Whether a path was found, or why not.")
@@ -81,7 +84,11 @@ void bind_plan(nb::module_& m) {
       .def_ro("checks", &Plan::checks, "The work, see max_checks of PlannerSettings; improvement included.")
       .def_ro("search_seconds", &Plan::search_seconds, "[s] until a path was found, or given up.")
       .def_ro("improvement_seconds", &Plan::improvement_seconds,
-              "[s] to look for a wider one, and to make it short.");
+              "[s] to look for a wider one, and to make it short.")
+      .def("__repr__", [](const Plan& p) {
+        return std::string("Plan(") + nb::str(nb::cast(p.status).attr("name")).c_str() + ", " + std::to_string(p.path.cols()) +
+               " waypoints, length=" + in_short(length(p.path)) + ")";
+      });
 }
 
 void bind_planner_settings(nb::module_& m) {

@@ -51,14 +51,18 @@ void bind_real_time(nb::module_& m) {
             return self.finish();
           },
           "Waits for the end; the RealTimeRecord of the steps done. Ctrl-C stops the run.")
-      .def("stop", &RealTimeRun::stop, "Asks for the end after the step at hand, and waits for nothing: `finish` does.");
+      .def("stop", &RealTimeRun::stop, "Asks for the end after the step at hand, and waits for nothing: `finish` does.")
+      .def("__repr__", [](const RealTimeRun& self) { return std::string("RealTimeRun(") + (self.running() ? "running)" : "ended)"); });
   nb::class_<RealTimeRecord>(m, "RealTimeRecord", "When the steps of a real-time run began and ended.")
       .def_prop_ro("late", [](const RealTimeRecord& r) { return to_numpy(r.late); },
                    "(T,) [s] from when a step was due to when it began.")
       .def_prop_ro("taken", [](const RealTimeRecord& r) { return to_numpy(r.taken); },
                    "(T,) [s] from when it began to when its command was there.")
       .def_ro("missed", &RealTimeRecord::missed, "Steps that ended after the next one was due.")
-      .def_ro("prioritised", &RealTimeRecord::prioritised, "Whether real-time scheduling was granted.");
+      .def_ro("prioritised", &RealTimeRecord::prioritised, "Whether real-time scheduling was granted.")
+      .def("__repr__", [](const RealTimeRecord& r) {
+        return "RealTimeRecord(" + std::to_string(r.taken.size()) + " steps, " + std::to_string(r.missed) + " missed)";
+      });
 }
 
 }  // namespace sidestep::python

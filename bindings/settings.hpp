@@ -56,6 +56,7 @@ template <class Settings>
 struct Part {
   std::string name, type;
   std::function<void(Settings&, nb::handle)> set;
+  std::function<nb::object(const Settings&)> get;
 };
 
 /// A part that is a class of its own, perhaps one that may be left out; type: of Python.
@@ -65,7 +66,8 @@ Part<Settings> part(const char* name, const std::string& type, Value Settings::*
             if (!nb::try_cast<Value>(value, settings.*member)) {
               throw nb::type_error((std::string(name) + " is " + nb::repr(value).c_str() + ", must be " + type).c_str());
             }
-          }};
+          },
+          [member](const Settings& settings) { return nb::cast(settings.*member); }};
 }
 
 /// A class with a keyword and a property for every field, and a keyword for every part.
@@ -115,6 +117,26 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
       self->validate();
     }
   }, nb::sig(kept("def __init__(self, *" + keywords + ") -> None")));
+  c.def(
+      "__repr__",
+      [name, parts](const Settings& self) {
+        const Settings defaults{};
+        std::string text;
+        const auto add = [&text](const std::string& key, const nb::object& value, const nb::object& by_default) {
+          const std::string told = nb::repr(value).c_str();
+          if (told != nb::repr(by_default).c_str()) {
+            text += (text.empty() ? "" : ", ") + key + "=" + told;
+          }
+        };
+        for (const Field<Settings>& field : fields<Settings>()) {
+          add(field.name, get_field(self, field), get_field(defaults, field));
+        }
+        for (const Part<Settings>& each : parts) {
+          add(each.name, each.get(self), each.get(defaults));
+        }
+        return std::string(name) + "(" + text + ")";
+      },
+      "What differs from the defaults.");
   for (const Field<Settings>& field : fields<Settings>()) {
     const std::string own = field.name;
     c.def_prop_rw(

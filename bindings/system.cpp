@@ -58,7 +58,11 @@ void bind_diagnosis(nb::module_& m) {
   nb::class_<CoordinateLabel>(m, "CoordinateLabel", "What one coordinate of an embedding is about.")
       .def_ro("kind", &CoordinateLabel::kind, "What the coordinate measures.")
       .def_ro("name", &CoordinateLabel::name, "Of the link, or of the joint for a limit; empty for a potential.")
-      .def_ro("other", &CoordinateLabel::other, "The second link of a pair; 'lower' or 'upper' for a joint limit.");
+      .def_ro("other", &CoordinateLabel::other, "The second link of a pair; 'lower' or 'upper' for a joint limit.")
+      .def("__repr__", [](const CoordinateLabel& l) {
+        return std::string("CoordinateLabel(") + nb::str(nb::cast(l.kind).attr("name")).c_str() +
+               (l.name.empty() ? "" : ", '" + l.name + "'") + (l.other.empty() ? "" : ", '" + l.other + "'") + ")";
+      });
   using E = Explanation;
   nb::class_<E>(m, "Diagnosis",
                 "Why a motion is what it is, from one step. Stuck: |v| < 0.02 rad/s short of the goal, and the metric lets\n"
@@ -81,7 +85,8 @@ void bind_diagnosis(nb::module_& m) {
       .def_prop_ro("way_left", [](const E& e) { return e.diagnosis.way_left(); },
                    "How far the goal is, in words: '0.31 rad', '12.0 mm' of a sliding joint.")
       .def("describe", [](const E& e) { return e.words; }, "In one English sentence.")
-      .def("__str__", [](const E& e) { return e.words; });
+      .def("__str__", [](const E& e) { return e.words; })
+      .def("__repr__", [](const E& e) { return "Diagnosis(" + e.words + ")"; });
 
   nb::class_<PenetrationRecovery>(m, "PenetrationRecovery",
                        "What is done with an arm inside a barrier. speed [m/s] with which it leaves, rate [1/s] at which it\n"

@@ -337,3 +337,24 @@ def test_reach_prints_the_unit_of_a_step(invoke: Invoke, capsys: pytest.CaptureF
         == 0
     )
     assert "step [us]" in capsys.readouterr().out
+
+
+def test_a_method_of_ones_own_moves_an_arm_of_ones_own(
+    invoke: Invoke, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """As docs/how-to/comparing.md says, with the file of that page and a robot file of the examples."""
+    root = Path(__file__).parents[1]
+    page = (root / "docs" / "how-to" / "comparing.md").read_text(encoding="utf-8")
+    (tmp_path / "my_method.py").write_text(page.split("```python\n")[1].split("```")[0], encoding="utf-8")
+    of_files = ("--robot", str(root / "examples" / "planar3.urdf"), "--method", "my_method.py")
+    few = ("--problems", "3", "--obstacles", "2", "--duration", "4", "--jobs", "1", "--quiet")
+    code = invoke("bench", "reach", *of_files, *few, "--export", "p.json", "--json", "-")
+    document = json.loads(capsys.readouterr().out)
+    assert (Path(document["robot"]).name, document["method"]) == ("planar3.urdf", "my_method.py")
+    assert (document["problems"], document["success"], document["collision"]) == (3, 2, 1)
+    assert code == 1  # something was touched
+    assert invoke("bench", "reach", *of_files, *few, "--problems-file", "p.json", "--json", "-") == code
+    assert json.loads(capsys.readouterr().out)["success"] == document["success"]
+    assert invoke("bench", "reach", *of_files, *few, "--poses") == 2
+    said = capsys.readouterr().err.replace("\n", " ")
+    assert "my_method.py: a method of your own gives accelerations, without --torque and --poses" in said

@@ -109,6 +109,8 @@ class Robot:
 
     def __init__(self, name: str, *, joints: Sequence[Joint], frames: Sequence[Frame], coordinate_names: Sequence[str], limits: JointLimits) -> None: ...
 
+    def __repr__(self) -> str: ...
+
     @property
     def name(self) -> str:
         """What messages call the arm."""
@@ -159,6 +161,8 @@ class Body:
         links (K,): frame of each component; weights (K,), sum 1 per link; means (K, 3) [m];
         covariances (K, 3, 3) [m^2]; levels (K,) of a calibrated body. Raises ValueError that names the component at fault.
         """
+
+    def __repr__(self) -> str: ...
 
     @property
     def num_components(self) -> int:
@@ -215,6 +219,8 @@ class Obstacles:
         """A workspace that is known to be free."""
 
     def __len__(self) -> int: ...
+
+    def __repr__(self) -> str: ...
 
     @property
     def points(self) -> numpy.typing.NDArray[numpy.float64]: ...
@@ -542,6 +548,8 @@ class JointGoal:
     @property
     def acceleration(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
+    def __repr__(self) -> str: ...
+
 class PoseGoal:
     """
     A pose of a frame as a goal,
@@ -565,6 +573,8 @@ class PoseGoal:
 
     @property
     def position_only(self) -> bool: ...
+
+    def __repr__(self) -> str: ...
 
 def find_posture(robot: Robot, goal: PoseGoal, near: numpy.typing.ArrayLike, *, starts: int = 1, seed: int = 0) -> tuple[numpy.typing.NDArray[numpy.float64], float, float]:
     """
@@ -665,6 +675,8 @@ class CoordinateLabel:
     def other(self) -> str:
         """The second link of a pair; 'lower' or 'upper' for a joint limit."""
 
+    def __repr__(self) -> str: ...
+
 class Diagnosis:
     """
     Why a motion is what it is, from one step. Stuck: |v| < 0.02 rad/s short of the goal, and the metric lets
@@ -734,6 +746,8 @@ class Diagnosis:
         """In one English sentence."""
 
     def __str__(self) -> str: ...
+
+    def __repr__(self) -> str: ...
 
 class PenetrationRecovery:
     """
@@ -1246,6 +1260,9 @@ class SafetySettings:
 
     def __init__(self, *, margin: float = 0.005, rate: float = 20.0, braking_fraction: float = 0.5, correction: float = 0.5, max_rows: int = 32) -> None: ...
 
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
     @property
     def margin(self) -> float: ...
 
@@ -1549,6 +1566,8 @@ class Obstruction:
 
     def __str__(self) -> str: ...
 
+    def __repr__(self) -> str: ...
+
 class Plan:
     """A path, or why there is none."""
 
@@ -1594,6 +1613,8 @@ class Plan:
     def improvement_seconds(self) -> float:
         """[s] to look for a wider one, and to make it short."""
 
+    def __repr__(self) -> str: ...
+
 class PlannerSettings:
     """
     How a PathPlanner searches.
@@ -1615,6 +1636,9 @@ class PlannerSettings:
     """
 
     def __init__(self, *, margin: float = 0.06, floor: float = 0.005, allowance: float = 0.02, pair_allowance: float = 0.02, slack: float = 0.002, fade: float = 0.3, range: float = 1.0, max_nodes: int = 10000, max_iterations: int = 40000, max_checks: int = 2000000, max_seconds: float = ..., shortcuts: int = 100) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def margin(self) -> float: ...
@@ -1699,6 +1723,9 @@ class TimedPathSettings:
     """
 
     def __init__(self, *, wide: float = 0.03, lead: float = 0.4) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def wide(self) -> float: ...
@@ -2039,6 +2066,8 @@ class Arm:
         SHA-256 (64 hex digits) of everything but the provenance: equal arms have equal hashes.
         """
 
+    def __repr__(self) -> str: ...
+
     @property
     def neutral(self) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -2079,6 +2108,8 @@ class Attachment:
     @property
     def rests_on(self) -> list[str]: ...
 
+    def __repr__(self) -> str: ...
+
 class BarrierSettings:
     """
     The spring that pulls to the goal, and the barriers that bend its way.
@@ -2099,6 +2130,9 @@ class BarrierSettings:
     """
 
     def __init__(self, *, stiffness: float = 4.0, damping: float = 4.0, activation: float = 0.1, strength: float = 0.1, power: float = 2.0, floor: float = 0.002, temperature: float = 0.002, limit_activation: float = 0.1, limit_strength: float = 0.02, self_activation: float = 0.05, self_strength: float = 0.02) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def stiffness(self) -> float: ...
@@ -2181,6 +2215,9 @@ class ArrivalSettings:
 
     def __init__(self, *, joint: float = 0.01, sliding: float = 0.001, position: float = 0.001, rotation: float = 0.0087, speed: float = 0.05) -> None: ...
 
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
     @property
     def joint(self) -> float: ...
 
@@ -2230,6 +2267,9 @@ class TrackingSettings:
     """
 
     def __init__(self, *, frequency: float = 60.0, damping: float = 1.0, velocity_filter: float = 0.004, observer_time: float = 0.05, observer_share: float = 0.8, largest_error: float = 0.2, servo_lag: float = 1.0, stiffness: float = 0.0, drift_gain: float = 2.0) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def frequency(self) -> float: ...
@@ -2300,6 +2340,9 @@ class SpeedLimitSettings:
 
     def __init__(self, *, near_speed: float = 0.25, near_distance: float = 0.1, far_speed: float = 1.5, far_distance: float = 1.0) -> None: ...
 
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
     @property
     def near_speed(self) -> float: ...
 
@@ -2338,6 +2381,9 @@ class InputSettings:
     """
 
     def __init__(self, *, response: float = 20.0, timeout: float = 0.25, singular: float = 0.05, frequency: float = 10.0, lead: float = 0.1) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def response(self) -> float: ...
@@ -2381,6 +2427,9 @@ class OnlinePlannerSettings:
     """
 
     def __init__(self, *, period: float = 0.02, patience: float = 1.0, retry: float = 1.0, search: PlannerSettings = ..., route: TimedPathSettings = ...) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def period(self) -> float: ...
@@ -2427,6 +2476,9 @@ class LookAheadSettings:
 
     def __init__(self, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 500) -> None: ...
 
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
+
     @property
     def horizon(self) -> float: ...
 
@@ -2470,6 +2522,9 @@ class LocalMinimumSettings:
     """
 
     def __init__(self, *, patience: float = 0.6, fraction: float = 0.05, leg: float = 2.0, spread: float = 1.7) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def patience(self) -> float: ...
@@ -2537,6 +2592,9 @@ class ControllerSettings:
     """
 
     def __init__(self, *, period: float = 0.001, speed: float = 1.0, limit_margin: float = 0.02, effort_margin: float = 0.05, position_margin: float = 0.0, stop_time: float = 0.1, stop_damping: float = 0.25, torque_weight: float = 1e-06, slack_weight: float = 1000.0, velocity_overrun: float = 1.2, acceleration_overrun: float = 10.0, obstacle_timeout: float = ..., local_activation: bool = True, synchronous: bool = False, seed: int = 0, barriers: BarrierSettings = ..., safety: SafetySettings = ..., arrival: ArrivalSettings = ..., tracking: TrackingSettings = ..., speed_limits: SpeedLimitSettings | None = ..., inputs: InputSettings = ..., planner: OnlinePlannerSettings | None = ..., look_ahead: LookAheadSettings | None = ..., local_minimum: LocalMinimumSettings | None = ..., output: Output | str = ...) -> None: ...
+
+    def __repr__(self) -> str:
+        """What differs from the defaults."""
 
     @property
     def period(self) -> float: ...
@@ -2875,6 +2933,8 @@ class Command:
     def on_path(self) -> bool:
         """Follows a path of the planner."""
 
+    def __repr__(self) -> str: ...
+
 class Controller:
     """
     State in, safe command out, once a period: planner, barriers, look-ahead and quadratic program in one.
@@ -3021,6 +3081,8 @@ class Controller:
     def has_torque(self) -> bool:
         """Whether the commands hold torque."""
 
+    def __repr__(self) -> str: ...
+
 def unlimited_joints(robot: Robot) -> list[bool]:
     """
     (nv) Which coordinates turn without limits, so that a configuration is the same a turn further.
@@ -3073,6 +3135,8 @@ class MotionRecord:
         Every joint came within the tolerance of the goal, which ended the motion.
         """
 
+    def __repr__(self) -> str: ...
+
 def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord:
     """
     Moves a model that does exactly what it is told, by semi-implicit Euler: v += a T, q += v T. Ends when every joint is
@@ -3108,6 +3172,8 @@ class RealTimeRun:
         Asks for the end after the step at hand, and waits for nothing: `finish` does.
         """
 
+    def __repr__(self) -> str: ...
+
 class RealTimeRecord:
     """When the steps of a real-time run began and ended."""
 
@@ -3126,5 +3192,7 @@ class RealTimeRecord:
     @property
     def prioritised(self) -> bool:
         """Whether real-time scheduling was granted."""
+
+    def __repr__(self) -> str: ...
 
 __version__: str

@@ -393,6 +393,19 @@ def test_a_joint_of_a_file_is_driven_within_a_range(tmp_path: Path) -> None:
             assemble(parse(text.replace("[0.5, 0.9]", wrong), folder=tmp_path))
 
 
+def test_a_joint_of_a_named_robot_is_locked() -> None:
+    text = LACKING.format(method="controller", mode="kinematic", more=", locked: {joint3: 0.7}")
+    scenario = parse(text.replace("urdf: arm.urdf", "name: planar3"))
+    robot = assemble(scenario).robot
+    assert (robot.name, robot.held, robot.num_coordinates) == ("planar3", {"joint3": 0.7}, 2)
+    assert robot.fingerprint == Robot.named("planar3", locked={"joint3": 0.7}).fingerprint
+    assert robot_code(scenario.robot, scenario) == "ss.Robot.named('planar3', locked={'joint3': 0.7})"
+    with pytest.raises(
+        ScenarioError, match=r"locked: joint 'elbow' does not exist; joints that can be locked: joint1"
+    ):
+        assemble(parse(text.replace("urdf: arm.urdf", "name: planar3").replace("joint3", "elbow")))
+
+
 def test_limits_by_joint_go_with_a_file() -> None:
     text = LACKING.format(method="custom", mode="kinematic", more="").replace(
         "urdf: arm.urdf", "name: planar2"

@@ -1,6 +1,8 @@
 // What a controller does, in words.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 
 #include "../settings.hpp"
@@ -9,10 +11,20 @@
 namespace sidestep {
 namespace {
 
+constexpr double least_lag = 0.05;  // share of an asked velocity that is missed and told
+
 std::string millimetres(double metres) {
   char text[32];
   std::snprintf(text, sizeof text, "%.0f mm", 1e3 * std::abs(metres));
   return text;
+}
+
+/// For example "0.62 s old, more than inputs.timeout (0.5 s)".
+std::string age(double seconds, const char* setting, double timeout) {
+  char old[32], most[32];
+  std::snprintf(old, sizeof old, "%.3g", seconds);
+  std::snprintf(most, sizeof most, "%g s", timeout);
+  return old + std::string(" s old, more than ") + setting + " (" + most + ")";
 }
 
 std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
@@ -67,13 +79,87 @@ std::string Controller::Impl::explain_target() const {
 }
 
 std::string Controller::Impl::explain_input() const {
-  std::string words = trajectory_order() ? "follows a trajectory" : "moves at the velocity that it is told";
-  if (command.bound_by >= 0) {
-    const CoordinateLabel& label = system->labels()[static_cast<std::size_t>(command.bound_by)];
-    words += ", bent by the clearance of " +
-             parties(label, command.bound_by == command.coordinate ? obstacles().words_for(command.point) : "an obstacle");
+  const bool on_trajectory = trajectory_order() != nullptr;
+  const Eigen::Index clearance = command.bound_by >= 0 || on_trajectory ? command.bound_by : held_clearance_;
+  std::string by;
+  if (clearance >= 0) {
+    by = parties(system->labels()[static_cast<std::size_t>(clearance)],
+                 obstacles().words_for(workspace.clearances.nearest[clearance]));
+  } else if (!on_trajectory && held_joint_ >= 0) {
+    by = "joint '" + arm.robot().coordinate_names()[static_cast<std::size_t>(held_joint_)] + "' and its " +
+         (held_upper_ ? "upper" : "lower") + " limit";
   }
-  return words;
+  const std::string lag = on_trajectory || by.empty() ? "" : explain_lag();
+  std::string words = on_trajectory ? "follows a trajectory" : lag.empty() ? "moves at the velocity that it is told" : lag;
+  return by.empty() ? words : words + ", bent by the clearance of " + by;
+}
+
+std::string Controller::Impl::explain_lag() const {
+  const Order& order = goal_orders_.current().order;
+  char text[64];
+  if (const auto* velocity = std::get_if<VelocityOrder>(&order)) {
+    Eigen::VectorXd asked = velocity->velocity;
+    scale_to_limits(asked);
+    Eigen::Index most = 0;  // the joint that lacks the largest share of its limit
+    const Eigen::VectorXd got = next_v_.array() * asked.array().sign(), lack = asked.cwiseAbs() - got;
+    lack.cwiseQuotient(most_v_).maxCoeff(&most);
+    if (lack[most] <= least_lag * std::abs(asked[most])) {
+      return {};
+    }
+    const bool slides = is_sliding_[static_cast<std::size_t>(most)];
+    std::snprintf(text, sizeof text, slides ? "%.3f of %.3f m/s of joint '" : "%.2f of %.2f rad/s of joint '", got[most],
+                  std::abs(velocity->velocity[most]));
+    return "slower than asked: " + std::string(text) + arm.robot().coordinate_names()[static_cast<std::size_t>(most)] + "'";
+  }
+  const auto* twist = std::get_if<TwistOrder>(&order);
+  if (twist == nullptr) {
+    return {};
+  }
+  KinematicState state(arm.robot());
+  state.update(arm.robot(), q_, next_v_);
+  const KinematicState::Link& link = state.link(twist->frame.joint);
+  const Eigen::Vector3d p = link.p_WL + link.R_WL * twist->frame.X_JF.translation();
+  const Eigen::Matrix3d R =
+      twist->local ? Eigen::Matrix3d(link.R_WL * twist->frame.X_JF.linear()) : Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d linear = R * twist->twist.head<3>(), angular = R * twist->twist.tail<3>();
+  const double speed = linear.norm(), rate = angular.norm();
+  const double got_speed = speed > 0.0 ? linear.dot(link.velocity.linear + link.velocity.angular.cross(p)) / speed : 0.0;
+  const double got_rate = rate > 0.0 ? angular.dot(link.velocity.angular) / rate : 0.0;
+  const double lack = speed > 0.0 ? 1.0 - got_speed / speed : 0.0, turn_lack = rate > 0.0 ? 1.0 - got_rate / rate : 0.0;
+  if (std::max(lack, turn_lack) <= least_lag) {
+    return {};
+  }
+  if (lack >= turn_lack) {
+    std::snprintf(text, sizeof text, "%.3f of %.3f m/s of frame '", got_speed, speed);
+  } else {
+    std::snprintf(text, sizeof text, "%.2f of %.2f rad/s of frame '", got_rate, rate);
+  }
+  return "slower than asked: " + std::string(text) + twist->frame.name + "'";
+}
+
+Diagnosis Controller::Impl::diagnosis() const {
+  Diagnosis d = system->diagnose(workspace);
+  if (!has_goal() || has_input() || d.state == MotionState::fallback) {
+    return d;
+  }
+  d.slides = false;
+  d.joint_error = d.position_error = d.rotation_error = std::numeric_limits<double>::quiet_NaN();
+  if (const PoseGoal* pose = pose_goal()) {
+    const PoseError error = pose_error(*pose, arm_state());
+    const bool turns =
+        !pose->settings.position_only || std::any_of(pose->others.begin(), pose->others.end(),
+                                                     [](const PoseGoal& other) { return !other.settings.position_only; });
+    d.position_error = error.position;
+    d.rotation_error = turns ? error.rotation : d.rotation_error;
+  } else {
+    Eigen::Index farthest = 0;
+    d.joint_error = (arm_q_ - std::get<JointGoal>(*goal_).position).cwiseAbs().maxCoeff(&farthest);
+    d.slides = is_sliding_[static_cast<std::size_t>(farthest)];
+  }
+  if (d.state == MotionState::free || d.state == MotionState::arriving) {
+    d.state = d.is_near() ? MotionState::arriving : MotionState::free;
+  }
+  return d;
 }
 
 std::string Controller::Impl::explain() const {
@@ -86,7 +172,6 @@ std::string Controller::Impl::explain() const {
                      " of this step is unusable; check its size and that it is finite";
     return text;
   }
-  const auto diagnosis = system->diagnose(workspace);
   if (command.status == SafetyStatus::clearance_lost && command.coordinate >= 0) {
     const CoordinateLabel& label = system->labels()[static_cast<std::size_t>(command.coordinate)];
     text = parties(label, obstacles().words_for(command.point)) + " overlap by " + millimetres(command.clearance) +
@@ -110,10 +195,15 @@ std::string Controller::Impl::explain() const {
     text += trajectory + "; ";
   }
   switch (command.activity) {
-    case Activity::no_goal: return text + "no goal: it holds still, and evades what comes";
+    case Activity::no_goal:
+      if (!has_input()) {
+        return text + "no goal: it holds still, and evades what comes";
+      }
+      return text + "stopped: the velocity is " + age(order_age_, "inputs.timeout", settings.inputs.timeout) +
+             "; set_velocity or set_twist must be called more often";
     case Activity::stale:
-      return text + "stopped: the obstacles are " + std::to_string(obstacle_age_) +
-             " s old, more than obstacle_timeout; set_obstacles must be called more often";
+      return text + "stopped: the obstacles are " + age(obstacle_age_, "obstacle_timeout", settings.obstacle_timeout) +
+             "; set_obstacles must be called more often";
     case Activity::waiting: return text + "waiting for a posture that reaches the pose";
     case Activity::arrived: return text + "arrived";
     case Activity::blocked:
@@ -153,12 +243,17 @@ std::string Controller::Impl::explain() const {
   if (has_input()) {
     return text + explain_input();
   }
+  const Diagnosis why = diagnosis();
+  const bool is_under_way = why.state == MotionState::free || why.state == MotionState::arriving;
+  if (is_under_way && has_target_ && !posture_found_ && (arm_q_ - target_).cwiseAbs().maxCoeff() < judgement::arrived_joint) {
+    return text + "the arm is there";
+  }
   if (command.on_path) {
     text += "follows a path; ";
   }
   const CoordinateLabel label =
-      diagnosis.coordinate < 0 ? CoordinateLabel{} : system->labels()[static_cast<std::size_t>(diagnosis.coordinate)];
-  return text + diagnosis.describe(label, obstacles());
+      why.coordinate < 0 ? CoordinateLabel{} : system->labels()[static_cast<std::size_t>(why.coordinate)];
+  return text + why.describe(label, obstacles());
 }
 
 }  // namespace sidestep

@@ -176,6 +176,11 @@ class Controller::Impl : private StepState {
   }
   std::string explain_trajectory() const;
   std::string explain_input() const;
+  /// How much slower than the velocity or twist that was asked for it moves; empty where it does not.
+  std::string explain_lag() const;
+  /// Why the last step moved as it did; how far the goal is counts from the arm to the goal that was set, wherever a path or a
+  /// sub-goal leads first.
+  Diagnosis diagnosis() const;
   /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
   std::string explain_target() const;
   void avoid() noexcept;
@@ -277,7 +282,9 @@ class Controller::Impl : private StepState {
   OnlinePlannerStatus guide_status_ = OnlinePlannerStatus::idle;
   const Goal* followed_ = nullptr;
   Eigen::VectorXd held_v_;
-  Eigen::MatrixXd held_;  // directions that limits hold, orthonormal (nv × 6)
+  Eigen::MatrixXd held_;                                // directions that limits hold, orthonormal (nv × 6)
+  Eigen::Index held_clearance_ = -1, held_joint_ = -1;  // what holds the first of them, of a velocity or twist; -1: none
+  bool held_upper_ = false;                             // at that joint's upper limit
   KinematicState twist_state_;
   Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_, projected_;
   Eigen::VectorXd most_v_, most_a_;  // limits that motions use

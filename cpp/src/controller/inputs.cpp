@@ -77,6 +77,7 @@ void Controller::Impl::follow_input() noexcept {
 
 void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept {
   twist_state_.update(arm.robot(), q_, v_);
+  held_clearance_ = held_joint_ = -1;
   if (twist != nullptr && is_fresh()) {
     solve_twist(*twist);
   } else {
@@ -220,6 +221,11 @@ bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
     direction[joint] = 1.0;
   } else {
     return false;
+  }
+  if (held == 0) {
+    held_clearance_ = clearance;
+    held_joint_ = clearance < 0 ? joint : -1;
+    held_upper_ = joint >= 0 && wanted_v_[joint] > 0.0;
   }
   const double missing = bound - direction.dot(held_v_);
   for (Eigen::Index k = 0; k < held; ++k) {

@@ -45,12 +45,6 @@ Parties parties(const Diagnosis& d, const CoordinateLabel& label, const Obstacle
   return {"the arm", "an obstacle or a limit (a density does not tell which)"};
 }
 
-bool arrived(const GoalPull& pull) noexcept {
-  const auto within = [](double error, double limit) { return std::isnan(error) || error < limit; };
-  return within(pull.joint_error, judgement::arrived_joint) && within(pull.position_error, judgement::arrived_position) &&
-         within(pull.rotation_error, judgement::arrived_rotation);
-}
-
 }  // namespace
 
 const char* name(MotionState state) noexcept {
@@ -70,10 +64,14 @@ std::string Diagnosis::way_left() const {
   if (!std::isnan(joint_error)) {
     return way(joint_error, "%.2f rad", slides);
   }
-  if (std::isnan(rotation_error)) {
-    return number("%.3f m", position_error);
-  }
-  return number("%.3f m", position_error) + number(" and %.2f rad", rotation_error);
+  const std::string position = number("%.1f mm", 1000.0 * position_error);
+  return std::isnan(rotation_error) ? position : position + number(" and %.2f rad", rotation_error);
+}
+
+bool Diagnosis::is_near() const noexcept {
+  const auto within = [](double error, double limit) { return std::isnan(error) || error < limit; };
+  return within(joint_error, judgement::arrived_joint) && within(position_error, judgement::arrived_position) &&
+         within(rotation_error, judgement::arrived_rotation);
 }
 
 std::string Diagnosis::describe(const CoordinateLabel& label, const Obstacles& obstacles) const {
@@ -133,7 +131,7 @@ Diagnosis GeometricSystem::diagnose(const Workspace& w) const noexcept {
     d.state = MotionState::inside_barrier;
     d.coordinate = w.inside;
     d.share = 0.0;
-  } else if (arrived(w.pull)) {
+  } else if (d.is_near()) {
     d.state = MotionState::arriving;
   } else if (d.speed < judgement::slow && (d.blocked > 1.0 - judgement::held || pull < judgement::vanished)) {
     d.state = MotionState::stuck;

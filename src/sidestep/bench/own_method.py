@@ -58,10 +58,6 @@ class OwnMover:
 
     def move(self, problem: Problem, settings: MotionSettings) -> Motion:
         """Runs one problem."""
-        if settings.poses or settings.torque:
-            raise ValueError(
-                f"{self.name}: a method of your own gives accelerations, without --torque and --poses"
-            )
         step = self.start(self.robot, problem)
         if not callable(step):
             raise ValueError(

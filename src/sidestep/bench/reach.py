@@ -34,7 +34,7 @@ class BenchSettings:
         jobs: processes. draft: with a coarser body, which is made in seconds; of the controller.
 
     Raises:
-        ValueError: count or jobs below 1, or a draft for a method that has none.
+        ValueError: count or jobs below 1, a draft for a method that has none, torque or poses for a file.
     """
 
     problems: ProblemSettings
@@ -50,6 +50,10 @@ class BenchSettings:
                 raise ValueError(f"{name} is {getattr(self, name)}, must be at least 1")
         if self.draft and not (isinstance(self.method, Method) and self.method.safe):
             raise ValueError(f"draft is for the controller; the method is {self.method}")
+        if isinstance(self.method, Path) and (self.motion.torque or self.motion.poses):
+            raise ValueError(
+                f"{self.method.name}: a method of your own gives accelerations, without --torque and --poses"
+            )
 
 
 @dataclass(frozen=True, eq=False)

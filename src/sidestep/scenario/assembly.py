@@ -176,11 +176,13 @@ def load_robot(scenario: Scenario) -> Robot:
     """The robot that a scenario asks for; raises ValueError or FileNotFoundError that says what is wrong."""
     choice: RobotConfig = scenario.robot
     if choice.name is not None:
-        of_file = ("package_dirs", "tip", "locked", "base", "effort_limits", "velocity_limits")
+        of_file = ("package_dirs", "tip", "base", "effort_limits", "velocity_limits")
         extras = [key for key in of_file if getattr(choice, key)]
         if extras:
-            raise ValueError(f"{', '.join(extras)} go with 'urdf', not with a named robot")
-        return Robot.named(choice.name)
+            raise ValueError(
+                f"{', '.join(extras)} go with 'urdf', not with a named robot, which has its own; write robot.urdf: FILE"
+            )
+        return Robot.named(choice.name, locked=choice.locked)
     file, options = description_of(scenario)
     return Robot.from_urdf(file, **options)
 

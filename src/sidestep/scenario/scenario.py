@@ -36,8 +36,8 @@ class BasePose:
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """A robot by name, or by URDF file with the joints `locked` at a value [rad | m], at that of a posture or within a
-    range, a `tip`, a `base`, and limits by joint.
+    """A robot by name or by URDF file, with the joints `locked` at a value [rad | m], at that of a posture or within a
+    range; by file with a `tip`, a `base`, and limits by joint as well.
 
     effort_limits [Nm | N], velocity_limits [rad/s | m/s]: in place of those of the file.
     """

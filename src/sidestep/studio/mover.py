@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,14 +11,12 @@ import numpy.typing as npt
 from sidestep._core import Controller, ControllerSettings, GeometricSystem, Obstacles, PoseGoal
 from sidestep.arm import Arm
 from sidestep.robot import Robot
-from sidestep.simulation.joint_words import in_words, largest_ways
 from sidestep.simulation.pose_target import IkSolution, PoseTarget
 from sidestep.simulation.run import status_name
 from sidestep.studio.reason import Moment, Reason, binding, limit_in_words, reason_of
 
 Array = npt.NDArray[np.float64]
 
-ON_THE_PATH = re.compile(r"(arriving|on the way), [^;,]* from the goal")
 NEAR_GOAL = 0.05  # [rad | m] in every joint counts as arriving
 STILL = 1e-3  # [m/s] an obstacle slower than this is at rest
 ASIDE = 1e-4  # [m] farther from where its velocity has brought it, an obstacle is told anew
@@ -127,15 +124,8 @@ class ControllerMover:
             return None
         command, step = self._said.command, self._said.geometric_step
         link = "" if command.coordinate < 0 else self._said.labels[command.coordinate].name
-        words = self._said.explain()
-        if command.on_path and self._said.target is not None:
-            # On a path the sentence counts from the place on it that the arm is led to, which is never far.
-            way = self._said.target - self._q
-            left = in_words(*largest_ways(self._robot, way), radians=".2f", millimetres=".0f")
-            stage = "arriving" if np.abs(way).max() < NEAR_GOAL else "on the way"
-            words = ON_THE_PATH.sub(f"{stage}, {left} from the goal", words)
         return Account(
-            words,
+            self._said.explain(),
             f"{status_name(command.status)}, {status_name(command.activity)}",
             status_name(command.activity),
             (link, command.clearance),

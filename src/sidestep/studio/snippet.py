@@ -119,16 +119,20 @@ def call(head: str, values: dict[str, Any], *first: str) -> list[str]:
 def _arm_code(written: Scenario, ellipsoids: int | None) -> str:
     name = written.robot.name
     if name is not None and ellipsoids is None:
-        return f"ss.Arm.load({name!r})"
+        return f"ss.Arm.load({name!r}{_locked_code(written.robot)})"
     robot = robot_code(written.robot, written)
     count = "" if ellipsoids is None else f", components={ellipsoids}"
     return f"ss.Arm.from_robot(robot := {robot}, ss.Body.cover(robot{count}))"
 
 
+def _locked_code(robot: RobotConfig) -> str:
+    return "" if robot.locked is None else f", locked={robot.locked!r}"
+
+
 def robot_code(robot: RobotConfig, scenario: Scenario) -> str:
     """The robot of a scenario."""
     if robot.name is not None:
-        return f"ss.Robot.named({robot.name!r})"
+        return f"ss.Robot.named({robot.name!r}{_locked_code(robot)})"
     assert robot.urdf is not None
     parts = [repr(str(scenario.file(robot.urdf)))]
     if robot.package_dirs:

@@ -58,8 +58,10 @@ struct Diagnosis {
   double joint_error = nan, position_error = nan, rotation_error = nan;
   bool slides = false;  ///< the joint of `joint_error` slides, so that it is in m
 
-  /// How far the goal is, for example "0.31 rad" or "12 mm".
+  /// How far the goal is, for example "0.31 rad", "12.0 mm" or "12.0 mm and 0.31 rad".
   std::string way_left() const;
+  /// Whether that counts as there.
+  bool is_near() const noexcept;
 
   /// In one English sentence, given the label of the dominating coordinate and, for their names, the obstacles of the
   /// step.
