@@ -348,6 +348,10 @@ void bind_controller(nb::module_& m) {
                    nb::sig("def target(self) -> numpy.typing.NDArray[numpy.float64] | None"),
                    "(nv,) the configuration that the arm is led to: the goal, or a posture of a pose goal; None: none yet.")
       .def_prop_ro("plan", [](const Controller& self) { return self.last_plan(); }, "What the planner found last.")
+      .def_prop_ro("goal_obstruction", &Controller::goal_obstruction,
+                   nb::sig("def goal_obstruction(self) -> Obstruction | None"),
+                   "What the covering body touches at the goal, or at the posture found for a pose, among the obstacles as they "
+                   "were set; None: it is free there, or there is no goal.")
       .def_prop_ro("searches", [](const Controller& self) { return self.planner_counts().searches; },
                    "How often a path was looked for.")
       .def_prop_ro("has_torque", &Controller::has_torque, "Whether the commands hold torque.")

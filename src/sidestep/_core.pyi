@@ -3074,6 +3074,12 @@ class Controller:
         """What the planner found last."""
 
     @property
+    def goal_obstruction(self) -> Obstruction | None:
+        """
+        What the covering body touches at the goal, or at the posture found for a pose, among the obstacles as they were set; None: it is free there, or there is no goal.
+        """
+
+    @property
     def searches(self) -> int:
         """How often a path was looked for."""
 

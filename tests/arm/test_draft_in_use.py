@@ -104,6 +104,18 @@ def test_prepare_without_the_cache_leaves_none(urdf: Path, tmp_path: Path, cache
     assert {folder.name for folder in cache_folder.iterdir()} >= {"arms", "links"}
 
 
+@pytest.mark.slow
+def test_prepare_gives_links_the_ellipsoids_asked_for(urdf: Path, tmp_path: Path) -> None:
+    arguments = ["prepare", str(urdf), "--out", str(tmp_path / "a.arm"), "--components"]
+    for wrong in ("link1=2.5", "link1", "link1=0"):
+        refused = CliRunner().invoke(app, [*arguments, wrong])
+        assert refused.exit_code != 0
+        assert "link1" in str(refused.exception)
+    done = CliRunner().invoke(app, [*arguments, "link1=3"])
+    assert done.exit_code == 0, done.output
+    assert list(ss.Arm.load(tmp_path / "a.arm").body.links).count("link1") == 3
+
+
 def test_a_refinement_serves_without_a_cache_and_says_how_far_it_is(
     urdf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

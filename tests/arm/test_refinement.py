@@ -7,8 +7,10 @@ import pytest
 
 import sidestep as ss
 from sidestep.arm import Refinement
+from sidestep.arm.tight_places import tight_links
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_refine import Ellipsoids
+from sidestep.obstacles import Obstacles, pose_at
 
 PLANAR = """<robot name="two">
   <link name="base"/>
@@ -89,3 +91,80 @@ def test_what_fails_is_told_and_what_is_cancelled_stays_a_draft(tmp_path):
     with pytest.raises(RuntimeError, match="cancelled"):
         refinement.wait(0.0)
     assert refinement.arm is draft
+
+
+BOX = PLANAR.replace(
+    '<origin xyz="0.15 0 0"/><geometry><sphere radius="0.04"/></geometry>',
+    '<origin xyz="0.2 0 0"/><geometry><box size="0.3 0.08 0.08"/></geometry>',
+)
+
+
+def beside(arm: ss.Arm, goal: np.ndarray, gap: float) -> ss.Sphere:
+    """A ball that leaves a gap [m] to the flat side of the box at the goal."""
+    robot = arm.robot
+    assert isinstance(robot, ss.Robot)
+    X = robot.pose(goal, "l2")
+    return ss.Sphere(0.02, pose_at(X[:3, 3] + X[:3, :3] @ [0.2, 0.04 + 0.02 + gap, 0.0]), name="ball")
+
+
+@pytest.mark.slow
+def test_a_goal_that_only_the_cover_blocks_is_reached_with_a_finer_one():
+    arm = ss.Arm.load(BOX, components={"l2": 2})
+    assert [proof.max_overshoot > 0.03 for proof in arm.proof if proof.link == "l2"] == [True]
+    goal, q, v = np.array([0.5, 0.0]), np.array([-0.5, 0.0]), np.zeros(2)
+    controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
+    controller.set_goal(goal)
+    controller.set_obstacles([beside(arm, goal, 0.010)])
+    for _ in range(3000):
+        command = controller.step(q, v)
+        q, v = command.position, command.velocity
+    assert command.activity.name == "blocked"
+    assert controller.goal_obstruction.link == "l2"
+    assert "or with a finer cover of the link" in controller.explain()
+    assert tight_links(controller, arm) == {"l2": 24}
+
+    refinement = Refinement(arm, controller, watch=True)
+    assert refinement.is_done
+    end = time.monotonic() + 300.0
+    while refinement.arm is arm and time.monotonic() < end:
+        command = controller.step(q, v)
+        q, v = command.position, command.velocity
+        time.sleep(0.001)
+    for _ in range(3000):
+        command = controller.step(q, v)
+        q, v = command.position, command.velocity
+    refinement.cancel()
+    assert refinement.arm.body.links.count("l2") == 24
+    assert controller.goal_obstruction is None
+    assert command.activity.name == "arrived"
+    np.testing.assert_allclose(q, goal, atol=1e-6)
+
+
+def test_finer_covers_are_not_made_where_they_cannot_help():
+    arm = ss.Arm.load(PLANAR, draft=True)
+    goal = np.array([0.5, 0.0])
+    controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
+    controller.set_goal(goal)
+    middle = arm.robot.pose(goal, "l2") @ [0.15, 0.0, 0.0, 1.0]
+    controller.set_obstacles([ss.Sphere(0.03, pose_at(middle[:3]), name="ball")])
+    controller.step(np.zeros(2), np.zeros(2))
+    assert controller.goal_obstruction is not None  # the mesh is in the ball
+    assert tight_links(controller, arm) == {}
+    controller.set_obstacles(Obstacles.none())
+    assert controller.goal_obstruction is None
+    assert tight_links(controller, arm) == {}
+
+
+def test_components_of_unknown_links_and_arms_without_meshes_are_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"unknown links \['hand'\]; the links with geometry are l1, l2"):
+        ss.Arm.load(PLANAR, components={"hand": 24})
+    with pytest.raises(
+        ValueError, match="components of link 'l1' is 0, must be a whole number of at least 1"
+    ):
+        ss.Arm.load(PLANAR, components={"l1": 0})
+    file = tmp_path / "two.arm"
+    ss.Arm.load(PLANAR, draft=True).save(file)
+    with pytest.raises(ValueError, match="components cannot be given for arm file"):
+        ss.Arm.load(file, components={"l1": 24})
+    with pytest.raises(ValueError, match=r"was read from an \.arm file"):
+        Refinement(ss.Arm.load(file), watch=True)

@@ -140,6 +140,10 @@ Plan Controller::last_plan() const {
   const std::lock_guard lock(setters_);
   return newest().guide ? newest().guide->last_plan() : Plan{};
 }
+std::optional<Obstruction> Controller::goal_obstruction() const {
+  const std::lock_guard lock(setters_);
+  return newest().goal_obstruction();
+}
 OnlinePlanner::Counts Controller::planner_counts() const {
   const std::lock_guard lock(setters_);
   return newest().guide ? newest().guide->counts() : OnlinePlanner::Counts{};

@@ -42,13 +42,45 @@ std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
 
 Eigen::VectorXd Controller::Impl::target() const { return has_target_ ? Eigen::VectorXd(target_ - turns_) : Eigen::VectorXd(); }
 
+namespace {
+
+/// Says what ellipsoids touch, and searches for nothing.
+PlannerSettings of_ends() {
+  PlannerSettings exact;
+  exact.allowance = exact.pair_allowance = 0.0;
+  exact.max_nodes = 2;
+  return exact;
+}
+
+}  // namespace
+
+std::optional<Obstruction> Controller::Impl::goal_obstruction() const {
+  Order order;
+  std::shared_ptr<const Obstacles> shown;
+  std::optional<Posture> posture;
+  {
+    const std::lock_guard lock(mutex_);
+    order = shown_order_;
+    shown = shown_obstacles_;
+    posture = shown_posture_;
+  }
+  const Goal* const goal = std::get_if<Goal>(&order);
+  if (goal == nullptr) {
+    return std::nullopt;
+  }
+  const JointGoal* const joints = std::get_if<JointGoal>(goal);
+  if (joints == nullptr && !(posture && posture->found())) {
+    return std::nullopt;
+  }
+  Obstruction found;
+  const bool touches = RrtConnect(body_, of_ends()).obstructed(joints != nullptr ? joints->position : posture->q, *shown, found);
+  return touches ? std::optional(found) : std::nullopt;
+}
+
 std::string Controller::Impl::explain_target() const {
   if (!has_target_ || moves_) {
     return {};
   }
-  PlannerSettings exact;
-  exact.allowance = exact.pair_allowance = 0.0;
-  exact.max_nodes = 2;  // it searches for nothing
   std::shared_ptr<const Obstacles> shown;
   bool touches_itself;
   {
@@ -59,7 +91,7 @@ std::string Controller::Impl::explain_target() const {
   Obstacles around = *shown;
   around.advance(obstacle_age_);
   Obstruction obstruction;
-  RrtConnect ends(body_, exact);
+  RrtConnect ends(body_, of_ends());
   if (touches_itself &&
       ends.obstructed(target_, Obstacles::none(), obstruction)) {  // no obstacle that goes away frees the goal
     return "no posture without self-collision was found for the pose: at the last one " + describe(obstruction) +
@@ -72,10 +104,23 @@ std::string Controller::Impl::explain_target() const {
     obstruction = guide->last_plan().obstruction;
   }
   const bool own = obstruction.label.kind == CoordinateLabel::Kind::self;
+  const bool finer = finer_covers_may_free(obstruction);
   return "at the goal " + describe(obstruction) +
-         (!own          ? "; it goes on when that is free"
+         (!own          ? std::string("; it goes on when that is free") + (finer ? ", or with a finer cover of the link" : "")
           : pose_goal() ? "; another posture is looked for"
-                        : ", as far as the covering body says; set another goal, or allow the two to touch");
+                        : std::string(", as far as the covering body says; set another goal, or allow the two to touch") +
+                              (finer ? ", or cover them more finely" : ""));
+}
+
+bool Controller::Impl::finer_covers_may_free(const Obstruction& obstruction) const {
+  double overshoot = 0.0;
+  for (const CoverProof& proof : arm.proof()) {
+    if (proof.link == obstruction.label.name ||
+        (obstruction.label.kind == CoordinateLabel::Kind::self && proof.link == obstruction.label.other)) {
+      overshoot += proof.max_overshoot;
+    }
+  }
+  return overshoot > obstruction.depth + settings.safety.margin;
 }
 
 std::string Controller::Impl::explain_input() const {

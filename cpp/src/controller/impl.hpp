@@ -60,6 +60,8 @@ class Controller::Impl : private StepState {
   bool is_lifted() const noexcept;
   /// Asks the threads to end, and does not wait.
   void retire() noexcept { stopping_.store(true); }
+  /// See Controller.
+  std::optional<Obstruction> goal_obstruction() const;
   /// Measured in the last step; empty before the first. For one thread at a time.
   Eigen::VectorXd last_q() {
     const Eigen::VectorXd& q = measured_.get();
@@ -183,6 +185,8 @@ class Controller::Impl : private StepState {
   Diagnosis diagnosis() const;
   /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
   std::string explain_target() const;
+  /// Whether what is in the way may be so for the covering body alone: links overshoot by more than they reach into it.
+  bool finer_covers_may_free(const Obstruction& obstruction) const;
   void avoid() noexcept;
   using MassMatrix = const Eigen::Ref<const Eigen::MatrixXd>*;
   using Bias = const Eigen::Ref<const Eigen::VectorXd>*;

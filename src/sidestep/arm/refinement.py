@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import tempfile
 import threading
@@ -67,6 +68,7 @@ class Refinement:
             self._done.set()
         if arm.is_draft or watch:
             self._thread = threading.Thread(target=self._work, args=(watch,), daemon=True)
+            atexit.register(self.cancel)
             self._thread.start()
 
     @property
@@ -121,14 +123,14 @@ class Refinement:
         except Exception as error:
             if not self._cancelled.is_set():
                 warnings.warn(f"arm {self._arm.name!r}: no finer body: {error}", RuntimeWarning, stacklevel=1)
+        finally:
+            atexit.unregister(self.cancel)
 
     def _tight(self) -> dict[str, int]:
         """How many ellipsoids links are to have for what controllers plan."""
         found: dict[str, int] = {}
         for controller in self._controllers:
-            for link, number in tight_links(
-                controller.plan, self._arm, controller.settings.safety.margin
-            ).items():
+            for link, number in tight_links(controller, self._arm).items():
                 found[link] = max(number, found.get(link, 0))
         return found
 

@@ -10,19 +10,21 @@ BLOCKED = (PlanStatus.goal_in_collision, PlanStatus.start_in_collision)
 WAYLESS = (PlanStatus.no_path, PlanStatus.timeout)
 
 
-def tight_links(plan: _core.Plan, arm: _core.Arm, margin: float) -> dict[str, int]:
-    """How many ellipsoids links are to have that may be why a plan failed; empty where a finer cover cannot help.
+def tight_links(controller: _core.Controller, arm: _core.Arm) -> dict[str, int]:
+    """How many ellipsoids to give links that may be why no way leads to the goal; empty if finer covers cannot help.
 
-    Of an end in collision: the links that are named, if both overshoot together by more than they reach into what is in
-    the way, and the margin. Where an arm finds no path: every link that moves.
+    If an end is blocked: the links that are named, where they overshoot by more than they reach into what is in the
+    way, plus the margin that commands keep. If no path is found: every link that moves.
 
     Args:
-        plan: the last one. arm: what it is for. margin: [m] that commands keep.
+        controller: with a goal. arm: what it moves.
     """
+    margin = controller.settings.safety.margin
+    plan, at_goal = controller.plan, controller.goal_obstruction
     overshoot = {proof.link: proof.max_overshoot for proof in arm.proof}
     links: list[str] = []
-    if plan.status in BLOCKED:
-        found = plan.obstruction
+    if at_goal is not None or plan.status in BLOCKED:
+        found = plan.obstruction if at_goal is None else at_goal
         links = [found.link, found.other] if found.kind == CoordinateKind.self else [found.link]
         if sum(overshoot.get(link, 0.0) for link in links) <= found.depth + margin:
             return {}

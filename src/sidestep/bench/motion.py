@@ -169,7 +169,6 @@ class ControllerMover:
     ) -> Motion:
         """A motion with what its controller knows of it."""
         first, improved = (None, None) if planned is None else planned
-        margin = controller.settings.safety.margin
         return replace(
             motion,
             first_path_seconds=first,
@@ -177,7 +176,7 @@ class ControllerMover:
             ended="arrived" if motion.arrived else controller.command.activity.name,
             safe=True,
             pose_error=None if pose is None else pose.errors(motion.q[-1]),
-            tight={} if motion.arrived else tight_links(controller.plan, self.arm, margin),
+            tight={} if motion.arrived else tight_links(controller, self.arm),
         )
 
 

@@ -41,20 +41,28 @@ JerkLimitOption: TypeAlias = Annotated[
 
 
 def by_joint(texts: list[str] | None, option: str) -> dict[str, float]:
-    """Values of an option that is written JOINT=VALUE.
+    """Values of an option that is written JOINT=VALUE; raises as `by_name`."""
+    return by_name(texts, option, "JOINT=VALUE", "joint1=87")
+
+
+def by_name(texts: list[str] | None, option: str, form: str, example: str) -> dict[str, float]:
+    """Values of an option by names.
+
+    Args:
+        texts: what was given. option: its name. form, example: of what is allowed.
 
     Raises:
         ValueError: names the option, what was written and what is allowed.
     """
     values = {}
     for text in texts or ():
-        joint, _, value = text.rpartition("=")
+        name, _, value = text.rpartition("=")
         try:
-            values[joint] = float(value)
+            values[name] = float(value)
         except ValueError:
-            joint = ""
-        if not joint:
-            raise ValueError(f"{option} is {text!r}; allowed: JOINT=VALUE, for example {option} joint1=87")
+            name = ""
+        if not name:
+            raise ValueError(f"{option} is {text!r}; allowed: {form}, for example {option} {example}")
     return values
 
 

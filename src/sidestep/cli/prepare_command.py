@@ -15,6 +15,7 @@ from sidestep.cli.limit_options import (
     PackageDirOption,
     TipOption,
     VelocityLimitOption,
+    by_name,
     reading_options,
 )
 from sidestep.cli.output import QuietOption, console
@@ -30,6 +31,13 @@ def prepare(
     velocity_limit: VelocityLimitOption = None,
     acceleration_limit: AccelerationLimitOption = None,
     jerk_limit: JerkLimitOption = None,
+    components: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="LINK=NUMBER of ellipsoids for a link that works close to things: 24 overshoot about half as much "
+            "as 8; may be repeated."
+        ),
+    ] = None,
     draft: Annotated[
         bool, typer.Option(help="In seconds: a body that covers the arm as surely, with larger ellipsoids.")
     ] = False,
@@ -64,6 +72,12 @@ def prepare(
     given = reading_options(
         package_dir, tip, locked, effort_limit, velocity_limit, acceleration_limit, jerk_limit
     )
+    numbers = by_name(components, "--components", "LINK=NUMBER", "hand=24")
+    if wrong := [f"{link}={number:g}" for link, number in numbers.items() if not number.is_integer()]:
+        raise ValueError(
+            f"--components is {wrong[0]!r}; allowed: LINK=NUMBER with a whole number of at least 1"
+        )
+    given["components"] = {link: int(number) for link, number in numbers.items()}
     arm = Arm.load(source, draft=draft, cache=cache, progress=show, **given)
     arm.save(out)
     terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)

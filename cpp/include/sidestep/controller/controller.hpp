@@ -132,6 +132,9 @@ class Controller {
   Eigen::VectorXd target() const;
   /// The planner's last plan, and how often it searched. Not for use in the loop.
   Plan last_plan() const;
+  /// What the covering body touches at the goal, or at the posture found for a pose, among the obstacles as they were set; nothing
+  /// where that is free or there is no goal. From any thread; not for use in the loop.
+  std::optional<Obstruction> goal_obstruction() const;
   OnlinePlanner::Counts planner_counts() const;
   bool has_torque() const noexcept;
 
