@@ -11,6 +11,7 @@
 #include "interruptible.hpp"
 #include "module.hpp"
 #include "sidestep/body/cover_refinement.hpp"
+#include "sidestep/body/triangle_distance.hpp"
 
 namespace sidestep::python {
 namespace {
@@ -61,6 +62,35 @@ std::vector<Eigen::Matrix3Xd> as_directions(const ArrayLike& directions) {
     sets.emplace_back(Eigen::Map<const Eigen::Matrix3Xd>(array.data() + 3 * array.shape(1) * r, 3, num));
   }
   return sets;
+}
+
+void bind_triangle_distance(nb::module_& m) {
+  m.def(
+      "distance_to_triangles",
+      [](const ArrayLike& points, const ArrayLike& triangles, const ArrayLike& candidates) {
+        const Eigen::Matrix3Xd from = as_points(points, "points");
+        const Array corners = as_array(triangles, "triangles"), numbers = as_array(candidates, "candidates");
+        if (corners.ndim() != 3 || corners.shape(1) != 3 || corners.shape(2) != 3) {
+          throw nb::value_error("triangles must have shape (F, 3, 3)");
+        }
+        if (numbers.ndim() != 2 || numbers.shape(0) != static_cast<std::size_t>(from.cols())) {
+          throw nb::value_error("candidates must have shape (N, C)");
+        }
+        const auto num = static_cast<Eigen::Index>(3 * corners.shape(0));
+        const Eigen::Matrix3Xd columns = Eigen::Map<const Eigen::Matrix3Xd>(corners.data(), 3, num);
+        const std::vector<int> chosen(numbers.data(), numbers.data() + numbers.size());
+        Eigen::VectorXd distances;
+        {
+          const nb::gil_scoped_release others;
+          distances = nearest_triangle_distances(from, columns, chosen);
+        }
+        return to_numpy(distances);
+      },
+      nb::arg("points"), nb::arg("triangles"), nb::arg("candidates"),
+      nb::sig("def distance_to_triangles(points: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, "
+              "candidates: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]"),
+      "Exact distance (N,) [m] of points (N, 3) [m] to the nearest of those triangles (F, 3, 3) [m] that are candidates (N, C)\n"
+      "of each.");
 }
 
 void bind_cover_refinement(nb::module_& m) {
@@ -139,6 +169,7 @@ void bind_body(nb::module_& m) {
           },
           "Levels (K,) of the covering ellipsoids, or None if the body is not calibrated.")
       .def_prop_ro("covariances", [](const Body& b) { return to_numpy_matrices(b.covariances); }, "(K, 3, 3) [m^2] in the frame of the link.");
+  bind_triangle_distance(m);
   bind_cover_refinement(m);
 }
 

@@ -190,6 +190,12 @@ class Body:
     def covariances(self) -> numpy.typing.NDArray[numpy.float64]:
         """(K, 3, 3) [m^2] in the frame of the link."""
 
+def distance_to_triangles(points: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, candidates: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Exact distance (N,) [m] of points (N, 3) [m] to the nearest of those triangles (F, 3, 3) [m] that are candidates (N, C)
+    of each.
+    """
+
 def refine_cover(*, origin: numpy.typing.ArrayLike, spacing: float, values: numpy.typing.ArrayLike, points: numpy.typing.ArrayLike, multipliers: numpy.typing.ArrayLike, directions: numpy.typing.ArrayLike, centres: numpy.typing.ArrayLike, shapes: numpy.typing.ArrayLike, steps: int, first_rate: float, last_rate: float, stiffness: float, multiplier_steps: int, margin: float, unit: float, area: float, slimness: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Moves ellipsoids until they hold points (N, 3) [m] and overshoot a surface little: centres (K, 3),

@@ -12,12 +12,13 @@ import pytest
 import trimesh
 
 from sidestep import Body, Robot, _core
+from sidestep._core import distance_to_triangles
 from sidestep.body.cover import CoverSettings, components_for
 from sidestep.body.cover_certificate import certify, complete
 from sidestep.body.cover_overshoot import overshoot, union_volume
 from sidestep.body.cover_problem import TradeOff
 from sidestep.body.cover_refine import OUTLINE, Ellipsoids, rearranged, refine
-from sidestep.body.cover_surface import LinkSurface, distance_to_triangles
+from sidestep.body.cover_surface import LinkSurface
 from sidestep.body.sampling import sample_link
 
 TRIANGLE = np.array([[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]]])
@@ -85,6 +86,16 @@ def test_overshoot_of_a_ball_around_a_cube_by_value(planar: Robot) -> None:
     assert volume == pytest.approx(4.0 / 3.0 * np.pi * 1e-3, rel=0.01)  # three standard errors are 0.5 %
 
 
+def test_distance_to_a_triangle_by_value() -> None:
+    triangles = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[5.0, 0.0, 0.0]] * 3])
+    points = [[0.2, 0.2, -0.3], [0.5, -2.0, 0.0], [1.0, 1.0, 0.0], [-3.0, -4.0, 0.0], [5.0, 0.0, 2.0]]
+    both = np.tile([0, 1], (5, 1))
+    expected = [0.3, 2.0, np.sqrt(0.5), 5.0, 2.0]  # face, edge, edge, corner, a triangle without area
+    np.testing.assert_allclose(distance_to_triangles(points, triangles, both), expected, rtol=1e-14)
+    with pytest.raises(ValueError, match="candidate 2 is none of the 2 triangles"):
+        distance_to_triangles(points, triangles, both + 1)
+
+
 def test_distances_agree_with_every_triangle_examined() -> None:
     import trimesh
 
@@ -93,10 +104,8 @@ def test_distances_agree_with_every_triangle_examined() -> None:
     points = surface.sample(200, np.random.default_rng(1)) + np.random.default_rng(2).normal(
         0.0, 0.01, (200, 3)
     )
-    slow = [
-        distance_to_triangles(np.repeat(p[None], len(mesh.triangles), axis=0), mesh.triangles).min()
-        for p in points
-    ]
+    every = np.tile(np.arange(len(mesh.triangles)), (len(points), 1))
+    slow = distance_to_triangles(points, mesh.triangles, every)
     np.testing.assert_allclose(surface.distance(points), slow, atol=1e-9)  # rounding of cut triangles
     inside = np.linalg.norm(points[:, :2], axis=1) < 0.04
     inside &= np.abs(points[:, 2]) < 0.09

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
+from sidestep._core import distance_to_triangles
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -36,28 +38,6 @@ def bisect(triangles: Array, edge: NDArray[np.intp]) -> Array:
     a, b, c = (triangles[rows, (edge + shift) % 3] for shift in range(3))
     middle = 0.5 * (a + b)
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-
-
-def distance_to_triangles(points: Array, triangles: Array) -> Array:
-    """Exact distance (N,) of point i (N, 3) to triangle i (N, 3, 3)."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    ab, ac, ap = b - a, c - a, points - a
-    normal = np.cross(ab, ac)
-    area = np.einsum("ni,ni->n", normal, normal)
-    safe = np.where(area > 0.0, area, 1.0)
-    v = np.einsum("ni,ni->n", np.cross(ap, ac), normal) / safe
-    w = np.einsum("ni,ni->n", np.cross(ab, ap), normal) / safe
-    above = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0) & (area > 0.0)
-    plane = np.abs(np.einsum("ni,ni->n", ap, normal)) / np.sqrt(safe)
-    edges = np.minimum.reduce([_distance_to_segments(points, s, t) for s, t in ((a, b), (b, c), (c, a))])
-    return np.asarray(np.where(above, np.minimum(plane, edges), edges))
-
-
-def _distance_to_segments(points: Array, start: Array, end: Array) -> Array:
-    along = end - start
-    length = np.einsum("ni,ni->n", along, along)
-    share = np.einsum("ni,ni->n", points - start, along) / np.where(length > 0.0, length, 1.0)
-    return np.asarray(np.linalg.norm(points - start - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,9 +146,7 @@ class LinkSurface:
         """
         count = min(CANDIDATES, len(self.pieces))
         _, index = self._centroids.query(points, k=count)
-        repeated = np.repeat(points, count, axis=0)
-        distances = distance_to_triangles(repeated, self.pieces[index.reshape(-1)])
-        return np.asarray(distances.reshape(len(points), count).min(axis=1, initial=np.inf))
+        return distance_to_triangles(points, self.pieces, index.reshape(len(points), count))
 
     def overshoot(self, points: Array) -> Array:
         """How far points (N, 3) lie outside the link (N,) [m], 0 inside.
