@@ -162,6 +162,8 @@ def test_components_of_unknown_links_and_arms_without_meshes_are_refused(tmp_pat
         ValueError, match="components of link 'l1' is 0, must be a whole number of at least 1"
     ):
         ss.Arm.load(PLANAR, components={"l1": 0})
+    with pytest.raises(ValueError, match=r"unknown links \['hand'\]"):
+        ss.Arm.load(PLANAR, components={"hand": 24}, draft=True)
     file = tmp_path / "two.arm"
     ss.Arm.load(PLANAR, draft=True).save(file)
     with pytest.raises(ValueError, match="components cannot be given for arm file"):

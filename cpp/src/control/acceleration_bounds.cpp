@@ -214,11 +214,11 @@ AccelerationBounds::AccelerationBounds(int num_coordinates)
 static void return_smoothly(AccelerationInterval& interval, double q, double v, double before, const ScalarLimits& limits,
                             double step, double period) noexcept {
   if (q < limits.lower && v >= 0.0) {
-    interval.lower = std::min(interval.lower, std::max(before + step, -v / period));
+    interval.lower = std::min(interval.lower, std::max({before + step, -v / period, -limits.acceleration}));
     interval.position_lower = std::min(interval.position_lower, interval.lower);
   }
   if (q > limits.upper && v <= 0.0) {
-    interval.upper = std::max(interval.upper, std::min(before - step, -v / period));
+    interval.upper = std::max(interval.upper, std::min({before - step, -v / period, limits.acceleration}));
     interval.position_upper = std::max(interval.position_upper, interval.upper);
   }
 }

@@ -22,6 +22,8 @@ constexpr double slow = 0.01;
 constexpr double smallest_deceleration = 1e-6;
 // What accelerations and torques leave together is looked for where so small a share of what they leave alone would matter.
 constexpr double scarce = 0.05;
+// [m] Stands for the depth of what is not lost, so that its way back counts as that of what is: after what others have to keep.
+constexpr double least_depth = 1e-6;
 constexpr double at_rest = 1e-6;              // [rad/s | m/s], or slower
 constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
 constexpr double largest_acceleration = 1e3;  // stands for what has no limit [/s²]
@@ -296,11 +298,14 @@ bool SafetyRows::draw_on_reserves(double period) noexcept {
   return any;
 }
 
+void SafetyRows::ask_again() noexcept { lower.head(size_) = asked_.head(size_); }
+
 bool SafetyRows::ask_for_ways_back() noexcept {
   bool any = false;
   for (int row = 0; row < size_; ++row) {
     if (reserves_[static_cast<std::size_t>(row)].room <= 0.0 && lower[row] < asked_[row]) {
       lower[row] = asked_[row];
+      depths[row] = std::max(depths[row], least_depth);
       any = true;
     }
   }
@@ -408,11 +413,10 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
     reserve.jerk = 0.0;
     if (last != nullptr) {
-      const double asked = required;
-      if (last->jerk_share * gradient.cwiseAbs().dot(limits.jerk) < infinity) {
-        const double jerk =
-            of_jerk_alone * last->jerk_share * (room > 0.0 ? of_arm * stop_jerk : gradient.cwiseAbs().dot(limits.jerk));
-        reserve = {room, u, c, tau > 0.0 ? of_arm / tau : 0.0, jerk, gradient.dot(last->acceleration)};
+      const double asked = required, whole = last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
+      if (whole < infinity && (room <= 0.0 || u <= of_arm + slow)) {
+        const double jerk = room > 0.0 ? last->jerk_share * of_arm * stop_jerk : whole;
+        reserve = {room, u, c, tau > 0.0 ? of_arm / tau : 0.0, of_jerk_alone * jerk, gradient.dot(last->acceleration)};
       }
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
       smooth = required < asked;

@@ -256,6 +256,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
     if (!solved && smooth && rows_.draw_on_reserves(settings_.period)) {
       solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution);
       back = solved && rows_.ask_for_ways_back();
+      if (!solved) {
+        rows_.ask_again();
+      }
     }
     if (!solved && smooth) {
       // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of

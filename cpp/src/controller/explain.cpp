@@ -73,7 +73,8 @@ std::optional<Obstruction> Controller::Impl::goal_obstruction() const {
     return std::nullopt;
   }
   Obstruction found;
-  const bool touches = RrtConnect(body_, of_ends()).obstructed(joints != nullptr ? joints->position : posture->q, *shown, found);
+  const bool touches =
+      RrtConnect(body_, of_ends()).obstructed(joints != nullptr ? joints->position : posture->q, *shown, found);
   return touches ? std::optional(found) : std::nullopt;
 }
 

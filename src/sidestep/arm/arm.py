@@ -249,8 +249,12 @@ class Arm(_core.Arm):
     ) -> Arm:
         from sidestep.arm.cache import arm_path, stored_or_made
         from sidestep.arm.preparation import prepare
+        from sidestep.body.sampling import check_components, links_with_geometry
 
         robot = describe()
+        if how.components:
+            links = links_with_geometry(robot)
+            check_components({**dict.fromkeys(links, 1), **how.components}, links)
         allowed = tuple(dict.fromkeys((*robot.allowed_pairs, *how.allowed)))
         fine = arm_path(robot, allowed, label, components=how.components)
         draft = how.draft and not (how.cache and fine.exists())

@@ -14,7 +14,6 @@ from sidestep import _core
 from sidestep.arm.link_pairs import DRAFT, FULL, tables_and_pairs
 from sidestep.body import Body
 from sidestep.body.cover import CoverProgress, CoverSettings
-from sidestep.body.sampling import check_components, links_with_geometry
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 
@@ -57,9 +56,6 @@ def prepare(
     for pair in allowed:
         for link in pair:
             robot.link(link)
-    if components:
-        links = links_with_geometry(robot)
-        check_components({**dict.fromkeys(links, 1), **components}, links)
     if body is None:
         body = Body.cover(
             robot, effort="draft" if draft else "fine", cache=cached, progress=_of_stage("cover", progress)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import atexit
-import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
 import tempfile
 import threading
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from sidestep import _core
 from sidestep._core import Controller
@@ -17,8 +20,6 @@ from sidestep.arm.arm import Arm
 from sidestep.arm.tight_places import tight_links
 
 if TYPE_CHECKING:  # imported where they are needed
-    from multiprocessing.connection import Connection
-
     from sidestep.arm.preparation import Progress
 
 LOOK = 0.5  # [s] between two looks at what controllers plan
@@ -57,7 +58,7 @@ class Refinement:
         self._error: str | None = None
         self._done = threading.Event()
         self._cancelled = threading.Event()
-        self._process: multiprocessing.process.BaseProcess | None = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
         if watch and arm._request is None:
             raise ValueError(
@@ -101,11 +102,11 @@ class Refinement:
         if not self._done.is_set():
             self._error = "it was cancelled"
         self._cancelled.set()
-        process = self._process
-        if process is not None and process.is_alive():
-            process.terminate()
-        if self._thread is not None:
-            self._thread.join()
+        process, thread = self._process, self._thread
+        if process is not None:
+            process.kill()
+        if thread is not None and thread is not threading.current_thread():
+            thread.join()
 
     def _work(self, watch: bool) -> None:
         """Of the thread."""
@@ -139,28 +140,40 @@ class Refinement:
         assert self._arm._request is not None
         source, options = self._arm._request
         options = {**options, "components": {**options.get("components", {}), **components}}
-        context = multiprocessing.get_context("spawn")
-        messages, sending = context.Pipe(duplex=False)
-        self._process = context.Process(target=_prepare, args=(source, options, sending), daemon=True)
-        self._process.start()
-        sending.close()  # so that the pipe ends with the process
-        try:
-            if self._cancelled.is_set():
-                self._process.terminate()
-            finer = Arm(self._received(messages), description=self._arm._description)
-        finally:
-            self._process.join()
+        finer = Arm(self._prepared(source, options), description=self._arm._description)
         finer._request = source, options
         for controller in self._controllers:
             controller.set_arm(finer)
         self._arm = finer
 
-    def _received(self, messages: Connection[Any, Any]) -> _core.Arm:
-        """The arm that the process prepares."""
+    def _prepared(self, source: str | Path, options: Mapping[str, Any]) -> _core.Arm:
+        """The arm that a process of its own prepares: one that does not run the caller's program again."""
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(folder for folder in sys.path if folder)}
+        command = [sys.executable, "-c", "from sidestep.arm.refinement import work; work()"]
+        process = subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self._process = process
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            if self._cancelled.is_set():
+                raise RuntimeError("it was cancelled")
+            try:
+                with process.stdin as request:
+                    pickle.dump((source, dict(options)), request)
+            except BrokenPipeError:  # it ended: said below
+                pass
+            return self._received(process.stdout)
+        finally:
+            process.kill()
+            process.stdout.close()
+            process.wait()
+
+    def _received(self, messages: IO[bytes]) -> _core.Arm:
+        """What the process sends, up to the arm."""
         while True:
             try:
-                message = messages.recv()
-            except (EOFError, OSError):
+                message = pickle.load(messages)
+            except (EOFError, pickle.UnpicklingError, OSError):
                 raise RuntimeError("its process ended") from None
             if isinstance(message, str):
                 raise RuntimeError(message)
@@ -173,17 +186,21 @@ class Refinement:
                 self._progress(*message)
 
 
-def _prepare(source: str | Path, options: Mapping[str, Any], messages: Connection[Any, Any]) -> None:
-    """Of the process: sends how far it is, then the arm as a file has it, or what failed."""
+def work() -> None:
+    """Of the process: reads what to prepare, and sends how far it is, then the arm as a file has it, or what failed."""
+    with os.fdopen(os.dup(1), "wb") as messages:
+        os.dup2(2, 1)  # what anything prints goes elsewhere
 
-    def progress(*told: object) -> None:
-        messages.send(told)
+        def send(message: object) -> None:
+            pickle.dump(message, messages)
+            messages.flush()
 
-    try:
-        with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
-            warnings.simplefilter("ignore")  # the draft's reading said them
-            file = Path(folder) / "fine.arm"
-            Arm.load(source, **options, progress=progress).save(file)
-            messages.send(file.read_bytes())
-    except Exception as error:
-        messages.send(f"{type(error).__name__}: {error}")
+        try:
+            source, options = pickle.load(sys.stdin.buffer)
+            with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+                warnings.simplefilter("ignore")  # the draft's reading said them
+                file = Path(folder) / "fine.arm"
+                Arm.load(source, **options, progress=lambda *told: send(told)).save(file)
+                send(file.read_bytes())
+        except Exception as error:
+            send(f"{type(error).__name__}: {error}")

@@ -229,6 +229,10 @@ class Body(_core.Body):
         Raises:
             ValueError: the body covers nothing, or not this robot; a link that it does not have; a number below 1.
         """
+        if self.levels is not None and not isinstance(self.settings, CoverSettings):
+            raise ValueError(
+                "the body is of a prepared arm, which does not say how it was made; Body.cover(robot) makes one"
+            )
         if self.levels is None or not isinstance(self.settings, CoverSettings):
             raise ValueError(
                 "the body does not cover its links (it has no levels); Body.cover(robot) makes one that does"

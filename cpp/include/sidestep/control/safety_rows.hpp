@@ -177,7 +177,9 @@ class SafetyRows {
   /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, `lower` and
   /// `lengths` as it left them or less.
   bool draw_on_reserves(double period) noexcept;
-  /// After it: asks again in full where there is no room, and only the way back was put off; false where that is nowhere.
+  /// After it: asks for all of it again.
+  void ask_again() noexcept;
+  /// After it: asks again in full where there is no room, as where a clearance is lost, and only the way back was put off; false where that is nowhere.
   bool ask_for_ways_back() noexcept;
 
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
