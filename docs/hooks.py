@@ -22,6 +22,7 @@ DOCS = Path(__file__).parent
 ROOT = DOCS.parent
 RUNS = ROOT / "build" / "runs"  # of record_runs.py
 TO_BE_MADE = "[Recorded runs: how to make them](how-to/studio.md#pages-of-recorded-runs)"  # in index.md
+RUNS_HEADING = "<h1>Recorded runs</h1>"  # in runs/index.html
 MAKE = runpy.run_path(str(DOCS / "make_reference.py"))
 log = logging.getLogger("mkdocs.hooks.sidestep")
 outside = re.compile(r"\[([^\]]+)\]\(((?:\.\./)+[^)#]+)(?:#[^)]*)?\)")
@@ -86,10 +87,20 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     return outside.sub(as_text, markdown)
 
 
+def with_way_back(index: str) -> str:
+    """The list of recorded runs with a link to the first page of the site, which it has only as part of the site."""
+    if RUNS_HEADING not in index:
+        log.warning("runs/index.html has no %s to put the link to the site before", RUNS_HEADING)
+    return index.replace(RUNS_HEADING, f'<p><a href="../index.html">Sidestep</a></p>{RUNS_HEADING}')
+
+
 def on_post_build(config: Any) -> None:
     """Copies the recorded runs, where they were made; writes the C++ pages by Doxygen, where it is installed."""
     if (RUNS / "index.html").is_file():
-        shutil.copytree(RUNS, Path(config.site_dir) / "runs", dirs_exist_ok=True)
+        runs = Path(config.site_dir) / "runs"
+        shutil.copytree(RUNS, runs, dirs_exist_ok=True)
+        index = runs / "index.html"
+        index.write_text(with_way_back(index.read_text(encoding="utf-8")), encoding="utf-8")
     else:
         log.info("The site has no recorded runs (python docs/record_runs.py build/runs)")
     target = Path(config.site_dir) / "reference" / "cpp"
