@@ -22,6 +22,8 @@ constexpr double slow = 0.01;
 constexpr double smallest_deceleration = 1e-6;
 // What accelerations and torques leave together is looked for where so small a share of what they leave alone would matter.
 constexpr double scarce = 0.05;
+// [m/s] What closes no faster does not close: rounding, or a clearance that joints hardly change.
+constexpr double creeping = 1e-4;
 // [m] Stands for the depth of what is not lost, so that its way back counts as that of what is: after what others have to keep.
 constexpr double least_depth = 1e-6;
 constexpr double at_rest = 1e-6;              // [rad/s | m/s], or slower
@@ -258,7 +260,7 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   const double lasting = last.early ? std::min(c, 0.0) : c;
   const auto stops = [&](double x, double share) { return smooth_stop_fits(room, u, x + lasting, A, share * jerk, period); };
   const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
-  if (room <= 0.0 && u <= 0.0) {  // nothing closes: the way back can wait for the jerk
+  if (room <= 0.0 && u <= creeping) {  // nothing closes: the way back can wait for the jerk
     return std::min(required, alone);
   }
   const bool enough = stops(shared, of_jerk);
@@ -276,7 +278,7 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   return least_that_fits(low, high, [&](double x) { return stops(x, part); });
 }
 
-bool SafetyRows::draw_on_reserves(double period) noexcept {
+bool SafetyRows::draw_on_reserves(double period, bool ways_back_only) noexcept {
   bool any = false;
   for (int row = 0; row < size_; ++row) {
     const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
@@ -285,10 +287,11 @@ bool SafetyRows::draw_on_reserves(double period) noexcept {
       const double slowing = x + reserve.curvature;
       return reserve.room > 0.0
                  ? smooth_stop_fits(reserve.room, reserve.closing_speed, slowing, reserve.hardest, reserve.jerk, period)
-                 : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= 0.0;
+                 : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= creeping;
     };
     asked_[row] = lower[row];
-    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk <= 0.0 || !fits(asked)) {
+    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk <= 0.0 || !fits(asked) ||
+        (ways_back_only && reserve.room > 0.0)) {
       continue;
     }
     const double least = std::min(reserve.before - reserve.jerk * period, asked);
@@ -302,11 +305,24 @@ void SafetyRows::ask_again() noexcept { lower.head(size_) = asked_.head(size_); 
 
 bool SafetyRows::ask_for_ways_back() noexcept {
   bool any = false;
-  for (int row = 0; row < size_; ++row) {
-    if (reserves_[static_cast<std::size_t>(row)].room <= 0.0 && lower[row] < asked_[row]) {
+  for (int row = 0, asked = size_; row < asked; ++row) {
+    const auto at = static_cast<std::size_t>(row);
+    if (reserves_[at].room > 0.0 || lower[row] >= asked_[row]) {
+      continue;
+    }
+    any = true;
+    if (depths[row] > 0.0) {
       lower[row] = asked_[row];
-      depths[row] = std::max(depths[row], least_depth);
-      any = true;
+    } else if (size_ < max_size()) {
+      const auto added = static_cast<std::size_t>(size_);
+      normals.row(size_) = normals.row(row);
+      lower[size_] = asked_[row];
+      lengths[size_] = lengths[row];
+      depths[size_] = least_depth;
+      coordinates[added] = coordinates[at];
+      nearest[added] = nearest[at];
+      along_path[added] = 0;
+      ++size_;
     }
   }
   return any;

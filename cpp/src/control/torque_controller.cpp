@@ -260,6 +260,10 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
         rows_.ask_again();
       }
     }
+    if (solved && !back && smooth && presses_for_lost()) {  // before what is lost other ways back do not count more
+      rows_.draw_on_reserves(settings_.period, true);
+      back = rows_.ask_for_ways_back();
+    }
     if (!solved && smooth) {
       // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of
       // a state that noise and disturbances change faster than torque may. The torque's rate stays, since motors take no other, until a

@@ -278,9 +278,19 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   ask(-0.03, 0.0, 0.0);
   BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
   BOOST_TEST(rows.draw_on_reserves(0.001));
-  BOOST_TEST(std::abs(rows.lower[0]) < 1e-3);
+  BOOST_TEST(rows.lower[0] == -0.1, boost::test_tools::tolerance(0.01));  // 0.1 mm/s is none
   BOOST_TEST(rows.ask_for_ways_back());
   BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
+
+  // Where the clearance is not lost, the way back is a row of its own, which counts less than what keeps it from closing.
+  ask(-0.003, 0.0, 0.0);
+  const double back = rows.lower[0];
+  BOOST_TEST(rows.draw_on_reserves(0.001, true));
+  BOOST_TEST(rows.ask_for_ways_back());
+  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.lower[0] == -0.1, boost::test_tools::tolerance(0.01));
+  BOOST_TEST((rows.lower[1] == back && rows.depths[0] == 0.0 && rows.depths[1] > 0.0));
+  BOOST_TEST(rows.normals(1, 0) == rows.normals(0, 0));
 
   // What closes in without room has no reserve, nor has what the arm's own stop does not stop.
   ask(-0.003, 0.1, 0.1);

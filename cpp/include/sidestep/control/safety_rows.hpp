@@ -174,12 +174,13 @@ class SafetyRows {
   void add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, const AccelerationBounds& bounds,
            double period, const BrakingTorque* torque = nullptr, const LastMotion* last = nullptr) noexcept;
 
-  /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, `lower` and
-  /// `lengths` as it left them or less.
-  bool draw_on_reserves(double period) noexcept;
+  /// Asks for as little as each clearance can do with next, see above, or only where there is no room; false where no row has a reserve.
+  /// After `add`, `lower` and `lengths` as it left them or less.
+  bool draw_on_reserves(double period, bool ways_back_only = false) noexcept;
   /// After it: asks for all of it again.
   void ask_again() noexcept;
-  /// After it: asks again in full where there is no room, as where a clearance is lost, and only the way back was put off; false where that is nowhere.
+  /// After it: asks in full for the ways back that were put off, false where none was: by another row for each that is not lost, which
+  /// counts as one that is, so that what keeps it from closing still counts more.
   bool ask_for_ways_back() noexcept;
 
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
