@@ -260,9 +260,6 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   const double lasting = last.early ? std::min(c, 0.0) : c;
   const auto stops = [&](double x, double share) { return smooth_stop_fits(room, u, x + lasting, A, share * jerk, period); };
   const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
-  if (room <= 0.0 && u <= creeping) {  // nothing closes: the way back can wait for the jerk
-    return std::min(required, alone);
-  }
   const bool enough = stops(shared, of_jerk);
   if (required > shared) {
     return enough ? shared : stops(alone, of_jerk_alone) ? std::min(required, alone) : required;
@@ -435,6 +432,12 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
         reserve = {room, u, c, tau > 0.0 ? of_arm / tau : 0.0, of_jerk_alone * jerk, gradient.dot(last->acceleration)};
       }
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
+      if (room <= 0.0 && u <= creeping &&
+          clearances.least.minCoeff() >= 0.0) {  // nothing closes: the way back can wait for the jerk
+        const double before = gradient.dot(last->acceleration);
+        const double most = largest_product(gradient, bounds.smooth_lower, bounds.smooth_upper);
+        required = std::min(asked, std::min(before + of_jerk_alone * std::max(most - before, 0.0), most));
+      }
       smooth = required < asked;
       if (rates != nullptr && required == asked && asked > last->acceleration.dot(gradient)) {
         required = within_rates(gradient, required);

@@ -253,16 +253,12 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
     const LastCommand without_rate{nullptr, nullptr, last.gravity};
     write_cost();
     bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true, back = false;
-    if (!solved && smooth && rows_.draw_on_reserves(settings_.period)) {
+    if (!solved && smooth && solution.least_clearance >= 0.0 && rows_.draw_on_reserves(settings_.period)) {
       solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution);
       back = solved && rows_.ask_for_ways_back();
       if (!solved) {
         rows_.ask_again();
       }
-    }
-    if (solved && !back && smooth && presses_for_lost()) {  // before what is lost other ways back do not count more
-      rows_.draw_on_reserves(settings_.period, true);
-      back = rows_.ask_for_ways_back();
     }
     if (!solved && smooth) {
       // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of
@@ -293,8 +289,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       if (!rates) {
         write_torque_rows(without_rate);
       }
-      status = solve_relaxed(solved && kept, solution);  // a way out of what is lost, within jerk limits where they leave one
-      kept = kept && (solved || !smooth);
+      status = solve_relaxed(back, solution);  // ways back share what the jerk limits leave
+      kept = kept && (back || !smooth);
       if (status < TorqueStatus::relaxed && !kept) {
         status = TorqueStatus::relaxed;
       }
