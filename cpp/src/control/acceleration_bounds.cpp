@@ -107,6 +107,19 @@ void widen(AccelerationInterval& interval, double q, double v, const ScalarLimit
   interval.position_upper = std::max(interval.position_upper, interval.upper);
 }
 
+/// From outside of a position limit, and not on the way farther out, the way back can wait for the jerk: by `step` a period.
+void return_smoothly(AccelerationInterval& interval, double q, double v, double before, const ScalarLimits& limits, double step,
+                     double period) noexcept {
+  if (q < limits.lower && v >= 0.0) {
+    interval.lower = std::min(interval.lower, std::max({before + step, -v / period, -limits.acceleration}));
+    interval.position_lower = std::min(interval.position_lower, interval.lower);
+  }
+  if (q > limits.upper && v <= 0.0) {
+    interval.upper = std::max(interval.upper, std::min({before - step, -v / period, limits.acceleration}));
+    interval.position_upper = std::max(interval.position_upper, interval.upper);
+  }
+}
+
 }  // namespace
 
 double jerk_braking_distance(double v, double a, double A, double J) noexcept {
@@ -209,19 +222,6 @@ AccelerationBounds::AccelerationBounds(int num_coordinates)
       smooth_upper_limit(upper_limit),
       position_lower(lower),
       position_upper(upper) {}
-
-/// From outside of a position limit, and not on the way farther out, the way back can wait for the jerk: by `step` a period.
-static void return_smoothly(AccelerationInterval& interval, double q, double v, double before, const ScalarLimits& limits,
-                            double step, double period) noexcept {
-  if (q < limits.lower && v >= 0.0) {
-    interval.lower = std::min(interval.lower, std::max({before + step, -v / period, -limits.acceleration}));
-    interval.position_lower = std::min(interval.position_lower, interval.lower);
-  }
-  if (q > limits.upper && v <= 0.0) {
-    interval.upper = std::max(interval.upper, std::min({before - step, -v / period, limits.acceleration}));
-    interval.position_upper = std::max(interval.position_upper, interval.upper);
-  }
-}
 
 void AccelerationBounds::update(const JointLimits& limits, ConstVectorRef q, ConstVectorRef v, double period,
                                 const LimitMargins& margins, const Eigen::VectorXd* before) noexcept {

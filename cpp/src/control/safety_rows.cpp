@@ -260,6 +260,9 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   const double lasting = last.early ? std::min(c, 0.0) : c;
   const auto stops = [&](double x, double share) { return smooth_stop_fits(room, u, x + lasting, A, share * jerk, period); };
   const double shared = raised(of_jerk), alone = raised(of_jerk_alone);
+  if (!last.lost && room <= 0.0 && u <= creeping) {  // nothing closes: the way back can wait for the jerk
+    return std::min(required, alone);
+  }
   const bool enough = stops(shared, of_jerk);
   if (required > shared) {
     return enough ? shared : stops(alone, of_jerk_alone) ? std::min(required, alone) : required;
@@ -275,7 +278,7 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   return least_that_fits(low, high, [&](double x) { return stops(x, part); });
 }
 
-bool SafetyRows::draw_on_reserves(double period, bool ways_back_only) noexcept {
+bool SafetyRows::draw_on_reserves(double period) noexcept {
   bool any = false;
   for (int row = 0; row < size_; ++row) {
     const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
@@ -287,8 +290,7 @@ bool SafetyRows::draw_on_reserves(double period, bool ways_back_only) noexcept {
                  : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= creeping;
     };
     asked_[row] = lower[row];
-    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk <= 0.0 || !fits(asked) ||
-        (ways_back_only && reserve.room > 0.0)) {
+    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk <= 0.0 || !fits(asked)) {
       continue;
     }
     const double least = std::min(reserve.before - reserve.jerk * period, asked);
@@ -432,12 +434,6 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
         reserve = {room, u, c, tau > 0.0 ? of_arm / tau : 0.0, of_jerk_alone * jerk, gradient.dot(last->acceleration)};
       }
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
-      if (room <= 0.0 && u <= creeping &&
-          clearances.least.minCoeff() >= 0.0) {  // nothing closes: the way back can wait for the jerk
-        const double before = gradient.dot(last->acceleration);
-        const double most = largest_product(gradient, bounds.smooth_lower, bounds.smooth_upper);
-        required = std::min(asked, std::min(before + of_jerk_alone * std::max(most - before, 0.0), most));
-      }
       smooth = required < asked;
       if (rates != nullptr && required == asked && asked > last->acceleration.dot(gradient)) {
         required = within_rates(gradient, required);

@@ -226,7 +226,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
       const RateLimits next{jerk_lower_, jerk_upper_, rate_lower_, rate_upper_};
-      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates,
+      const bool lost = solution.least_clearance < 0.0;
+      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates, lost,
                               rates ? &next : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);

@@ -285,7 +285,7 @@ BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
   // Where the clearance is not lost, the way back is a row of its own, which counts less than what keeps it from closing.
   ask(-0.003, 0.0, 0.0);
   const double back = rows.lower[0];
-  BOOST_TEST(rows.draw_on_reserves(0.001, true));
+  BOOST_TEST(rows.draw_on_reserves(0.001));
   BOOST_TEST(rows.ask_for_ways_back());
   BOOST_REQUIRE(rows.size() == 2);
   BOOST_TEST(rows.lower[0] == -0.1, boost::test_tools::tolerance(0.01));

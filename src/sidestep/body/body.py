@@ -241,13 +241,14 @@ class Body(_core.Body):
             raise ValueError(
                 f"the body was made for robot {self.robot_name!r}, not for {robot.name!r} as it is"
             )
-        numbers = {link: self.links.count(link) for link in dict.fromkeys(self.links)}
-        check_components({**numbers, **components}, tuple(numbers))
+        own = tuple(dict.fromkeys(self.links))
+        numbers = {**{link: self.links.count(link) for link in own}, **components}
+        check_components(numbers, own)
         effort = "fine" if self.settings.effort == "draft" else self.settings.effort
         settings = replace(
             self.settings,
-            components={**numbers, **components},
-            max_components=sum({**numbers, **components}.values()),
+            components=numbers,
+            max_components=sum(numbers.values()),
         )
         made = {
             cover.link: body_file.LinkContents(

@@ -88,8 +88,9 @@ struct ClosingLimits {
 // fits into the room, S of acceleration_bounds.hpp. The share is one half, so that two rows can rise together; where that is not
 // enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
 // Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw on their
-// reserves: each asks for no more than after which the arm's stop along its path fits, with −v/τ and all but a twentieth of the jerk,
-// which is one stop for all rows; without room, only for what keeps it from closing. Ways back then share what jerk leaves, as if nothing were enough.
+// reserves: each asks for as little as still lets the arm's own stop along its path fit into the room, by −v/τ and with all but a
+// twentieth of the jerk. That is one stop for all rows; what closes in by more has no reserve. A row without room asks only for what
+// keeps it from closing, and its way back shares with others what the jerk limits leave. Where a clearance is lost, nothing waits.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
 // it asks for the least after which the smooth stop fits (or for the most, where none fits), without a curvature that helps, which
 // may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
@@ -140,6 +141,7 @@ struct LastMotion {
   const Eigen::VectorXd& acceleration;
   double jerk_share;
   bool early = false;
+  bool lost = false;                  ///< a clearance is: ways out do not wait for the jerk
   const RateLimits* rates = nullptr;  ///< null: none
 };
 
@@ -174,9 +176,9 @@ class SafetyRows {
   void add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, const AccelerationBounds& bounds,
            double period, const BrakingTorque* torque = nullptr, const LastMotion* last = nullptr) noexcept;
 
-  /// Asks for as little as each clearance can do with next, see above, or only where there is no room; false where no row has a reserve.
-  /// After `add`, `lower` and `lengths` as it left them or less.
-  bool draw_on_reserves(double period, bool ways_back_only = false) noexcept;
+  /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, where no
+  /// clearance is lost.
+  bool draw_on_reserves(double period) noexcept;
   /// After it: asks for all of it again.
   void ask_again() noexcept;
   /// After it: asks in full for the ways back that were put off, false where none was: by another row for each that is not lost, which
