@@ -6,6 +6,7 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +20,11 @@ from sidestep.bench import (
     SceneSettings,
     read_motion_bench_maker,
     run_scenes,
+    scenes,
 )
-from sidestep.bench.arm import Arms, load_robot
+from sidestep.bench.arm import Arm, Arms, load_robot
+from sidestep.bench.scenes import SceneOutcome
+from sidestep.bench.step_times import StepTimes
 from sidestep.body import Body
 from sidestep.cli import app
 
@@ -65,6 +69,31 @@ def test_the_report_counts_them(result: SceneResult) -> None:
     assert document["unknown_joints"] == ["gripper"]
     assert [(item["set"], item["index"]) for item in document["failures"]] == [("sweep", 2)]
     json.dumps(document, allow_nan=False)
+
+
+@pytest.mark.slow
+def test_finer_covers_are_tried_where_they_may_help_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    free, inside = read_motion_bench_maker(PLANAR)
+    settings = replace(SETTINGS, method=Method.controller, motion=MotionSettings(duration=0.2), finer=True)
+    blocked = run_scenes(settings, [inside])  # the meshes are inside the post as well
+    assert blocked.outcomes[0].outcome is not None
+    assert not blocked.outcomes[0].outcome.arrived
+    assert blocked.to_document()["finer"] == []
+
+    numbers: list[int] = []
+    judged = scenes.judged
+
+    def late_at_first(arm: Arm, *given: Any, **named: Any) -> tuple[SceneOutcome, StepTimes]:
+        numbers.append(list(arm.body.links).count("link2"))
+        outcome, times = judged(arm, *given, **named)
+        return replace(outcome, tight={"link2": 31} if len(numbers) == 1 else {}), times
+
+    monkeypatch.setattr(scenes, "judged", late_at_first)
+    again = run_scenes(settings, [free])  # 0.2 s is not enough
+    assert numbers[0] < 31
+    assert numbers[1:] == [31]
+    expected = {"set": "sweep", "index": 1, "links": {"link2": 31}, "solved": False}
+    assert again.to_document()["finer"] == [expected]
 
 
 def test_motions_without_an_optimum_are_counted(result: SceneResult) -> None:

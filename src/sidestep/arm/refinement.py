@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import tempfile
@@ -37,7 +38,7 @@ class Refinement:
 
     Covering ellipsoids are larger than links. So a planner may find a goal blocked, or no path, where the meshes are
     free. With `watch` the links that may be why get finer covers, which controllers take over in the same way: 24
-    ellipsoids, then 48 (`tight_links`). That takes up to a minute of one core for every link, once.
+    ellipsoids, then 48. The cache keeps them.
 
     Args:
         arm: of `Arm.load`. One that is fine already is done at once.
@@ -190,6 +191,7 @@ def work() -> None:
     """Of the process: reads what to prepare, and sends how far it is, then the arm as a file has it, or what failed."""
     with os.fdopen(os.dup(1), "wb") as messages:
         os.dup2(2, 1)  # what anything prints goes elsewhere
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the caller, who ends this process
 
         def send(message: object) -> None:
             pickle.dump(message, messages)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sidestep import _core
 from sidestep._core import CoordinateKind, PlanStatus
 
-LEVELS = (24, 48)  # ellipsoids of a link, one after the other: they overshoot half as much as 8, and a third
+LEVELS = (24, 48)  # ellipsoids of a link, one after the other; by default it has up to 16
 BLOCKED = (PlanStatus.goal_in_collision, PlanStatus.start_in_collision)
 WAYLESS = (PlanStatus.no_path, PlanStatus.timeout)
 

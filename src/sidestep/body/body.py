@@ -222,8 +222,8 @@ class Body(_core.Body):
         """This covering body with other covers of some links; those of the others stay as they are.
 
         Args:
-            robot: what it covers. components: ellipsoids of the links that get another cover, {link: number}: a link of
-                24 overshoots about half as much as one of 8.
+            robot: what it covers. components: ellipsoids of the links that get another cover, {link: number}: more of
+                them overshoot less.
             progress, cache: as in `cover`.
 
         Raises:

@@ -34,8 +34,8 @@ def prepare(
     components: Annotated[
         list[str] | None,
         typer.Option(
-            help="LINK=NUMBER of ellipsoids for a link that works close to things: 24 overshoot about half as much "
-            "as 8; may be repeated."
+            help="LINK=NUMBER of ellipsoids for a link that works close to things, such as hand=24: more of them "
+            "overshoot less; may be repeated."
         ),
     ] = None,
     draft: Annotated[
