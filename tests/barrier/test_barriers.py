@@ -85,6 +85,29 @@ def table_of(robot: ss.Robot) -> ClearanceTable:
     )
 
 
+def test_links_that_are_usually_near_have_short_barriers() -> None:
+    robot = ss.Robot.named("planar3")
+    usual = (0.004, 0.0105, 0.02, -0.001)
+
+    def table(median: float) -> ClearanceTable:
+        control = np.full((9, 9), median)
+        control[:4] = 0.3
+        return ClearanceTable(
+            "link1",
+            "link3",
+            coordinates=(1, 2),
+            begin=(-4.0, -4.0),
+            spacing=(1.0, 1.0),
+            periodic=(False, False),
+            control=control,
+        )
+
+    barrier = ClearanceTableBarrier(robot, [table(h) for h in usual], activation=0.05)
+    at = barrier.evaluate(np.array([0.0, 2.0, 0.0]), np.zeros(3), ss.Obstacles.none())
+    assert at.clearances == pytest.approx(usual)
+    assert list(at.values > 0.0) == [False, False, True, True]
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("kind", ["obstacles", "self", "plane", "limits", "tables"])
 def test_derivatives(name: str, kind: str) -> None:

@@ -90,3 +90,24 @@ def test_a_clearance_that_no_joint_changes_is_told() -> None:
     ):
         assert solution.status == TorqueStatus.clearance_lost
         assert (solution.least_clearance, solution.least_coordinate, solution.least_nearest) == (-1.0, 0, 4)
+
+
+def test_a_way_out_comes_before_the_margins_of_others() -> None:
+    """Of a Puma: two links 2.3 mm inside each other; two others, 1.4 mm apart, come 12 mm/rad nearer as these part."""
+    robot = ss.Robot.named("planar3")
+    zero = np.zeros(3)
+
+    def lost(depth: float, other: float) -> Clearances:
+        gradients = np.array([[0.469, 0.0, 0.0], [-0.012, 0.0, 0.0]])
+        return Clearances(
+            values=[-depth, other], rates=[0.0] * 2, curvatures=[0.0] * 2, gradients=gradients, nearest=[0, 1]
+        )
+
+    for other, sign in ((0.0014, 1.0), (0.0002, -1.0)):  # of which one is about to be lost in its turn
+        filtered = AccelerationFilter(robot).apply(zero, zero, zero, clearances=lost(0.0023, other))
+        solved = TorqueController(robot).solve(
+            zero, zero, zero, np.eye(3), zero, clearances=lost(0.0023, other)
+        )
+        assert filtered.status == solved.status == TorqueStatus.clearance_lost
+        assert sign * filtered.acceleration[0] > 1.0
+        assert sign * solved.acceleration[0] > 1.0

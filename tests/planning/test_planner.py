@@ -113,6 +113,22 @@ def test_finds_a_path_wherever_ompl_does(robot: ss.Robot, body: _core.Body) -> N
     assert missed == []
 
 
+def test_links_that_are_always_near_do_not_block_every_way(robot: ss.Robot, body: _core.Body) -> None:
+    """As of a wrist whose parts pass 4 mm apart all the way round: less than the margin of other links."""
+
+    def planned(control: np.ndarray) -> PlanStatus:
+        square: dict[str, Any] = {"begin": (-4.0, -4.0), "spacing": (1.0, 1.0), "periodic": (False, False)}
+        table = ClearanceTable("link1", "link3", coordinates=(1, 2), control=control, **square)
+        planner = PathPlanner(robot, body, tables=[table], settings=PlannerSettings(fade=0.01))
+        return planner.plan(np.array([0.3, 0.5, 0.5]), np.array([0.9, 1.6, -1.2]), ss.Obstacles.none()).status
+
+    assert planned(np.full((9, 9), 0.004)) == PlanStatus.found
+    assert planned(np.full((9, 9), -0.02)) == PlanStatus.goal_in_collision
+    folds = np.full((9, 9), 0.004)
+    folds[:, 3:5] = -0.02  # wherever the way has to pass
+    assert planned(folds) == PlanStatus.no_path
+
+
 def test_tables_tell_how_far_links_are_apart(robot: ss.Robot, body: _core.Body) -> None:
     tables = clearance_tables(robot).tables
     planner = PathPlanner(robot, body, tables=tables)

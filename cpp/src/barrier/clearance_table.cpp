@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <vector>
 
 namespace sidestep {
 namespace {
@@ -58,6 +59,13 @@ Eigen::Vector2d ClearanceTable::steepest() const noexcept {
     return most / axis.spacing;
   };
   return {slope(control, axes[0]), slope(control.transpose(), axes[1])};
+}
+
+double ClearanceTable::median() const {
+  std::vector<double> values(control.data(), control.data() + control.size());
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 void ClearanceTable::validate(int coordinates) const {

@@ -36,6 +36,9 @@ ClearanceTableBarrier::ClearanceTableBarrier(const Robot& robot, std::vector<Cle
     steepest_.push_back(table.steepest());
   }
   set_num_coordinates(static_cast<int>(tables_.size()));
+  for (std::size_t i = 0; i < tables_.size(); ++i) {
+    shorten_for_usual(static_cast<int>(i), tables_[i].median());
+  }
 }
 
 void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& state,

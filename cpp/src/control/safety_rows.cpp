@@ -26,6 +26,8 @@ constexpr double scarce = 0.05;
 constexpr double creeping = 1e-4;
 // [m] Stands for the depth of what is not lost, so that its way back counts as that of what is: after what others have to keep.
 constexpr double least_depth = 1e-6;
+// Of its margin, what a clearance keeps while another is lost: enough that it is not lost in its turn.
+constexpr double of_margin = 0.2;
 constexpr double at_rest = 1e-6;              // [rad/s | m/s], or slower
 constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
 constexpr double largest_acceleration = 1e3;  // stands for what has no limit [/s²]
@@ -300,6 +302,19 @@ bool SafetyRows::draw_on_reserves(double period) noexcept {
   return any;
 }
 
+void SafetyRows::put_off_ways_back(double period) noexcept {
+  for (int row = 0; row < size_; ++row) {
+    const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
+    asked_[row] = lower[row];
+    if (along_path[static_cast<std::size_t>(row)] == 0 && depths[row] == 0.0) {
+      const double room = reserve.room + (1.0 - of_margin) * reserve.margin;
+      const double needed = demanded_deceleration(room, reserve.closing_speed, reserve.limits, period) - reserve.curvature;
+      lower[row] = std::min(lower[row], needed / lengths[row]);
+    }
+  }
+  ask_for_ways_back();
+}
+
 void SafetyRows::ask_again() noexcept { lower.head(size_) = asked_.head(size_); }
 
 bool SafetyRows::ask_for_ways_back() noexcept {
@@ -426,12 +441,16 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     }
     bool smooth = false;
     Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
-    reserve.jerk = 0.0;
+    reserve = {room, u, c};
+    reserve.limits = closing;
+    reserve.margin = approach.values[k] - room;
     if (last != nullptr) {
       const double asked = required, whole = last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
       if (whole < infinity && (room <= 0.0 || u <= of_arm + slow)) {
         const double jerk = room > 0.0 ? last->jerk_share * of_arm * stop_jerk : whole;
-        reserve = {room, u, c, tau > 0.0 ? of_arm / tau : 0.0, of_jerk_alone * jerk, gradient.dot(last->acceleration)};
+        reserve.hardest = tau > 0.0 ? of_arm / tau : 0.0;
+        reserve.jerk = of_jerk_alone * jerk;
+        reserve.before = gradient.dot(last->acceleration);
       }
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
       smooth = required < asked;

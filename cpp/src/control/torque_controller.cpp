@@ -290,6 +290,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       if (!rates) {
         write_torque_rows(without_rate);
       }
+      if (solution.least_clearance < 0.0) {
+        rows_.put_off_ways_back(settings_.period);
+      }
       status = solve_relaxed(back, solution);  // ways back share what the jerk limits leave
       kept = kept && (back || !smooth);
       if (status < TorqueStatus::relaxed && !kept) {

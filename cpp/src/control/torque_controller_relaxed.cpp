@@ -12,7 +12,8 @@ namespace {
 constexpr double regularisation = 1e-6;
 // That of the ways out of what is lost, which a joint of little leverage [rad/rad] is not to be flung about for.
 constexpr double lost_regularisation = 1e-2;
-// Shortfalls below this, relative to 1 /s^2 plus what is asked for, may be of the regularisation alone.
+// Shortfalls below this, relative to 1 /s^2 plus what is asked for, may be of the regularisation alone; but ways out of what is lost
+// are no reason to fling a joint of no leverage about.
 constexpr double shortfall_tolerance = 1e-4;
 // ε: the shortfall of a clearance that the joints change by less than 5 cm/rad counts less [(m/rad)²].
 constexpr double least_gradient_squared = 0.05 * 0.05;
@@ -64,10 +65,10 @@ void TorqueController::collect_rows() noexcept {
 }
 
 double TorqueController::lowered(int n, bool rounded) const noexcept {
-  const double asked = rows_.lower[rows_used_[static_cast<std::size_t>(n)]], size = 1.0 + std::abs(asked);
-  return rounded                                    ? asked - allowed_[n] - slack_tolerance * size
-         : allowed_[n] > shortfall_tolerance * size ? asked - allowed_[n]
-                                                    : asked;
+  const int row = rows_used_[static_cast<std::size_t>(n)];
+  const double asked = rows_.lower[row], size = 1.0 + std::abs(asked);
+  const double counts = rows_.depths[row] > 0.0 ? 0.0 : shortfall_tolerance * size;
+  return rounded ? asked - allowed_[n] - slack_tolerance * size : allowed_[n] > counts ? asked - allowed_[n] : asked;
 }
 
 bool TorqueController::solve_least(LeastShortfall& least, bool of_lost, TorqueSolution& solution) noexcept {

@@ -6,14 +6,17 @@
 
 #include "../settings.hpp"
 #include "kernels/distance_kernel.hpp"
+#include "sidestep/barrier/clearance_table_barrier.hpp"
 #include "sidestep/barrier/ellipsoid_gap.hpp"
+#include "sidestep/barrier/self_collision_barrier.hpp"
 
 namespace sidestep {
 namespace {
 
 constexpr const char* owner = "body clearance";
-constexpr double closest_centres = 1e-6;  // [m] of which a direction is taken
-constexpr int planes_of_pair = 3;         // tried before the gap of two ellipsoids is looked for
+constexpr double closest_centres = 1e-6;                        // [m] of which a direction is taken
+constexpr BarrierFunction any_barrier{0.05, 0.02, 2.0, 0.002};  // that is longer than of links that are usually near
+constexpr int planes_of_pair = 3;                               // tried before the gap of two ellipsoids is looked for
 
 static_assert(kernels::most_balls == PointTree::leaf_size);
 
@@ -87,6 +90,19 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
     }
   }
   add_tables();
+  const auto bound_margins = [](const Barrier& barrier, auto item) {
+    for (const double activation : barrier.activations()) {
+      (item++)->most_margin = Barrier::margin_share * activation;
+    }
+  };
+  const auto first_pair = std::find_if(items_.begin(), items_.end(), [](const Item& i) { return i.other >= 0; });
+  if (!pairs.empty()) {
+    bound_margins(SelfCollisionBarrier(robot_, body, pairs, any_barrier), first_pair);
+  }
+  if (!tables_.empty()) {
+    bound_margins(ClearanceTableBarrier(robot_, tables_, any_barrier),
+                  items_.end() - static_cast<std::ptrdiff_t>(tables_.size()));
+  }
   reach_ = Eigen::VectorXd::Zero(nv);
   reaches_.resize(num_items(), nv);
   bends_.resize(num_items(), nv * nv);

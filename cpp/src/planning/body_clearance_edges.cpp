@@ -141,7 +141,7 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacle
         double slope = 0.0;
         const double least = margin_at(i, w.q_, margins, slope);
         const Motion moved{w.motions_[i], slope, speed(item, w), w.curvatures_[i]};
-        const double enough = least - margins.slack + moved.distance(at.half);
+        const double slack_here = slack(i, margins), enough = least - slack_here + moved.distance(at.half);
         const double clearance = look(item, obstacles, {std::max(least, enough), least + exact_within, least}, w).clearance;
         if (clearance < least) {
           w.last_ = i;
@@ -149,7 +149,7 @@ bool BodyClearance::edge_free(ConstVectorRef a, ConstVectorRef b, const Obstacle
         }
         if (clearance < enough) {
           open[word] |= std::uint64_t{1} << bit;
-          decided = std::min(decided, moved.share(clearance - least + margins.slack));
+          decided = std::min(decided, moved.share(clearance - least + slack_here));
         }
       }
     }

@@ -35,6 +35,9 @@ struct ClearanceTable {
   /// neighbouring control points.
   Eigen::Vector2d steepest() const noexcept;
 
+  /// Of the control points [m]: what is usual.
+  double median() const;
+
   /// Throws std::invalid_argument that names what is wrong, in a robot of `coordinates` coordinates.
   void validate(int coordinates) const;
 };

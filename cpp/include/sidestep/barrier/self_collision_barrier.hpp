@@ -28,6 +28,7 @@ class SelfCollisionBarrier final : public Barrier {
   CoordinateLabel label(int k) const override;
 
  private:
+  void shorten_where_usually_near();
   struct Group {
     std::string link;
     int joint;

@@ -179,6 +179,9 @@ class SafetyRows {
   /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, where no
   /// clearance is lost.
   bool draw_on_reserves(double period) noexcept;
+  /// After `add`, where a clearance is lost: the others ask for a fifth of their margin only, and for the rest after the way out of what
+  /// is lost, by another row each.
+  void put_off_ways_back(double period) noexcept;
   /// After it: asks for all of it again.
   void ask_again() noexcept;
   /// After it: asks in full for the ways back that were put off, false where none was: by another row for each that is not lost, which
@@ -221,6 +224,8 @@ class SafetyRows {
   struct Reserve {
     double room = 0.0, closing_speed = 0.0, curvature = 0.0, hardest = 0.0, jerk = 0.0;
     double before = 0.0;  ///< ∇h·a of the last period
+    double margin = 0.0;
+    ClosingLimits limits{};
   };
 
   SafetySettings settings_;
