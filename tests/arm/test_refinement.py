@@ -11,16 +11,7 @@ from sidestep.arm.tight_places import tight_links
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.obstacles import Obstacles, pose_at
-
-PLANAR = """<robot name="two">
-  <link name="base"/>
-  <link name="l1"><collision><origin xyz="0.15 0 0"/><geometry><sphere radius="0.05"/></geometry></collision></link>
-  <link name="l2"><collision><origin xyz="0.15 0 0"/><geometry><sphere radius="0.04"/></geometry></collision></link>
-  <joint name="j1" type="revolute"><parent link="base"/><child link="l1"/><axis xyz="0 0 1"/>
-    <limit lower="-2" upper="2" velocity="2" effort="50"/></joint>
-  <joint name="j2" type="revolute"><origin xyz="0.3 0 0"/><parent link="l1"/><child link="l2"/><axis xyz="0 0 1"/>
-    <limit lower="-2" upper="2" velocity="2" effort="50"/></joint>
-</robot>"""
+from support.two_links import BOX, PLANAR, beside
 
 
 @pytest.fixture(autouse=True)
@@ -93,20 +84,6 @@ def test_what_fails_is_told_and_what_is_cancelled_stays_a_draft(tmp_path):
     assert refinement.arm is draft
 
 
-BOX = PLANAR.replace(
-    '<origin xyz="0.15 0 0"/><geometry><sphere radius="0.04"/></geometry>',
-    '<origin xyz="0.2 0 0"/><geometry><box size="0.3 0.08 0.08"/></geometry>',
-)
-
-
-def beside(arm: ss.Arm, goal: np.ndarray, gap: float) -> ss.Sphere:
-    """A ball that leaves a gap [m] to the flat side of the box at the goal."""
-    robot = arm.robot
-    assert isinstance(robot, ss.Robot)
-    X = robot.pose(goal, "l2")
-    return ss.Sphere(0.02, pose_at(X[:3, 3] + X[:3, :3] @ [0.2, 0.04 + 0.02 + gap, 0.0]), name="ball")
-
-
 @pytest.mark.slow
 def test_a_goal_that_only_the_cover_blocks_is_reached_with_a_finer_one():
     arm = ss.Arm.load(BOX, components={"l2": 2})
@@ -114,7 +91,7 @@ def test_a_goal_that_only_the_cover_blocks_is_reached_with_a_finer_one():
     goal, q, v = np.array([0.5, 0.0]), np.array([-0.5, 0.0]), np.zeros(2)
     controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
     controller.set_goal(goal)
-    controller.set_obstacles([beside(arm, goal, 0.010)])
+    controller.set_obstacles([beside(arm.robot, goal, 0.010)])
     for _ in range(3000):
         command = controller.step(q, v)
         q, v = command.position, command.velocity

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from sidestep.bench import BenchSettings, Method, MotionSettings, ProblemSettings, run_bench
-from sidestep.bench.problems import ProblemGenerator
+from sidestep.bench import BenchSettings, Method, MotionSettings, ProblemSettings, reach, run_bench
+from sidestep.bench.problems import ProblemGenerator, ReachProblem
+from sidestep.body import Body
 from sidestep.cli import app
+from sidestep.robot import Robot
+from support.two_links import BOX, beside
 
 SETTINGS = BenchSettings(
     problems=ProblemSettings(robot="planar3", obstacles=2, seed=1),
@@ -102,3 +105,36 @@ def test_poses_are_reached_in_any_posture() -> None:
 def test_the_thesis_has_no_pose_goals() -> None:
     with pytest.raises(ValueError, match="pose goals are for the methods 'controller' and 'barrier'"):
         run_bench(replace(SETTINGS, motion=MotionSettings(duration=5.0, poses=True)))
+
+
+@pytest.mark.slow
+def test_finer_covers_reach_what_only_the_cover_blocks(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    file = tmp_path / "box.urdf"
+    file.write_text(BOX)
+    goal, start = np.array([0.5, 0.0]), np.array([-0.5, 0.0])
+    ball = beside(Robot.from_urdf(file), goal, 0.010)
+    problem = ReachProblem(
+        robot=str(file),
+        seed=0,
+        index=0,
+        start=start,
+        goal=goal,
+        centers=ball.pose[:3, 3][None],
+        velocities=np.zeros((1, 3)),
+        radii=np.array([ball.radius]),
+        straight_line_blocked=False,
+    )
+    coarse = Body.cover(Robot.from_urdf(file), components={"l2": 2})
+    monkeypatch.setattr(reach, "build_body", lambda *_given, **_named: coarse)
+    settings = BenchSettings(
+        problems=ProblemSettings(robot=str(file)), motion=MotionSettings(duration=4.0, tolerance=0.005)
+    )
+    (blocked,) = run_bench(settings, problems=[problem]).outcomes
+    (reached,) = run_bench(replace(settings, finer=True), problems=[problem]).outcomes
+    assert blocked.only_short_of_goal
+    assert reached.success
+    assert reached.min_clearance_m == pytest.approx(0.010, abs=0.003)
+    with pytest.raises(ValueError, match="finer is for the controller"):
+        replace(settings, method=Method.thesis, finer=True)

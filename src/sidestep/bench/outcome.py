@@ -88,6 +88,11 @@ class Outcome:
         """It touched nothing and did not arrive in time."""
         return not self.arrived and not self.collision and not self.self_collision
 
+    @property
+    def only_short_of_goal(self) -> bool:
+        """It did not arrive, and nothing else went wrong."""
+        return self.late and not self.limits
+
     def reasons(self, *, arrives: bool = True) -> list[str]:
         """What went wrong, a sentence each; empty when nothing did. `arrives`: it should."""
         found = []

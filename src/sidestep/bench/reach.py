@@ -19,6 +19,7 @@ from sidestep.bench.own_method import OwnMover
 from sidestep.bench.parallel import Progress, cpu_name, run_tasks
 from sidestep.bench.problems import ProblemGenerator, ProblemSettings, ReachProblem
 from sidestep.bench.step_times import StepTimes
+from sidestep.body import Body
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 from sidestep.robot.any_source import robot_from
@@ -32,9 +33,12 @@ class BenchSettings:
         problems: what is drawn, and the robot. count: how many, from index 0.
         method: how the arm is moved, or a Python file of `OwnMover`. motion: how problems are run.
         jobs: processes. draft: with a coarser body, which is made in seconds; of the controller.
+        finer: where the arm does not arrive, and touches nothing, it is run again with finer covers of the links that
+            may be why, see `tight_links`: twice at most.
 
     Raises:
-        ValueError: count or jobs below 1, a draft for a method that has none, torque or poses for a file.
+        ValueError: count or jobs below 1, a draft or finer covers for a method that has none, torque or poses for a
+            file.
     """
 
     problems: ProblemSettings
@@ -43,13 +47,16 @@ class BenchSettings:
     motion: MotionSettings = field(default_factory=MotionSettings)
     jobs: int = 1
     draft: bool = False
+    finer: bool = False
 
     def __post_init__(self) -> None:
         for name in ("count", "jobs"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}, must be at least 1")
-        if self.draft and not (isinstance(self.method, Method) and self.method.safe):
-            raise ValueError(f"draft is for the controller; the method is {self.method}")
+        if not (isinstance(self.method, Method) and self.method.safe):
+            for name in ("draft", "finer"):
+                if getattr(self, name):
+                    raise ValueError(f"{name} is for the controller; the method is {self.method}")
         if isinstance(self.method, Path) and (self.motion.torque or self.motion.poses):
             raise ValueError(
                 f"{self.method.name}: a method of your own gives accelerations, without --torque and --poses"
@@ -124,6 +131,7 @@ class BenchResult:
                 },
             },
             "draft": self.settings.draft,
+            "finer": self.settings.finer,
             "jobs": self.settings.jobs,
             "cpu": cpu_name(),
             "version": __version__,
@@ -170,18 +178,20 @@ def run_bench(
     return BenchResult(settings, tuple(drawn[k] for k in order), tuple(outcomes[k] for k in order), times)
 
 
-def _prepared(settings: BenchSettings, name: str, progress: Progress | None) -> tuple[Robot, Mover]:
-    """The robot, and what moves it."""
+def _prepared(
+    settings: BenchSettings, name: str, progress: Progress | None
+) -> tuple[Robot, Body | None, Mover]:
+    """The robot, its body where the method has one, and what moves it."""
     robot = robot_from(name, settings.problems.options)
     if isinstance(settings.method, Path):
-        return robot, OwnMover.from_file(settings.method, robot)
+        return robot, None, OwnMover.from_file(settings.method, robot)
 
     def show(link: str, done: int, in_all: int) -> None:
         if progress is not None:
             progress(0, settings.count, f"preparing {link} ({done} of {in_all})")
 
     body = build_body(settings.method, robot, draft=settings.draft, progress=show)
-    return robot, build_mover(settings.method, robot, body)
+    return robot, body, build_mover(settings.method, robot, body)
 
 
 class _Worker:
@@ -189,12 +199,19 @@ class _Worker:
 
     def __init__(self, settings: BenchSettings, robot_name: str, *, progress: Progress | None = None) -> None:
         self.settings, self.robot_name = settings, robot_name
-        self._robot, self._mover = _prepared(settings, robot_name, progress)
+        self._robot, self._body, self._mover = _prepared(settings, robot_name, progress)
         own = SelfCollision(self._robot)
         self._generator = ProblemGenerator(settings.problems, robot=self._robot, self_collision=own)
         self._judge = Judge(self._robot, self_collision=own)
 
     def run(self, task: int | ReachProblem) -> tuple[ReachProblem, Outcome, StepTimes]:
         problem = self._generator.problem(task) if isinstance(task, int) else task
-        motion = self._mover.move(problem, self.settings.motion)
-        return problem, self._judge.judge(problem, motion, self.settings.motion), times_of(motion)
+        method, mover, body = self.settings.method, self._mover, self._body
+        while True:
+            motion = mover.move(problem, self.settings.motion)
+            outcome = self._judge.judge(problem, motion, self.settings.motion)
+            again = self.settings.finer and motion.tight and outcome.only_short_of_goal
+            if not again or body is None or isinstance(method, Path):
+                return problem, outcome, times_of(motion)
+            body = body.finer(self._robot, motion.tight)
+            mover = build_mover(method, self._robot, body)

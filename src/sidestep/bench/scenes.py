@@ -133,12 +133,6 @@ class SceneOutcome:
         """Arrived where it should, touched nothing, broke no limit."""
         return not self.reasons()
 
-    @property
-    def only_short_of_goal(self) -> bool:
-        """Did not arrive, and nothing else went wrong."""
-        outcome = self.outcome
-        return outcome is not None and outcome.late and not outcome.limits
-
     def reasons(self) -> list[str]:
         """What went wrong, a sentence each; empty when the problem is solved."""
         if self.outcome is None:
@@ -310,7 +304,12 @@ class _Worker:
     def run(self, task: MotionBenchMakerProblem) -> tuple[SceneOutcome, StepTimes]:
         outcome, times = self._run(task, self._arms)
         body, finer = self._body, dict[str, int]()
-        while self.settings.finer and outcome.tight and outcome.only_short_of_goal:
+        while (
+            self.settings.finer
+            and outcome.tight
+            and outcome.outcome is not None
+            and outcome.outcome.only_short_of_goal
+        ):
             finer |= outcome.tight
             body = body.finer(self._robot, outcome.tight)
             settings = self.settings

@@ -11,6 +11,7 @@ from sidestep.bench.method import Method
 from sidestep.cli.bench_output import (
     DurationOption,
     FailuresOption,
+    FinerOption,
     JobsOption,
     OwnMethodOption,
     PeriodOption,
@@ -64,6 +65,7 @@ def reach(
         bool,
         typer.Option("--draft", help="With the body that is prepared in seconds, see `sidestep prepare`."),
     ] = False,
+    finer: FinerOption = False,
     obstacles: Annotated[int, typer.Option(min=0, help="Balls per problem.")] = 10,
     problems: Annotated[int, typer.Option(min=1, help="Number of problems.")] = 100,
     seed: SeedOption = 0,
@@ -122,6 +124,7 @@ def reach(
         motion=MotionSettings(period=period, duration=duration, torque=torque, poses=poses),
         jobs=jobs or default_jobs(),
         draft=draft,
+        finer=finer,
     )
     terminal = console(quiet=quiet, to_stderr=json == "-")
     title = f"{Path(settings.problems.robot).name} {method}"

@@ -20,6 +20,13 @@ Result = TypeVar("Result")
 RobotOption: TypeAlias = Annotated[str, typer.Option(help="A name from `sidestep robots`.")]
 SeedOption: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of all that is random.")]
 MethodOption: TypeAlias = Annotated[Method, typer.Option(help="How the arm is moved.")]
+FinerOption: TypeAlias = Annotated[
+    bool,
+    typer.Option(
+        "--finer",
+        help="Where the arm does not arrive, and touches nothing, run again with finer covers of links.",
+    ),
+]
 OwnMethodOption: TypeAlias = Annotated[
     str,
     typer.Option(

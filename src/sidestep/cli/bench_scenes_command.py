@@ -13,6 +13,7 @@ from sidestep.bench.points import POINT_RADIUS, SPACING
 from sidestep.cli.bench_output import (
     DurationOption,
     FailuresOption,
+    FinerOption,
     JobsOption,
     MethodOption,
     PeriodOption,
@@ -54,13 +55,7 @@ def motion_bench_maker(
         int | None, typer.Option(min=1, help="Only so many of each set, the first ones.")
     ] = None,
     only: Annotated[list[str] | None, typer.Option(help="Only this set; may be repeated.")] = None,
-    finer: Annotated[
-        bool,
-        typer.Option(
-            "--finer",
-            help="Where the arm does not arrive, and touches nothing, run again with finer covers of links.",
-        ),
-    ] = False,
+    finer: FinerOption = False,
     clearances: Annotated[
         bool, typer.Option("--clearances", help="Measure starts and goals only, move nothing.")
     ] = False,
