@@ -33,7 +33,7 @@ from sidestep.studio.systems import make_body
 FRAME = 1.0 / 25.0  # [s] between two pictures
 TRIANGLES = 15_000  # of an arm: half a megabyte
 BALL_MIDDLE, BALL_SWING = np.array([0.45, 0.0, 0.62]), np.array([0.0, 0.45, 0.06])  # [m] of the ball's way
-BALL_PERIOD = 5.0  # [s] to and fro
+BALL_PERIOD = 8.0  # [s] to and fro
 
 STYLE = (
     "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}"
