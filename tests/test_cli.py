@@ -121,7 +121,7 @@ def test_a_wrong_switch_is_refused_with_the_allowed_forms(text: str) -> None:
     [
         (("unit: rad", "unit: grad"), "error: bad.yaml: start.unit is 'grad'; allowed: deg, rad\n"),
         (("planar2", "planar7"), "error: small: robot: no robot is named 'planar7'"),
-        (("[1, 0.5]", "[4, 0.5]"), "error: small: goal.position: joint 'joint1' is 4.0, allowed: [-3.14"),
+        (("[1, 0.5]", "[4, 0.5]"), "error: small: goal.position: joint 'joint1' is 4.0 rad, allowed: [-3.14"),
         (
             ("[1, 0.5]", "[.nan, 0.5]"),
             "error: bad.yaml: goal.position[0] is nan; it must be a finite number\n",

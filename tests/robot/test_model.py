@@ -63,9 +63,9 @@ def test_check_configuration() -> None:
         robot.check_configuration(robot.limits.upper + 1.1e-3)
     with pytest.raises(ValueError, match=re.escape("goal has shape (3,), expected (2,)")):
         robot.check_configuration([1, 2, 3], "goal")
-    with pytest.raises(ValueError, match=re.escape("goal: joint 'joint2' is 4.0, allowed: [-3.14")):
+    with pytest.raises(ValueError, match=re.escape("goal: joint 'joint2' is 4.0 rad, allowed: [-3.14")):
         robot.check_configuration([0, 4], "goal")
-    with pytest.raises(ValueError, match=re.escape("q: joint 'joint1' is nan, allowed: [-3.14")):
+    with pytest.raises(ValueError, match=re.escape("q: joint 'joint1' is nan rad, allowed: [-3.14")):
         robot.check_configuration([np.nan, 0])
     with pytest.raises(TypeError, match="q must be an array of real numbers"):
         robot.check_configuration(["left", "right"])

@@ -122,7 +122,7 @@ def test_the_switch_and_embedding_are_those_asked_for() -> None:
     ("old", "new", "message"),
     [
         ("planar2", "planr2", "small: robot: no robot is named 'planr2'"),
-        ("[0.5, 0.25]", "[0.5, 4.0]", "small: goal.position: joint 'joint2' is 4.0, allowed: [-3.14"),
+        ("[0.5, 0.25]", "[0.5, 4.0]", "small: goal.position: joint 'joint2' is 4.0 rad, allowed: [-3.14"),
         ("[0, 90]", "[0, 90, 0]", "small: start.position has 3 values; robot 'planar2' has 2 coordinates"),
         ("[10, 0]", "[1000, 0]", "small: start.velocity: joint 'joint1' is 17.4"),
         ("[10, 0]", "[1]", "small: start.velocity has 1 values"),

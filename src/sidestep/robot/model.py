@@ -365,13 +365,15 @@ class Robot(_core.Robot):
         if array.shape != (self.num_coordinates,):
             raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
         limits, rounding = self.limits, _core.JointLimits.rounding
-        for joint, value, lower, upper in zip(
-            self.coordinate_names, array, limits.lower, limits.upper, strict=True
+        for k, (joint, value, lower, upper) in enumerate(
+            zip(self.coordinate_names, array, limits.lower, limits.upper, strict=True)
         ):
             if not (np.isfinite(value) and lower - rounding <= value <= upper + rounding):
                 turns = {item.coordinate for item in self.joints if item.type == _core.JointType.revolute}
-                hint = degrees_hint(array[sorted(turns)])
-                raise ValueError(f"{name}: joint {joint!r} is {value}, allowed: [{lower}, {upper}]{hint}")
+                unit, hint = "rad" if k in turns else "m", degrees_hint(array[sorted(turns)])
+                raise ValueError(
+                    f"{name}: joint {joint!r} is {value} {unit}, allowed: [{lower}, {upper}] {unit}{hint}"
+                )
         return array
 
     def mass_matrix(self, q: ArrayLike) -> Array:
