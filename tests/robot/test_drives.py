@@ -81,6 +81,16 @@ def test_ranges_that_are_none_are_named(locked, words):
         ss.Robot.from_urdf(GRIPPER, locked=locked)
 
 
+def test_more_than_can_be_swept_is_refused_with_numbers():
+    rail = """<link name="floor"/><link name="base"/>
+      <joint name="rail" type="prismatic"><parent link="floor"/><child link="base"/><axis xyz="1 0 0"/>
+        <limit lower="0" upper="1" velocity="1" effort="10"/></joint>"""
+    on_a_rail = GRIPPER.replace('<link name="base"/>', rail)
+    words = r"link 'finger' is swept through 2400 cells by the ranges of 'turn', 'slide', allowed: 2000"
+    with pytest.raises(ValueError, match=words):
+        ss.Robot.from_urdf(on_a_rail, locked={"turn": (-3.0, 3.0), "slide": (0.0, 0.04)})
+
+
 def test_ranges_are_of_mjcf_too():
     text = """
     <mujoco><worldbody><body name="hand"><joint name="turn" axis="0 0 1" range="-90 90" limited="true"/>

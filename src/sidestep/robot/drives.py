@@ -13,6 +13,7 @@ from sidestep.robot.link import Array, Link
 from sidestep.robot.pose import about_axis, pose_at
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
+MOST_CELLS = 2000  # of a link that several joints with a range move: each takes a millisecond
 LARGEST_TURN = 0.05  # [rad] between two poses of a sweep: 0.03 mm of 0.1 m are cut off the arc
 
 
@@ -70,6 +71,9 @@ def swept_links(
         kept: joints of the tree, parents first. locks: position of every joint that is held, the middle of its range
             where it has one [rad | m]. ranges: of joints that something else drives. poses: of joints with several
             coordinates.
+
+    Raises:
+        ValueError: so many joints with long ranges move a link that its shapes cannot be swept.
     """
     if not ranges:
         return {}
@@ -110,6 +114,13 @@ def swept_links(
         ]
         if not movers:
             continue
+        count = math.prod(len(grid[name]) - 1 for name in movers)
+        if count > MOST_CELLS:
+            names = ", ".join(map(repr, movers))
+            raise ValueError(
+                f"locked: link {link!r} is swept through {count} cells by the ranges of {names}, "
+                f"allowed: {MOST_CELLS}; give shorter ranges, or hold some of these joints at a value"
+            )
         cells = itertools.product(*(itertools.pairwise(grid[name]) for name in movers))
         sweeps = tuple(
             np.array(
