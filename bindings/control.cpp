@@ -193,7 +193,7 @@ void bind_safety(nb::module_& m) {
       .def(
           "__init__",
           [](Clearances* self, const ArrayLike& values, const ArrayLike& rates, const ArrayLike& curvatures,
-             const ArrayLike& gradients, const std::vector<int>& nearest) {
+             const ArrayLike& gradients, const std::vector<int>& nearest, const std::optional<ArrayLike>& margins) {
             const auto num = static_cast<Eigen::Index>(nearest.size());
             const Array rows = as_array(gradients, "gradients");
             if (rows.ndim() != 2) {
@@ -206,11 +206,14 @@ void bind_safety(nb::module_& m) {
             result.curvatures = as_vector(curvatures, "curvatures", num);
             result.gradients = as_matrix(gradients, "gradients", num, nv).transpose();
             result.nearest = Eigen::Map<const Eigen::VectorXi>(nearest.data(), num);
+            if (margins) {
+              result.margins = as_vector(*margins, "margins", num);
+            }
             result.mind_nearest();
             new (self) Clearances(std::move(result));
           },
           nb::kw_only(), nb::arg("values"), nb::arg("rates"), nb::arg("curvatures"), nb::arg("gradients"),
-          nb::arg("nearest"))
+          nb::arg("nearest"), nb::arg("margins") = nb::none())
       .def_prop_ro("values", [](const Clearances& c) { return to_numpy(c.values); },
                    "h (m,) [m]; inf beyond the reach, where the rest has no meaning.")
       .def_prop_ro("rates", [](const Clearances& c) { return to_numpy(c.rates); },

@@ -1212,7 +1212,7 @@ class Clearances:
     Clearances h(q, t) of parts of an arm with what their motion needs; arrays are copies.
     """
 
-    def __init__(self, *, values: numpy.typing.ArrayLike, rates: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike, gradients: numpy.typing.ArrayLike, nearest: Sequence[int]) -> None: ...
+    def __init__(self, *, values: numpy.typing.ArrayLike, rates: numpy.typing.ArrayLike, curvatures: numpy.typing.ArrayLike, gradients: numpy.typing.ArrayLike, nearest: Sequence[int], margins: numpy.typing.ArrayLike | None = None) -> None: ...
 
     @property
     def values(self) -> numpy.typing.NDArray[numpy.float64]:

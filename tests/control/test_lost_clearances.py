@@ -1,5 +1,7 @@
 """Arms that start in contact: folded into themselves, or inside a ball."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -97,17 +99,17 @@ def test_a_way_out_comes_before_the_margins_of_others() -> None:
     robot = ss.Robot.named("planar3")
     zero = np.zeros(3)
 
-    def lost(depth: float, other: float) -> Clearances:
+    def lost(depth: float, other: float, margin: float) -> Clearances:
         gradients = np.array([[0.469, 0.0, 0.0], [-0.012, 0.0, 0.0]])
-        return Clearances(
-            values=[-depth, other], rates=[0.0] * 2, curvatures=[0.0] * 2, gradients=gradients, nearest=[0, 1]
-        )
+        values, margins = [-depth, other], [margin, margin]
+        rest: dict[str, Any] = {"rates": [0.0] * 2, "curvatures": [0.0] * 2, "nearest": [0, 1]}
+        return Clearances(values=values, gradients=gradients, margins=margins, **rest)
 
-    for other, sign in ((0.0014, 1.0), (0.0002, -1.0)):  # of which one is about to be lost in its turn
-        filtered = AccelerationFilter(robot).apply(zero, zero, zero, clearances=lost(0.0023, other))
-        solved = TorqueController(robot).solve(
-            zero, zero, zero, np.eye(3), zero, clearances=lost(0.0023, other)
-        )
+    # Unless it is about to be lost in its turn, or is seen: then its margin covers errors.
+    for other, margin, sign in ((0.0014, 0.025, 1.0), (0.0002, 0.025, -1.0), (0.0014, np.inf, -1.0)):
+        clearances = lost(0.0023, other, margin)
+        filtered = AccelerationFilter(robot).apply(zero, zero, zero, clearances=clearances)
+        solved = TorqueController(robot).solve(zero, zero, zero, np.eye(3), zero, clearances=clearances)
         assert filtered.status == solved.status == TorqueStatus.clearance_lost
         assert sign * filtered.acceleration[0] > 1.0
         assert sign * solved.acceleration[0] > 1.0

@@ -89,7 +89,7 @@ void ClearanceTableBarrier::add_to(EmbeddingView out, const KinematicState& stat
 
 CoordinateLabel ClearanceTableBarrier::label(int k) const {
   const ClearanceTable& table = tables_[static_cast<std::size_t>(k)];
-  return {CoordinateLabel::Kind::self, table.first, table.second, function().floor};
+  return {CoordinateLabel::Kind::self, table.first, table.second, floor(k)};
 }
 
 }  // namespace sidestep

@@ -305,8 +305,9 @@ void SelfCollisionBarrier::shorten_where_usually_near() {
   const Eigen::VectorXd v = Eigen::VectorXd::Zero(nv);
   for (int n = 0; n < configurations; ++n) {
     for (Eigen::Index j = 0; j < nv; ++j) {
-      const double low = std::max(arm.limits().lower[j], -std::numbers::pi),
-                   high = std::min(arm.limits().upper[j], std::numbers::pi);
+      const double lower = arm.limits().lower[j], upper = arm.limits().upper[j], turn = 2.0 * std::numbers::pi;
+      const double low = std::isfinite(lower) ? lower : std::isfinite(upper) ? upper - turn : -0.5 * turn;
+      const double high = std::isfinite(upper) ? upper : low + turn;
       const double place = (static_cast<double>(n) + 0.5) * std::pow(x, -static_cast<double>(j + 1));
       q[j] = low + (place - std::floor(place)) * (high - low);
     }
@@ -371,7 +372,7 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
 
 CoordinateLabel SelfCollisionBarrier::label(int k) const {
   const Pair& pair = pairs_[static_cast<std::size_t>(k)];
-  return {CoordinateLabel::Kind::self, pair.first.link, pair.second.link, function().floor};
+  return {CoordinateLabel::Kind::self, pair.first.link, pair.second.link, floor(k)};
 }
 
 PlaneBarrier::PlaneBarrier(const Robot& robot, const Body& body, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,

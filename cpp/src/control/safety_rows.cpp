@@ -26,7 +26,7 @@ constexpr double scarce = 0.05;
 constexpr double creeping = 1e-4;
 // [m] Stands for the depth of what is not lost, so that its way back counts as that of what is: after what others have to keep.
 constexpr double least_depth = 1e-6;
-// Of its margin, what a clearance keeps while another is lost: enough that it is not lost in its turn.
+// Of its margin, what a clearance keeps that opposes the way out of a lost one.
 constexpr double of_margin = 0.2;
 constexpr double at_rest = 1e-6;              // [rad/s | m/s], or slower
 constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
@@ -303,16 +303,31 @@ bool SafetyRows::draw_on_reserves(double period) noexcept {
 }
 
 void SafetyRows::put_off_ways_back(double period) noexcept {
-  for (int row = 0; row < size_; ++row) {
+  asked_.head(size_) = lower.head(size_);
+  int spare = max_size() - size_;
+  for (int row = 0; row < size_ && spare > 0; ++row) {
     const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
-    asked_[row] = lower[row];
-    if (along_path[static_cast<std::size_t>(row)] == 0 && depths[row] == 0.0) {
-      const double room = reserve.room + (1.0 - of_margin) * reserve.margin;
-      const double needed = demanded_deceleration(room, reserve.closing_speed, reserve.limits, period) - reserve.curvature;
-      lower[row] = std::min(lower[row], needed / lengths[row]);
+    if (along_path[static_cast<std::size_t>(row)] != 0 || depths[row] > 0.0 || reserve.seen || reserve.room > 0.0 ||
+        !opposes_lost(row)) {
+      continue;
+    }
+    const double room = reserve.room + (1.0 - of_margin) * reserve.margin;
+    const double needed = demanded_deceleration(room, reserve.closing_speed, reserve.limits, period) - reserve.curvature;
+    if (needed / lengths[row] < lower[row]) {
+      lower[row] = needed / lengths[row];
+      --spare;
     }
   }
   ask_for_ways_back();
+}
+
+bool SafetyRows::opposes_lost(int row) const noexcept {
+  for (int lost = 0; lost < size_; ++lost) {
+    if (depths[lost] > 0.0 && normals.row(row).dot(normals.row(lost)) < 0.0) {
+      return true;
+    }
+  }
+  return false;
 }
 
 void SafetyRows::ask_again() noexcept { lower.head(size_) = asked_.head(size_); }
@@ -444,6 +459,7 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     reserve = {room, u, c};
     reserve.limits = closing;
     reserve.margin = approach.values[k] - room;
+    reserve.seen = clearances.margins[k] == infinity;
     if (last != nullptr) {
       const double asked = required, whole = last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
       if (whole < infinity && (room <= 0.0 || u <= of_arm + slow)) {

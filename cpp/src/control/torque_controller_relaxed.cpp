@@ -12,8 +12,8 @@ namespace {
 constexpr double regularisation = 1e-6;
 // That of the ways out of what is lost, which a joint of little leverage [rad/rad] is not to be flung about for.
 constexpr double lost_regularisation = 1e-2;
-// Shortfalls below this, relative to 1 /s^2 plus what is asked for, may be of the regularisation alone; but ways out of what is lost
-// are no reason to fling a joint of no leverage about.
+// Shortfalls below this, relative to 1 /s^2 plus what is asked for, may be of the regularisation alone, and are not granted. Those of
+// ways out are granted all the same: to avoid them, joints of no leverage would be flung about.
 constexpr double shortfall_tolerance = 1e-4;
 // ε: the shortfall of a clearance that the joints change by less than 5 cm/rad counts less [(m/rad)²].
 constexpr double least_gradient_squared = 0.05 * 0.05;

@@ -179,8 +179,8 @@ class SafetyRows {
   /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, where no
   /// clearance is lost.
   bool draw_on_reserves(double period) noexcept;
-  /// After `add`, where a clearance is lost: the others ask for a fifth of their margin only, and for the rest after the way out of what
-  /// is lost, by another row each.
+  /// After `add`, where a clearance is lost. Those that oppose its way out, are known and not seen, and are inside their margin, ask
+  /// for a fifth of it only; and for the rest after the way out, by another row each.
   void put_off_ways_back(double period) noexcept;
   /// After it: asks for all of it again.
   void ask_again() noexcept;
@@ -225,8 +225,11 @@ class SafetyRows {
     double room = 0.0, closing_speed = 0.0, curvature = 0.0, hardest = 0.0, jerk = 0.0;
     double before = 0.0;  ///< ∇h·a of the last period
     double margin = 0.0;
+    bool seen = false;  ///< by a sensor: its whole margin counts
     ClosingLimits limits{};
   };
+
+  bool opposes_lost(int row) const noexcept;
 
   SafetySettings settings_;
   int size_ = 0;
