@@ -171,7 +171,9 @@ def test_limits_of_whole_turns_and_of_no_end_are_radians(
 
 def test_an_error_about_a_configuration_says_that_it_looks_like_degrees() -> None:
     robot = Robot.from_urdf(planar_arm(2))
-    with pytest.raises(ValueError, match=r"joint 'joint1' is 4\.0, .*; 90 looks like degrees; radians are"):
+    with pytest.raises(
+        ValueError, match=r"joint 'joint1' is 4\.0 rad, .*; 90 looks like degrees; radians are"
+    ):
         robot.check_configuration([4.0, 90.0])
-    with pytest.raises(ValueError, match=r"allowed: \[[^;]*\]$"):
+    with pytest.raises(ValueError, match=r"allowed: \[[^;]*\] rad$"):
         robot.check_configuration([4.0, 0.0])

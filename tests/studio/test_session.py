@@ -343,7 +343,7 @@ def test_the_controller_is_told_of_what_moves_otherwise_than_it_was_told(
 def test_a_goal_outside_the_limits_is_refused(make_session: MakeSession, scenario: Scenario) -> None:
     session = make_session(scenario)
     goal = session.snapshot().goal
-    with pytest.raises(ValueError, match=r"goal: joint 'joint1' is 9\.0, allowed"):
+    with pytest.raises(ValueError, match=r"goal: joint 'joint1' is 9\.0 rad, allowed"):
         session.handle(m.SetJointGoal(np.array([9.0, 0.0])))
     np.testing.assert_array_equal(session.snapshot().goal, goal)
 
