@@ -244,6 +244,17 @@ std::vector<BodyEllipsoid> of_link(const std::vector<BodyEllipsoid>& all, const 
   return found;
 }
 
+/// Of two links that may be within reach of each other.
+MeanGap solved(const PairOfLinks& pair, double temperature, double horizon, double reach, double reach_ahead) noexcept {
+  MeanGap gaps(pair, temperature, horizon, reach, reach_ahead);
+  pair.find_below(reach + BoltzmannMean::window * temperature, [&](const auto&... near) {
+    gaps.add(near...);
+    return false;
+  });
+  gaps.solve();
+  return gaps;
+}
+
 }  // namespace
 
 SelfCollisionBarrier::SelfCollisionBarrier(const Robot& robot, const Body& body, const std::vector<LinkPair>& pairs,
@@ -316,13 +327,7 @@ void SelfCollisionBarrier::shorten_where_usually_near() {
       const double reach = usually_near + pairs_[i].contact;
       const PairOfLinks pair(state, pairs_[i].first, pairs_[i].second);
       if (pair.find_below(reach, [](const auto&...) { return true; })) {
-        MeanGap gaps(pair, temperature_, 0.0, reach, reach);
-        pair.find_below(reach + BoltzmannMean::window * temperature_, [&](const auto&... each) {
-          gaps.add(each...);
-          return false;
-        });
-        gaps.solve();
-        near[i].push_back(gaps.least() - pairs_[i].contact);
+        near[i].push_back(solved(pair, temperature_, 0.0, reach, reach).least() - pairs_[i].contact);
       }
     }
   }
@@ -349,12 +354,7 @@ void SelfCollisionBarrier::add_to(EmbeddingView out, const KinematicState& state
     if (!pair.find_below(reach + contact, [](const auto&...) { return true; })) {
       continue;
     }
-    MeanGap gaps(pair, temperature_, ahead.time, reach + contact, ahead.distance + contact);
-    pair.find_below(reach + contact + BoltzmannMean::window * temperature_, [&](const auto&... near) {
-      gaps.add(near...);
-      return false;
-    });
-    gaps.solve();
+    const MeanGap gaps = solved(pair, temperature_, ahead.time, reach + contact, ahead.distance + contact);
     ClearanceSample mean = gaps.mean(), approach = gaps.approach();
     mean.value -= contact;
     approach.value -= contact;

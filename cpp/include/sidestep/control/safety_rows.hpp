@@ -179,14 +179,14 @@ class SafetyRows {
   /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, where no
   /// clearance is lost.
   bool draw_on_reserves(double period) noexcept;
-  /// After `add`, where a clearance is lost. Those that oppose its way out, are known and not seen, and are inside their margin, ask
-  /// for a fifth of it only; and for the rest after the way out, by another row each.
-  void put_off_ways_back(double period) noexcept;
   /// After it: asks for all of it again.
   void ask_again() noexcept;
   /// After it: asks in full for the ways back that were put off, false where none was: by another row for each that is not lost, which
   /// counts as one that is, so that what keeps it from closing still counts more.
   bool ask_for_ways_back() noexcept;
+  /// After `add`, where a clearance is lost. Those that oppose its way out, are known and not seen, and are inside their margin, ask
+  /// for a fifth of it only; and for the rest after the way out, by another row each.
+  void put_off_ways_back(double period) noexcept;
 
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
   bool satisfied_within(int k, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) const noexcept;

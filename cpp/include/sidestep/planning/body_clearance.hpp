@@ -1,9 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <limits>
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -140,8 +140,9 @@ class BodyClearance {
 
   /// What `margins` ask of an item away from the ends [m].
   double margin(int item, const Margins& margins) const noexcept {
-    const double most = label(item).kind == CoordinateLabel::Kind::self ? margins.pair_margin : margins.margin;
-    return std::min({most, margins.margin, items_[static_cast<std::size_t>(item)].most_margin});
+    const bool pair = label(item).kind == CoordinateLabel::Kind::self;
+    return pair ? std::min({margins.pair_margin, margins.margin, items_[static_cast<std::size_t>(item)].most_margin})
+                : margins.margin;
   }
 
   /// What `margins` give an item between the configurations that are looked at [m].
@@ -188,14 +189,16 @@ class BodyClearance {
         : label(std::move(what)), link(on), reach(Eigen::VectorXd::Zero(nv)), bend(Eigen::MatrixXd::Zero(nv, nv)) {}
 
     CoordinateLabel label;
-    int link, other = -1;                                          // links_; other: of a pair; both -1 for a table
-    int plane = -1;                                                // planes_
-    int table = -1;                                                // tables_
-    int base = -1;                                                 // joint that moves both of a pair alike
-    Eigen::VectorXd reach;                                         // R of every coordinate
-    Eigen::MatrixXd bend;                                          // R of the later one of two, row by row in bends_
-    double contact = 0.0;                                          // of a pair [m]
-    double most_margin = std::numeric_limits<double>::infinity();  // of links that are usually near, see Barrier [m]
+    int link, other = -1;   // links_; other: of a pair; both -1 for a table
+    int plane = -1;         // planes_
+    int table = -1;         // tables_
+    int base = -1;          // joint that moves both of a pair alike
+    Eigen::VectorXd reach;  // R of every coordinate
+    Eigen::MatrixXd bend;   // R of the later one of two, row by row in bends_
+    double contact = 0.0;   // of a pair [m]
+
+    /// Of links that are usually near, see Barrier [m].
+    double most_margin = std::numeric_limits<double>::infinity();
   };
   struct Plane {
     Eigen::Vector3d normal;
