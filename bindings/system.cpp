@@ -54,7 +54,8 @@ void bind_diagnosis(nb::module_& m) {
       .value("obstacle", CoordinateLabel::Kind::obstacle, "A link against the obstacle points.")
       .value("self", CoordinateLabel::Kind::self, "Two links of the robot.")
       .value("plane", CoordinateLabel::Kind::plane, "A link against a plane.")
-      .value("joint_limit", CoordinateLabel::Kind::joint_limit, "A joint against a position limit.");
+      .value("joint_limit", CoordinateLabel::Kind::joint_limit, "A joint against a position limit.")
+      .value("effort", CoordinateLabel::Kind::effort, "What a joint holds of the arm against its effort limit.");
   nb::class_<CoordinateLabel>(m, "CoordinateLabel", "What one coordinate of an embedding is about.")
       .def_ro("kind", &CoordinateLabel::kind, "What the coordinate measures.")
       .def_ro("name", &CoordinateLabel::name, "Of the link, or of the joint for a limit; empty for a potential.")

@@ -666,6 +666,9 @@ class CoordinateKind(enum.Enum):
     joint_limit = 4
     """A joint against a position limit."""
 
+    effort = 5
+    """What a joint holds of the arm against its effort limit."""
+
 class CoordinateLabel:
     """What one coordinate of an embedding is about."""
 

@@ -108,6 +108,18 @@ def test_motions_without_an_optimum_are_counted(result: SceneResult) -> None:
     assert plain["jerk_time_ratio_unsolved"] == 0
 
 
+def test_goals_that_no_torque_holds_are_counted_and_said(result: SceneResult) -> None:
+    _, failed = result.outcomes
+    assert failed.goal_effort is None  # nothing is moved by torque
+    several = replace(
+        result, outcomes=tuple(replace(failed, goal_effort=share) for share in (0.4, 0.99, 1.04))
+    )
+    figures = several.to_document()["all"]
+    assert (figures["goal_beyond_effort"], figures["goal_effort"]["max"]) == (1, pytest.approx(1.04))
+    said = [any("104 % of a joint's effort limit" in r for r in item.reasons()) for item in several.outcomes]
+    assert said == [False, False, True]
+
+
 def test_the_optimum_needs_its_package_before_anything_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "casadi", None)
     with pytest.raises(ModuleNotFoundError, match="casadi"):

@@ -481,7 +481,7 @@ void TorqueController::report_clearance(const Clearances* clearances, TorqueSolu
   }
   const Eigen::Index num = std::min({clearances->nearest.size(), clearances->least.size(), clearances->values.size()});
   for (Eigen::Index k = 0; k < num; ++k) {
-    const double value = std::min(clearances->least[k], clearances->values[k]);
+    const double value = clearances->least[k];
     if (clearances->nearest[k] >= 0 && value < solution.least_clearance) {
       solution.least_clearance = value;
       solution.least_coordinate = static_cast<int>(k);

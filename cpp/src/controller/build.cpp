@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "impl.hpp"
 #include "sidestep/barrier/clearance_barrier.hpp"
 #include "sidestep/barrier/clearance_table_barrier.hpp"
+#include "sidestep/barrier/holding_torque.hpp"
 #include "sidestep/barrier/joint_limit_barrier.hpp"
 #include "sidestep/barrier/self_collision_barrier.hpp"
 
@@ -21,7 +23,18 @@ constexpr Eigen::Index most_held = 6;        // bounds that a twist is held by
 constexpr double most_per_period = 0.2;      // of the feedback's frequency: a slow rate holds its torques for long
 constexpr double default_look_period = 0.02;  // [s] of looks at places where there is no planner
 
-std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const BarrierSettings& b) {
+/// Of joints whose torque may not hold the arm, as far as effort margins leave it; nothing without torque control.
+std::optional<HoldingTorque> make_holding(const Arm& arm, const ControllerSettings& settings, bool torque) {
+  if (!torque || !arm.has_dynamics()) {
+    return std::nullopt;
+  }
+  const Eigen::VectorXd effort = (1.0 - settings.effort_margin) * arm.robot().limits().effort;
+  HoldingTorque holding(arm.dynamics(), effort, settings.barriers.self_activation);
+  return holding.loads().empty() ? std::nullopt : std::optional(std::move(holding));
+}
+
+std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const BarrierSettings& b,
+                                                   const std::optional<HoldingTorque>& holding) {
   const Robot& robot = arm.robot();
   const int nv = robot.num_coordinates();
   std::vector<std::shared_ptr<const Embedding>> parts;
@@ -37,6 +50,9 @@ std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const Barrier
   }
   if (!arm.pairs().empty()) {
     parts.push_back(std::make_shared<SelfCollisionBarrier>(robot, arm.body(), arm.pairs(), self, b.temperature));
+  }
+  if (holding) {
+    parts.push_back(std::make_shared<HoldingTorqueBarrier>(*holding, self));
   }
   GeometricSystemSettings settings;
   settings.stiffness = b.stiffness * Eigen::MatrixXd::Identity(nv, nv);
@@ -174,11 +190,12 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
     : StepState(a.robot()),
       arm(std::move(a)),
       settings((s.validate(), std::move(s))),
-      system(make_system(arm, settings.barriers)),
+      torque(use_torque(arm, settings.output)),
+      holding_(make_holding(arm, settings, torque)),
+      system(make_system(arm, settings.barriers, holding_)),
       workspace(*system),
       solution(arm.num_coordinates(), settings.safety.max_rows),
       command(c),
-      torque(use_torque(arm, settings.output)),
       goal_orders_(GoalOrder{}),
       obstacle_orders_(ObstacleOrder{}),
       snapshots_(Snapshot(arm, trajectory_)),
@@ -187,7 +204,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
       trajectories_(FoundTrajectory{0.0, 0, false, trajectory_}),
       measured_(last_arm_q_),
       shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
-      body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables()),
+      body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables(), holding_),
       here_(body_),
       drives_track_(settings.output == ControllerSettings::Output::position ||
                     settings.output == ControllerSettings::Output::velocity),
@@ -272,7 +289,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
     is_sliding_[j] = is_sliding_[j] || joint.type == JointType::prismatic;
   }
   for (std::size_t k = 0; k < system->labels().size(); ++k) {
-    if (system->labels()[k].kind != CoordinateLabel::Kind::joint_limit) {
+    const CoordinateLabel::Kind kind = system->labels()[k].kind;
+    if (kind != CoordinateLabel::Kind::joint_limit && kind != CoordinateLabel::Kind::effort) {
       metric_coordinates_.push_back(static_cast<Eigen::Index>(k));
     }
   }

@@ -33,6 +33,7 @@ std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
     case CoordinateLabel::Kind::self: return "links '" + label.name + "' and '" + label.other + "'";
     case CoordinateLabel::Kind::plane: return "link '" + label.name + "' and a plane";
     case CoordinateLabel::Kind::joint_limit: return "joint '" + label.name + "' and its " + label.other + " limit";
+    case CoordinateLabel::Kind::effort: return "joint '" + label.name + "' and its effort limit, by what it holds of the arm";
     case CoordinateLabel::Kind::potential: break;
   }
   return "a potential";
@@ -103,6 +104,9 @@ std::string Controller::Impl::explain_target() const {
       return {};
     }
     obstruction = guide->last_plan().obstruction;
+  }
+  if (obstruction.label.kind == CoordinateLabel::Kind::effort) {
+    return "at the goal " + describe(obstruction) + (pose_goal() ? "; another posture is looked for" : "; set another goal");
   }
   const bool own = obstruction.label.kind == CoordinateLabel::Kind::self;
   const bool finer = finer_covers_may_free(obstruction);

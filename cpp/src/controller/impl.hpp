@@ -70,6 +70,8 @@ class Controller::Impl : private StepState {
 
   const Arm arm;
   const ControllerSettings settings;
+  const bool torque;
+  const std::optional<HoldingTorque> holding_;
   std::shared_ptr<const GeometricSystem> system;
   GeometricSystem::Workspace workspace;
   TorqueSolution solution;
@@ -77,7 +79,6 @@ class Controller::Impl : private StepState {
   Impl* before = nullptr;              // of those that wait for another thread to destroy them
   std::atomic<Impl*> lifted{nullptr};  // to go on with once what rests is lifted; its own until then
   std::unique_ptr<OnlinePlanner> guide;
-  bool torque = false;
 
  private:
   struct VelocityOrder {

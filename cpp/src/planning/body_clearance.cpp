@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "../settings.hpp"
 #include "kernels/distance_kernel.hpp"
@@ -33,8 +34,9 @@ kernels::PlacedEllipsoid placed(const Eigen::Vector3d& centre, const Eigen::Matr
 }  // namespace
 
 BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs,
-                             const std::vector<KeptPlane>& planes, std::vector<ClearanceTable> tables)
-    : robot_(std::move(robot)), tables_(std::move(tables)) {
+                             const std::vector<KeptPlane>& planes, std::vector<ClearanceTable> tables,
+                             std::optional<HoldingTorque> holding)
+    : robot_(std::move(robot)), tables_(std::move(tables)), holding_(std::move(holding)) {
   for (const Joint& joint : robot_.joints()) {
     const Eigen::Vector3d& a = joint.axis;
     const Eigen::Matrix3d R_PJ = joint.X_PJ.linear();
@@ -103,6 +105,7 @@ BodyClearance::BodyClearance(Robot robot, const Body& body, const std::vector<Li
     bound_margins(ClearanceTableBarrier(robot_, tables_, any_barrier),
                   items_.end() - static_cast<std::ptrdiff_t>(tables_.size()));
   }
+  add_loads();
   reach_ = Eigen::VectorXd::Zero(nv);
   reaches_.resize(num_items(), nv);
   bends_.resize(num_items(), nv * nv);
@@ -126,7 +129,10 @@ BodyClearance::Workspace::Workspace(const BodyClearance& body)
       products_(body.robot_.num_coordinates() * body.robot_.num_coordinates()),
       q_(body.robot_.num_coordinates()),
       difference_(body.robot_.num_coordinates()),
-      placed_(body.robot_.num_coordinates()) {
+      placed_(body.robot_.num_coordinates()),
+      state_(body.robot_),
+      rest_(Eigen::VectorXd::Zero(body.robot_.num_coordinates())),
+      gradient_(rest_) {
   std::size_t most = 0;
   for (const Link& link : body.links_) {
     most = std::max(most, link.ellipsoids.size());
@@ -138,6 +144,7 @@ BodyClearance::Workspace::Workspace(const BodyClearance& body)
 
 void BodyClearance::place(ConstVectorRef q, Workspace& w) const noexcept {
   w.placed_ = q;
+  w.state_is_old_ = true;
   for (std::size_t i = 0; i < rotations_.size(); ++i) {
     const Joint& joint = robot_.joints()[i];
     const Workspace::Pose& parent = pose(w, joint.parent);
@@ -159,6 +166,13 @@ void BodyClearance::place(ConstVectorRef q, Workspace& w) const noexcept {
   }
 }
 
+const KinematicState& BodyClearance::state(Workspace& w) const noexcept {
+  if (std::exchange(w.state_is_old_, false)) {
+    w.state_.update(robot_, w.placed_, w.rest_);
+  }
+  return w.state_;
+}
+
 const BodyClearance::Workspace::Pose& BodyClearance::pose(const Workspace& w, int joint) const noexcept {
   static const Workspace::Pose world{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                      Eigen::Vector3d::Zero()};
@@ -177,6 +191,9 @@ BodyClearance::Found BodyClearance::look(const Item& item, const Obstacles& obst
     const ClearanceTable& table = tables_[static_cast<std::size_t>(item.table)];
     const double clearance = table.at(w.placed_[table.axes[0].coordinate], w.placed_[table.axes[1].coordinate]).value;
     return {std::min(clearance, asked.cap), -1};
+  }
+  if (item.load >= 0) {
+    return {std::min(holding_->value(holding_->loads()[static_cast<std::size_t>(item.load)], state(w)), asked.cap), -1};
   }
   if (item.plane >= 0) {
     const Link& link = links_[static_cast<std::size_t>(item.link)];

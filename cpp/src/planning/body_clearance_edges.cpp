@@ -43,7 +43,11 @@ void BodyClearance::move(ConstVectorRef velocity, Workspace& w) const noexcept {
   }
 }
 
-double BodyClearance::speed(const Item& item, const Workspace& w) const noexcept {
+double BodyClearance::speed(const Item& item, Workspace& w) const noexcept {
+  if (item.load >= 0) {
+    static_cast<void>(holding_->at(holding_->loads()[static_cast<std::size_t>(item.load)], state(w), w.gradient_));
+    return std::abs(w.gradient_.dot(w.difference_));
+  }
   if (item.table >= 0) {
     return item.reach.dot(w.lengths_);
   }
@@ -64,6 +68,7 @@ double BodyClearance::speed(const Item& item, const Workspace& w) const noexcept
 
 void BodyClearance::bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept {
   const Eigen::Index nv = displacement.size();
+  w.difference_ = displacement;
   w.lengths_ = displacement.cwiseAbs();
   w.motions_.noalias() = reaches_ * w.lengths_;
   for (Eigen::Index i = 0, k = 0; i < nv; k += nv, ++i) {

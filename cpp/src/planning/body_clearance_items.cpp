@@ -93,4 +93,20 @@ void BodyClearance::add_tables() {
   }
 }
 
+void BodyClearance::add_loads() {
+  if (!holding_) {
+    return;
+  }
+  for (std::size_t i = 0; i < holding_->loads().size(); ++i) {
+    const HoldingTorque::Load& load = holding_->loads()[i];
+    const std::string& name = robot_.coordinate_names()[static_cast<std::size_t>(load.coordinate)];
+    Item item({CoordinateLabel::Kind::effort, name}, -1, robot_.num_coordinates());
+    item.load = static_cast<int>(i);
+    item.reach = load.steepest;
+    item.bend = load.bend;
+    item.most_margin = Barrier::margin_share * load.activation;
+    items_.push_back(std::move(item));
+  }
+}
+
 }  // namespace sidestep

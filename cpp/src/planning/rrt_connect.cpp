@@ -83,8 +83,7 @@ bool RrtConnect::obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles
   int worst = -1;
   double excess = 0.0;
   for (int i = 0; i < body_->num_items(); ++i) {
-    const bool pair = body_->label(i).kind == CoordinateLabel::Kind::self;
-    const double beyond = -clearances_[i] - (pair ? settings_.pair_allowance : settings_.allowance);
+    const double beyond = -clearances_[i] - (body_->is_own(i) ? settings_.pair_allowance : settings_.allowance);
     if (clearances_[i] < -least && beyond > excess) {
       excess = beyond;
       worst = i;

@@ -40,6 +40,7 @@ Parties parties(const Diagnosis& d, const CoordinateLabel& label, const Obstacle
                   (std::isfinite(d.clearance) ? ", " + way(std::abs(d.clearance), "%.3f rad", label.slides) +
                                                     (d.clearance < 0.0 ? " beyond it" : " away")
                                               : "")};
+    case CoordinateLabel::Kind::effort: return {"joint " + label.name, "its effort limit, by what it holds of the arm"};
     case CoordinateLabel::Kind::potential: break;
   }
   return {"the arm", "an obstacle or a limit (a density does not tell which)"};

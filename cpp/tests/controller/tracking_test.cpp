@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
+#include <numbers>
 
 #include "sidestep/controller/controller.hpp"
 #include "support/covered_arm.hpp"
@@ -129,4 +130,51 @@ BOOST_AUTO_TEST_CASE(an_arm_with_a_payload_arrives_and_the_payload_is_found) {
   Eigen::VectorXd gravity(nv);
   model.gravity(state, of_model, gravity);
   BOOST_TEST((command.torque - command.torque_without_gravity - gravity).cwiseAbs().maxCoeff() < 0.01);
+}
+
+BOOST_AUTO_TEST_CASE(where_the_torque_cannot_hold_the_arm_it_does_not_go) {
+  // Stretched out level, gravity takes 1.1 times what the second joint has; folded or upright much less.
+  JointLimits limits = test::arm_limits(nv);
+  const Arm strong = covered_arm(limits);
+  const RigidBodyDynamics of_strong(strong.dynamics());
+  RigidBodyDynamics::Workspace w(of_strong);
+  Eigen::VectorXd level = Eigen::VectorXd::Zero(nv), bias(nv);
+  level[1] = 0.5 * std::numbers::pi;
+  of_strong.bias(level, Eigen::VectorXd::Zero(nv), w, bias);
+  limits.effort[1] = std::abs(bias[1]) / 1.1;
+  const Arm arm = covered_arm(limits);
+  Controller controller(arm, settings_of(ControllerSettings::Output::torque));
+  const double period = controller.settings().period, allowed = 1.0 - controller.settings().effort_margin;
+  const RigidBodyDynamics model(arm.dynamics());
+  RigidBodyDynamics::Workspace of_model(model);
+  Eigen::MatrixXd mass(nv, nv);
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, gravity(nv);
+  const Eigen::VectorXd rest = v;
+  q[3] = 0.3;
+  const auto run = [&](const Eigen::VectorXd& goal, int steps) {
+    controller.set_goal(goal);
+    double most = 0.0;
+    for (int k = 0; k < steps; ++k) {
+      const Command& command = controller.step(q, v);
+      BOOST_REQUIRE(command.status <= SafetyStatus::relaxed);
+      model.mass_matrix(q, of_model, mass);
+      model.bias(q, v, of_model, bias);
+      v += period * mass.ldlt().solve(command.torque - bias);
+      q += period * v;
+      model.bias(q, rest, of_model, gravity);
+      most = std::max(most, std::abs(gravity[1]) / limits.effort[1]);
+    }
+    return most;
+  };
+  BOOST_TEST(run(level, 6000) < allowed);
+  BOOST_TEST((controller.command().activity == Activity::blocked));
+  BOOST_TEST(controller.explain().find("joint 'joint2' cannot hold the arm with its effort limit; set another goal") !=
+             std::string::npos);
+  BOOST_TEST(q[1] > 0.5);  // as near as it can be held
+
+  Eigen::VectorXd beyond = Eigen::VectorXd::Zero(nv);  // straight there the arm would pass where it cannot be held
+  beyond[1] = 2.3;
+  beyond[3] = -0.6;
+  BOOST_TEST(run(beyond, 6000) < allowed);
+  BOOST_TEST((controller.command().activity == Activity::arrived));
 }

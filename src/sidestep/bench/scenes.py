@@ -24,6 +24,7 @@ from sidestep.bench.problem import Problem
 from sidestep.bench.step_times import StepTimes
 from sidestep.bench.time_ratio import ratio_to_jerk_limited_optimum, ratio_to_optimum
 from sidestep.distance import Clearance, EllipsoidClearance, SceneObject
+from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
 Task = TypeVar("Task")
@@ -96,6 +97,8 @@ class SceneOutcome:
         set, index: which one. start, goal: clearances there, of the goal as published.
         goal_beyond_limits: [rad | m] by which the published goal is outside the position limits; the arm is
             sent to the nearest configuration within.
+        goal_effort: largest share of its effort limit that gravity takes of a joint at the goal; above 1 no torque
+            holds the arm there. None where no torque moves it.
         outcome: of the motion, None if there was none. path_length: sum of |dq| [rad | m].
         first_path_s: until the first path; planning_s: until it was improved; None where none is planned.
         first_motion_s: until the first command.
@@ -123,6 +126,7 @@ class SceneOutcome:
     tolerance: float
     arrives: bool = True
     ended: str = ""
+    goal_effort: float | None = None
     time_ratio: float | None = None
     jerk_time_ratio: float | None = None
     tight: Mapping[str, int] = field(default_factory=dict)
@@ -140,6 +144,10 @@ class SceneOutcome:
         found = self.outcome.reasons(arrives=self.arrives)
         if self.goal_beyond_limits > self.tolerance:
             found.append(f"the goal is {self.goal_beyond_limits:.3f} rad beyond the position limits")
+        if found and self.goal_effort is not None and self.goal_effort > 1.0:
+            found.append(
+                f"gravity takes {100.0 * self.goal_effort:.0f} % of a joint's effort limit at the goal"
+            )
         if found and self.ended:
             found.append(f"the controller says {self.ended}")
         covered = self.goal.covered
@@ -224,6 +232,9 @@ def _figures(items: Sequence[SceneOutcome]) -> dict[str, Any]:
             "min_clearance_mm": _lower(clearances, 1e3),
         }
     figures["goal_beyond_limits"] = sum(item.goal_beyond_limits > 0.0 for item in items)
+    efforts = [item.goal_effort for item in items if item.goal_effort is not None]
+    figures["goal_beyond_effort"] = sum(effort > 1.0 for effort in efforts)
+    figures["goal_effort"] = _upper(efforts)
     figures["points"] = int(np.median([item.num_points for item in items]))
     for end in ("start", "goal"):
         ends: list[EndClearances] = [getattr(item, end) for item in items]
@@ -363,8 +374,14 @@ def judged(
         tolerance=settings.motion.tolerance,
         arrives=arrives,
         ended="" if motion is None else motion.ended,
+        goal_effort=_effort_at(problem.goal, arm.robot) if settings.motion.torque else None,
         time_ratio=ratio,
         jerk_time_ratio=jerk_ratio,
         tight={} if motion is None else motion.tight,
     )
     return outcome, StepTimes() if motion is None else times_of(motion)
+
+
+def _effort_at(q: Array, robot: Robot) -> float:
+    """Largest share of an effort limit that gravity takes at q (nv,)."""
+    return float(np.abs(robot.bias(q, np.zeros_like(q)) / robot.limits.effort).max())

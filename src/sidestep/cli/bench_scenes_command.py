@@ -219,7 +219,14 @@ def _motions(document: dict[str, Any], *, optimum: bool) -> object:
 
 
 def _ends(document: dict[str, Any]) -> object:
-    columns = ("start [mm]", "goal [mm]", "goal of body [mm]", "goals inside body", "beyond limits")
+    columns = (
+        "start [mm]",
+        "goal [mm]",
+        "goal of body [mm]",
+        "goals inside body",
+        "beyond limits",
+        "beyond effort",
+    )
     table = figures_table("set", *columns, caption="clearance at the ends: min, 5 %, median")
     for name, figures in _rows(document):
         cells = []
@@ -231,6 +238,7 @@ def _ends(document: dict[str, Any]) -> object:
         cells += [
             f"{figures['goal_inside_body']} of {figures['problems']}",
             str(figures["goal_beyond_limits"]),
+            str(figures["goal_beyond_effort"]),
         ]
         table.add_row(name, *cells)
     return table

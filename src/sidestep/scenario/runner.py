@@ -83,6 +83,8 @@ def embedding_names(scenario: Scenario, labels: Sequence[CoordinateLabel]) -> tu
                 return f"{label.name} - {label.other}"
             case CoordinateKind.joint_limit:
                 return f"{label.name} - {label.other} limit"
+            case CoordinateKind.effort:
+                return f"{label.name} - effort limit"
         return next(potentials, "density")
 
     return tuple(map(name, labels))

@@ -55,8 +55,11 @@ struct Clearances : ClearanceState {
     nearest.setConstant(-1);
     least.setConstant(std::numeric_limits<double>::infinity());
   }
-  /// Lets what is nearest be what approaches.
-  void mind_nearest() { approach = *this; }
+  /// Lets what is nearest be what approaches, and the least of itself.
+  void mind_nearest() {
+    approach = *this;
+    least = least.cwiseMin(values);
+  }
 
   ClearanceView view(Eigen::Index start, Eigen::Index num) noexcept {
     return {state_view(start, num),
@@ -69,7 +72,8 @@ struct Clearances : ClearanceState {
   Eigen::VectorXi nearest;
   Eigen::VectorXd margins;
   ClearanceState approach;
-  Eigen::VectorXd least;  ///< (m) never above `values`, which are smooth: what is touched has less than zero here
+  /// (m) never above `values`, which are smooth: what is touched has less than zero here. +inf of what is no clearance from anything.
+  Eigen::VectorXd least;
 };
 
 }  // namespace sidestep

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "sidestep/barrier/embedding.hpp"
 #include "sidestep/barrier/body_ellipsoid.hpp"
 #include "sidestep/barrier/clearance_table.hpp"
+#include "sidestep/barrier/holding_torque.hpp"
 #include "sidestep/barrier/link_pair.hpp"
 #include "sidestep/planning/ball_cover.hpp"
 #include "sidestep/planning/distance_field.hpp"
@@ -51,7 +53,7 @@ struct Margins {
 /// Clearance of a covering body from obstacle points, itself and planes, made for searches: positions alone, no
 /// derivative.
 ///
-/// What must keep apart are items: a link and the obstacles, a link and a plane, two links. The clearances of planes
+/// What must keep apart are items: a link and the obstacles, a link and a plane, two links, what a joint holds and its effort limit. The clearances of planes
 /// and pairs are those of PlaneBarrier and SelfCollisionBarrier, or of ClearanceTableBarrier; that of obstacles is the
 /// distance of their balls from the ellipsoids, signed, by two steps of Newton towards the nearest place: a lower
 /// bound, as a supporting plane gives it.
@@ -62,16 +64,18 @@ struct Margins {
 ///     motion(s Δq) = s Σ_i |Δq_i| R_i      and      s v + s²/2 Σ_i Σ_j |Δq_i| |Δq_j| R_max(i, j),
 ///
 /// R_i the largest distance that the item can have from the axis of joint i and v the speed of its fastest point where
-/// the motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint; of a table it is the first, with its steepest slopes for
-/// R. An interval of an edge is free as far around its middle as the
+/// the motion begins, |∂²x/∂q_i∂q_j| ≤ R_j of the later joint; of a table it is the first, with the steepest slopes for R;
+/// of what a joint holds both, with its slope along the edge for v and bounds of the derivatives. An interval of an edge is free as far around its middle as the
 /// clearance there exceeds the smaller of the two; what is left to either side is looked at in the same way.
 class BodyClearance {
  public:
-  /// `pairs` as for SelfCollisionBarrier, `tables` of other pairs as for ClearanceTableBarrier. Throws
+  /// `pairs` as for SelfCollisionBarrier, `tables` of other pairs as for ClearanceTableBarrier; `holding`:
+  /// configurations that the arm cannot rest in are not free. Throws
   /// std::invalid_argument if the body is not calibrated or no joint moves it, a table is at fault, a name is unknown,
   /// or a prismatic joint has no limits.
   BodyClearance(Robot robot, const Body& body, const std::vector<LinkPair>& pairs = {},
-                const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {});
+                const std::vector<KeptPlane>& planes = {}, std::vector<ClearanceTable> tables = {},
+                std::optional<HoldingTorque> holding = std::nullopt);
 
   const Robot& robot() const noexcept { return robot_; }
   int num_items() const noexcept { return static_cast<int>(items_.size()); }
@@ -112,6 +116,9 @@ class BodyClearance {
     std::vector<double> bounds_;  // of the ellipsoids of a link
     Eigen::VectorXd q_, difference_;
     Eigen::VectorXd placed_;  // where the body is
+    KinematicState state_;    // there, once it is asked for
+    Eigen::VectorXd rest_, gradient_;
+    bool state_is_old_ = true;
     std::int64_t checks_ = 0;
     int last_ = 0;  // the item that was in the way last: it is looked at first
   };
@@ -138,11 +145,16 @@ class BodyClearance {
   /// around the links; infinity where all are at rest.
   double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept;
 
+  /// Whether an item is of the arm alone, and known: no sensor's error is in it.
+  bool is_own(int item) const noexcept {
+    const CoordinateLabel::Kind kind = label(item).kind;
+    return kind == CoordinateLabel::Kind::self || kind == CoordinateLabel::Kind::effort;
+  }
+
   /// What `margins` ask of an item away from the ends [m].
   double margin(int item, const Margins& margins) const noexcept {
-    const bool pair = label(item).kind == CoordinateLabel::Kind::self;
-    return pair ? std::min({margins.pair_margin, margins.margin, items_[static_cast<std::size_t>(item)].most_margin})
-                : margins.margin;
+    return is_own(item) ? std::min({margins.pair_margin, margins.margin, items_[static_cast<std::size_t>(item)].most_margin})
+                        : margins.margin;
   }
 
   /// What `margins` give an item between the configurations that are looked at [m].
@@ -189,15 +201,16 @@ class BodyClearance {
         : label(std::move(what)), link(on), reach(Eigen::VectorXd::Zero(nv)), bend(Eigen::MatrixXd::Zero(nv, nv)) {}
 
     CoordinateLabel label;
-    int link, other = -1;   // links_; other: of a pair; both -1 for a table
+    int link, other = -1;   // links_; other: of a pair; both -1 for a table and a load
     int plane = -1;         // planes_
     int table = -1;         // tables_
+    int load = -1;          // of holding_
     int base = -1;          // joint that moves both of a pair alike
     Eigen::VectorXd reach;  // R of every coordinate
     Eigen::MatrixXd bend;   // R of the later one of two, row by row in bends_
     double contact = 0.0;   // of a pair [m]
 
-    /// Of links that are usually near, see Barrier [m].
+    /// Of links that are usually near, and of loads, see Barrier [m].
     double most_margin = std::numeric_limits<double>::infinity();
   };
   struct Plane {
@@ -213,9 +226,11 @@ class BodyClearance {
   int add_link(const std::vector<BodyEllipsoid>& all, const Body& body, const std::string& name);
   void add_reach(Item& item, const Link& link) const;
   void add_tables();
+  void add_loads();
   void place(ConstVectorRef q, Workspace& w) const noexcept;
   void move(ConstVectorRef velocity, Workspace& w) const noexcept;
-  double speed(const Item& item, const Workspace& w) const noexcept;
+  double speed(const Item& item, Workspace& w) const noexcept;
+  const KinematicState& state(Workspace& w) const noexcept;
   void bound_motions(ConstVectorRef displacement, Workspace& w) const noexcept;
   const Workspace::Pose& pose(const Workspace& w, int joint) const noexcept;
   // How exact a clearance must be: not above `cap`, a lower bound from `near` on, and any that is below `stop`.
@@ -232,6 +247,7 @@ class BodyClearance {
   std::vector<Link> links_;
   std::vector<Plane> planes_;
   std::vector<ClearanceTable> tables_;
+  std::optional<HoldingTorque> holding_;
   std::vector<Item> items_;
   Eigen::VectorXd reach_;
   Eigen::MatrixXd reaches_, bends_;  // of all items: (items × nv), (items × nv²)
