@@ -27,6 +27,19 @@ constexpr int fewest_rows = 4;
 // Damping [Nm s/rad | N s/m] of the stop for joints without an effort or a velocity limit to derive it from.
 constexpr double unlimited_stop_damping = 1.0;
 
+/// Whether anything comes nearer that is lost already.
+bool lost_closes(const Clearances* clearances) noexcept {
+  constexpr double creeping = 1e-4;  // [m/s]
+  const Eigen::Index num = clearances == nullptr ? 0 : clearances->nearest.size();
+  for (Eigen::Index k = 0; k < num; ++k) {
+    if (clearances->nearest[k] >= 0 && clearances->least[k] < 0.0 &&
+        std::min(clearances->rates[k], clearances->approach.rates[k]) < -creeping) {
+      return true;
+    }
+  }
+  return false;
+}
+
 Eigen::VectorXd expanded(const Eigen::VectorXd& weight, int num) {
   return weight.size() == 1 ? Eigen::VectorXd::Constant(num, weight[0]) : weight;
 }
@@ -221,13 +234,14 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       jerk_lower_ = *last.acceleration - settings_.period * limits_.jerk;
       jerk_upper_ = *last.acceleration + settings_.period * limits_.jerk;
     }
+    const bool lost = clear && solution.least_clearance < 0.0;
+    const bool closes = lost && (lost_closes(clearances) || lost_closes(second.clearances));
     if (clearances != nullptr && clear) {
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
       const RateLimits next{jerk_lower_, jerk_upper_, rate_lower_, rate_upper_};
-      const bool lost = solution.least_clearance < 0.0;
-      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates, lost,
+      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates, closes,
                               rates ? &next : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
@@ -293,7 +307,14 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       if (solution.least_clearance < 0.0) {
         rows_.put_off_ways_back(settings_.period);
       }
-      status = solve_relaxed(back, solution);  // ways back share what the jerk limits leave
+      // Ways back share what the jerk limits leave; so do ways out while nothing of them closes, unless others need more.
+      const bool waits = lost && !closes && smooth;
+      status = solve_relaxed(back || waits, solution);
+      if (waits && others_fall_short(solution)) {
+        status = solve_relaxed(back, solution);
+      }
+      back = back || (waits && solution.acceleration.cwiseMax(bounds_.smooth_lower).cwiseMin(bounds_.smooth_upper) ==
+                                   solution.acceleration);
       kept = kept && (back || !smooth);
       if (status < TorqueStatus::relaxed && !kept) {
         status = TorqueStatus::relaxed;

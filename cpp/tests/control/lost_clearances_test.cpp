@@ -187,3 +187,42 @@ BOOST_AUTO_TEST_CASE(what_is_inside_is_never_ok_although_it_leaves) {
   BOOST_TEST((controller.solve(zero, zero, zero, M, zero, &clearances, solution) == TorqueStatus::clearance_lost));
   BOOST_TEST(solution.least_clearance == -0.001);
 }
+
+BOOST_AUTO_TEST_CASE(the_way_out_of_what_does_not_close_keeps_the_jerk_limits) {
+  JointLimits limits = test::arm_limits(nv);
+  limits.jerk.setConstant(1000.0);
+  AccelerationFilter filter(test::serial_arm(limits));
+  TorqueSolution solution(nv);
+  const double T = filter.period();
+  // Two clearances 30 and 10 mm below zero, whose ways out share joints.
+  Eigen::MatrixXd gradients = Eigen::MatrixXd::Zero(nv, 2);
+  gradients.col(0).head(2) << 0.4, -0.2;
+  gradients.col(1).segment(1, 2) << 0.3, 0.3;
+  const Eigen::Vector2d begin(-0.03, -0.01);
+  const auto run = [&](double speed, int steps) {
+    Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;
+    v[0] = -speed;
+    double hardest = 0.0;
+    Eigen::Vector2d h = begin;
+    for (int k = 0; k < steps; ++k) {
+      Clearances clearances(nv, 2);
+      clearances.values = h;
+      clearances.rates = gradients.transpose() * v;
+      clearances.gradients = gradients;
+      clearances.nearest << 0, 1;
+      clearances.mind_nearest();
+      static_cast<void>(filter.apply(q, v, Eigen::VectorXd::Zero(nv), &clearances, {}, LastCommand{&a}, solution));
+      hardest = std::max(hardest, (solution.acceleration - a).cwiseAbs().maxCoeff() / (T * limits.jerk[0]));
+      a = solution.acceleration;
+      q += T * v + 0.5 * T * T * a;
+      v += T * a;
+      h = begin + gradients.transpose() * q;
+    }
+    return std::pair(hardest, h.minCoeff());
+  };
+  const auto [at_rest, out] = run(0.0, 2000);
+  BOOST_TEST(at_rest < 1.0 + 1e-6);
+  BOOST_TEST(out > 0.0);
+  const auto [closing, deepest] = run(1.0, 1);  // what goes deeper is stopped at once
+  BOOST_TEST(closing > 5.0);
+}

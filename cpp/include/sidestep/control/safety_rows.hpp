@@ -90,7 +90,8 @@ struct ClosingLimits {
 // Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw on their
 // reserves: each asks for as little as still lets the arm's own stop along its path fit into the room, by −v/τ and with all but a
 // twentieth of the jerk. That is one stop for all rows; what closes in by more has no reserve. A row without room asks only for what
-// keeps it from closing, and its way back shares with others what the jerk limits leave. Where a clearance is lost, nothing waits.
+// keeps it from closing, and its way back shares with others what the jerk limits leave. Where what is lost comes nearer, nothing
+// waits; else its way out shares what the jerk limits leave.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
 // it asks for the least after which the smooth stop fits (or for the most, where none fits), without a curvature that helps, which
 // may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
@@ -141,7 +142,7 @@ struct LastMotion {
   const Eigen::VectorXd& acceleration;
   double jerk_share;
   bool early = false;
-  bool lost = false;                  ///< a clearance is: ways out do not wait for the jerk
+  bool lost = false;                  ///< a clearance is, and comes nearer: ways out do not wait for the jerk
   const RateLimits* rates = nullptr;  ///< null: none
 };
 
