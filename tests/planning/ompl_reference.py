@@ -7,8 +7,10 @@ was solved. A process of its own, as OMPL's module reports leaks when it ends.
 import json
 import pickle
 import sys
+from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 from ompl import base, geometric, util
 
 import sidestep as ss
@@ -16,14 +18,23 @@ from sidestep import _core
 from sidestep.planning import PathPlanner
 
 
-def solved(planner: PathPlanner, robot: ss.Robot, problem: dict, margin: float, seconds: float) -> bool:
-    nv = robot.num_coordinates
+def covered_free(
+    planner: PathPlanner, problem: dict, margin: float
+) -> Callable[[npt.NDArray[np.float64]], bool]:
     obstacles = ss.Obstacles(problem["points"], problem["radii"])
+    return lambda q: planner.is_free(q, obstacles, margin=margin)
+
+
+def solved(
+    robot: ss.Robot, problem: dict, free: Callable[[npt.NDArray[np.float64]], bool], seconds: float
+) -> bool:
+    nv = robot.num_coordinates
     space = base.RealVectorStateSpace(nv)
     bounds = base.RealVectorBounds(nv)
     for i in range(nv):
-        bounds.setLow(i, float(robot.limits.lower[i]))
-        bounds.setHigh(i, float(robot.limits.upper[i]))
+        ends = problem["start"][i], problem["goal"][i]  # joints without limits: a turn beyond both
+        bounds.setLow(i, float(max(robot.limits.lower[i], min(ends) - 2.0 * np.pi)))
+        bounds.setHigh(i, float(min(robot.limits.upper[i], max(ends) + 2.0 * np.pi)))
     space.setBounds(bounds)
     setup = geometric.SimpleSetup(space)
     q = np.empty(nv)
@@ -31,18 +42,18 @@ def solved(planner: PathPlanner, robot: ss.Robot, problem: dict, margin: float, 
     def valid(state: base.State) -> bool:
         for i in range(nv):
             q[i] = state[i]
-        return planner.is_free(q, obstacles, margin=margin)
+        return free(q)
 
     setup.setStateValidityChecker(valid)
     information = setup.getSpaceInformation()
     information.setStateValidityCheckingResolution(0.005)
-    ends = []
+    states = []
     for end in (problem["start"], problem["goal"]):
         state = space.allocState()
         for i in range(nv):
             state[i] = float(end[i])
-        ends.append(state)
-    setup.setStartAndGoalStates(*ends)
+        states.append(state)
+    setup.setStartAndGoalStates(*states)
     setup.setPlanner(geometric.RRTConnect(information))
     setup.solve(seconds)
     return bool(setup.haveExactSolutionPath())
@@ -53,7 +64,8 @@ def main() -> None:
     util.setLogLevel(util.LOG_NONE)
     robot = ss.Robot.named(name)
     planner = PathPlanner(robot, _core.Body(**body))
-    print(json.dumps([solved(planner, robot, problem, margin, seconds) for problem in problems]))
+    found = [solved(robot, problem, covered_free(planner, problem, margin), seconds) for problem in problems]
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

@@ -285,10 +285,12 @@ bool SafetyRows::draw_on_reserves(double period) noexcept {
   for (int row = 0; row < size_; ++row) {
     const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
     const double asked = lower[row] * lengths[row];
+    // Of what is known and not seen most of the margin is a reserve as well.
+    const double room = reserve.room + (reserve.seen ? 0.0 : (1.0 - of_margin) * reserve.margin);
     const auto fits = [&](double x) {
       const double slowing = x + reserve.curvature;
-      return reserve.room > 0.0
-                 ? smooth_stop_fits(reserve.room, reserve.closing_speed, slowing, reserve.hardest, reserve.jerk, period)
+      return room > 0.0
+                 ? smooth_stop_fits(room, reserve.closing_speed, slowing, reserve.hardest, reserve.jerk, period)
                  : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= creeping;
     };
     asked_[row] = lower[row];

@@ -226,3 +226,41 @@ BOOST_AUTO_TEST_CASE(the_way_out_of_what_does_not_close_keeps_the_jerk_limits) {
   const auto [closing, deepest] = run(1.0, 1);  // what goes deeper is stopped at once
   BOOST_TEST(closing > 5.0);
 }
+
+BOOST_AUTO_TEST_CASE(the_margin_of_what_is_known_gives_way_before_the_jerk_limit) {
+  JointLimits limits = test::arm_limits(nv);
+  limits.jerk.setConstant(1000.0);
+  AccelerationFilter filter(test::serial_arm(limits));
+  TorqueSolution solution(nv);
+  const double T = filter.period();
+  // Joint 0 moves at 0.5 rad/s, and is still accelerated, towards a clearance of which it changes 0.4 m/rad.
+  const auto run = [&](double margin) {
+    Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;
+    v[0] = -0.5;
+    a[0] = -5.0;
+    double hardest = 0.0, least = 1.0;
+    for (int k = 0; k < 500; ++k) {
+      Clearances clearances(nv, 1);
+      clearances.values[0] = 0.0115 + 0.4 * q[0];
+      clearances.rates[0] = 0.4 * v[0];
+      clearances.gradients(0, 0) = 0.4;
+      clearances.nearest[0] = 0;
+      clearances.margins[0] = margin;
+      clearances.mind_nearest();
+      least = std::min(least, clearances.values[0]);
+      static_cast<void>(filter.apply(q, v, Eigen::VectorXd::Zero(nv), &clearances, {}, LastCommand{&a}, solution));
+      hardest = std::max(hardest, (solution.acceleration - a).cwiseAbs().maxCoeff() / (T * limits.jerk[0]));
+      a = solution.acceleration;
+      q += T * v + 0.5 * T * T * a;
+      v += T * a;
+    }
+    return std::pair(hardest, least);
+  };
+  const auto [seen, kept] = run(std::numeric_limits<double>::infinity());
+  BOOST_TEST(seen > 2.0);
+  BOOST_TEST(kept > 0.005 - 1e-4);
+  const auto [known, left] = run(0.005);
+  BOOST_TEST(known < 1.0 + 1e-6);
+  BOOST_TEST(left > 0.001);
+  BOOST_TEST(left < 0.005);
+}

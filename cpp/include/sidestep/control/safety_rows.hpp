@@ -89,7 +89,8 @@ struct ClosingLimits {
 // enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
 // Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw on their
 // reserves: each asks for as little as still lets the arm's own stop along its path fit into the room, by −v/τ and with all but a
-// twentieth of the jerk. That is one stop for all rows; what closes in by more has no reserve. A row without room asks only for what
+// twentieth of the jerk. That is one stop for all rows; what closes in by more has no reserve. Of what is known and not seen, as of
+// links against each other, four fifths of the margin count as room then: they are for what sensors miss. A row without room asks only for what
 // keeps it from closing, and its way back shares with others what the jerk limits leave. Where what is lost comes nearer, nothing
 // waits; else its way out shares what the jerk limits leave.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
