@@ -290,7 +290,7 @@ bool SafetyRows::draw_on_reserves(double period) noexcept {
     const auto fits = [&](double x) {
       const double slowing = x + reserve.curvature;
       return room > 0.0
-                 ? smooth_stop_fits(room, reserve.closing_speed, slowing, reserve.hardest, reserve.jerk, period)
+                 ? smooth_stop_fits(room, reserve.closing_speed, slowing, std::max(reserve.hardest, 0.0), reserve.jerk, period)
                  : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= creeping;
     };
     asked_[row] = lower[row];
@@ -485,7 +485,8 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     lower[row] = required / length;
     lengths[row] = length;
     nearest[static_cast<std::size_t>(row)] = clearances.nearest[k];
-    depths[row] = std::max(-approach.values[k], 0.0);
+    depths[row] =
+        clearances.least[k] < infinity ? std::max(-approach.values[k], 0.0) : 0.0;  // nothing is lost that touches nothing
   }
   if (hardest_row >= 0) {
     const int row = size_ < max_size() ? size_++ : size_ - 1;

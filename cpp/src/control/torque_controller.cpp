@@ -32,8 +32,7 @@ bool lost_closes(const Clearances* clearances) noexcept {
   constexpr double creeping = 1e-4;  // [m/s]
   const Eigen::Index num = clearances == nullptr ? 0 : clearances->nearest.size();
   for (Eigen::Index k = 0; k < num; ++k) {
-    if (clearances->nearest[k] >= 0 && clearances->least[k] < 0.0 &&
-        std::min(clearances->rates[k], clearances->approach.rates[k]) < -creeping) {
+    if (clearances->nearest[k] >= 0 && clearances->least[k] < 0.0 && clearances->approach.rates[k] < -creeping) {
       return true;
     }
   }
@@ -310,11 +309,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       // Ways back share what the jerk limits leave; so do ways out while nothing of them closes, unless others need more.
       const bool waits = lost && !closes && smooth;
       status = solve_relaxed(back || waits, solution);
-      if (waits && others_fall_short(solution)) {
+      if (waits && (status == TorqueStatus::fallback_solver || others_fall_short(solution))) {
         status = solve_relaxed(back, solution);
       }
-      back = back || (waits && solution.acceleration.cwiseMax(bounds_.smooth_lower).cwiseMin(bounds_.smooth_upper) ==
-                                   solution.acceleration);
       kept = kept && (back || !smooth);
       if (status < TorqueStatus::relaxed && !kept) {
         status = TorqueStatus::relaxed;

@@ -272,7 +272,9 @@ std::string Controller::Impl::explain() const {
     }
   }
   if (guide_status_ == OnlinePlannerStatus::start_in_collision) {
-    return text + "where the arm is, " + describe(guide->last_plan().obstruction) + "; it goes on when that is free";
+    const Obstruction& here = guide->last_plan().obstruction;
+    const bool holds = here.label.kind == CoordinateLabel::Kind::effort;
+    return text + "where the arm is, " + describe(here) + (holds ? "" : "; it goes on when that is free");
   }
   const std::string at_target = explain_target();
   if (guide_status_ == OnlinePlannerStatus::goal_in_collision || stops_short()) {

@@ -126,7 +126,9 @@ void Controller::Impl::look_along(const JointTrajectory& path, double window) no
     path.sample(c.seen, seen_q_, seen_v_, seen_a_);
     const BodyClearance::Nearest nearest = body_.nearest(seen_q_, obstacles(), far, here_);
     if (begins) {  // where it is near already it may go on, not nearer
-      c.room = std::min(settings.safety.margin, nearest.clearance - receding);
+      const bool touches = body_.label(std::max(0, nearest.item)).kind != CoordinateLabel::Kind::effort;
+      c.room =
+          touches ? std::min(settings.safety.margin, nearest.clearance - receding) : std::min(c.room, settings.safety.margin);
     }
     if (nearest.clearance < c.room) {
       c.free = std::min(c.free, std::max(c.time, c.seen - station));
@@ -173,6 +175,7 @@ std::string Controller::Impl::explain_trajectory() const {
     const CoordinateLabel& label = body_.label(clock_.blocker.item);
     words += (words.empty() ? "" : ": ") + std::string("the path ahead is blocked by ") +
              (label.kind == CoordinateLabel::Kind::obstacle ? obstacles().words_for(clock_.blocker.point)
+              : label.kind == CoordinateLabel::Kind::effort ? describe({label, -1, 0.0, {}})
               : label.other.empty() ? "a plane"
                                     : "the arm itself, links '" + label.name + "' and '" + label.other + "'");
   }

@@ -115,7 +115,8 @@ Posture Controller::Impl::search_posture(const PoseGoal& goal, const Eigen::Vect
   bool free_of_itself = false;
   Posture posture =
       find_posture(arm.robot(), goal, rest.size() == near.size() ? rest : near, search, [&](const Eigen::VectorXd& q) {
-        free_of_itself = free_of_itself || body_.nearest(q, Obstacles::none(), 0.0, posture_room_).clearance >= 0.0;
+        const BodyClearance::Nearest own = body_.nearest(q, Obstacles::none(), 0.0, posture_room_);
+        free_of_itself = free_of_itself || own.clearance >= 0.0 || body_.label(own.item).kind == CoordinateLabel::Kind::effort;
         return ends_->obstructed(q, around, obstruction)
                    ? -infinity
                    : std::max(0.0, body_.nearest(q, around, 2.0 * search.room, posture_room_).clearance);

@@ -77,14 +77,21 @@ RrtConnect::RrtConnect(const BodyClearance& body, const PlannerSettings& setting
   settings_.validate();
 }
 
+double RrtConnect::allowance(int item) const noexcept {
+  switch (body_->label(item).kind) {
+    case CoordinateLabel::Kind::effort: return 0.0;  // it is exact
+    case CoordinateLabel::Kind::self: return settings_.pair_allowance;
+    default: return settings_.allowance;
+  }
+}
+
 bool RrtConnect::obstructed(const Eigen::VectorXd& q, const Obstacles& obstacles, Obstruction& obstruction) {
-  const double least = std::min(settings_.allowance, settings_.pair_allowance);
-  body_->clearances(q, obstacles, -least, workspace_, clearances_);
+  body_->clearances(q, obstacles, 0.0, workspace_, clearances_);
   int worst = -1;
   double excess = 0.0;
   for (int i = 0; i < body_->num_items(); ++i) {
-    const double beyond = -clearances_[i] - (body_->is_own(i) ? settings_.pair_allowance : settings_.allowance);
-    if (clearances_[i] < -least && beyond > excess) {
+    const double beyond = -clearances_[i] - allowance(i);
+    if (beyond > excess) {
       excess = beyond;
       worst = i;
     }

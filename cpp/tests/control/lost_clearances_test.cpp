@@ -26,9 +26,11 @@ Clearances hopeless(Random& random) {
     clearances.rates[k] = random.uniform(-1.0, 1.0);
     clearances.curvatures[k] = random.uniform(-5.0, 5.0);
     clearances.nearest[k] = random.chance(0.8) ? k : -1;
-    clearances.least[k] = clearances.values[k] - random.uniform(0.0, 0.004);
   }
   clearances.mind_nearest();
+  for (int k = 0; k < num; ++k) {
+    clearances.least[k] -= random.uniform(0.0, 0.004);
+  }
   return clearances;
 }
 

@@ -97,6 +97,8 @@ def binding(controller: Controller, obstacles: Obstacles) -> tuple[str, str, int
     if command.bound_by < 0:
         return "", "", -1
     label = controller.labels[command.bound_by]
+    if label.kind == CoordinateKind.effort:
+        return "", "", -1
     if label.kind != CoordinateKind.obstacle:
         return label.name, "", -1
     index = controller.geometric_step.clearances.nearest[command.bound_by]

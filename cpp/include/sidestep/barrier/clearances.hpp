@@ -58,7 +58,7 @@ struct Clearances : ClearanceState {
   /// Lets what is nearest be what approaches, and the least of itself.
   void mind_nearest() {
     approach = *this;
-    least = least.cwiseMin(values);
+    least = values;
   }
 
   ClearanceView view(Eigen::Index start, Eigen::Index num) noexcept {

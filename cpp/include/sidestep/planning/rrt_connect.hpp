@@ -86,6 +86,8 @@ class RrtConnect {
   bool enter(Eigen::MatrixXd& path, Eigen::Index first, double margin, const Eigen::VectorXd& here, const Obstacles& obstacles);
 
  private:
+  /// By how much an item may be below zero at an end [m].
+  double allowance(int item) const noexcept;
   enum class Growth { trapped, advanced, reached };
 
   /// Whether the budget of checks is used up.
