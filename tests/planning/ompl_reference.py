@@ -32,9 +32,10 @@ def solved(
     space = base.RealVectorStateSpace(nv)
     bounds = base.RealVectorBounds(nv)
     for i in range(nv):
-        ends = problem["start"][i], problem["goal"][i]  # joints without limits: a turn beyond both
-        bounds.setLow(i, float(max(robot.limits.lower[i], min(ends) - 2.0 * np.pi)))
-        bounds.setHigh(i, float(min(robot.limits.upper[i], max(ends) + 2.0 * np.pi)))
+        low, high = float(robot.limits.lower[i]), float(robot.limits.upper[i])
+        ends = problem["start"][i], problem["goal"][i]  # of a joint without limits: a turn beyond both
+        bounds.setLow(i, low if np.isfinite(low) else float(min(ends) - 2.0 * np.pi))
+        bounds.setHigh(i, high if np.isfinite(high) else float(max(ends) + 2.0 * np.pi))
     space.setBounds(bounds)
     setup = geometric.SimpleSetup(space)
     q = np.empty(nv)

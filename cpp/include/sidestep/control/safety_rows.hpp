@@ -87,12 +87,12 @@ struct ClosingLimits {
 //     S(u, −(∇h·a + c)) at a share of the jerk J = Σ |∂h/∂q_j| J_j and at three quarters of the hardest deceleration,
 // fits into the room, S of acceleration_bounds.hpp. The share is one half, so that two rows can rise together; where that is not
 // enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
-// Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw on their
-// reserves: each asks for as little as still lets the arm's own stop along its path fit into the room, by −v/τ and with all but a
-// twentieth of the jerk. That is one stop for all rows; what closes in by more has no reserve. Of what is known and not seen, as of
-// links against each other, four fifths of the margin count as room then: they are for what sensors miss. A row without room asks only for what
-// keeps it from closing, and its way back shares with others what the jerk limits leave. Where what is lost comes nearer, nothing
-// waits; else its way out shares what the jerk limits leave.
+// Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw
+// on their reserves: each asks for as little as still lets the arm's own stop along its path fit into the room, by −v/τ and
+// with all but a twentieth of the jerk. That is one stop for all rows; what closes in by more has no reserve. Of what is
+// known and not seen, as of links against each other, four fifths of the margin count as room then: they are for what sensors
+// miss. A row without room asks only for what keeps it from closing, and its way back shares with others what the jerk limits
+// leave. Where what is lost comes nearer, nothing waits; else its way out shares what the jerk limits leave.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
 // it asks for the least after which the smooth stop fits (or for the most, where none fits), without a curvature that helps, which
 // may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
