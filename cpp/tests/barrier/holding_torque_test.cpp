@@ -21,9 +21,9 @@ RigidBodyDynamics random_dynamics(Random& random, const Robot& robot) {
   return RigidBodyDynamics(robot, inertials, {1.0, -0.5, -9.0});
 }
 
-}  // namespace
-
 constexpr double effort = 1e-3;  // so little that every load counts
+
+}  // namespace
 
 BOOST_AUTO_TEST_CASE(rooms_and_their_derivatives_are_those_of_gravity) {
   Random random(11);
@@ -41,7 +41,8 @@ BOOST_AUTO_TEST_CASE(rooms_and_their_derivatives_are_those_of_gravity) {
     dynamics.gravity(state, w, gravity);
     for (const HoldingTorque::Load& load : holding.loads()) {
       state.update(robot, q, v);
-      const HoldingTorque::Room room = holding.at(load, state, gradient);
+      HoldingTorque::Room room{};
+      BOOST_TEST(test::allocations_of([&] { room = holding.at(load, state, gradient); }) == 0U);
       BOOST_TEST(std::abs(room.value - (effort - std::abs(gravity[load.coordinate])) / load.weight) < 1e-12);
       BOOST_TEST(std::abs(room.value - holding.value(load, state)) < 1e-12);
       BOOST_TEST(std::abs(room.rate - gradient.dot(v)) < 1e-12);

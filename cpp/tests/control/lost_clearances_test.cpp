@@ -55,6 +55,45 @@ Clearances pressed(double q, double v, double depth) {
   return clearances;
 }
 
+/// Of a filtered motion among clearances h = begin + gradientsᵀ q.
+struct FilteredMotion {
+  double jerk = 0.0;   // the most, as a share of its limit
+  double least = 1.0;  // of the clearances, on the way [m]
+  double last = 0.0;   // the least of them at the end [m]
+};
+
+/// From q = 0 with velocity v after acceleration a, wanting none.
+FilteredMotion filtered_motion(const Eigen::MatrixXd& gradients, const Eigen::VectorXd& begin, double margin, Eigen::VectorXd v,
+                               Eigen::VectorXd a, int steps) {
+  JointLimits limits = test::arm_limits(nv);
+  limits.jerk.setConstant(1000.0);
+  AccelerationFilter filter(test::serial_arm(limits));
+  TorqueSolution solution(nv);
+  const double T = filter.period();
+  const auto num = static_cast<int>(begin.size());
+  const Eigen::VectorXd wanted = Eigen::VectorXd::Zero(nv);
+  Eigen::VectorXd q = wanted, h = begin;
+  FilteredMotion found;
+  for (int k = 0; k < steps; ++k) {
+    Clearances clearances(nv, num);
+    clearances.values = h;
+    clearances.rates = gradients.transpose() * v;
+    clearances.gradients = gradients;
+    clearances.nearest = Eigen::VectorXi::LinSpaced(num, 0, num - 1);
+    clearances.margins.setConstant(margin);
+    clearances.mind_nearest();
+    found.least = std::min(found.least, h.minCoeff());
+    static_cast<void>(filter.apply(q, v, wanted, &clearances, {}, LastCommand{&a}, solution));
+    found.jerk = std::max(found.jerk, (solution.acceleration - a).cwiseAbs().maxCoeff() / (T * limits.jerk[0]));
+    a = solution.acceleration;
+    q += T * v + 0.5 * T * T * a;
+    v += T * a;
+    h = begin + gradients.transpose() * q;
+  }
+  found.last = h.minCoeff();
+  return found;
+}
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(there_is_a_command_within_the_overruns_whatever_is_lost) {
@@ -191,78 +230,31 @@ BOOST_AUTO_TEST_CASE(what_is_inside_is_never_ok_although_it_leaves) {
 }
 
 BOOST_AUTO_TEST_CASE(the_way_out_of_what_does_not_close_keeps_the_jerk_limits) {
-  JointLimits limits = test::arm_limits(nv);
-  limits.jerk.setConstant(1000.0);
-  AccelerationFilter filter(test::serial_arm(limits));
-  TorqueSolution solution(nv);
-  const double T = filter.period();
   // Two clearances 30 and 10 mm below zero, whose ways out share joints.
   Eigen::MatrixXd gradients = Eigen::MatrixXd::Zero(nv, 2);
   gradients.col(0).head(2) << 0.4, -0.2;
   gradients.col(1).segment(1, 2) << 0.3, 0.3;
   const Eigen::Vector2d begin(-0.03, -0.01);
-  const auto run = [&](double speed, int steps) {
-    Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;
-    v[0] = -speed;
-    double hardest = 0.0;
-    Eigen::Vector2d h = begin;
-    for (int k = 0; k < steps; ++k) {
-      Clearances clearances(nv, 2);
-      clearances.values = h;
-      clearances.rates = gradients.transpose() * v;
-      clearances.gradients = gradients;
-      clearances.nearest << 0, 1;
-      clearances.mind_nearest();
-      static_cast<void>(filter.apply(q, v, Eigen::VectorXd::Zero(nv), &clearances, {}, LastCommand{&a}, solution));
-      hardest = std::max(hardest, (solution.acceleration - a).cwiseAbs().maxCoeff() / (T * limits.jerk[0]));
-      a = solution.acceleration;
-      q += T * v + 0.5 * T * T * a;
-      v += T * a;
-      h = begin + gradients.transpose() * q;
-    }
-    return std::pair(hardest, h.minCoeff());
-  };
-  const auto [at_rest, out] = run(0.0, 2000);
-  BOOST_TEST(at_rest < 1.0 + 1e-6);
-  BOOST_TEST(out > 0.0);
-  const auto [closing, deepest] = run(1.0, 1);  // what goes deeper is stopped at once
-  BOOST_TEST(closing > 5.0);
+  const double unlimited = std::numeric_limits<double>::infinity();
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(nv);
+  const FilteredMotion out = filtered_motion(gradients, begin, unlimited, rest, rest, 2000);
+  BOOST_TEST(out.jerk < 1.0 + 1e-6);
+  BOOST_TEST(out.last > 0.0);
+  const FilteredMotion deeper = filtered_motion(gradients, begin, unlimited, -Eigen::VectorXd::Unit(nv, 0), rest, 1);
+  BOOST_TEST(deeper.jerk > 5.0);  // it is stopped at once
 }
 
 BOOST_AUTO_TEST_CASE(the_margin_of_what_is_known_gives_way_before_the_jerk_limit) {
-  JointLimits limits = test::arm_limits(nv);
-  limits.jerk.setConstant(1000.0);
-  AccelerationFilter filter(test::serial_arm(limits));
-  TorqueSolution solution(nv);
-  const double T = filter.period();
   // Joint 0 moves at 0.5 rad/s, and is still accelerated, towards a clearance of which it changes 0.4 m/rad.
-  const auto run = [&](double margin) {
-    Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, a = q;
-    v[0] = -0.5;
-    a[0] = -5.0;
-    double hardest = 0.0, least = 1.0;
-    for (int k = 0; k < 500; ++k) {
-      Clearances clearances(nv, 1);
-      clearances.values[0] = 0.0115 + 0.4 * q[0];
-      clearances.rates[0] = 0.4 * v[0];
-      clearances.gradients(0, 0) = 0.4;
-      clearances.nearest[0] = 0;
-      clearances.margins[0] = margin;
-      clearances.mind_nearest();
-      least = std::min(least, clearances.values[0]);
-      static_cast<void>(filter.apply(q, v, Eigen::VectorXd::Zero(nv), &clearances, {}, LastCommand{&a}, solution));
-      hardest = std::max(hardest, (solution.acceleration - a).cwiseAbs().maxCoeff() / (T * limits.jerk[0]));
-      a = solution.acceleration;
-      q += T * v + 0.5 * T * T * a;
-      v += T * a;
-    }
-    return std::pair(hardest, least);
+  const Eigen::VectorXd joint = Eigen::VectorXd::Unit(nv, 0), begin = Eigen::VectorXd::Constant(1, 0.0115);
+  const auto with_margin = [&](double margin) {
+    return filtered_motion(0.4 * joint, begin, margin, -0.5 * joint, -5.0 * joint, 500);
   };
-  const auto [seen, kept] = run(std::numeric_limits<double>::infinity());
-  BOOST_TEST(seen > 2.0);
-  BOOST_TEST(kept > 0.005 - 1e-4);
-  const auto [known, left] = run(0.005);
-  BOOST_TEST(known < 1.0 + 1e-6);
-  BOOST_TEST(left > 0.001);
-  BOOST_TEST(left < 0.005);
+  const FilteredMotion seen = with_margin(std::numeric_limits<double>::infinity());
+  BOOST_TEST(seen.jerk > 2.0);
+  BOOST_TEST(seen.least > 0.005 - 1e-4);
+  const FilteredMotion known = with_margin(0.005);
+  BOOST_TEST(known.jerk < 1.0 + 1e-6);
+  BOOST_TEST(known.least > 0.001);
+  BOOST_TEST(known.least < 0.005);
 }
