@@ -21,6 +21,7 @@
 #include "sidestep/barrier/stopping_clearance.hpp"
 #include "sidestep/system/local_minimum_recovery.hpp"
 #include "sidestep/lookahead/look_ahead.hpp"
+#include "failsafe.hpp"
 #include "step_state.hpp"
 
 namespace sidestep {
@@ -196,6 +197,8 @@ class Controller::Impl : private StepState {
   void observe() noexcept;
   void take_dynamics(const KinematicState& state, MassMatrix mass_matrix, Bias bias) noexcept;
   void solve_reference(MassMatrix mass_matrix, Bias bias) noexcept;
+  /// Lets the reference go on only to where it can stop, see Failsafe.
+  void keep_failsafe() noexcept;
   void track(MassMatrix mass_matrix, Bias bias) noexcept;
   bool is_impedance() const noexcept { return torque && settings.tracking.stiffness > 0.0; }
   static constexpr int most_of_impedance = 32;  // joints
@@ -268,6 +271,7 @@ class Controller::Impl : private StepState {
   std::optional<LocalMinimumRecovery> escape_;
   BodyClearance body_;
   BodyClearance::Workspace here_;
+  Failsafe failsafe_;
   bool drives_track_ = false;              // the output is position or velocity
   SpeedRows speed_rows_, arm_speed_rows_;  // of the reference, of the arm
   int nearest_point_ = -1;                 // of obstacles

@@ -145,11 +145,14 @@ void Controller::Impl::write_places(Eigen::MatrixXd& places, Eigen::Index& num) 
 }
 
 void Controller::Impl::leave_room(bool looks) noexcept {
-  if (!settings.local_activation) {
-    return;
-  }
   if (looks) {
     disturbed_ = body_.nearest_moving(q_, obstacles(), moving_foresight, here_) < near_moving;
+    if (obstacles().tree().moves()) {
+      failsafe_.look_anew();
+    }
+  }
+  if (!settings.local_activation) {
+    return;
   }
   if (disturbed_ || !has_target_) {
     if (looks) {

@@ -53,6 +53,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   }
   wanted_ += coupling_;
   solve_reference(mass_matrix, bias);
+  keep_failsafe();
   advance_reference();
   track(mass_matrix, bias);
   report(true);
@@ -76,6 +77,7 @@ void Controller::Impl::take_orders() noexcept {
   if (obstacle_orders_.current().number != obstacle_number_) {
     obstacle_number_ = obstacle_orders_.current().number;
     obstacle_age_ = 0.0;
+    failsafe_.look_anew();
   } else {
     obstacle_age_ += settings.period;
     obstacle_orders_.current().obstacles.advance(settings.period);

@@ -49,6 +49,7 @@ void Controller::Impl::begin_reference() noexcept {
   next_v_ = arm_v_.unaryExpr([](double v) { return std::abs(v) < jitter ? 0.0 : v; });
   a_.setZero();
   smooth_a_.setZero();
+  failsafe_.reset();
   if (!torque) {
     return;
   }
@@ -173,6 +174,27 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
   } else {
     command.program = filter_->apply(q_, v_, wanted_, &workspace.clearances, second, last, solution, speed);
   }
+}
+
+void Controller::Impl::keep_failsafe() noexcept {
+  if (disturbed_ || avoiding_ || !solution.acceleration.allFinite()) {  // a stop would only wait for what comes
+    failsafe_.reset();
+    return;
+  }
+  const StopTorque taken{mass_, bias_, torque ? torque_program_->jerk_share() : 1.0};
+  if (!failsafe_.keep(q_, v_, smooth_a_, obstacles(), torque ? &taken : nullptr, solution.acceleration)) {
+    return;
+  }
+  solution.slack.setZero();
+  std::fill(solution.active.begin(), solution.active.end(), Limit::none);
+  if (torque) {
+    solution.torque = bias_;
+    for (Eigen::Index j = 0; j < q_.size(); ++j) {
+      solution.torque += solution.acceleration[j] * mass_.col(j);
+    }
+    reference_torque_ = solution.torque;
+  }
+  command.program = solution.least_clearance < 0.0 ? TorqueStatus::clearance_lost : TorqueStatus::limited;
 }
 
 double Controller::Impl::feedback_frequency() noexcept {

@@ -388,4 +388,25 @@ void BodyClearance::clearances(ConstVectorRef q, const Obstacles& obstacles, dou
   }
 }
 
+double BodyClearance::room(ConstVectorRef q, const Obstacles& obstacles, const Eigen::VectorXd& floors, double near, double cap,
+                           Workspace& w) const noexcept {
+  w.field_.follow(obstacles);
+  place(q, w);
+  double least = cap;
+  const int first = w.last_;  // what had the least before
+  for (int k = 0; k < num_items() && least >= 0.0; ++k) {
+    const int i = k == 0 ? first : k <= first ? k - 1 : k;
+    const Item& item = items_[static_cast<std::size_t>(i)];
+    if (item.load >= 0) {
+      continue;
+    }
+    const double found = look(item, obstacles, {least + floors[i], near + floors[i], floors[i]}, w).clearance - floors[i];
+    if (found < least) {
+      least = found;
+      w.last_ = i;
+    }
+  }
+  return least;
+}
+
 }  // namespace sidestep

@@ -183,6 +183,9 @@ class TorqueController {
   /// The first program of the last solve that had usable input: rows of torque limits, of clearances, and of
   /// Cartesian speed, without bounds where they are not in use.
   const QuadraticProgramData& program() const noexcept { return hard_data_; }
+  /// The share of the jerk limits by which the torque keeps its rate, whatever the joints do, with the last mass matrix; 1 without
+  /// a rate.
+  double jerk_share() const noexcept;
   /// Number of solves, since construction, that ended with this status.
   std::int64_t count(TorqueStatus status) const noexcept { return counts_[static_cast<std::size_t>(status)]; }
 
@@ -198,8 +201,6 @@ class TorqueController {
     QuadraticProgram program;
   };
 
-  /// The share of the jerk limits by which the torque keeps its rate, whatever the joints do; 1 without a rate.
-  double jerk_share() const noexcept;
   /// Writes the torque rows: within the effort limits, and near the last torque unless null.
   void write_torque_rows(const LastCommand& last) noexcept;
   void write_cost() noexcept;

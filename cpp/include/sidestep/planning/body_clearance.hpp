@@ -141,6 +141,11 @@ class BodyClearance {
   void clearances(ConstVectorRef q, const Obstacles& obstacles, double cap, Workspace& w,
                   Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
+  /// The least of what the clearances have beyond `floors` (num_items), not above `cap` [m]; where it is more than `near`, a lower
+  /// bound. Any of what joints hold counts as far. Ends below zero.
+  double room(ConstVectorRef q, const Obstacles& obstacles, const Eigen::VectorXd& floors, double near, double cap,
+              Workspace& w) const noexcept;
+
   /// How near an obstacle that moves is, or could be after `time` [s] at its speed: a lower bound [m], as by balls
   /// around the links; infinity where all are at rest.
   double nearest_moving(ConstVectorRef q, const Obstacles& obstacles, double time, Workspace& w) const noexcept;

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "sidestep/control/failsafe_stop.hpp"
+#include "sidestep/kinematics/robot.hpp"
+#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/planning/body_clearance.hpp"
+
+namespace sidestep {
+
+/// What a stop takes of torques, which are M a + h (Coriolis, centrifugal and gravity forces) of now.
+struct StopTorque {
+  const Eigen::MatrixXd& mass;
+  const Eigen::VectorXd& bias;
+  double jerk_share;  ///< of the jerk limits, with which torques keep their rate
+};
+
+/// Lets a motion go on only to states from which a stop is known that keeps every limit and touches nothing; where it would go
+/// on otherwise, it stops instead. So limits of jerk and acceleration are kept among whatever is at rest: of several clearances
+/// that ask for opposite things none has to be met by a demand that comes too late.
+///
+/// A stop is free where the body keeps its clearances, of obstacles and of its own links, above floors: 1 mm, or what there was
+/// when the first stop was found, if that was less. Places are looked at along it; around one no point of the body moves farther
+/// than R·|Δq|, see BodyClearance::reach. What was looked at for one stop serves the next ones.
+///
+/// One thread at a time; nothing here allocates after construction.
+class Failsafe {
+ public:
+  /// `body`, which stays; `limits` of the motion; period [s].
+  Failsafe(const BodyClearance& body, const JointLimits& limits, double period);
+
+  /// No stop is known: of a state that was not reached by what `keep` gave, or where something moves.
+  void reset() noexcept { known_ = false; }
+  /// What was looked at counts no more: the obstacles are others, or have moved.
+  void look_anew() noexcept { num_looked_ = 0; }
+
+  /// At q, v, after the acceleration `last` in the period before, `a` is wanted in this one (nv). True where a stop takes its
+  /// place, whose acceleration is written to it. It stays where it leads on to a stop, and where no stop is known. `torque`: null
+  /// for motion without torque.
+  bool keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
+            const StopTorque* torque, Eigen::VectorXd& a) noexcept;
+
+ private:
+  static constexpr int most_looked = 64;
+
+  bool is_smooth(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept;
+  /// Plans a stop from q, v, a: false where none is within the limits.
+  bool plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const StopTorque* torque) noexcept;
+  bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
+  bool is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) noexcept;
+  void set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
+  /// How far any of the body may move from q on without a clearance below its floor [m]: by what was looked at before, each place
+  /// good for `least` at least, or by a look.
+  double room_at(const Eigen::VectorXd& q, double least, const Obstacles& obstacles) noexcept;
+
+  const BodyClearance& body_;
+  BodyClearance::Workspace room_;
+  const JointLimits limits_;
+  JointLimits slowed_;  // with less acceleration
+  const double period_;
+  FailsafeStop stop_, next_stop_;  // from here, and from where this period ends
+  bool known_ = false, low_ = false;  // a stop is known; a floor is below the usual one
+  Eigen::VectorXd next_q_, next_v_, q_, v_, a_, force_;
+  Eigen::VectorXd clearances_, floors_;  // of items
+  // Where was looked, the newest over the oldest, and the room there.
+  Eigen::MatrixXd looked_at_;
+  Eigen::VectorXd looked_room_;
+  int num_looked_ = 0;
+};
+
+}  // namespace sidestep
