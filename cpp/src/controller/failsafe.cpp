@@ -9,22 +9,25 @@ namespace sidestep {
 namespace {
 
 constexpr double jerk_of_stops = 0.95;   // of the limits
-constexpr double least_floor = 0.001;    // [m] of clearance that stops keep
+constexpr double of_margin = 0.2;        // of clearance that stops keep: the rest of the margin gives way before the jerk
 constexpr double below_now = 0.0002;     // [m] by which they may come nearer, where there is less
-constexpr double least_look = 0.001;     // [m] of motion between two looks
-constexpr double looks_of_stop = 32.0;   // where there is hardly room
+constexpr double least_look = 0.0002;    // [m] of motion between two looks, where the floor is lower
 constexpr double near_body = 0.03;       // [m] nearer than that a look is exact
 constexpr double far_from_body = 0.1;    // [m] farther is as good: what moves is as far for as long as a stop takes
+constexpr double early = 0.75;           // of the room at a place, up to where it serves
+constexpr int looks_again = 16;          // in a step
 constexpr double rounded = 1e-6;         // relative
 constexpr int slower_stops = 3;          // each with half the acceleration
 
 }  // namespace
 
-Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double period)
+Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double margin, double period)
     : body_(body),
       room_(body),
       limits_(limits),
       slowed_(limits),
+      floor_(of_margin * margin),
+      spacing_(std::max(floor_, least_look)),
       period_(period),
       stop_(body.robot().num_coordinates()),
       next_stop_(stop_),
@@ -39,8 +42,11 @@ Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double 
       looked_at_(Eigen::MatrixXd::Zero(next_q_.size(), most_looked)),
       looked_room_(Eigen::VectorXd::Zero(most_looked)) {}
 
+void Failsafe::look_anew() noexcept { stale_.fill(true); }
+
 bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
                     const StopTorque* torque, Eigen::VectorXd& a) noexcept {
+  left_ = looks_again;
   if (!known_ || low_) {
     set_floors(q, obstacles);
   }
@@ -106,35 +112,55 @@ bool Failsafe::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
 }
 
 void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
-  body_.clearances(q, obstacles, least_floor + below_now, room_, clearances_);
+  body_.clearances(q, obstacles, floor_ + below_now, room_, clearances_);
   low_ = false;
   for (Eigen::Index i = 0; i < floors_.size(); ++i) {
-    const double now = std::min(least_floor, clearances_[i] - below_now);
+    const double now = std::min(floor_, clearances_[i] - below_now);
     floors_[i] = known_ ? std::max(floors_[i], now) : now;
-    low_ = low_ || floors_[i] < least_floor;
+    low_ = low_ || floors_[i] < floor_;
   }
   num_looked_ = 0;
 }
 
-double Failsafe::room_at(const Eigen::VectorXd& q, double least, const Obstacles& obstacles) noexcept {
-  const Eigen::VectorXd& reach = body_.reach();
-  double most = -infinity;
-  for (int k = 0; k < std::min(num_looked_, most_looked); ++k) {
-    double left = std::max(looked_room_[k], least);
-    for (Eigen::Index j = 0; j < q.size() && left > most; ++j) {
-      left -= reach[j] * std::abs(q[j] - looked_at_(j, k));
-    }
-    most = std::max(most, left);
-  }
-  if (most > 0.0) {
-    return most;
-  }
+double Failsafe::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {
   const double room = body_.room(q, obstacles, floors_, near_body, far_from_body, room_);
   if (room >= 0.0) {
-    const int at = num_looked_ % most_looked;
     looked_at_.col(at) = q;
-    looked_room_[at] = room;
+  }
+  looked_room_[at] = room;
+  stale_[static_cast<std::size_t>(at)] = false;
+  return room;
+}
+
+double Failsafe::room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {
+  const Eigen::VectorXd& reach = body_.reach();
+  const int num = std::min(num_looked_, most_looked);
+  for (int n = 0; n < num; ++n) {
+    const int at = hit_ + n < num ? hit_ + n : hit_ + n - num;
+    const auto left = [&] {
+      const double room = looked_room_[at] < 0.0 ? 0.0 : std::max(looked_room_[at], spacing_), least = (1.0 - early) * room;
+      double rest = room;
+      for (Eigen::Index j = 0; j < q.size() && rest > least; ++j) {
+        rest -= reach[j] * std::abs(q[j] - looked_at_(j, at));
+      }
+      return rest > least ? rest : -infinity;
+    };
+    double room = left();
+    if (room > 0.0 && stale_[static_cast<std::size_t>(at)] && left_ > 0) {
+      --left_;
+      look(looked_at_.col(at), at, obstacles);
+      room = left();
+    }
+    if (room > 0.0) {
+      hit_ = at;
+      return room;
+    }
+  }
+  const int at = num_looked_ % most_looked;
+  const double room = look(q, at, obstacles);
+  if (room >= 0.0) {
     num_looked_ = num_looked_ + 1 < 2 * most_looked ? num_looked_ + 1 : most_looked;
+    hit_ = at;
   }
   return room;
 }
@@ -142,8 +168,8 @@ double Failsafe::room_at(const Eigen::VectorXd& q, double least, const Obstacles
 bool Failsafe::is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                        const Obstacles& obstacles) noexcept {
   const Eigen::VectorXd& reach = body_.reach();
-  const double way = reach.dot(stop.way()), least = std::max(least_look, way / looks_of_stop);
-  double room = room_at(q, least, obstacles);
+  const double way = reach.dot(stop.way());
+  double room = room_at(q, obstacles);
   if (room > way) {
     return true;
   }
@@ -154,14 +180,14 @@ bool Failsafe::is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const
     stop.acceleration(k, a_);
     v_ += period_ * a_;
     const double motion = period_ * reach.dot(v_.cwiseAbs());
-    if (moved > 0.0 && moved + motion > std::max(room, least)) {
-      room = room_at(q_, least, obstacles);
+    if (moved > 0.0 && moved + motion > std::max(room, spacing_)) {
+      room = room_at(q_, obstacles);
       moved = 0.0;
     }
     moved += motion;
     q_ += period_ * v_;
   }
-  return room >= 0.0 && room_at(q_, least, obstacles) >= 0.0;
+  return room >= 0.0 && room_at(q_, obstacles) >= 0.0;
 }
 
 }  // namespace sidestep

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "sidestep/control/failsafe_stop.hpp"
 #include "sidestep/kinematics/robot.hpp"
@@ -20,20 +21,22 @@ struct StopTorque {
 /// on otherwise, it stops instead. So limits of jerk and acceleration are kept among whatever is at rest: of several clearances
 /// that ask for opposite things none has to be met by a demand that comes too late.
 ///
-/// A stop is free where the body keeps its clearances, of obstacles and of its own links, above floors: 1 mm, or what there was
-/// when the first stop was found, if that was less. Places are looked at along it; around one no point of the body moves farther
-/// than R·|Δq|, see BodyClearance::reach. What was looked at for one stop serves the next ones.
+/// A stop is free where the body keeps its clearances, of obstacles and of its own links, above floors: a fifth of the margin, or
+/// what there was when the first stop was found, if that was less. Places are looked at along it; around one no point of the body
+/// moves farther than R·|Δq|, see BodyClearance::reach, so that clearances are known to be as far above the floors, or where that
+/// is less than a spacing as large as the floor, above zero. What was looked at for one stop serves the next ones.
 ///
 /// One thread at a time; nothing here allocates after construction.
 class Failsafe {
  public:
-  /// `body`, which stays; `limits` of the motion; period [s].
-  Failsafe(const BodyClearance& body, const JointLimits& limits, double period);
+  /// `body`, which stays; `limits` of the motion; `margin` of clearances [m]; period [s].
+  Failsafe(const BodyClearance& body, const JointLimits& limits, double margin, double period);
 
   /// No stop is known: of a state that was not reached by what `keep` gave, or where something moves.
   void reset() noexcept { known_ = false; }
-  /// What was looked at counts no more: the obstacles are others, or have moved.
-  void look_anew() noexcept { num_looked_ = 0; }
+  /// The obstacles are others, or have moved: what was looked at
+  /// is looked at again when it is needed, a few places in a step.
+  void look_anew() noexcept;
 
   /// At q, v, after the acceleration `last` in the period before, `a` is wanted in this one (nv). True where a stop takes its
   /// place, whose acceleration is written to it. It stays where it leads on to a stop, and where no stop is known. `torque`: null
@@ -42,22 +45,25 @@ class Failsafe {
             const StopTorque* torque, Eigen::VectorXd& a) noexcept;
 
  private:
-  static constexpr int most_looked = 64;
+  static constexpr int most_looked = 512;
 
   bool is_smooth(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept;
   /// Plans a stop from q, v, a: false where none is within the limits.
   bool plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const StopTorque* torque) noexcept;
   bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
   bool is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) noexcept;
+  /// Looks at q, and writes what it finds to a place of what was looked at; negative where the body is below a floor.
+  double look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept;
   void set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
   /// How far any of the body may move from q on without a clearance below its floor [m]: by what was looked at before, each place
-  /// good for `least` at least, or by a look.
-  double room_at(const Eigen::VectorXd& q, double least, const Obstacles& obstacles) noexcept;
+  /// good for the spacing at least, or by a look.
+  double room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
 
   const BodyClearance& body_;
   BodyClearance::Workspace room_;
   const JointLimits limits_;
   JointLimits slowed_;  // with less acceleration
+  const double floor_, spacing_;  // [m] of clearance, and of motion between looks
   const double period_;
   FailsafeStop stop_, next_stop_;  // from here, and from where this period ends
   bool known_ = false, low_ = false;  // a stop is known; a floor is below the usual one
@@ -66,7 +72,9 @@ class Failsafe {
   // Where was looked, the newest over the oldest, and the room there.
   Eigen::MatrixXd looked_at_;
   Eigen::VectorXd looked_room_;
-  int num_looked_ = 0;
+  std::array<bool, most_looked> stale_{};
+  int num_looked_ = 0, hit_ = 0;  // hit_: what served last
+  int left_ = 0;                  // looks at stale places in this step
 };
 
 }  // namespace sidestep

@@ -6,6 +6,7 @@
 
 #include "sidestep/controller/controller.hpp"
 #include "support/covered_arm.hpp"
+#include "support/numbers.hpp"
 #include "support/random.hpp"
 
 using namespace sidestep;

@@ -381,3 +381,29 @@ BOOST_AUTO_TEST_CASE(what_moves_is_nearer_than_it_is_said_to_be) {
     BOOST_TEST(found == body.nearest_moving(q, obstacles, 0.0, w) - time * speed, boost::test_tools::tolerance(1e-12));
   }
 }
+
+BOOST_AUTO_TEST_CASE(room_is_what_the_least_clearance_has_beyond_its_floor) {
+  Random random(11);
+  for (int trial = 0; trial < 60; ++trial) {
+    const Robot robot = test::random_tree(random, 6);
+    const BodyClearance checked(robot, calibrated(random, robot, 0.05), {{"link0", "link5"}, {"link1", "link4", -0.03}});
+    BodyClearance::Workspace w(checked);
+    const Obstacles obstacles(2.0 * random.matrix(3, 40), Eigen::VectorXd::Constant(40, 0.01), Eigen::Matrix3Xd::Zero(3, 40));
+    const Eigen::VectorXd q = random.vector(robot.num_coordinates()).cwiseMax(-3.0).cwiseMin(3.0);
+    const Eigen::VectorXd floors = 0.05 * random.vector(checked.num_items());
+    Eigen::VectorXd clearances(checked.num_items());
+    constexpr double cap = 0.5, far = 1.0;  // the room is never more than the cap, whatever the floors
+    checked.clearances(q, obstacles, far, w, clearances);
+    const double least = std::min(cap, (clearances - floors).minCoeff());
+    const double room = checked.room(q, obstacles, floors, cap, cap, w);
+    if (least >= 0.0) {
+      BOOST_TEST(std::abs(room - least) < 1e-12);
+    } else {
+      BOOST_TEST(room < 0.0);
+    }
+    constexpr double near = 0.05;
+    const double rough = checked.room(q, obstacles, floors, near, cap, w);
+    BOOST_TEST(rough <= room + 1e-12);
+    BOOST_TEST((rough >= near || std::abs(rough - room) < 1e-12 || room < 0.0));
+  }
+}
