@@ -33,6 +33,7 @@ Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double 
       next_stop_(stop_),
       next_q_(Eigen::VectorXd::Zero(body.robot().num_coordinates())),
       next_v_(next_q_),
+      next_a_(next_q_),
       q_(next_q_),
       v_(next_q_),
       a_(next_q_),
@@ -50,17 +51,32 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   if (!known_ || low_) {
     set_floors(q, obstacles);
   }
-  if (is_smooth(last, a)) {
-    next_v_ = v + period_ * a;
-    next_q_ = q + period_ * next_v_;
-    if (plan(next_q_, next_v_, a, torque) && is_free(next_stop_, next_q_, next_v_, obstacles)) {
-      std::swap(stop_, next_stop_);
-      known_ = true;
-      return false;
-    }
+  // As much of the change as the limits allow.
+  const double share = smooth_share(last, a);
+  next_a_ = last + share * (a - last);
+  if (share == 1.0) {
+    next_a_ = a;
   }
-  known_ = known_ && is_free(stop_, q, v, obstacles);
-  if (!known_) {
+  next_v_ = v + period_ * next_a_;
+  next_q_ = q + period_ * next_v_;
+  if (!find_stop(next_q_, next_v_, next_a_, obstacles, torque)) {
+    known_ = known_ && is_free(stop_, q, v, obstacles);
+    // At rest as near as the floors are it may go on all the same: then they are those of there.
+    const bool leaves = known_ ? stop_.num_periods() <= 0 : share == 1.0;
+    if (!leaves) {
+      return stop_instead(q, v, last, obstacles, torque, a);
+    }
+    known_ = false;
+  }
+  if (share < 1.0) {
+    a = next_a_;
+  }
+  return share < 1.0;
+}
+
+bool Failsafe::stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
+                            const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
+  if (!known_ && !find_stop(q, v, last, obstacles, torque)) {
     return false;
   }
   stop_.acceleration(0, a_);
@@ -73,15 +89,19 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   return true;
 }
 
-bool Failsafe::is_smooth(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept {
+double Failsafe::smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept {
+  double share = 1.0;
   for (Eigen::Index j = 0; j < a.size(); ++j) {
-    const double rounding = rounded * (1.0 + std::abs(a[j]));
-    if (!(std::abs(a[j] - last[j]) <= limits_.jerk[j] * period_ + rounding &&
-          std::abs(a[j]) <= limits_.acceleration[j] + rounding)) {
-      return false;
+    const double change = a[j] - last[j], rounding = rounded * (1.0 + std::abs(a[j]));
+    const double most = limits_.acceleration[j];
+    if (std::abs(change) > limits_.jerk[j] * period_ + rounding) {
+      share = std::min(share, limits_.jerk[j] * period_ / std::abs(change));
+    }
+    if (std::abs(a[j]) > most + rounding) {
+      share = std::min(share, std::max(0.0, (most - std::copysign(last[j], change * last[j])) / std::abs(change)));
     }
   }
-  return true;
+  return share;
 }
 
 bool Failsafe::is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept {
@@ -109,6 +129,15 @@ bool Failsafe::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
     slowed_.acceleration *= 0.5;
   }
   return false;
+}
+
+bool Failsafe::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
+                         const StopTorque* torque) noexcept {
+  if (!plan(q, v, a, torque) || !is_free(next_stop_, q, v, obstacles)) {
+    return false;
+  }
+  std::swap(stop_, next_stop_);
+  return known_ = true;
 }
 
 void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept {

@@ -38,18 +38,26 @@ class Failsafe {
   /// is looked at again when it is needed, a few places in a step.
   void look_anew() noexcept;
 
-  /// At q, v, after the acceleration `last` in the period before, `a` is wanted in this one (nv). True where a stop takes its
-  /// place, whose acceleration is written to it. It stays where it leads on to a stop, and where no stop is known. `torque`: null
-  /// for motion without torque.
+  /// At q, v, after the acceleration `last` in the period before, `a` is wanted in this one (nv). Where that changes faster than
+  /// the limits allow, only as much of the change is made. True where another acceleration is written to `a`: that, or that of a
+  /// stop. It stays where it leads on to a stop, where no stop is known and it is within the limits, and where there is none.
+  /// `torque`: null for motion without torque.
   bool keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
             const StopTorque* torque, Eigen::VectorXd& a) noexcept;
 
  private:
   static constexpr int most_looked = 512;
 
-  bool is_smooth(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept;
+  /// The share of the change from `last` to `a` with which acceleration and jerk keep their limits, in [0, 1].
+  double smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd& a) const noexcept;
+  /// Writes the acceleration of the stop that is known, or else of one from here; false where there is none.
+  bool stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
+                    const StopTorque* torque, Eigen::VectorXd& a) noexcept;
   /// Plans a stop from q, v, a: false where none is within the limits.
   bool plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const StopTorque* torque) noexcept;
+  /// Plans one and takes it where it is free; false where it is not.
+  bool find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
+                 const StopTorque* torque) noexcept;
   bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
   bool is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) noexcept;
   /// Looks at q, and writes what it finds to a place of what was looked at; negative where the body is below a floor.
@@ -67,7 +75,7 @@ class Failsafe {
   const double period_;
   FailsafeStop stop_, next_stop_;  // from here, and from where this period ends
   bool known_ = false, low_ = false;  // a stop is known; a floor is below the usual one
-  Eigen::VectorXd next_q_, next_v_, q_, v_, a_, force_;
+  Eigen::VectorXd next_q_, next_v_, next_a_, q_, v_, a_, force_;
   Eigen::VectorXd clearances_, floors_;  // of items
   // Where was looked, the newest over the oldest, and the room there.
   Eigen::MatrixXd looked_at_;
