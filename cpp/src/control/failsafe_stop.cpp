@@ -7,7 +7,7 @@ namespace sidestep {
 namespace {
 
 constexpr double rounding = 1e-9;  // relative
-constexpr int hold_of_ramp = 3;    // a fifth of the stop for each ramp: stops that accelerations bound take 1.25 times the least
+constexpr int hold_of_ramp = 3;  // a fifth of the stop for each ramp: stops that accelerations bound take 1.25 times the least
 
 }  // namespace
 
@@ -77,8 +77,8 @@ bool FailsafeStop::fits(Eigen::Index joint, double q, double v, double a, const 
   double low = q, high = q, fastest = std::abs(v);
   if (a * v <= 0.0 && p * v >= 0.0) {  // it only slows down
     const double r = shape.ramp, m = shape.hold, n = shape.num_periods();
-    const double ramp = a * (r * (n + 1.0) - 0.5 * r * (r + 1.0)) -
-                        (p + a) * (r + 1.0) * (0.5 * (n + 1.0) - (2.0 * r + 1.0) / 6.0);
+    const double ramp =
+        a * (r * (n + 1.0) - 0.5 * r * (r + 1.0)) - (p + a) * (r + 1.0) * (0.5 * (n + 1.0) - (2.0 * r + 1.0) / 6.0);
     const double rest = p * (m * (n + 1.0 - 0.5 * (2.0 * r + m + 1.0)) + (r * r - 1.0) / 3.0);
     const double end = q + period * (n * v + period * (ramp - rest));
     low = std::min(low, end);

@@ -206,8 +206,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
       shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
       body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables(), holding_),
       here_(body_),
-      failsafe_(body_, within_margins(arm.robot(), settings, settings.speed).limits(), settings.safety.margin,
-                settings.period),
+      failsafe_(body_, within_margins(arm.robot(), settings, settings.speed).limits(), settings.safety.margin, settings.period),
       drives_track_(settings.output == ControllerSettings::Output::position ||
                     settings.output == ControllerSettings::Output::velocity),
       speed_rows_(arm.robot()),

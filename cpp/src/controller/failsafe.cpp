@@ -8,16 +8,16 @@
 namespace sidestep {
 namespace {
 
-constexpr double jerk_of_stops = 0.95;   // of the limits
-constexpr double of_margin = 0.2;        // of clearance that stops keep: the rest of the margin gives way before the jerk
-constexpr double below_now = 0.0002;     // [m] by which they may come nearer, where there is less
-constexpr double least_look = 0.0002;    // [m] of motion between two looks, where the floor is lower
-constexpr double near_body = 0.03;       // [m] nearer than that a look is exact
-constexpr double far_from_body = 0.1;    // [m] farther is as good: what moves is as far for as long as a stop takes
-constexpr double early = 0.75;           // of the room at a place, up to where it serves
-constexpr int looks_again = 16;          // in a step
-constexpr double rounded = 1e-6;         // relative
-constexpr int slower_stops = 3;          // each with half the acceleration
+constexpr double jerk_of_stops = 0.95;  // of the limits
+constexpr double of_margin = 0.2;       // of clearance that stops keep: the rest of the margin gives way before the jerk
+constexpr double below_now = 0.0002;    // [m] by which they may come nearer, where there is less
+constexpr double least_look = 0.0002;   // [m] of motion between two looks, where the floor is lower
+constexpr double near_body = 0.03;      // [m] nearer than that a look is exact
+constexpr double far_from_body = 0.1;   // [m] farther is as good: what moves is as far for as long as a stop takes
+constexpr double early = 0.75;          // of the room at a place, up to where it serves
+constexpr int looks_again = 16;         // in a step
+constexpr double rounded = 1e-6;        // relative
+constexpr int slower_stops = 3;         // each with half the acceleration
 
 }  // namespace
 
@@ -40,14 +40,23 @@ Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double 
       force_(next_q_),
       clearances_(Eigen::VectorXd::Zero(body.num_items())),
       floors_(clearances_),
+      last_floors_(clearances_),
       looked_at_(Eigen::MatrixXd::Zero(next_q_.size(), most_looked)),
       looked_room_(Eigen::VectorXd::Zero(most_looked)) {}
 
-void Failsafe::look_anew() noexcept { stale_.fill(true); }
+void Failsafe::look_anew() noexcept {
+  stale_.fill(true);
+  checks_ = most_looked / looks_again;
+}
 
 bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last, const Obstacles& obstacles,
                     const StopTorque* torque, Eigen::VectorXd& a) noexcept {
   left_ = looks_again;
+  checks_ = std::max(0, checks_ - 1);
+  const bool rises = known_ && low_;
+  if (rises) {
+    last_floors_ = floors_;
+  }
   if (!known_ || low_) {
     set_floors(q, obstacles);
   }
@@ -59,8 +68,15 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   }
   next_v_ = v + period_ * next_a_;
   next_q_ = q + period_ * next_v_;
-  if (!find_stop(next_q_, next_v_, next_a_, obstacles, torque)) {
-    known_ = known_ && is_free(stop_, q, v, obstacles);
+  bool found = find_stop(next_q_, next_v_, next_a_, obstacles, torque);
+  if (!found && rises) {  // the stop that is known was free above the floors of before
+    floors_ = last_floors_;
+    low_ = true;
+    found = find_stop(next_q_, next_v_, next_a_, obstacles, torque);
+  }
+  if (!found) {
+    // What is known stays so while nothing changes: looked at from elsewhere it may be below a floor, by no more than a spacing.
+    known_ = known_ && (checks_ == 0 || is_free(stop_, q, v, obstacles));
     // At rest as near as the floors are it may go on all the same: then they are those of there.
     const bool leaves = known_ ? stop_.num_periods() <= 0 : share == 1.0;
     if (!leaves) {
@@ -131,8 +147,8 @@ bool Failsafe::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   return false;
 }
 
-bool Failsafe::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
-                         const StopTorque* torque) noexcept {
+bool Failsafe::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
+                         const Obstacles& obstacles, const StopTorque* torque) noexcept {
   if (!plan(q, v, a, torque) || !is_free(next_stop_, q, v, obstacles)) {
     return false;
   }
@@ -148,7 +164,7 @@ void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) 
     floors_[i] = known_ ? std::max(floors_[i], now) : now;
     low_ = low_ || floors_[i] < floor_;
   }
-  num_looked_ = 0;
+  num_looked_ = 0;  // places count by the floors
 }
 
 double Failsafe::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {

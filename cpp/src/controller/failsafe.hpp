@@ -59,7 +59,8 @@ class Failsafe {
   bool find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
                  const StopTorque* torque) noexcept;
   bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
-  bool is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) noexcept;
+  bool is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+               const Obstacles& obstacles) noexcept;
   /// Looks at q, and writes what it finds to a place of what was looked at; negative where the body is below a floor.
   double look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept;
   void set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
@@ -70,19 +71,20 @@ class Failsafe {
   const BodyClearance& body_;
   BodyClearance::Workspace room_;
   const JointLimits limits_;
-  JointLimits slowed_;  // with less acceleration
+  JointLimits slowed_;            // with less acceleration
   const double floor_, spacing_;  // [m] of clearance, and of motion between looks
   const double period_;
-  FailsafeStop stop_, next_stop_;  // from here, and from where this period ends
+  FailsafeStop stop_, next_stop_;     // from here, and from where this period ends
   bool known_ = false, low_ = false;  // a stop is known; a floor is below the usual one
   Eigen::VectorXd next_q_, next_v_, next_a_, q_, v_, a_, force_;
-  Eigen::VectorXd clearances_, floors_;  // of items
+  Eigen::VectorXd clearances_, floors_, last_floors_;  // of items
   // Where was looked, the newest over the oldest, and the room there.
   Eigen::MatrixXd looked_at_;
   Eigen::VectorXd looked_room_;
   std::array<bool, most_looked> stale_{};
   int num_looked_ = 0, hit_ = 0;  // hit_: what served last
   int left_ = 0;                  // looks at stale places in this step
+  int checks_ = 0;                // steps in which a known stop is looked at again
 };
 
 }  // namespace sidestep

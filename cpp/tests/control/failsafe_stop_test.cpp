@@ -59,9 +59,9 @@ BOOST_AUTO_TEST_CASE(a_stop_ends_at_rest_and_keeps_every_limit) {
       stop.advance();
     }
     BOOST_TEST(a.norm() == 0.0);
-    BOOST_TEST(v.norm() < 1e-10);                                                // rounding of sums
-    BOOST_TEST((farthest.array() <= stop.way().array() + 1e-10).all());          // no joint moves farther than it says,
-    BOOST_TEST((stop.way() - farthest).cwiseMax(0.0).maxCoeff() < 1e-9);         // nor less
+    BOOST_TEST(v.norm() < 1e-10);                                         // rounding of sums
+    BOOST_TEST((farthest.array() <= stop.way().array() + 1e-10).all());   // no joint moves farther than it says,
+    BOOST_TEST((stop.way() - farthest).cwiseMax(0.0).maxCoeff() < 1e-9);  // nor less
   }
 }
 

@@ -48,7 +48,8 @@ class FailsafeStop {
   static double plateau(double v, double a, const Shape& shape, double period) noexcept;
   static Shape shortest(double v, double a, double most_a, double most_step, double period, const Shape& near) noexcept;
   /// Plans one joint with its shape; false where that does not keep the limits.
-  bool fits(Eigen::Index joint, double q, double v, double a, const JointLimits& limits, double most_step, double period) noexcept;
+  bool fits(Eigen::Index joint, double q, double v, double a, const JointLimits& limits, double most_step,
+            double period) noexcept;
   static bool keeps(double v, double a, double most_a, double most_step, const Shape& shape, double period) noexcept;
   double at(Eigen::Index joint, int period) const noexcept;
 
