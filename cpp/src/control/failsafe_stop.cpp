@@ -14,6 +14,7 @@ constexpr int hold_of_ramp = 3;  // a fifth of the stop for each ramp: stops tha
 FailsafeStop::FailsafeStop(int num_coordinates)
     : shapes_(static_cast<std::size_t>(num_coordinates)),
       shortest_(shapes_),
+      passes_(shapes_.size()),
       first_(Eigen::VectorXd::Zero(num_coordinates)),
       hardest_(first_),
       way_(first_) {}
@@ -66,32 +67,54 @@ double FailsafeStop::at(Eigen::Index joint, int period) const noexcept {
   return left >= shape.ramp ? -p : left > 0 ? -p * left / shape.ramp : 0.0;
 }
 
+double FailsafeStop::place(Eigen::Index joint, int periods) const noexcept {
+  const Shape& shape = shapes_[static_cast<std::size_t>(joint)];
+  const Passes& at = passes_[static_cast<std::size_t>(joint)];
+  const double a = first_[joint], p = -hardest_[joint], T = period_, r = shape.ramp;
+  if (periods <= shape.ramp) {
+    const double k = periods, up = k * (k + 1.0);
+    return at.q + T * (k * at.v + T * up * (0.5 * a - (p + a) * (k + 2.0) / (6.0 * r)));
+  }
+  if (periods <= shape.ramp + shape.hold) {
+    const double k = periods - shape.ramp;
+    return at.held_q + T * k * (at.held_v - 0.5 * T * p * (k + 1.0));
+  }
+  const double k = std::min(periods - shape.ramp - shape.hold, shape.ramp), up = k * (k + 1.0);
+  return at.left_q + T * (k * at.left_v - T * p / r * up * (0.5 * r - (k + 2.0) / 6.0));
+}
+
 bool FailsafeStop::fits(Eigen::Index joint, double q, double v, double a, const JointLimits& limits, double most_step,
                         double period) noexcept {
   const Shape& shape = shapes_[static_cast<std::size_t>(joint)];
   if (!keeps(v, a, limits.acceleration[joint], most_step, shape, period)) {
     return false;
   }
-  const double p = plateau(v, a, shape, period);
+  const double p = plateau(v, a, shape, period), r = shape.ramp;
   hardest_[joint] = -p;
-  double low = q, high = q, fastest = std::abs(v);
-  if (a * v <= 0.0 && p * v >= 0.0) {  // it only slows down
-    const double r = shape.ramp, m = shape.hold, n = shape.num_periods();
-    const double ramp =
-        a * (r * (n + 1.0) - 0.5 * r * (r + 1.0)) - (p + a) * (r + 1.0) * (0.5 * (n + 1.0) - (2.0 * r + 1.0) / 6.0);
-    const double rest = p * (m * (n + 1.0 - 0.5 * (2.0 * r + m + 1.0)) + (r * r - 1.0) / 3.0);
-    const double end = q + period * (n * v + period * (ramp - rest));
-    low = std::min(low, end);
-    high = std::max(high, end);
-  } else {
-    double speed = v, place = q;
-    for (int k = 0; k < shape.num_periods(); ++k) {
-      speed += period * at(joint, k);
-      place += period * speed;
-      low = std::min(low, place);
-      high = std::max(high, place);
-      fastest = std::max(fastest, std::abs(speed));
+  const auto speed_in_ramp = [&](double k) { return v + period * (a * k - 0.5 * (p + a) * k * (k + 1.0) / r); };
+  Passes& at = passes_[static_cast<std::size_t>(joint)];
+  at.q = q;
+  at.v = v;
+  at.held_v = speed_in_ramp(r);
+  at.held_q = place(joint, shape.ramp);
+  at.left_v = at.held_v - period * p * shape.hold;
+  at.left_q = place(joint, shape.ramp + shape.hold);
+  const double end = place(joint, shape.num_periods());
+  double low = std::min(q, end), high = std::max(q, end), fastest = std::abs(v);
+  // It is fastest where it begins, where its acceleration is gone, or on its way back; that is where the hold begins.
+  if (a * (p + a) > 0.0) {
+    fastest = std::max(fastest, std::abs(speed_in_ramp(std::min(r, std::floor(a * r / (p + a))))));
+  }
+  if (p * v < 0.0) {  // it turns back, once: where v + T (a k − (p + a) k (k + 1)/2r) = 0
+    const double bend = 0.5 * (p + a) / r, slope = a - bend;
+    const double root = std::sqrt(std::max(slope * slope + 4.0 * bend * v / period, 0.0));
+    const double turn = std::clamp(bend == 0.0 ? 0.0 : 0.5 * (slope - std::copysign(root, a)) / bend, 0.0, r);
+    for (const double k : {std::floor(turn), std::ceil(turn)}) {
+      const double there = place(joint, static_cast<int>(k));
+      low = std::min(low, there);
+      high = std::max(high, there);
     }
+    fastest = std::max(fastest, std::abs(at.held_v));
   }
   way_[joint] = std::max(high - q, q - low);
   // Where it is outside already, it goes no farther.
@@ -111,6 +134,7 @@ bool FailsafeStop::plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, co
     }
   }
   first_ = a;
+  period_ = period;
   passed_ = num_periods_ = 0;
   for (Eigen::Index j = 0; j < nv; ++j) {
     const double step = jerk_share * limits.jerk[j] * period;
@@ -130,6 +154,12 @@ bool FailsafeStop::plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, co
 void FailsafeStop::acceleration(int periods, Eigen::VectorXd& a) const noexcept {
   for (Eigen::Index j = 0; j < first_.size(); ++j) {
     a[j] = at(j, passed_ + periods);
+  }
+}
+
+void FailsafeStop::position(int periods, Eigen::VectorXd& q) const noexcept {
+  for (Eigen::Index j = 0; j < first_.size(); ++j) {
+    q[j] = place(j, passed_ + periods);
   }
 }
 

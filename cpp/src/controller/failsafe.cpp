@@ -8,16 +8,18 @@
 namespace sidestep {
 namespace {
 
-constexpr double jerk_of_stops = 0.95;  // of the limits
-constexpr double of_margin = 0.2;       // of clearance that stops keep: the rest of the margin gives way before the jerk
-constexpr double below_now = 0.0002;    // [m] by which they may come nearer, where there is less
-constexpr double least_look = 0.0002;   // [m] of motion between two looks, where the floor is lower
-constexpr double near_body = 0.03;      // [m] nearer than that a look is exact
-constexpr double far_from_body = 0.1;   // [m] farther is as good: what moves is as far for as long as a stop takes
-constexpr double early = 0.75;          // of the room at a place, up to where it serves
-constexpr int looks_again = 16;         // in a step
-constexpr double rounded = 1e-6;        // relative
-constexpr int slower_stops = 3;         // each with half the acceleration
+constexpr double jerk_of_stops = 0.95;   // of the limits
+constexpr double of_margin = 0.2;        // of clearance that stops keep: the rest of the margin gives way before the jerk
+constexpr double below_now = 0.0002;     // [m] by which they may come nearer, where there is less
+constexpr double least_look = 0.0002;    // [m] of motion between two looks, where the floor is lower
+constexpr double near_body = 0.03;       // [m] nearer than that a look is exact
+constexpr double far_from_body = 1.0;    // [m] farther is as good
+constexpr double far_from_moving = 0.1;  // [m] the same, where something moves: it is as far for as long as a stop takes
+constexpr double early = 0.75;           // of the room at a place, up to where it serves
+constexpr int looks_again = 16;          // in a step
+constexpr int first_strides = 16;        // of a stop
+constexpr double rounded = 1e-6;         // relative
+constexpr int slower_stops = 3;          // each with half the acceleration
 
 }  // namespace
 
@@ -35,7 +37,7 @@ Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double 
       next_v_(next_q_),
       next_a_(next_q_),
       q_(next_q_),
-      v_(next_q_),
+      next_place_(next_q_),
       a_(next_q_),
       force_(next_q_),
       clearances_(Eigen::VectorXd::Zero(body.num_items())),
@@ -53,6 +55,13 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
                     const StopTorque* torque, Eigen::VectorXd& a) noexcept {
   left_ = looks_again;
   checks_ = std::max(0, checks_ - 1);
+  // As much of the change as the limits allow.
+  const double share = smooth_share(last, a);
+  if (torque != nullptr &&
+      share == 1.0) {  // torques that change slowly take long stops: they are looked for where they are needed
+    known_ = false;
+    return false;
+  }
   const bool rises = known_ && low_;
   if (rises) {
     last_floors_ = floors_;
@@ -60,8 +69,6 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   if (!known_ || low_) {
     set_floors(q, obstacles);
   }
-  // As much of the change as the limits allow.
-  const double share = smooth_share(last, a);
   next_a_ = last + share * (a - last);
   if (share == 1.0) {
     next_a_ = a;
@@ -76,7 +83,7 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   }
   if (!found) {
     // What is known stays so while nothing changes: looked at from elsewhere it may be below a floor, by no more than a spacing.
-    known_ = known_ && (checks_ == 0 || is_free(stop_, q, v, obstacles));
+    known_ = known_ && (checks_ == 0 || is_free(stop_, obstacles));
     // At rest as near as the floors are it may go on all the same: then they are those of there.
     const bool leaves = known_ ? stop_.num_periods() <= 0 : share == 1.0;
     if (!leaves) {
@@ -149,7 +156,7 @@ bool Failsafe::plan(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
 
 bool Failsafe::find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
                          const Obstacles& obstacles, const StopTorque* torque) noexcept {
-  if (!plan(q, v, a, torque) || !is_free(next_stop_, q, v, obstacles)) {
+  if (!plan(q, v, a, torque) || !is_free(next_stop_, obstacles)) {
     return false;
   }
   std::swap(stop_, next_stop_);
@@ -168,7 +175,8 @@ void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) 
 }
 
 double Failsafe::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {
-  const double room = body_.room(q, obstacles, floors_, near_body, far_from_body, room_);
+  const double far = obstacles.tree().moves() ? far_from_moving : far_from_body;
+  const double room = body_.room(q, obstacles, floors_, near_body, far, room_);
   if (room >= 0.0) {
     looked_at_.col(at) = q;
   }
@@ -210,27 +218,35 @@ double Failsafe::room_at(const Eigen::VectorXd& q, const Obstacles& obstacles) n
   return room;
 }
 
-bool Failsafe::is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                       const Obstacles& obstacles) noexcept {
+bool Failsafe::is_free(const FailsafeStop& stop, const Obstacles& obstacles) noexcept {
   const Eigen::VectorXd& reach = body_.reach();
-  const double way = reach.dot(stop.way());
-  double room = room_at(q, obstacles);
-  if (room > way) {
+  stop.position(0, q_);
+  double room = room_at(q_, obstacles);
+  if (room > reach.dot(stop.way())) {
     return true;
   }
-  q_ = q;
-  v_ = v;
+  // On from place to place, by strides that double and are halved.
+  const int num = stop.num_periods();
+  int stride = std::max(1, num / first_strides), at = 0;
   double moved = 0.0;
-  for (int k = 0; k < stop.num_periods() && room >= 0.0; ++k) {
-    stop.acceleration(k, a_);
-    v_ += period_ * a_;
-    const double motion = period_ * reach.dot(v_.cwiseAbs());
-    if (moved > 0.0 && moved + motion > std::max(room, spacing_)) {
+  while (at < num && room >= 0.0) {
+    stride = std::min(stride, num - at);
+    stop.position(at + stride, next_place_);
+    double motion = 0.0;
+    for (Eigen::Index j = 0; j < q_.size(); ++j) {
+      motion += reach[j] * std::abs(next_place_[j] - q_[j]);
+    }
+    if (moved + motion <= std::max(room, spacing_) || (stride == 1 && moved == 0.0)) {
+      q_.swap(next_place_);
+      moved += motion;
+      at += stride;
+      stride *= 2;
+    } else if (stride > 1) {
+      stride /= 2;
+    } else {
       room = room_at(q_, obstacles);
       moved = 0.0;
     }
-    moved += motion;
-    q_ += period_ * v_;
   }
   return room >= 0.0 && room_at(q_, obstacles) >= 0.0;
 }

@@ -26,6 +26,8 @@ struct StopTorque {
 /// moves farther than R·|Δq|, see BodyClearance::reach, so that clearances are known to be as far above the floors, or where that
 /// is less than a spacing as large as the floor, above zero. What was looked at for one stop serves the next ones.
 ///
+/// Torques that change slowly take long stops. With them a stop is looked for only where the motion would break a limit.
+///
 /// One thread at a time; nothing here allocates after construction.
 class Failsafe {
  public:
@@ -59,8 +61,7 @@ class Failsafe {
   bool find_stop(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& a, const Obstacles& obstacles,
                  const StopTorque* torque) noexcept;
   bool is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept;
-  bool is_free(const FailsafeStop& stop, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-               const Obstacles& obstacles) noexcept;
+  bool is_free(const FailsafeStop& stop, const Obstacles& obstacles) noexcept;
   /// Looks at q, and writes what it finds to a place of what was looked at; negative where the body is below a floor.
   double look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept;
   void set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) noexcept;
@@ -76,7 +77,7 @@ class Failsafe {
   const double period_;
   FailsafeStop stop_, next_stop_;     // from here, and from where this period ends
   bool known_ = false, low_ = false;  // a stop is known; a floor is below the usual one
-  Eigen::VectorXd next_q_, next_v_, next_a_, q_, v_, a_, force_;
+  Eigen::VectorXd next_q_, next_v_, next_a_, q_, next_place_, a_, force_;
   Eigen::VectorXd clearances_, floors_, last_floors_;  // of items
   // Where was looked, the newest over the oldest, and the room there.
   Eigen::MatrixXd looked_at_;

@@ -44,7 +44,7 @@ BOOST_AUTO_TEST_CASE(a_stop_ends_at_rest_and_keeps_every_limit) {
     const Moving begin = random_state(random, limits);
     FailsafeStop stop(nv);
     BOOST_REQUIRE(stop.plan(begin.q, begin.v, begin.a, limits, T));
-    Eigen::VectorXd q = begin.q, v = begin.v, last = begin.a, a(nv), farthest = Eigen::VectorXd::Zero(nv);
+    Eigen::VectorXd q = begin.q, v = begin.v, last = begin.a, a(nv), there(nv), farthest = Eigen::VectorXd::Zero(nv);
     while (stop.num_periods() > 0) {
       stop.acceleration(0, a);
       v += T * a;
@@ -56,6 +56,8 @@ BOOST_AUTO_TEST_CASE(a_stop_ends_at_rest_and_keeps_every_limit) {
       BOOST_REQUIRE((q.array() <= limits.upper.array() + rounding && q.array() >= limits.lower.array() - rounding).all());
       farthest = farthest.cwiseMax((q - begin.q).cwiseAbs());
       last = a;
+      stop.position(1, there);
+      BOOST_REQUIRE((there - q).cwiseAbs().maxCoeff() < 1e-10);
       stop.advance();
     }
     BOOST_TEST(a.norm() == 0.0);

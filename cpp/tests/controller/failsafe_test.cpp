@@ -47,11 +47,10 @@ Obstacles narrow(Random& random, Controller& controller, const Eigen::VectorXd& 
 
 struct Worst {
   double jerk = 0.0, acceleration = 0.0, clearance = 1.0;
-  int stops = 0;
 };
 
 /// Drives it to and fro at random, at full speed.
-Worst drive(ControllerSettings::Output output, unsigned seed, double seconds) {
+Worst drive(unsigned seed, double seconds) {
   const JointLimits limits = jerk_limited();
   const Arm arm = covered_arm(limits);
   Random random(seed);
@@ -59,7 +58,8 @@ Worst drive(ControllerSettings::Output output, unsigned seed, double seconds) {
   for (Eigen::Index j = 0; j < nv; ++j) {
     q[j] = random.uniform(-0.8, 0.8);
   }
-  Controller empty(arm, told(output)), controller(arm, told(output));
+  const ControllerSettings settings = told(ControllerSettings::Output::acceleration);
+  Controller empty(arm, settings), controller(arm, settings);
   controller.set_obstacles(narrow(random, empty, q));
   Worst worst;
   for (int k = 0; k < seconds / step_time; ++k) {
@@ -87,15 +87,12 @@ Worst drive(ControllerSettings::Output output, unsigned seed, double seconds) {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(no_drive_into_obstacles_breaks_a_limit) {
-  for (const auto output : {ControllerSettings::Output::acceleration, ControllerSettings::Output::torque}) {
-    for (unsigned seed = 1; seed <= 6; ++seed) {
-      const Worst worst = drive(output, seed, 6.0);
-      BOOST_TEST_MESSAGE("jerk " << worst.jerk << " acceleration " << worst.acceleration << " clearance " << worst.clearance);
-      BOOST_TEST(worst.jerk < 1.0 + 1e-6);
-      BOOST_TEST(worst.acceleration < 1.0 + 1e-6);
-      BOOST_TEST(worst.clearance > 0.0);
-      BOOST_TEST(worst.clearance < 0.01);  // it came near
-    }
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const Worst worst = drive(seed, 6.0);
+    BOOST_TEST(worst.jerk < 1.0 + 1e-6);
+    BOOST_TEST(worst.acceleration < 1.0 + 1e-6);
+    BOOST_TEST(worst.clearance > 0.0);
+    BOOST_TEST(worst.clearance < 0.01);  // it came near
   }
 }
 

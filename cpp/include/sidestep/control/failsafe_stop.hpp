@@ -35,6 +35,8 @@ class FailsafeStop {
   const Eigen::VectorXd& hardest() const noexcept { return hardest_; }
   /// Writes the acceleration (nv) [/s²] in the period that begins in `periods`.
   void acceleration(int periods, Eigen::VectorXd& a) const noexcept;
+  /// Writes the configuration (nv) [rad | m] after so many periods.
+  void position(int periods, Eigen::VectorXd& q) const noexcept;
   /// Goes on by a period.
   void advance() noexcept { ++passed_; }
 
@@ -53,8 +55,17 @@ class FailsafeStop {
   static bool keeps(double v, double a, double most_a, double most_step, const Shape& shape, double period) noexcept;
   double at(Eigen::Index joint, int period) const noexcept;
 
+  /// Where joint `joint` is after so many periods since the stop was planned.
+  double place(Eigen::Index joint, int periods) const noexcept;
+
+  /// Of a joint where it begins, where its hold begins and where it ends.
+  struct Passes {
+    double q = 0.0, v = 0.0, held_q = 0.0, held_v = 0.0, left_q = 0.0, left_v = 0.0;
+  };
   std::vector<Shape> shapes_, shortest_;
+  std::vector<Passes> passes_;
   Eigen::VectorXd first_, hardest_, way_;
+  double period_ = 0.0;
   int num_periods_ = 0, passed_ = 0;
 };
 
