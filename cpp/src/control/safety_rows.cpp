@@ -24,6 +24,10 @@ constexpr double smallest_deceleration = 1e-6;
 constexpr double scarce = 0.05;
 // [m/s] What closes no faster does not close: rounding, or a clearance that joints hardly change.
 constexpr double creeping = 1e-4;
+// [m] Stands for the depth of what is not lost, so that its way back counts as that of what is: after what others have to keep.
+constexpr double least_depth = 1e-6;
+// Of its margin, what a clearance keeps that opposes the way out of a lost one.
+constexpr double of_margin = 0.2;
 constexpr double at_rest = 1e-6;              // [rad/s | m/s], or slower
 constexpr double linear = 1e4;                // weight of the direction against the size of accelerations
 constexpr double largest_acceleration = 1e3;  // stands for what has no limit [/s²]
@@ -133,7 +137,9 @@ SafetyRows::SafetyRows(int num_coordinates, SafetySettings settings)
       depths(Eigen::VectorXd::Zero(normals.rows())),
       along_path(static_cast<std::size_t>(normals.rows())),
       settings_(settings),
-      urgency_(Eigen::VectorXd::Zero(normals.rows())),
+      reserves_(static_cast<std::size_t>(normals.rows())),
+      asked_(Eigen::VectorXd::Zero(normals.rows())),
+      urgency_(asked_),
       response_(Eigen::VectorXd::Zero(num_coordinates)),
       responses_(RowMatrix::Zero(num_coordinates, normals.rows())),
       least_(response_),
@@ -274,6 +280,85 @@ double SafetyRows::smoothed(double required, double room, double u, double c, do
   return least_that_fits(low, high, [&](double x) { return stops(x, part); });
 }
 
+bool SafetyRows::draw_on_reserves(double period) noexcept {
+  bool any = false;
+  for (int row = 0; row < size_; ++row) {
+    const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
+    const double asked = lower[row] * lengths[row];
+    // Of what is known and not seen most of the margin is a reserve as well.
+    const double room = reserve.room + (reserve.seen ? 0.0 : (1.0 - of_margin) * reserve.margin);
+    const auto fits = [&](double x) {
+      const double slowing = x + reserve.curvature;
+      return room > 0.0
+                 ? smooth_stop_fits(room, reserve.closing_speed, slowing, std::max(reserve.hardest, 0.0), reserve.jerk, period)
+                 : std::max(reserve.closing_speed, reserve.closing_speed - slowing * period) <= creeping;
+    };
+    asked_[row] = lower[row];
+    if (along_path[static_cast<std::size_t>(row)] != 0 || reserve.jerk <= 0.0 || !fits(asked)) {
+      continue;
+    }
+    const double least = std::min(reserve.before - reserve.jerk * period, asked);
+    lower[row] = std::min(lower[row], least_that_fits(least, asked, fits) / lengths[row]);
+    any = true;
+  }
+  return any;
+}
+
+void SafetyRows::put_off_ways_back(double period) noexcept {
+  asked_.head(size_) = lower.head(size_);
+  int spare = max_size() - size_;
+  for (int row = 0; row < size_ && spare > 0; ++row) {
+    const Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
+    if (along_path[static_cast<std::size_t>(row)] != 0 || depths[row] > 0.0 || reserve.seen || reserve.room > 0.0 ||
+        !opposes_lost(row)) {
+      continue;
+    }
+    const double room = reserve.room + (1.0 - of_margin) * reserve.margin;
+    const double needed = demanded_deceleration(room, reserve.closing_speed, reserve.limits, period) - reserve.curvature;
+    if (needed / lengths[row] < lower[row]) {
+      lower[row] = needed / lengths[row];
+      --spare;
+    }
+  }
+  ask_for_ways_back();
+}
+
+bool SafetyRows::opposes_lost(int row) const noexcept {
+  for (int lost = 0; lost < size_; ++lost) {
+    if (depths[lost] > 0.0 && normals.row(row).dot(normals.row(lost)) < 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void SafetyRows::ask_again() noexcept { lower.head(size_) = asked_.head(size_); }
+
+bool SafetyRows::ask_for_ways_back() noexcept {
+  bool any = false;
+  for (int row = 0, asked = size_; row < asked; ++row) {
+    const auto at = static_cast<std::size_t>(row);
+    if (reserves_[at].room > 0.0 || lower[row] >= asked_[row]) {
+      continue;
+    }
+    any = true;
+    if (depths[row] > 0.0) {
+      lower[row] = asked_[row];
+    } else if (size_ < max_size()) {
+      const auto added = static_cast<std::size_t>(size_);
+      normals.row(size_) = normals.row(row);
+      lower[size_] = asked_[row];
+      lengths[size_] = lengths[row];
+      depths[size_] = least_depth;
+      coordinates[added] = coordinates[at];
+      nearest[added] = nearest[at];
+      along_path[added] = 0;
+      ++size_;
+    }
+  }
+  return any;
+}
+
 void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits,
                      const AccelerationBounds& bounds, double period, const BrakingTorque* torque,
                      const LastMotion* last) noexcept {
@@ -320,6 +405,8 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
     return std::min(asked, largest_by_both(direction, rates->acceleration_lower, rates->acceleration_upper, rates->torque_lower,
                                            rates->torque_upper, asked));
   };
+  // [1/s²] Of v: the jerk of a stop along the path.
+  const double stop_jerk = last == nullptr ? 0.0 : (limits.jerk.array() / v.array().abs().max(at_rest)).minCoeff();
   double hardest_stop = 0.0;
   int hardest_row = -1;  // that a stop along the path is for
   for (int row = first; row < size_; ++row) {
@@ -370,8 +457,19 @@ void SafetyRows::add(const Clearances& clearances, const Eigen::VectorXd& v, con
       required = std::min(required, std::max(now, settings_.correction * u / period - c));
     }
     bool smooth = false;
+    Reserve& reserve = reserves_[static_cast<std::size_t>(row)];
+    reserve = {room, u, c};
+    reserve.limits = closing;
+    reserve.margin = approach.values[k] - room;
+    reserve.seen = clearances.margins[k] == infinity;
     if (last != nullptr) {
-      const double asked = required;
+      const double asked = required, whole = last->jerk_share * gradient.cwiseAbs().dot(limits.jerk);
+      if (whole < infinity && (room <= 0.0 || u <= of_arm + slow)) {
+        const double jerk = room > 0.0 ? last->jerk_share * of_arm * stop_jerk : whole;
+        reserve.hardest = tau > 0.0 ? of_arm / tau : 0.0;
+        reserve.jerk = of_jerk_alone * jerk;
+        reserve.before = gradient.dot(last->acceleration);
+      }
       required = smoothed(asked, room, u, c, of_hardest * hardest, gradient, *last, bounds, limits, period);
       smooth = required < asked;
       if (rates != nullptr && required == asked && asked > last->acceleration.dot(gradient)) {

@@ -27,6 +27,18 @@ constexpr int fewest_rows = 4;
 // Damping [Nm s/rad | N s/m] of the stop for joints without an effort or a velocity limit to derive it from.
 constexpr double unlimited_stop_damping = 1.0;
 
+/// Whether anything comes nearer that is lost already.
+bool lost_closes(const Clearances* clearances) noexcept {
+  constexpr double creeping = 1e-4;  // [m/s]
+  const Eigen::Index num = clearances == nullptr ? 0 : clearances->nearest.size();
+  for (Eigen::Index k = 0; k < num; ++k) {
+    if (clearances->nearest[k] >= 0 && clearances->least[k] < 0.0 && clearances->approach.rates[k] < -creeping) {
+      return true;
+    }
+  }
+  return false;
+}
+
 Eigen::VectorXd expanded(const Eigen::VectorXd& weight, int num) {
   return weight.size() == 1 ? Eigen::VectorXd::Constant(num, weight[0]) : weight;
 }
@@ -222,12 +234,13 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       jerk_upper_ = *last.acceleration + settings_.period * limits_.jerk;
     }
     const bool lost = clear && solution.least_clearance < 0.0;
+    const bool closes = lost && (lost_closes(clearances) || lost_closes(second.clearances));
     if (clearances != nullptr && clear) {
       // Without any effort limit the torque never is what braking lacks.
       const BrakingTorque braking{mass_, mass_cholesky_, bias_};
       const bool limited = limits_.effort.array().isFinite().any();
       const RateLimits next{jerk_lower_, jerk_upper_, rate_lower_, rate_upper_};
-      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates, lost,
+      const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates, closes,
                               rates ? &next : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
@@ -253,7 +266,14 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
     }
     const LastCommand without_rate{nullptr, nullptr, last.gravity};
     write_cost();
-    bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true;
+    bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true, back = false;
+    if (!solved && smooth && solution.least_clearance >= 0.0 && rows_.draw_on_reserves(settings_.period)) {
+      solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution);
+      back = solved && rows_.ask_for_ways_back();
+      if (!solved) {
+        rows_.ask_again();
+      }
+    }
     if (!solved && smooth) {
       // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of
       // a state that noise and disturbances change faster than torque may. The torque's rate stays, since motors take no other, until a
@@ -273,7 +293,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
         solved = solve_within_bounds(bounds_.lower, bounds_.upper, false, solution);
       }
     }
-    if (solved && !presses_for_lost()) {
+    if (solved && !back && !presses_for_lost()) {
       const bool free =
           std::all_of(solution.active.begin(), solution.active.end(), [](Limit limit) { return limit == Limit::none; });
       status = !kept                                                                    ? TorqueStatus::relaxed
@@ -283,8 +303,16 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       if (!rates) {
         write_torque_rows(without_rate);
       }
-      status = solve_relaxed(solution);
-      kept = kept && !smooth;
+      if (solution.least_clearance < 0.0) {
+        rows_.put_off_ways_back(settings_.period);
+      }
+      // Ways back share what the jerk limits leave; so do ways out while nothing of them closes, unless others need more.
+      const bool waits = lost && !closes && smooth;
+      status = solve_relaxed(back || waits, solution);
+      if (waits && (status == TorqueStatus::fallback_solver || others_fall_short(solution))) {
+        status = solve_relaxed(back, solution);
+      }
+      kept = kept && (back || !smooth);
       if (status < TorqueStatus::relaxed && !kept) {
         status = TorqueStatus::relaxed;
       }

@@ -55,6 +55,16 @@ bool TorqueController::presses_for_lost() const noexcept {
   return false;
 }
 
+bool TorqueController::others_fall_short(const TorqueSolution& solution) const noexcept {
+  for (int k = 0; k < rows_.size(); ++k) {
+    const double short_by = rows_.lower[k] - rows_.normals.row(k).dot(solution.acceleration.transpose());
+    if (rows_.depths[k] == 0.0 && short_by > shortfall_tolerance * (1.0 + std::abs(rows_.lower[k]))) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void TorqueController::collect_rows() noexcept {
   num_rows_used_ = 0;
   for (int k = 0; k < rows_.size(); ++k) {
@@ -195,8 +205,13 @@ bool TorqueController::solve_comfort(bool rounded, TorqueSolution& solution) noe
   return accept(solution);
 }
 
-TorqueStatus TorqueController::solve_relaxed(TorqueSolution& solution) noexcept {
-  widen_bounds();
+TorqueStatus TorqueController::solve_relaxed(bool smooth, TorqueSolution& solution) noexcept {
+  if (smooth) {
+    wide_lower_ = bounds_.smooth_lower;
+    wide_upper_ = bounds_.smooth_upper;
+  } else {
+    widen_bounds();
+  }
   collect_rows();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   allowed_.setZero();

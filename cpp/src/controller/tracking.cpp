@@ -177,7 +177,8 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
 }
 
 void Controller::Impl::keep_failsafe() noexcept {
-  if (disturbed_ || avoiding_ || !solution.acceleration.allFinite()) {  // a stop would only wait for what comes
+  // Beside what moves a stop would only wait for it; and the way out of what is lost comes before the jerk.
+  if (disturbed_ || avoiding_ || solution.least_clearance < 0.0 || !solution.acceleration.allFinite()) {
     failsafe_.reset();
     return;
   }
@@ -194,7 +195,7 @@ void Controller::Impl::keep_failsafe() noexcept {
     }
     reference_torque_ = solution.torque;
   }
-  command.program = solution.least_clearance < 0.0 ? TorqueStatus::clearance_lost : TorqueStatus::limited;
+  command.program = TorqueStatus::limited;
 }
 
 double Controller::Impl::feedback_frequency() noexcept {

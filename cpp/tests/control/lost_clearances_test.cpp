@@ -55,6 +55,45 @@ Clearances pressed(double q, double v, double depth) {
   return clearances;
 }
 
+/// Of a filtered motion among clearances h = begin + gradientsᵀ q.
+struct FilteredMotion {
+  double jerk = 0.0;   // the most, as a share of its limit
+  double least = 1.0;  // of the clearances, on the way [m]
+  double last = 0.0;   // the least of them at the end [m]
+};
+
+/// From q = 0 with velocity v after acceleration a, wanting none.
+FilteredMotion filtered_motion(const Eigen::MatrixXd& gradients, const Eigen::VectorXd& begin, double margin, Eigen::VectorXd v,
+                               Eigen::VectorXd a, int steps) {
+  JointLimits limits = test::arm_limits(nv);
+  limits.jerk.setConstant(1000.0);
+  AccelerationFilter filter(test::serial_arm(limits));
+  TorqueSolution solution(nv);
+  const double T = filter.period();
+  const auto num = static_cast<int>(begin.size());
+  const Eigen::VectorXd wanted = Eigen::VectorXd::Zero(nv);
+  Eigen::VectorXd q = wanted, h = begin;
+  FilteredMotion found;
+  for (int k = 0; k < steps; ++k) {
+    Clearances clearances(nv, num);
+    clearances.values = h;
+    clearances.rates = gradients.transpose() * v;
+    clearances.gradients = gradients;
+    clearances.nearest = Eigen::VectorXi::LinSpaced(num, 0, num - 1);
+    clearances.margins.setConstant(margin);
+    clearances.mind_nearest();
+    found.least = std::min(found.least, h.minCoeff());
+    static_cast<void>(filter.apply(q, v, wanted, &clearances, {}, LastCommand{&a}, solution));
+    found.jerk = std::max(found.jerk, (solution.acceleration - a).cwiseAbs().maxCoeff() / (T * limits.jerk[0]));
+    a = solution.acceleration;
+    q += T * v + 0.5 * T * T * a;
+    v += T * a;
+    h = begin + gradients.transpose() * q;
+  }
+  found.last = h.minCoeff();
+  return found;
+}
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(there_is_a_command_within_the_overruns_whatever_is_lost) {
@@ -188,4 +227,34 @@ BOOST_AUTO_TEST_CASE(what_is_inside_is_never_ok_although_it_leaves) {
   const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(nv, nv);
   BOOST_TEST((controller.solve(zero, zero, zero, M, zero, &clearances, solution) == TorqueStatus::clearance_lost));
   BOOST_TEST(solution.least_clearance == -0.001);
+}
+
+BOOST_AUTO_TEST_CASE(the_way_out_of_what_does_not_close_keeps_the_jerk_limits) {
+  // Two clearances 30 and 10 mm below zero, whose ways out share joints.
+  Eigen::MatrixXd gradients = Eigen::MatrixXd::Zero(nv, 2);
+  gradients.col(0).head(2) << 0.4, -0.2;
+  gradients.col(1).segment(1, 2) << 0.3, 0.3;
+  const Eigen::Vector2d begin(-0.03, -0.01);
+  const double unlimited = std::numeric_limits<double>::infinity();
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(nv);
+  const FilteredMotion out = filtered_motion(gradients, begin, unlimited, rest, rest, 2000);
+  BOOST_TEST(out.jerk < 1.0 + 1e-6);
+  BOOST_TEST(out.last > 0.0);
+  const FilteredMotion deeper = filtered_motion(gradients, begin, unlimited, -Eigen::VectorXd::Unit(nv, 0), rest, 1);
+  BOOST_TEST(deeper.jerk > 5.0);  // it is stopped at once
+}
+
+BOOST_AUTO_TEST_CASE(the_margin_of_what_is_known_gives_way_before_the_jerk_limit) {
+  // Joint 0 moves at 0.5 rad/s, and is still accelerated, towards a clearance of which it changes 0.4 m/rad.
+  const Eigen::VectorXd joint = Eigen::VectorXd::Unit(nv, 0), begin = Eigen::VectorXd::Constant(1, 0.0115);
+  const auto with_margin = [&](double margin) {
+    return filtered_motion(0.4 * joint, begin, margin, -0.5 * joint, -5.0 * joint, 500);
+  };
+  const FilteredMotion seen = with_margin(std::numeric_limits<double>::infinity());
+  BOOST_TEST(seen.jerk > 2.0);
+  BOOST_TEST(seen.least > 0.005 - 1e-4);
+  const FilteredMotion known = with_margin(0.005);
+  BOOST_TEST(known.jerk < 1.0 + 1e-6);
+  BOOST_TEST(known.least > 0.001);
+  BOOST_TEST(known.least < 0.005);
 }

@@ -236,6 +236,69 @@ BOOST_AUTO_TEST_CASE(a_row_by_value) {
   BOOST_TEST(!rows.satisfied_within(0, -1.001 * box, 1.001 * box));
 }
 
+BOOST_AUTO_TEST_CASE(reserves_are_what_a_stop_can_do_without) {
+  JointLimits limits = JointLimits::unlimited(1);
+  limits.acceleration << 10.0;
+  limits.jerk << 1000.0;
+  const Eigen::VectorXd still = Eigen::VectorXd::Zero(1);
+  const LastMotion last{still, 1.0};
+  AccelerationBounds bounds(1);
+  SafetyRows rows(1, {});
+  const auto ask = [&](double room, double closing, double of_arm) {
+    const Eigen::VectorXd v = Eigen::VectorXd::Constant(1, -of_arm);
+    bounds.update(limits, still, v, 0.001, {}, &still);
+    Clearances clearances(1, 1);
+    clearances.nearest << 0;
+    clearances.values[0] = room + rows.settings().margin;
+    clearances.rates[0] = -closing;
+    clearances.gradients.col(0) << 1.0;
+    clearances.mind_nearest();
+    rows.update(clearances, v, limits, bounds, 0.001, nullptr, &last);
+    BOOST_REQUIRE(rows.size() == 1);
+  };
+  // With 5 m/s² and half of the jerk the stop from 0.4 m/s takes 22 mm; the arm's own, with 10 m/s² and all jerk, 10.2 mm.
+  ask(0.022, 0.4, 0.4);
+  BOOST_TEST(rows.lower[0] == 0.5, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(rows.draw_on_reserves(0.001));
+  BOOST_TEST(rows.lower[0] == -0.95, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(!rows.ask_for_ways_back());
+
+  ask(0.0107, 0.4, 0.4);
+  const double asked = rows.lower[0];
+  BOOST_TEST(rows.draw_on_reserves(0.001));
+  const double least = rows.lower[0];
+  BOOST_TEST((least > -0.95 && least < asked));
+  const auto way = [](double x) {
+    const double next = 0.4 - x * 0.001;
+    return std::max(0.4, next) * 0.001 + jerk_braking_distance(next, -x, 10.0, 950.0);
+  };
+  BOOST_TEST((way(least) <= 0.0107 && way(least - 0.01) > 0.0107));
+
+  // Without room and without closing the way back asks for what jerk allows; as a reserve, for nothing.
+  ask(-0.03, 0.0, 0.0);
+  BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(rows.draw_on_reserves(0.001));
+  BOOST_TEST(rows.lower[0] == -0.1, boost::test_tools::tolerance(0.01));  // 0.1 mm/s is none
+  BOOST_TEST(rows.ask_for_ways_back());
+  BOOST_TEST(rows.lower[0] == 0.95, boost::test_tools::tolerance(1e-12));
+
+  // Where the clearance is not lost, the way back is a row of its own, which counts less than what keeps it from closing.
+  ask(-0.003, 0.0, 0.0);
+  const double back = rows.lower[0];
+  BOOST_TEST(rows.draw_on_reserves(0.001));
+  BOOST_TEST(rows.ask_for_ways_back());
+  BOOST_REQUIRE(rows.size() == 2);
+  BOOST_TEST(rows.lower[0] == -0.1, boost::test_tools::tolerance(0.01));
+  BOOST_TEST((rows.lower[1] == back && rows.depths[0] == 0.0 && rows.depths[1] > 0.0));
+  BOOST_TEST(rows.normals(1, 0) == rows.normals(0, 0));
+
+  // What closes in without room has no reserve, nor has what the arm's own stop does not stop.
+  ask(-0.003, 0.1, 0.1);
+  BOOST_TEST(!rows.draw_on_reserves(0.001));
+  ask(0.022, 0.4, 0.0);
+  BOOST_TEST(!rows.draw_on_reserves(0.001));
+}
+
 BOOST_AUTO_TEST_CASE(what_accelerations_and_torques_together_give_is_counted_on) {
   // M = (2, 1; 1, 1), so that a₁ = τ₁ − τ₂ and τ₂ = a₁ + a₂. The torques alone allow a₁ = 4.7, the accelerations alone 5. Together
   // they allow 4.5, at a₂ = −5 and τ₂ = −0.5: 0.2 less, half of which counts.

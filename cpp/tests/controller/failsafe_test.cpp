@@ -96,37 +96,6 @@ BOOST_AUTO_TEST_CASE(no_drive_into_obstacles_breaks_a_limit) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(the_way_out_of_what_is_touched_keeps_the_jerk_limits) {
-  // Two balls, from both sides a few millimetres inside the covers of links at the start.
-  const JointLimits limits = jerk_limited();
-  for (const auto output : {ControllerSettings::Output::acceleration, ControllerSettings::Output::torque}) {
-    Controller controller(covered_arm(limits), told(output));
-    Eigen::VectorXd q = Eigen::VectorXd::Zero(nv), v = q, last = q;
-    q[1] = 0.4;
-    q[3] = -0.5;
-    const KinematicState state = test::state_at(controller.arm().robot(), q);
-    const auto beside = [&](const char* link, const Eigen::Vector3d& place) {
-      return frame_pose(controller.arm().robot(), state, controller.arm().robot().frame_index(link)) * place;
-    };
-    Eigen::Matrix3Xd points(3, 2);
-    points.col(0) = beside("link5", {0.065, 0.0, 0.2});  // the semi-axis is 0.04, the radius 0.03
-    points.col(1) = beside("link7", {-0.064, 0.0, 0.15});
-    controller.set_obstacles(Obstacles(points, Eigen::VectorXd::Constant(2, 0.03), Eigen::Matrix3Xd::Zero(3, 2)));
-    double jerk = 0.0, first = 0.0;
-    for (int k = 0; k < 4000; ++k) {
-      const Command& command = controller.step(q, v);
-      first = k == 0 ? command.clearance : first;
-      jerk = std::max(jerk, (command.acceleration - last).cwiseAbs().cwiseQuotient(limits.jerk).maxCoeff() / step_time);
-      last = command.acceleration;
-      v += step_time * command.acceleration;
-      q += step_time * v;
-    }
-    BOOST_TEST(first < -0.002);
-    BOOST_TEST(controller.command().clearance > 0.003);
-    BOOST_TEST(jerk < 1.0 + 1e-6);
-  }
-}
-
 BOOST_AUTO_TEST_CASE(places_that_are_looked_at_again_serve_once_they_are_free) {
   // The same cloud, told anew in every step, changes nothing; a wall that appears in the way does.
   const Arm arm = covered_arm(jerk_limited());

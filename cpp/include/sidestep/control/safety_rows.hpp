@@ -87,8 +87,12 @@ struct ClosingLimits {
 //     S(u, −(∇h·a + c)) at a share of the jerk J = Σ |∂h/∂q_j| J_j and at three quarters of the hardest deceleration,
 // fits into the room, S of acceleration_bounds.hpp. The share is one half, so that two rows can rise together; where that is not
 // enough, all but a twentieth. Where neither is, as with what comes into view late, jerk gives way.
-// Several rows together may ask for more than jerk allows, each within its share: then jerk gives way here. A Controller keeps it all
-// the same, by stops that are known to be free.
+// Several rows together may ask for more than jerk allows, each within its share. Before jerk gives way for them, they draw
+// on their reserves: each asks for as little as still lets the arm's own stop along its path fit into the room, by −v/τ and
+// with all but a twentieth of the jerk. That is one stop for all rows; what closes in by more has no reserve. Of what is
+// known and not seen, as of links against each other, four fifths of the margin count as room then: they are for what sensors
+// miss. A row without room asks only for what keeps it from closing, and its way back shares with others what the jerk limits
+// leave. Where what is lost comes nearer, nothing waits; else its way out shares what the jerk limits leave.
 // Where torques have to keep a rate, jerk is a small part of its limit, and a row begins early: of the ∇h·a that jerk allows next
 // it asks for the least after which the smooth stop fits (or for the most, where none fits), without a curvature that helps, which
 // may be gone before the arm has slowed. And it asks for no more than rate and jerk limits can do next: beyond it light joints
@@ -174,6 +178,18 @@ class SafetyRows {
   void add(const Clearances& clearances, const Eigen::VectorXd& v, const JointLimits& limits, const AccelerationBounds& bounds,
            double period, const BrakingTorque* torque = nullptr, const LastMotion* last = nullptr) noexcept;
 
+  /// Asks for as little as each clearance can do with next, see above; false where no row has a reserve. After `add`, where no
+  /// clearance is lost.
+  bool draw_on_reserves(double period) noexcept;
+  /// After it: asks for all of it again.
+  void ask_again() noexcept;
+  /// After it: asks in full for the ways back that were put off, false where none was: by another row for each that is not lost, which
+  /// counts as one that is, so that what keeps it from closing still counts more.
+  bool ask_for_ways_back() noexcept;
+  /// After `add`, where a clearance is lost. Those that oppose its way out, are known and not seen, and are inside their margin, ask
+  /// for a fifth of it only; and for the rest after the way out, by another row each.
+  void put_off_ways_back(double period) noexcept;
+
   /// Whether every acceleration with lower <= q̈ <= upper satisfies row k.
   bool satisfied_within(int k, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) const noexcept;
 
@@ -206,8 +222,21 @@ class SafetyRows {
                          ConstVectorRef gradient, const LastMotion& last, const AccelerationBounds& bounds,
                          const JointLimits& limits, double period) noexcept;
 
+  /// What the stop of a row can count on: in [m], [m/s], [m/s²], [m/s³]; no jerk [m/s³]: nothing is known of it.
+  struct Reserve {
+    double room = 0.0, closing_speed = 0.0, curvature = 0.0, hardest = 0.0, jerk = 0.0;
+    double before = 0.0;  ///< ∇h·a of the last period
+    double margin = 0.0;
+    bool seen = false;  ///< by a sensor: its whole margin counts
+    ClosingLimits limits{};
+  };
+
+  bool opposes_lost(int row) const noexcept;
+
   SafetySettings settings_;
   int size_ = 0;
+  std::vector<Reserve> reserves_;                // (max)
+  Eigen::VectorXd asked_;                        // (max) before reserves are drawn on
   Eigen::VectorXd urgency_;                      // (max) predicted room of the rows chosen, ascending
   Eigen::VectorXd response_;                     // (nv) M v
   RowMatrix responses_;                          // (nv, max) M⁻¹ ∇h of the rows chosen

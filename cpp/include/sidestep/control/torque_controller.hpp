@@ -211,13 +211,15 @@ class TorqueController {
   /// The first program; smooth: within the limits of jerk and torque rate.
   bool solve_within_bounds(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, bool smooth,
                            TorqueSolution& solution) noexcept;
-  /// The other programs.
-  TorqueStatus solve_relaxed(TorqueSolution& solution) noexcept;
+  /// The other programs; smooth: within the limits of jerk, which leave a solution.
+  TorqueStatus solve_relaxed(bool smooth, TorqueSolution& solution) noexcept;
   void widen_bounds() noexcept;
   void collect_rows() noexcept;
   /// Whether a clearance below zero bends the last solution. Then the third program has its say also where all could be
   /// met: what only the last bit of an acceleration limit can give would come and go from step to step.
   bool presses_for_lost() const noexcept;
+  /// Whether a clearance that is not lost has less than it asks for.
+  bool others_fall_short(const TorqueSolution& solution) const noexcept;
   /// The second program, with rows lowered by what is allowed; rounded: also where that is next to nothing.
   bool solve_comfort(bool rounded, TorqueSolution& solution) noexcept;
   /// What row n of those used asks for, less what is allowed.
