@@ -36,8 +36,7 @@ class Failsafe {
 
   /// No stop is known: of a state that was not reached by what `keep` gave, or where something moves.
   void reset() noexcept { known_ = false; }
-  /// The obstacles are others, or have moved: what was looked at
-  /// is looked at again when it is needed, a few places in a step.
+  /// The obstacles are others, or have moved: places are looked at again when they are needed, a few in a step.
   void look_anew() noexcept;
 
   /// At q, v, after the acceleration `last` in the period before, `a` is wanted in this one (nv). Where that changes faster than

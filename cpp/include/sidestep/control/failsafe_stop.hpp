@@ -23,7 +23,7 @@ class FailsafeStop {
   explicit FailsafeStop(int num_coordinates);
 
   /// Plans the stop from q [rad | m], v [/s], a [/s²] (nv), finite; period T [s]. Of jerk limits it takes `jerk_share`. False where
-  /// no stop of at most `most_periods` keeps acceleration, position and velocity limits. No allocation.
+  /// no stop with ramps of at most `most_periods` keeps acceleration, position and velocity limits. No allocation.
   [[nodiscard]] bool plan(ConstVectorRef q, ConstVectorRef v, ConstVectorRef a, const JointLimits& limits, double period,
                           double jerk_share = 1.0) noexcept;
 
