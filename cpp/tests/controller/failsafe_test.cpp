@@ -4,27 +4,21 @@
 #include <cmath>
 
 #include "sidestep/controller/controller.hpp"
-#include "support/allocations.hpp"
 #include "support/covered_arm.hpp"
 #include "support/numbers.hpp"
 #include "support/random.hpp"
+#include "support/repeatable_settings.hpp"
 
 using namespace sidestep;
 using test::covered_arm;
 using test::nv;
 using test::Random;
+using test::repeatable_settings;
 
 namespace {
 
 constexpr double step_time = 0.001;
 constexpr int num_balls = 150;
-
-ControllerSettings told(ControllerSettings::Output output) {
-  ControllerSettings settings;
-  settings.synchronous = true;
-  settings.output = output;
-  return settings;
-}
 
 JointLimits jerk_limited() {
   JointLimits limits = test::arm_limits(nv);
@@ -58,7 +52,7 @@ Worst drive(unsigned seed, double seconds) {
   for (Eigen::Index j = 0; j < nv; ++j) {
     q[j] = random.uniform(-0.8, 0.8);
   }
-  const ControllerSettings settings = told(ControllerSettings::Output::acceleration);
+  const ControllerSettings settings = repeatable_settings(ControllerSettings::Output::acceleration);
   Controller empty(arm, settings), controller(arm, settings);
   controller.set_obstacles(narrow(random, empty, q));
   Worst worst;
@@ -97,13 +91,13 @@ BOOST_AUTO_TEST_CASE(no_drive_into_obstacles_breaks_a_limit) {
 }
 
 BOOST_AUTO_TEST_CASE(places_that_are_looked_at_again_serve_once_they_are_free) {
-  // The same cloud, told anew in every step, changes nothing; a wall that appears in the way does.
+  // The same cloud, told anew in every step, changes nothing.
   const Arm arm = covered_arm(jerk_limited());
-  Controller once(arm, told(ControllerSettings::Output::acceleration)),
-      anew(arm, told(ControllerSettings::Output::acceleration));
+  Controller once(arm, repeatable_settings(ControllerSettings::Output::acceleration)),
+      anew(arm, repeatable_settings(ControllerSettings::Output::acceleration));
   Random random(3);
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.2), v = Eigen::VectorXd::Zero(nv);
-  Controller empty(arm, told(ControllerSettings::Output::acceleration));
+  Controller empty(arm, repeatable_settings(ControllerSettings::Output::acceleration));
   const Obstacles cloud = narrow(random, empty, q);
   once.set_obstacles(cloud);
   for (int k = 0; k < 1000; ++k) {

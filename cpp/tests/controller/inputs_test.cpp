@@ -9,6 +9,7 @@
 #include "support/allocations.hpp"
 #include "support/covered_arm.hpp"
 #include "support/numbers.hpp"
+#include "support/repeatable_settings.hpp"
 
 using namespace sidestep;
 using test::ball;
@@ -19,12 +20,7 @@ namespace {
 
 constexpr double tick = 0.001;
 
-ControllerSettings repeatable() {
-  ControllerSettings settings;
-  settings.synchronous = true;
-  settings.output = ControllerSettings::Output::acceleration;
-  return settings;
-}
+ControllerSettings repeatable() { return test::repeatable_settings(ControllerSettings::Output::acceleration); }
 
 Eigen::VectorXd bent() {
   Eigen::VectorXd q(nv);

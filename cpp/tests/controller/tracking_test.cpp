@@ -8,22 +8,17 @@
 #include "support/covered_arm.hpp"
 #include "support/numbers.hpp"
 #include "support/random.hpp"
+#include "support/repeatable_settings.hpp"
 
 using namespace sidestep;
 using test::covered_arm;
 using test::nv;
+using test::repeatable_settings;
 
 namespace {
 
 const Eigen::VectorXd from = (Eigen::VectorXd(nv) << -0.5, 0.9, 0.0, 0.6, 0.0, 0.3, 0.0).finished();
 const Eigen::VectorXd to = (Eigen::VectorXd(nv) << 0.4, 0.5, 0.3, 0.9, -0.2, 0.6, 0.4).finished();
-
-ControllerSettings settings_of(ControllerSettings::Output output) {
-  ControllerSettings settings;
-  settings.synchronous = true;
-  settings.output = output;
-  return settings;
-}
 
 JointLimits limits_with_rates() {
   JointLimits limits = test::arm_limits(nv);
@@ -36,7 +31,7 @@ JointLimits limits_with_rates() {
 
 BOOST_AUTO_TEST_CASE(positions_and_velocities_integrate_the_acceleration_whatever_the_drives_do) {
   for (const double lag : {0.0, 0.02}) {
-    Controller controller(covered_arm(limits_with_rates()), settings_of(ControllerSettings::Output::position));
+    Controller controller(covered_arm(limits_with_rates()), repeatable_settings(ControllerSettings::Output::position));
     controller.set_goal(to);
     const double period = controller.settings().period;
     Eigen::VectorXd q = from, v = Eigen::VectorXd::Zero(nv), position = q, velocity = v;
@@ -56,7 +51,7 @@ BOOST_AUTO_TEST_CASE(positions_and_velocities_integrate_the_acceleration_whateve
 }
 
 BOOST_AUTO_TEST_CASE(velocities_lead_the_arm_back_to_the_reference) {
-  Controller controller(covered_arm(limits_with_rates()), settings_of(ControllerSettings::Output::velocity));
+  Controller controller(covered_arm(limits_with_rates()), repeatable_settings(ControllerSettings::Output::velocity));
   Eigen::VectorXd q = from;
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(nv);
   BOOST_TEST(controller.step(q, rest).velocity.norm() == 0.0);
@@ -72,7 +67,7 @@ BOOST_AUTO_TEST_CASE(jerk_and_torque_rate_keep_their_limits_at_every_sample) {
   JointLimits limits = limits_with_rates();
   limits.jerk.setConstant(200.0);
   const Arm arm = covered_arm(limits);
-  Controller controller(arm, settings_of(ControllerSettings::Output::torque));
+  Controller controller(arm, repeatable_settings(ControllerSettings::Output::torque));
   const double period = controller.settings().period;
   Eigen::VectorXd q = from, v = Eigen::VectorXd::Zero(nv), a = v, held(nv);
   const RigidBodyDynamics dynamics(arm.dynamics());
@@ -100,7 +95,7 @@ BOOST_AUTO_TEST_CASE(jerk_and_torque_rate_keep_their_limits_at_every_sample) {
 
 BOOST_AUTO_TEST_CASE(an_arm_with_a_payload_arrives_and_the_payload_is_found) {
   const Arm arm = covered_arm(test::arm_limits(nv));
-  Controller controller(arm, settings_of(ControllerSettings::Output::torque));
+  Controller controller(arm, repeatable_settings(ControllerSettings::Output::torque));
   controller.set_goal(to);
   const double period = controller.settings().period;
   const RigidBodyDynamics model(arm.dynamics());
@@ -144,7 +139,7 @@ BOOST_AUTO_TEST_CASE(where_the_torque_cannot_hold_the_arm_it_does_not_go) {
   of_strong.bias(level, Eigen::VectorXd::Zero(nv), w, bias);
   limits.effort[1] = std::abs(bias[1]) / 1.1;
   const Arm arm = covered_arm(limits);
-  Controller controller(arm, settings_of(ControllerSettings::Output::torque));
+  Controller controller(arm, repeatable_settings(ControllerSettings::Output::torque));
   const double period = controller.settings().period, allowed = 1.0 - controller.settings().effort_margin;
   const RigidBodyDynamics model(arm.dynamics());
   RigidBodyDynamics::Workspace of_model(model);
