@@ -12,6 +12,8 @@ constexpr double filter = 0.03;     // [s] time constant of all terms: far longe
 constexpr double memory = 3.0;      // [s] of motion
 constexpr double adoption = 0.05;   // [s] in which a new estimate is taken over
 constexpr double direction = 0.02;  // [rad/s | m/s] at which dry friction is three quarters of the whole
+constexpr double leap = 0.1;        // of the velocity limit, by which no model is wrong in a period [-]
+constexpr double least_leap = 0.1;  // [rad/s | m/s] the same, of slow joints: velocities are noisy
 constexpr double absurd = 1e9;      // [Nm | N] that is no measurement
 constexpr double explained = 0.8;   // of the missing force's variation that has to be explained [-]
 constexpr double largest = 0.1;     // of the effort limit, that a rotor takes at the acceleration limit [-]
@@ -24,6 +26,7 @@ DisturbanceObserver::DisturbanceObserver(const JointLimits& limits, double perio
     : period_(period),
       share_of_period_(std::min(1.0, period / time)),
       most_disturbance_(share * limits.effort),
+      most_unexpected_((leap * limits.velocity).cwiseMax(least_leap) / period),
       most_rotor_(largest * limits.effort.cwiseQuotient(limits.acceleration)),
       disturbance_(Eigen::VectorXd::Zero(limits.effort.size())),
       rotors_(disturbance_),
@@ -60,6 +63,10 @@ void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::Vec
                                  const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix,
                                  const Eigen::VectorXd& bias) noexcept {
   acceleration_ = (after - before) / period_;
+  // An impact, or a simulation that starts anew, says nothing about the model.
+  if (((acceleration_ - predicted).cwiseAbs().array() > most_unexpected_.array()).any()) {
+    return;
+  }
   for (Eigen::Index j = 0; j < disturbance_.size(); ++j) {
     const double moved = mass_matrix.row(j).dot(acceleration_), expected = mass_matrix.row(j).dot(predicted);
     const double surplus = moved - expected + rotors_[j] * (acceleration_[j] - predicted[j]);

@@ -20,6 +20,7 @@ constexpr int looks_again = 16;          // in a step
 constexpr int first_strides = 16;        // of a stop
 constexpr double rounded = 1e-6;         // relative
 constexpr int slower_stops = 3;          // each with half the acceleration
+constexpr int pause = 16;                // [periods] after a torque's stop was looked for in vain
 
 }  // namespace
 
@@ -57,8 +58,8 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   checks_ = std::max(0, checks_ - 1);
   // As much of the change as the limits allow.
   const double share = smooth_share(last, a);
-  if (torque != nullptr &&
-      share == 1.0) {  // torques that change slowly take long stops: they are looked for where they are needed
+  pause_ = std::max(0, pause_ - 1);
+  if (torque != nullptr && (share == 1.0 || pause_ > 0)) {
     known_ = false;
     return false;
   }
@@ -100,6 +101,7 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
 bool Failsafe::stop_instead(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Eigen::VectorXd& last,
                             const Obstacles& obstacles, const StopTorque* torque, Eigen::VectorXd& a) noexcept {
   if (!known_ && !find_stop(q, v, last, obstacles, torque)) {
+    pause_ = torque != nullptr ? pause : 0;
     return false;
   }
   stop_.acceleration(0, a_);
@@ -167,11 +169,16 @@ void Failsafe::set_floors(const Eigen::VectorXd& q, const Obstacles& obstacles) 
   body_.clearances(q, obstacles, floor_ + below_now, room_, clearances_);
   low_ = false;
   for (Eigen::Index i = 0; i < floors_.size(); ++i) {
-    const double now = std::min(floor_, clearances_[i] - below_now);
-    floors_[i] = known_ ? std::max(floors_[i], now) : now;
-    low_ = low_ || floors_[i] < floor_;
+    double floor = std::min(floor_, clearances_[i] - below_now);
+    if (known_) {
+      floor = std::max(floors_[i], floor);
+    }
+    if (floor != floors_[i]) {
+      floors_[i] = floor;
+      num_looked_ = 0;  // places count by the floors
+    }
+    low_ = low_ || floor < floor_;
   }
-  num_looked_ = 0;  // places count by the floors
 }
 
 double Failsafe::look(ConstVectorRef q, int at, const Obstacles& obstacles) noexcept {

@@ -26,7 +26,8 @@ struct StopTorque {
 /// moves farther than R·|Δq|, see BodyClearance::reach, so that clearances are known to be as far above the floors, or where that
 /// is less than a spacing as large as the floor, above zero. What was looked at for one stop serves the next ones.
 ///
-/// Torques that change slowly take long stops. With them a stop is looked for only where the motion would break a limit.
+/// Torques that change slowly take long stops. With them a stop is looked for only where the motion would break a limit, and
+/// where there is none, not again for a few periods.
 ///
 /// One thread at a time; nothing here allocates after construction.
 class Failsafe {
@@ -35,7 +36,10 @@ class Failsafe {
   Failsafe(const BodyClearance& body, const JointLimits& limits, double margin, double period);
 
   /// No stop is known: of a state that was not reached by what `keep` gave, or where something moves.
-  void reset() noexcept { known_ = false; }
+  void reset() noexcept {
+    known_ = false;
+    num_looked_ = 0;
+  }
   /// The obstacles are others, or have moved: places are looked at again when they are needed, a few in a step.
   void look_anew() noexcept;
 
@@ -85,6 +89,7 @@ class Failsafe {
   int num_looked_ = 0, hit_ = 0;  // hit_: what served last
   int left_ = 0;                  // looks at stale places in this step
   int checks_ = 0;                // steps in which a known stop is looked at again
+  int pause_ = 0;                 // steps in which none is looked for
 };
 
 }  // namespace sidestep

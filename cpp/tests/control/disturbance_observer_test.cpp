@@ -20,6 +20,7 @@ JointLimits limits_of_two() {
   JointLimits limits = JointLimits::unlimited(2);
   limits.effort << 50.0, 20.0;
   limits.acceleration << 10.0, 10.0;
+  limits.velocity << 5.0, 5.0;
   return limits;
 }
 
@@ -82,12 +83,29 @@ BOOST_AUTO_TEST_CASE(a_constant_disturbance_is_found_with_the_time_constant) {
 BOOST_AUTO_TEST_CASE(a_disturbance_is_bounded_by_its_share_of_the_effort_limits) {
   DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
   Plant plant;
-  plant.disturbance << -500.0, 500.0;
+  plant.disturbance << -100.0, 100.0;
   for (int k = 0; k < 500; ++k) {
     plant.step(observer, Eigen::Vector2d::Zero());
   }
   BOOST_TEST(observer.disturbance()[0] == -share * 50.0);
   BOOST_TEST(observer.disturbance()[1] == share * 20.0);
+}
+
+BOOST_AUTO_TEST_CASE(a_leap_of_the_velocity_is_not_a_disturbance) {
+  // As by an impact, or where a simulation starts anew: 1 rad/s within a period would be a force of 2,000 Nm.
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  Plant plant;
+  plant.disturbance << -6.0, 2.0;
+  for (int k = 0; k < 3000; ++k) {
+    if (k % 500 == 400) {
+      plant.v[0] += k % 1000 < 500 ? 1.0 : -1.0;
+    }
+    plant.step(observer, swing(k, 2.0));
+    if (k > 300) {
+      BOOST_REQUIRE((observer.disturbance() - plant.disturbance).cwiseAbs().maxCoeff() < 0.01);
+    }
+  }
+  BOOST_TEST(observer.rotors().cwiseAbs().maxCoeff() < 1e-3);
 }
 
 BOOST_AUTO_TEST_CASE(rotors_are_found_where_there_are_some) {

@@ -39,6 +39,7 @@ from sidestep.body import Body
 from sidestep.robot import Robot
 
 Array = npt.NDArray[np.float64]
+_State = tuple[Array, Array]  # q, v
 
 TABLE_ROBOTS = ("planar2", "planar3", "fr3_arm")  # 2, 3 and 7 joints
 POINTS = (1, 100, 1_000, 10_000, 100_000)
@@ -225,10 +226,10 @@ class _Row:
         q = self._goal(rng)
         run = self._from_python if self.python else self._from_cpp
         steps = min(MOTION, settings.steps)
-        run(q, self._goal(rng), max(1, round(WARM_UP * steps)))
+        state, _ = run((q, np.zeros_like(q)), self._goal(rng), max(1, round(WARM_UP * steps)))
         while times.total < settings.steps and (times.total == 0 or time.perf_counter() < end):
             goal, before = self._goal(rng), interruptions()
-            q, seconds = run(q, goal, steps)
+            state, seconds = run(state, goal, steps)
             after = interruptions()
             if before is not None and after is not None:
                 interrupted += after - before
@@ -252,27 +253,31 @@ class _Row:
     def _goal(self, rng: np.random.Generator) -> Array:
         return clear_place(self.robot, self.system, self.obstacles, rng)
 
-    def _from_cpp(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
+    def _from_cpp(self, state: _State, goal: Array, steps: int) -> tuple[_State, Array]:
         moved = rollout(
             self.system,
-            q,
-            np.zeros_like(q),
+            *self._at_rest(state),
             goal,
             self.obstacles,
             steps=steps,
             time_steps=True,
         )
-        return _inside(self.robot, moved.q[-1]), moved.step_seconds
+        return (moved.q[-1], moved.v[-1]), moved.step_seconds
 
-    def _from_python(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
-        moved = rollout(self.system, q, np.zeros_like(q), goal, self.obstacles, steps=steps)
+    def _from_python(self, state: _State, goal: Array, steps: int) -> tuple[_State, Array]:
+        moved = rollout(self.system, *self._at_rest(state), goal, self.obstacles, steps=steps)
         seconds = np.empty(steps)
         for k in range(steps):
             start = time.perf_counter_ns()
             step = self.system.acceleration(moved.q[k], moved.v[k], goal, self.obstacles)
             _ = step.acceleration
             seconds[k] = 1e-9 * (time.perf_counter_ns() - start)
-        return _inside(self.robot, moved.q[-1]), seconds
+        return (moved.q[-1], moved.v[-1]), seconds
+
+    def _at_rest(self, state: _State) -> _State:
+        """Without the filter nothing keeps the limits: the next motion begins at rest, within them."""
+        q, v = state
+        return np.clip(q, self.robot.limits.lower, self.robot.limits.upper), np.zeros_like(v)
 
 
 @dataclass(frozen=True)
@@ -287,18 +292,19 @@ class _ControllerRow(_Row):
         controller.set_obstacles(self.obstacles)
         return controller
 
-    def _from_cpp(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
+    def _from_cpp(self, state: _State, goal: Array, steps: int) -> tuple[_State, Array]:
         self._controller.set_goal(goal)
-        moved = integrate(self._controller, q, np.zeros_like(q), steps=steps)
-        return _inside(self.robot, moved.last_q), moved.step_seconds
+        moved = integrate(self._controller, *state, steps=steps)
+        return (moved.last_q, moved.last_v), moved.step_seconds
 
 
 @dataclass(frozen=True)
 class _DynamicsRow(_Row):
     dynamics: RigidBodyDynamics
 
-    def _from_cpp(self, q: Array, goal: Array, steps: int) -> tuple[Array, Array]:
-        return goal, self.dynamics.call_seconds(q, goal - q, calls=steps)
+    def _from_cpp(self, state: _State, goal: Array, steps: int) -> tuple[_State, Array]:
+        q, v = state
+        return (goal, v), self.dynamics.call_seconds(q, goal - q, calls=steps)
 
 
 def clearance_at(q: Array, system: GeometricSystem, obstacles: Obstacles) -> float:
@@ -320,10 +326,6 @@ def clear_place(
         if clearance > most:
             best, most = q, clearance
     return best
-
-
-def _inside(robot: Robot, q: Array) -> Array:
-    return np.clip(q, robot.limits.lower, robot.limits.upper)
 
 
 def _rows(settings: StepSettings) -> Iterator[_Row]:

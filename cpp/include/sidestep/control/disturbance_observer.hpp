@@ -26,7 +26,8 @@ class DisturbanceObserver {
   DisturbanceObserver(const JointLimits& limits, double period, double time, double share);
 
   /// One period: velocity (nv) [/s] at its begin and end, the torque (nv) [Nm | N] that was sent, the acceleration (nv) that
-  /// was predicted for it, the model's mass matrix (nv × nv) and bias (nv) there. What is not finite changes nothing.
+  /// was predicted for it, the model's mass matrix (nv × nv) and bias (nv) there. What is not finite changes nothing, nor does a
+  /// velocity that leaps, as by an impact: by more than a tenth of its limit beyond what was predicted.
   void update(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::VectorXd& torque,
               const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix, const Eigen::VectorXd& bias) noexcept;
 
@@ -51,7 +52,7 @@ class DisturbanceObserver {
   void find_rotor(Eigen::Index joint, double mass) noexcept;
 
   double period_, share_of_period_;
-  Eigen::VectorXd most_disturbance_, most_rotor_;
+  Eigen::VectorXd most_disturbance_, most_unexpected_, most_rotor_;
   Eigen::VectorXd disturbance_, rotors_, acceleration_;
   std::vector<Joint> joints_;
   std::size_t next_ = 0;  // whose inertia is found in this period
