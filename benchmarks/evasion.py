@@ -1,9 +1,6 @@
-"""Processor time of a look of `LookAhead`, in problems of `sidestep bench reach --moving 0.5`.
+"""Processor time of a look of `LookAhead`, in problems of `sidestep bench reach --moving 0.5`."""
 
-Usage: python benchmarks/evasion.py [ROBOT ...]
-"""
-
-import sys
+import argparse
 import time
 
 import numpy as np
@@ -41,7 +38,11 @@ def looks(name: str) -> tuple[list[float], list[float]]:
 
 def main() -> None:
     print("| robot | looks | number | median [ms] | p95 [ms] | most [ms] |\n|---|---|---|---|---|---|")
-    for name in sys.argv[1:] or ("fr3", "panda", "ur10", "xarm7", "iiwa"):
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "robots", nargs="*", metavar="ROBOT", default=["fr3", "panda", "ur10", "xarm7", "iiwa"]
+    )
+    for name in parser.parse_args().robots:
         for label, times in zip(("no trajectory", "trajectory"), looks(name), strict=True):
             median, p95, most = np.quantile(times, (0.5, 0.95, 1.0))
             print(f"| {name} | {label} | {len(times)} | {median:.1f} | {p95:.1f} | {most:.1f} |")

@@ -7,6 +7,7 @@ where a page asks the network for something, lacks a picture, or is wider than t
 
 from __future__ import annotations
 
+import argparse
 import sys
 import threading
 from collections.abc import Iterator
@@ -73,12 +74,17 @@ def states(chromium: Any, page: Page, address: str) -> None:
 
 
 def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("pages", nargs="*", metavar="PAGE", help="a path in docs without suffix [all]")
+    chosen = parser.parse_args().pages
     faults = 0
     with served() as address, driver() as playwright, browser(playwright) as chromium:
         page = chromium.new_page(viewport=WINDOW)
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
-        for path in pages(sys.argv[1:]):
+        for path in pages(chosen):
             asked.clear()
             page.goto(address + path.relative_to(SITE).as_posix(), wait_until="load", timeout=PATIENCE)
             page.wait_for_timeout(300)  # [ms] what fades in
@@ -91,7 +97,7 @@ def main() -> int:
             wrong += ["is wider than the window"] if page.evaluate(TOO_WIDE) else []
             faults += len(wrong)
             print(name.with_suffix("").as_posix(), *wrong, sep="\n    ")
-        if not sys.argv[1:]:
+        if not chosen:
             states(chromium, page, address)
     return 1 if faults else 0
 

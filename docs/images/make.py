@@ -4,6 +4,7 @@ demo, studio; in figures.py those of the concepts, in theory_figures.py those of
 first screen. That of the studio needs Chromium and `pip install 'sidestep[headless]'`.
 """
 
+import argparse
 import importlib
 import os
 import subprocess
@@ -57,9 +58,14 @@ if __name__ == "__main__":
     for module, names in FIGURES.items():
         MAKERS |= {name: lambda _, module=module, name=name: drawn_in(module, name) for name in names}
     MAKERS["table"] = lambda _: table.table()
-    wrong = [name for name in sys.argv[1:] if name not in MAKERS]
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(MAKERS)} [all]")
+    chosen = parser.parse_args().names
+    wrong = [name for name in chosen if name not in MAKERS]
     if wrong:
-        sys.exit(f"there is no picture {wrong[0]!r}; allowed: {', '.join(MAKERS)}")
+        parser.error(f"there is no picture {wrong[0]!r}; allowed: {', '.join(MAKERS)}")
     with tempfile.TemporaryDirectory() as temporary:
-        for name in sys.argv[1:] or MAKERS:
+        for name in chosen or MAKERS:
             MAKERS[name](Path(temporary))
