@@ -153,9 +153,29 @@ def test_a_controller_runs_with_what_is_always_installed(arm_file: Path) -> None
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_solids_are_obstacles_with_what_is_always_installed(arm_file: Path) -> None:
+    code = """
+from sidestep.obstacles import Box, Capsule, Cylinder, Plane, Sphere, obstacles_from_shapes
+solids = [Box((0.2, 0.1, 0.3)), Capsule(0.1, 0.2), Cylinder(0.1, 0.2), Plane((0, 0, 0), (0, 0, 1)), Sphere(0.1)]
+for solid in solids:
+    for spacing in (None, 0.05):
+        print(len(obstacles_from_shapes([solid], spacing=spacing).points) > 0)
+"""
+    done = run("hide(*sys.argv[2].split(','))" + code, arm_file, ",".join(OPTIONAL))
+    assert (done.stderr, done.stdout.split()) == ("", ["True"] * 10)
+
+
+def test_the_readme_runs_with_what_is_always_installed() -> None:
+    hello = Path(__file__).parents[1] / ".ci" / "hello.py"
+    code = "\nimport runpy\nhide(*sys.argv[1].split(','))\nrunpy.run_path(sys.argv[2])"
+    done = run(code, ",".join(OPTIONAL), hello)
+    assert done.stderr == ""
+    assert done.stdout.endswith("arrived ok arrived\n")
+
+
 def test_few_packages_are_installed_always() -> None:
     names = {re.split(r"[^\w-]", requirement)[0] for requirement in PROJECT["dependencies"]}
-    assert names == {"lazy-loader", "numpy", "platformdirs", "rich", "typer"}
+    assert names == {"lazy-loader", "numpy", "platformdirs", "rich", "scipy", "typer"}
 
 
 def test_the_extras_hold_what_the_errors_say() -> None:
@@ -201,18 +221,13 @@ def test_the_extras_hold_what_the_errors_say() -> None:
         ),
         ("trimesh", "import sidestep as ss; ss.Robot.named('planar3').collision_mesh('link1')", "prepare"),
         (
-            "scipy",
-            "from sidestep import Arm, robot; Arm.load(robot.planar_arm(4), cache=False)",
-            "prepare",
-        ),
-        (
             "coal",
             "from sidestep import Arm, robot; Arm.load(robot.planar_arm(4), cache=False)",
             "prepare",
         ),
         ("coal", "from sidestep.distance import SelfCollision", "prepare"),
-        ("scipy", "import sidestep as ss; ss.Body", "prepare"),
-        ("trimesh", "import sidestep as ss; ss.Sphere", "prepare"),
+        ("trimesh", "import sidestep as ss; ss.MeshShape(sys.executable).balls()", "prepare"),
+        ("trimesh", "import sidestep as ss; ss.Sphere(0.1).mesh()", "prepare"),
         (
             "sklearn",
             "import sidestep as ss; ss.Body.fit(ss.Robot.named('planar3'), components=1, cache=False)",

@@ -118,9 +118,13 @@ def test_a_mesh_is_scaled_and_placed(l_shape: Path) -> None:
 def test_bad_shapes_are_refused_with_the_value(tmp_path: Path, l_shape: Path) -> None:
     with pytest.raises(ValueError, match=r"sphere: radius is -0\.1, must be positive"):
         Sphere(-0.1)
+    with pytest.raises(ValueError, match=r"sphere: radius is \(0, 0, 0\), must be positive"):
+        Sphere((0, 0, 0))  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="box: size must be an array of real numbers"):
+        Box("abc")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="box: size y is nan"):
         Box((1.0, np.nan, 1.0))
-    with pytest.raises(ValueError, match="box: size has 2 lengths, expected 3"):
+    with pytest.raises(ValueError, match="box: size is .*, must be three lengths"):
         Box((1.0, 1.0))
     with pytest.raises(ValueError, match=r"cylinder: length is 0\.0"):
         Cylinder(0.1, 0.0)

@@ -14,7 +14,7 @@ from types import ModuleType
 
 # The extras of pyproject.toml that add what Sidestep imports.
 MODULES: dict[str, tuple[str, ...]] = {
-    "prepare": ("coal", "collada", "jsonschema", "jsonschema_rs", "pypcd4", "scipy", "trimesh", "xacro"),
+    "prepare": ("coal", "collada", "jsonschema", "jsonschema_rs", "pypcd4", "trimesh", "xacro"),
     "simulation": ("matplotlib", "mujoco", "PIL", "yaml"),
     "studio": ("viser", "websockets"),
     "headless": ("av", "playwright"),

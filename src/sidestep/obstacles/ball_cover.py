@@ -15,7 +15,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 
@@ -97,6 +96,8 @@ def _fewest(
 
     The first cells are those of the balls, in order. Greedy: always the ball that holds most of the cells left.
     """
+    from scipy.spatial import cKDTree
+
     near = cKDTree(middles).query_ball_point(centres, radii * (1.0 + 1e-9))
     reach: list[Array] = []
     for ball, cells in enumerate(near):

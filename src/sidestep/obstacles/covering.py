@@ -6,11 +6,13 @@ The points of box, cylinder and sphere lie exactly on the shape, and on its edge
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+
+if TYPE_CHECKING:
+    import trimesh
 
 Points = NDArray[np.float64]
 
@@ -90,6 +92,8 @@ def square(extent: float, spacing: float) -> Points:
 
 def triangles(mesh: trimesh.Trimesh, spacing: float) -> Points:
     """Covering points of a triangle mesh: its corners after subdivision, thinned to an even distance."""
+    import trimesh
+
     check_spacing(spacing, area=float(mesh.area))
     half = 0.5 * spacing  # one half for the subdivision, one for the thinning
     used, faces = np.unique(mesh.faces, return_inverse=True)  # a file may list corners that no face uses
@@ -131,6 +135,8 @@ def _ring(radius: float, number: int) -> Points:
 
 def _thinned(points: Points, distance: float) -> Points:
     """A subset more than `distance` apart, with every dropped point within `distance` of a kept one."""
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(points)
     alive = np.ones(len(points), dtype=bool)
     kept = []

@@ -6,17 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol, TypeGuard
+from typing import TYPE_CHECKING, Protocol, TypeGuard
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from sidestep._core import real_array
-from sidestep.obstacles import covering, mesh_cover, solid_cover
+from sidestep.obstacles import covering, solid_cover
 from sidestep.obstacles.ball_cover import EXCESS, check_excess
-from sidestep.robot.mesh import read_mesh
 from sidestep.robot.pose import about_axis, checked_pose, moved, pose_at
+
+if TYPE_CHECKING:
+    import trimesh
 
 Points = NDArray[np.float64]
 Balls = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -95,6 +96,8 @@ class Sphere:
 
     def mesh(self) -> trimesh.Trimesh:
         """Triangles with corners on the sphere: an approximation from inside."""
+        import trimesh
+
         return _placed(trimesh.creation.icosphere(subdivisions=4, radius=self.radius), self.pose)
 
 
@@ -119,9 +122,10 @@ class Box:
 
     def __post_init__(self) -> None:
         owner = _owner("box", self.name)
-        size = tuple(float(length) for length in self.size)
-        if len(size) != 3:
-            raise ValueError(f"{owner}: size has {len(size)} lengths, expected 3")
+        given = real_array(self.size, f"{owner}: size")
+        if given.shape != (3,):
+            raise ValueError(f"{owner}: size is {self.size}, must be three lengths [m]")
+        size = tuple(given.tolist())
         _check_lengths(owner, **dict(zip(("size x", "size y", "size z"), size, strict=True)))
         object.__setattr__(self, "size", size)
         _set_motion(self, owner)
@@ -136,6 +140,8 @@ class Box:
 
     def mesh(self) -> trimesh.Trimesh:
         """The surface as triangles in the world [m]."""
+        import trimesh
+
         return _placed(trimesh.creation.box(extents=self.size), self.pose)
 
 
@@ -175,6 +181,8 @@ class Cylinder:
 
     def mesh(self) -> trimesh.Trimesh:
         """Triangles with corners on the cylinder: an approximation from inside."""
+        import trimesh
+
         cylinder = trimesh.creation.cylinder(radius=self.radius, height=self.length, sections=64)
         return _placed(cylinder, self.pose)
 
@@ -215,6 +223,8 @@ class Capsule:
 
     def mesh(self) -> trimesh.Trimesh:
         """Triangles with corners on the capsule: an approximation from inside."""
+        import trimesh
+
         capsule = trimesh.creation.capsule(height=self.length, radius=self.radius, count=[64, 64])
         capsule.apply_translation([0.0, 0.0, -capsule.bounds.mean(axis=0)[2]])
         return _placed(capsule, self.pose)
@@ -275,6 +285,8 @@ class Plane:
 
     def mesh(self) -> trimesh.Trimesh:
         """The two triangles of the square."""
+        import trimesh
+
         corners = self.extent * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=np.float64)
         return _placed(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False), self.pose)
 
@@ -345,10 +357,14 @@ _cylinder_balls = lru_cache(maxsize=256)(solid_cover.cylinder_balls)
 @lru_cache(maxsize=64)
 def _mesh_balls(file: Path, changed: int, scale: tuple[float, float, float], excess: float) -> Balls:
     """Of a mesh file that changed last at a time [ns]."""
+    from sidestep.obstacles import mesh_cover
+
     return mesh_cover.mesh_balls(_scaled_mesh(file, np.array(scale)), excess)
 
 
 def _scaled_mesh(path: Path, scale: NDArray[np.float64]) -> trimesh.Trimesh:
+    from sidestep.robot.mesh import read_mesh
+
     mesh = read_mesh(path)
     mesh.apply_transform(np.diag([*scale, 1.0]))
     return mesh
@@ -388,7 +404,8 @@ def _turn_of_z(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _check_lengths(shape: str, **lengths: float) -> None:
     for name, value in lengths.items():
-        if not (np.isfinite(value) and value > 0.0):
+        length = real_array(value, f"{shape}: {name}")
+        if length.shape != () or not (np.isfinite(length) and length > 0.0):
             raise ValueError(f"{shape}: {name} is {value}, must be positive and finite [m]")
 
 
