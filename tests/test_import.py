@@ -7,7 +7,6 @@ import json
 import re
 import subprocess
 import sys
-import tomllib
 from importlib.util import resolve_name
 from pathlib import Path
 
@@ -15,26 +14,10 @@ import pytest
 
 import sidestep
 from sidestep.extras import MODULES
+from support.missing_packages import OPTIONAL, PROJECT, run
 
-PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 INSTALLED_ALWAYS = {"lazy_loader", "numpy", "sidestep"}  # of what a controller loads
-OPTIONAL = sorted(module for modules in MODULES.values() for module in modules)
 
-# Begins programs in which some packages are not installed.
-HIDE = """
-import sys
-
-class Hidden:
-    def __init__(self, finder, names):
-        self.finder, self.names = finder, names
-    def __getattr__(self, name):
-        return getattr(self.finder, name)
-    def find_spec(self, name, path=None, target=None):
-        return None if name.partition(".")[0] in self.names else self.finder.find_spec(name, path, target)
-
-def hide(*names):
-    sys.meta_path[:] = [Hidden(finder, names) for finder in sys.meta_path]
-"""
 CONTROL = """
 import numpy as np
 import sidestep as ss
@@ -49,12 +32,6 @@ for _ in range(20):
     q, v = command.position, command.velocity
 assert np.isfinite(command.torque).all() and controller.explain()
 """
-
-
-def run(code: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", HIDE + code, *map(str, arguments)], capture_output=True, text=True, check=False
-    )
 
 
 def last_line(done: subprocess.CompletedProcess[str]) -> str:

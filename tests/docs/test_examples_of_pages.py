@@ -1,7 +1,5 @@
 """Python in the pages runs as it stands, prints what stands below it, and commands in them exist."""
 
-import contextlib
-import io
 import re
 import shutil
 from pathlib import Path
@@ -11,6 +9,7 @@ import pytest
 import typer
 
 from sidestep.cli import app
+from support.missing_packages import missing_without, run
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -41,19 +40,21 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN, ids=name_of)
-def test_examples_run(page: Path, tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_run_with_the_extras_that_the_page_names(
+    page: Path, tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for file in (DOCS / "files").iterdir():
         shutil.copy(file, tmp_path)
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SIDESTEP_CACHE_DIR", str(cache))
-    names: dict[str, Any] = {}
+    named = re.findall(r"pip install '\.\[([a-z,]+)\]'", page.read_text(encoding="utf-8"))
+    program = ["", f"hide(*{missing_without(*(extra for names in named for extra in names.split(',')))!r})"]
+    expected = ""
     for block in blocks(page):
-        if block["reason"]:
-            continue
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
-            exec(compile(block["code"], name_of(page), "exec"), names)
-        assert printed.getvalue() == (block["output"] or "")
+        if not block["reason"]:
+            program.append(block["code"])
+            expected += block["output"] or ""
+    done = run("\n".join(program), folder=tmp_path)
+    assert (done.returncode, done.stdout) == (0, expected), done.stderr
 
 
 def test_every_how_to_has_short_code() -> None:

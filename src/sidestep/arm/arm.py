@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from sidestep import _core
 from sidestep.arm.shipped_arms import SUFFIX, shipped_file
+from sidestep.extras import MissingExtraError
 
 if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without them
     from sidestep.arm.preparation import Progress
@@ -184,8 +185,8 @@ class Arm(_core.Arm):
     def robot(self) -> _core.Robot:
         """The kinematic tree; a `Robot` with meshes where the arm comes from a robot, a description or a name.
 
-        Of an `.arm` file it is the core's, without meshes. So it is, with a warning, where the robot's package is not
-        installed or has other meshes by now.
+        Of an `.arm` file it is the core's, without meshes. So it is where the extra `prepare` is not installed; and, with
+        a warning, where the robot's package is not installed or has other meshes by now.
         """
         return self._robot
 
@@ -227,6 +228,8 @@ class Arm(_core.Arm):
             return core
         try:
             robot = self._description()
+        except MissingExtraError:
+            return core
         except FileNotFoundError as error:
             warnings.warn(f"arm {self.name!r} has no meshes: {error}", RuntimeWarning, stacklevel=4)
             return core
