@@ -63,8 +63,8 @@ void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::Vec
                                  const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix,
                                  const Eigen::VectorXd& bias) noexcept {
   acceleration_ = (after - before) / period_;
-  // An impact, or a simulation that starts anew, says nothing about the model.
-  if (((acceleration_ - predicted).cwiseAbs().array() > most_unexpected_.array()).any()) {
+  // A velocity that leaps, by an impact or where a simulation starts anew, says nothing about the model.
+  if (((acceleration_ - predicted).cwiseAbs().cwiseMin(acceleration_.cwiseAbs()).array() > most_unexpected_.array()).any()) {
     return;
   }
   for (Eigen::Index j = 0; j < disturbance_.size(); ++j) {

@@ -108,6 +108,19 @@ BOOST_AUTO_TEST_CASE(a_leap_of_the_velocity_is_not_a_disturbance) {
   BOOST_TEST(observer.rotors().cwiseAbs().maxCoeff() < 1e-3);
 }
 
+BOOST_AUTO_TEST_CASE(what_holds_a_light_joint_is_found) {
+  // What is predicted then is a leap, in every period.
+  DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
+  const Eigen::MatrixXd mass = Eigen::Matrix2d::Identity() * 0.01;
+  const Eigen::VectorXd none = Eigen::Vector2d::Zero(), torque = Eigen::Vector2d(8.0, 0.0);
+  for (int k = 0; k < 500; ++k) {  // at rest: 8 Nm and a disturbance of -8 Nm
+    const Eigen::VectorXd predicted = (torque + observer.disturbance()) / 0.01;
+    observer.update(none, none, torque, predicted, mass, none);
+  }
+  BOOST_TEST(observer.disturbance()[0] == -8.0, boost::test_tools::tolerance(1e-3));
+  BOOST_TEST(observer.disturbance()[1] == 0.0);
+}
+
 BOOST_AUTO_TEST_CASE(rotors_are_found_where_there_are_some) {
   for (const double rotor : {0.0, 0.1}) {
     DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);

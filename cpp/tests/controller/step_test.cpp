@@ -99,6 +99,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
     const Arm arm = covered_arm(test::arm_limits(nv));
     Controller controller(arm, settings);
     std::atomic<bool> done{false};
+    std::atomic<int> steps{0};
     std::thread other([&] {
       Random random(7);
       const Eigen::VectorXd left = Eigen::VectorXd::Constant(nv, -0.3), right = -left;
@@ -119,7 +120,10 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
         } else {
           controller.set_obstacles(random_balls(random, 1 + k % 4, 0.0));
         }
-        std::this_thread::sleep_for(std::chrono::milliseconds(k % 5 == 0 ? 900 : k % 5 == 4 ? 400 : 80));
+        // Counted in steps, so that a machine under load sees the same.
+        for (const int until = steps + (k % 5 == 0 ? 900 : k % 5 == 4 ? 400 : 80); steps < until && !done;) {
+          std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
       }
     });
     Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
@@ -133,6 +137,7 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_while_another_thread_sets_goals_an
       on_path += command.on_path;
       v += 0.001 * command.acceleration;
       q += 0.001 * v;
+      ++steps;
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     done = true;
