@@ -89,6 +89,52 @@ def test_implausible_limits_are_said_with_their_value_and_cause() -> None:
     assert "effort limit 1e+09" in load(re.sub(r'effort="[^"]*"', 'effort="1e9"', TWO))[1][0]
 
 
+MILLIMETRES = ": looks like millimetres; metres are expected"
+
+
+def boxed(shape: str) -> Edit:
+    return lambda text: re.sub(r'<box size="[^"]*"/>', shape, text, count=1)
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda t: t.replace('xyz="0.5 0 0"', 'xyz="500 0 0"', 1), "origin 500 0 0 of joint 'joint2'"),
+        (boxed('<box size="40 30 25"/>'), "box (40 30 25) of link 'link1'"),
+        (boxed('<box size="0.04 0.04 250"/>'), "box (0.04 0.04 250) of link 'link1'"),
+        (boxed('<sphere radius="40"/>'), "sphere (40) of link 'link1'"),
+        (boxed('<cylinder radius="40" length="250"/>'), "cylinder (40 250) of link 'link1'"),
+        (boxed('<capsule radius="4" length="25"/>'), "capsule (4 25) of link 'link1'"),
+        (lambda t: t.replace('<inertial><origin xyz="0.25', '<inertial><origin xyz="250', 1),
+         "<inertial> of link 'link1' at 250 0 0"),
+        (lambda t: t.replace('<collision><origin xyz="0.25', '<collision><origin xyz="250', 1),
+         "origin 250 0 0 of a shape of link 'link1'"),
+    ],
+)  # fmt: skip
+def test_lengths_in_millimetres_are_named(edit: Edit, said: str) -> None:
+    flat = re.sub(r">\s+<", "><", TWO)
+    assert edit(flat) != flat
+    assert load(edit(flat))[1] == [f"URDF string: {said}{MILLIMETRES}"]
+
+
+def test_strokes_in_millimetres_are_named() -> None:
+    text = TWO.replace("revolute", "prismatic", 1)
+    text = re.sub(
+        r"<limit [^>]*>", '<limit lower="-0.1" upper="800" velocity="500" effort="9"/>', text, count=1
+    )
+    assert load(text)[1] == [
+        "URDF string: velocity limit 500 of joint 'joint1': so fast is no slide joint; the likely cause is mm/s in "
+        "place of m/s, or a placeholder: pass velocity_limits",
+        f"URDF string: upper limit 800 of joint 'joint1'{MILLIMETRES}",
+    ]
+    assert load(text.replace('"800"', '"1e9"').replace('"500"', '"1"'))[1] == []  # no limit is meant
+
+
+def test_floors_and_walls_are_no_millimetres() -> None:
+    for size in ("100 100 0.2", "30 0.1 4"):
+        assert load(boxed(f'<box size="{size}"/>')(TWO))[1] == []
+
+
 def test_limits_of_zero_to_zero_are_not_given() -> None:
     text = re.sub(r'lower="[^"]*" upper="[^"]*"', 'lower="0" upper="0"', TWO)
     for written in (text, text.replace('lower="0" upper="0" ', "")):

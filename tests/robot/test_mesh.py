@@ -1,11 +1,13 @@
 """Meshes: what cannot be read is named, and coarse ones keep the shape."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from sidestep.obstacles import MeshShape
 from sidestep.robot.mesh import read_mesh, simplified
 
 
@@ -106,3 +108,60 @@ def test_the_format_is_that_of_the_content(tmp_path: Path) -> None:
         content = box.export(file_type=kind)
         (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
         np.testing.assert_allclose(read_mesh(tmp_path / name).extents, [1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "ply", "glb", "dae"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_vertices_that_are_not_finite_are_refused(tmp_path: Path, kind: str, value: float) -> None:
+    """A reader that leaves their triangles out leaves a hole in what is avoided."""
+    path = tmp_path / f"bad.{kind.removesuffix('_ascii')}"
+    if kind == "dae":
+        path.write_text(collada().replace("5 1 0 5 0 1", f"5 {value} 0 5 0 1"))
+        count = "1 of 8"
+    else:
+        box = trimesh.creation.box()
+        vertices = np.array(box.vertices)
+        vertices[3, 0] = value
+        content = trimesh.Trimesh(vertices, box.faces, process=False).export(file_type=kind)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        corners = np.sum(box.faces == 3)  # an STL repeats a vertex in each of its triangles
+        count = f"{corners} of 36" if "stl" in kind else "1 of 8"
+    message = rf"mesh file '.*bad\.\w+' .*holds vertices that are not finite \(nan or inf\): {count}\b"
+    with pytest.raises(ValueError, match=message):
+        read_mesh(path)
+    for use in (MeshShape(path).mesh, MeshShape(path).balls, lambda: MeshShape(path).sample(0.1)):
+        with pytest.raises(ValueError, match=message):
+            use()
+
+
+def test_coordinates_that_overflow_in_the_reader_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "far.dae"
+    path.write_text(collada().replace("5 1 0 5 0 1", "5 1e39 0 5 0 1"))
+    with pytest.raises(ValueError, match=r"not finite \(nan or inf\): 1 of 8"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("word", ["-nan(ind)", "-1.#IND", "1.#QNAN", "1e999", "NaN", "x"])
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "dae"])
+def test_words_that_are_no_finite_numbers_are_refused(tmp_path: Path, kind: str, word: str) -> None:
+    path = tmp_path / f"bad.{kind}"
+    if kind == "dae":
+        text = collada().replace("5 1 0 5 0 1", f"5 {word} 0 5 0 1")
+    else:
+        box = trimesh.creation.box((2.0, 4.0, 6.0))
+        export = {"stl": {"file_type": "stl_ascii"}, "obj": {"file_type": "obj"},
+                  "ply": {"file_type": "ply", "encoding": "ascii"}}[kind]  # fmt: skip
+        content = box.export(**export)
+        content = content if isinstance(content, str) else content.decode()
+        text = re.sub(r"(?<=[ \n])-?2\.0*(?= )", word, content, count=1)
+        assert word in text
+    path.write_text(text)
+    with pytest.raises(ValueError, match=rf"mesh file '.*bad\.{kind}' "):
+        read_mesh(path)
+
+
+def test_a_place_that_is_not_finite_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "moved.dae"
+    path.write_text(collada(nodes=NODE.format(k=1).replace("<node>", "<node><translate>0 nan 0</translate>")))
+    with pytest.raises(ValueError, match=r"not finite \(nan or inf\): 4 of 4"):
+        read_mesh(path)

@@ -357,3 +357,137 @@ def test_keyframes_are_postures_and_excludes_allowed_pairs() -> None:
     assert held.postures["home"].tolist() == [-0.25]
     robot.postures["home"][:] = 9.0  # a copy
     assert robot.postures["home"].tolist() == [0.5, -0.25]
+
+
+def limited(joint: str, *, unit: str = "radian", top: str = "") -> str:
+    """An arm of two hinges, of which the first is written as given."""
+    body = f"""<body name="a"><joint name="j1" {joint}/><geom size="0.1"/>
+        <body name="b" pos="1 0 0"><joint name="j2" range="-1 1"/><geom size="0.1"/></body></body>"""
+    return model_of(body, top=f'<compiler angle="{unit}"/>{top}')
+
+
+def said_of(xml: str | Path) -> tuple[Robot, list[str]]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = Robot.from_urdf(xml, **LIMITS)
+    assert all(item.filename == __file__ for item in caught)
+    return robot, [str(item.message) for item in caught]
+
+
+@pytest.mark.parametrize("top", ["", '<default><joint range="1 -1"/></default>'])
+def test_inverted_limits_are_refused(top: str) -> None:
+    xml = limited("" if top else 'range="1 -1"', top=top)
+    assert not mujoco.MjModel.from_xml_string(xml).jnt_limited[0]  # MuJoCo takes it as none
+    with pytest.raises(ValueError, match=r"joint 'j1': lower limit 1.0 must be below upper -1.0"):
+        Robot.from_mjcf(xml, **LIMITS)
+    with pytest.raises(ValueError, match=r"lower limit 0\.5 must be below upper 0\.0"):
+        Robot.from_mjcf(limited('type="slide" range="0.5 0"'), **LIMITS)
+    free = said_of(limited('range="1 -1" limited="false"'))[0]
+    assert np.isinf(free.limits.lower[0])
+
+
+@pytest.mark.parametrize(("unit", "written"), [("radian", "0.5"), ("degree", str(np.degrees(0.5)))])
+def test_a_joint_with_one_place_is_held_there(unit: str, written: str) -> None:
+    robot, said = said_of(limited(f'range="{written} {written}"', unit=unit))
+    assert robot.held == {"j1": pytest.approx(0.5)}
+    assert said == [
+        "MJCF string: joint 'j1' (0.5): lower and upper limit are the same, so that it is held there"
+    ]
+    np.testing.assert_allclose(robot.pose([0.0], "b")[:2, 3], [np.cos(0.5), np.sin(0.5)], atol=EXACT)
+
+
+@pytest.mark.parametrize("written", ["", 'range="0 0"', 'range="0 0" limited="false"'])
+def test_no_range_is_no_limit(written: str) -> None:
+    robot, said = said_of(limited(written))
+    assert (said, robot.limits.lower.tolist()) == ([], [-np.inf, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("joint", "drive", "what"),
+    [
+        ('actuatorfrcrange="3 -3"', "", "joint 'j1': actuatorfrcrange"),
+        ("", '<motor name="m" joint="j1" forcerange="3 -3"/>', "actuator 'm': forcerange"),
+        ("", '<motor name="m" joint="j1" ctrlrange="3 -3"/>', "actuator 'm': ctrlrange"),
+    ],
+)
+def test_inverted_efforts_are_refused(joint: str, drive: str, what: str) -> None:
+    xml = limited(joint).replace("</mujoco>", f"<actuator>{drive}</actuator></mujoco>")
+    with pytest.raises(ValueError, match=f"MJCF string: {what}: lower limit 3.0 must be below upper -3.0"):
+        Robot.from_mjcf(xml)
+
+
+def test_angles_that_look_like_degrees_are_named() -> None:
+    robot, said = said_of(limited('range="-90 45" ref="30"').replace('pos="1 0 0"', 'euler="0 90 0"'))
+    np.testing.assert_array_equal(robot.limits.upper, [45.0, 1.0])
+    assert said == [
+        "MJCF string: lower limit -90 of joint 'j1', upper limit 45 of joint 'j1', ref 30 of joint 'j1' and 1 more "
+        "looks like degrees; radians are expected"
+    ]
+    assert said_of(limited('range="-90 45" ref="30"', unit="degree").replace('"-1 1"', '"-9 9"'))[1] == []
+
+
+def test_millimetres_are_named() -> None:
+    said = said_of(limited('type="slide" range="0 800"').replace('pos="1 0 0"', 'pos="300 0 0"'))[1]
+    assert said == [
+        "MJCF string: upper limit 800 of joint 'j1', origin 300 0 0 of joint 'j2': looks like millimetres; metres are "
+        "expected"
+    ]
+
+
+SEEN = '<geom type="mesh" mesh="m" contype="0" conaffinity="0"{}/><geom size="0.1"/>'
+
+
+def seen(file: str, geoms: str, **texture: str) -> str:
+    images = "".join(f'<texture name="t" type="2d" file="{name}"/>' for name in texture.values())
+    return model_of(
+        f'<body name="a"><joint name="j1" range="-90 90"/>{geoms}</body>',
+        f'<asset><mesh name="m" file="{file}"/>{images}</asset>',
+        '<compiler meshdir="parts"/>',
+    )
+
+
+def test_visual_files_that_are_missing_are_left_out(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "lfs.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\n")
+    path = tmp_path / "arm.xml"
+    for file, fault in (("gone.stl", "does not exist"), ("lfs.stl", "is a Git LFS pointer, not the mesh")):
+        for mass, rest in (("", "; masses that come from the shapes lack theirs"), (' mass="0"', "")):
+            path.write_text(seen(file, SEEN.format(mass)))
+            robot, said = said_of(path)
+            assert [shape.kind for shape in robot.link("a").geometries] == ["sphere"]
+            assert robot.link("a").visuals == ()
+            assert said == [
+                f"{path}: visual files that cannot be used are left out: '{file}' ({fault}); collision shapes are "
+                f"shown in place of the meshes{rest}"
+            ]
+    trimesh.creation.box().export(tmp_path / "parts" / "box.stl")
+    path.write_text(seen("box.stl", SEEN.format(""), texture="gone.png"))
+    robot, said = said_of(path)
+    assert len(robot.link("a").visuals) == 1
+    assert said == [f"{path}: visual files that cannot be used are left out: 'gone.png' (does not exist)"]
+
+
+def test_collision_meshes_that_cannot_be_used_are_named(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    path, mesh = tmp_path / "arm.xml", tmp_path / "parts" / "m.stl"
+    for geoms in ('<geom type="mesh" mesh="m"/>', SEEN.partition("/>")[0].format("") + "/>"):
+        path.write_text(seen("m.stl", geoms))  # a visual mesh alone stands for a collision shape
+        mesh.unlink(missing_ok=True)
+        with pytest.raises(FileNotFoundError) as gone:
+            Robot.from_urdf(path)
+        assert f"body 'a' refers to 'm.stl', which does not exist; looked for at {mesh}" in str(gone.value)
+        mesh.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\n")
+        with pytest.raises(ValueError, match=r"'m\.stl', which is a Git LFS pointer, .*`git lfs pull`"):
+            Robot.from_urdf(path)
+        box = trimesh.creation.box()
+        corners = np.where(np.arange(8)[:, None] == 3, np.nan, box.vertices)
+        trimesh.Trimesh(corners, box.faces, process=False).export(mesh)
+        with pytest.raises(ValueError, match=r"mesh file '.*m\.stl' holds vertices that are not finite"):
+            Robot.from_urdf(path)
+
+
+def test_a_fragment_says_what_to_load(tmp_path: Path) -> None:
+    (tmp_path / "part.xml").write_text("<mujocoinclude><worldbody/></mujocoinclude>")
+    for read in (Robot.from_urdf, Robot.from_mjcf):
+        with pytest.raises(ValueError, match="part of an MJCF: load the file that includes it"):
+            read(tmp_path / "part.xml")

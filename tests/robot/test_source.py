@@ -67,10 +67,20 @@ def test_collada_unit_is_applied(packages: Path) -> None:
 
 def test_unreadable_mesh(packages: Path) -> None:
     path = packages / "broken.obj"
-    path.write_text("not a mesh")
+    path.write_text("v 0 0 0\nf 1 2 3\n")
     robot = Robot.from_urdf(MESH_URDF.format(path))
     with pytest.raises(ValueError, match=r"mesh file .*broken.obj"):
         robot.collision_mesh("link1")
+
+
+def test_a_mesh_without_triangles_is_refused_with_its_link(packages: Path) -> None:
+    for name, content in (
+        ("points.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"),
+        ("points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nelement face 0\nend_header\n0 0 0\n"),
+    ):
+        (packages / name).write_text(content)
+        with pytest.raises(ValueError, match=rf"link 'link1' refers to '.*{name}', which holds no triangles"):
+            Robot.from_urdf(MESH_URDF.format(packages / name))
 
 
 @pytest.mark.parametrize(
@@ -214,4 +224,67 @@ def test_a_package_of_xacro_that_is_not_found_is_the_folder_with_the_file(packag
     assert len(said) == 1
     (packages / "arm" / "urdf" / "part.xacro").unlink()
     with pytest.raises(ValueError, match=r"\$\(find arm_support\): no such package; searched in"):
+        Robot.from_urdf(path)
+
+
+DECLARED = '<robot name="planar1" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+
+
+def test_expressions_alone_are_xacro(tmp_path: Path) -> None:
+    text = re.sub(r'velocity="[^"]*"', 'velocity="${radians(120)}"', planar_arm(1))
+    named = tmp_path / "arm.urdf.xacro"
+    named.write_text(text)
+    declared = re.sub("<robot [^>]*>", DECLARED, text)
+    for source in (named, declared):
+        assert Robot.from_urdf(source).limits.velocity == pytest.approx([2 * np.pi / 3])
+    with pytest.raises(ValueError, match=r"velocity is '\$\{radians\(120\)\}', must be a number"):
+        Robot.from_urdf(text)  # nothing says that it is xacro
+    with pytest.raises(ValueError, match=r"xacro expansion failed: .*'prefix' is not defined"):
+        Robot.from_urdf(declared.replace('"link1"', '"${prefix}link1"'))
+    written = re.sub("<robot [^>]*>", DECLARED, planar_arm(1)).replace("</robot>", "<x>${y}</x></robot>")
+    assert Robot.from_urdf(written).num_coordinates == 1  # text between elements is another program's
+
+
+ARGUMENTS = re.sub(
+    "<robot [^>]*>",
+    DECLARED + '<xacro:arg name="speed" default="1"/><xacro:arg name="fast" default="false"/>'
+    '<xacro:property name="v" value="$(arg speed)"/><xacro:if value="$(arg fast)"><xacro:property name="v" value="9"/>'
+    "</xacro:if>",
+    re.sub(r'velocity="[^"]*"', 'velocity="${v}"', planar_arm(1)),
+)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "velocity"),
+    [({"speed": 0.05}, 0.05), ({"speed": 3}, 3), ({"speed": np.float64(0.5)}, 0.5), ({"fast": True}, 9),
+     ({"fast": np.bool_(False)}, 1), ({"fast": "true", "speed": "2"}, 9)],
+)  # fmt: skip
+def test_arguments_of_xacro_may_be_numbers_and_truth_values(
+    arguments: dict[str, float], velocity: float
+) -> None:
+    assert Robot.from_urdf(ARGUMENTS, xacro_arguments=arguments).limits.velocity == pytest.approx([velocity])
+
+
+def test_arguments_that_a_file_does_not_have_are_refused(tmp_path: Path) -> None:
+    known = r"'sped', which no <xacro:arg> defines; those of the file are: fast, speed"
+    with pytest.raises(ValueError, match=known):
+        Robot.from_urdf(ARGUMENTS, xacro_arguments={"speed": 2, "sped": 3})
+    with pytest.raises(ValueError, match=r"'speed' is \[1\], must be a text, a number, True or False"):
+        Robot.from_urdf(ARGUMENTS, xacro_arguments={"speed": [1]})  # type: ignore[dict-item]
+    part = tmp_path / "part.xacro"
+    part.write_text(f'{DECLARED}<xacro:arg name="more" default="1"/></robot>')
+    include = f'<xacro:include filename="{part}"/>'
+    whole = ARGUMENTS.replace("</robot>", include + "</robot>")
+    assert Robot.from_urdf(whole, xacro_arguments={"more": 3}).num_coordinates == 1
+    perhaps = ARGUMENTS.replace("</robot>", f'<xacro:if value="$(arg fast)">{include}</xacro:if></robot>')
+    with pytest.warns(RuntimeWarning, match="'more', which no .* on a condition may have more") as said:
+        Robot.from_urdf(perhaps, xacro_arguments={"more": 3})
+    assert said[0].filename == __file__
+    Robot.from_urdf(perhaps, xacro_arguments={"more": 3, "fast": True})
+
+
+def test_a_file_that_includes_itself_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "round.xacro"
+    path.write_text(f'{DECLARED}<xacro:include filename="round.xacro"/></robot>')
+    with pytest.raises(ValueError, match=r"RecursionError: .*round\.xacro is included in itself"):
         Robot.from_urdf(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import pytest
@@ -90,6 +91,28 @@ def test_the_file_beside_a_urdf_is_found_and_another_can_be_given(tmp_path: Path
         Robot.from_urdf(urdf, srdf=given)
     with pytest.raises(FileNotFoundError, match=r"gone\.srdf does not exist"):
         Robot.from_urdf(urdf, srdf=tmp_path / "gone.srdf")
+
+
+def test_a_file_beside_a_urdf_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    urdf = tmp_path / "my.urdf"
+    urdf.write_text(URDF)
+    broken = tmp_path / "any.srdf"
+    broken.write_text(TEXT.replace("</robot>", "<group>"))
+    with pytest.warns(RuntimeWarning) as said:
+        assert Robot.from_urdf(urdf).allowed_pairs == ()
+    (only,) = said
+    assert only.filename == __file__
+    assert str(only.message).startswith(f"{broken} is not well-formed XML: ")
+    assert str(only.message).endswith(
+        "; the SRDF was not read: postures and pairs that may touch are missing"
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        broken.write_text(broken.read_text().replace('name="arm"', 'name="leg"'))  # of another robot
+        Robot.from_urdf(urdf)
+        (tmp_path / "my.srdf").write_text(TEXT)  # one is read, and the other does not matter
+        broken.write_text(TEXT.replace("</robot>", "<group>"))
+        assert Robot.from_urdf(urdf).allowed_pairs == (("a", "b"),)
 
 
 def test_the_robots_of_the_list_check_every_pair() -> None:

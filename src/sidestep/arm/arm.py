@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without 
     from sidestep.body import Body
     from sidestep.robot import Robot
     from sidestep.robot.limits import LimitValues
+    from sidestep.robot.source import XacroValue
 
 
 class Arm(_core.Arm):
@@ -71,7 +72,7 @@ class Arm(_core.Arm):
         jerk_limits: LimitValues | None = None,
         effort_rate_limits: LimitValues | None = None,
         name: str | None = None,
-        xacro_arguments: Mapping[str, str] | None = None,
+        xacro_arguments: Mapping[str, XacroValue] | None = None,
         srdf: str | Path | None = None,
         allowed: Sequence[tuple[str, str]] = (),
         components: Mapping[str, int] | None = None,
@@ -185,8 +186,8 @@ class Arm(_core.Arm):
     def robot(self) -> _core.Robot:
         """The kinematic tree; a `Robot` with meshes where the arm comes from a robot, a description or a name.
 
-        Of an `.arm` file it is the core's, without meshes. So it is where the extra `prepare` is not installed; and, with
-        a warning, where the robot's package is not installed or has other meshes by now.
+        Of an `.arm` file it is the core's, without meshes. So it is where the extra `prepare` is not installed; and,
+        with a warning, where the robot's package is not installed or has other meshes by now.
         """
         return self._robot
 

@@ -7,6 +7,10 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+NOT_FINITE = "vertices that are not finite (nan or inf)"
+_MOST = float(np.finfo(np.float32).max)  # more is infinite for the reader behind trimesh
 _NO_SHAPE = frozenset(
     (
         *(
@@ -34,7 +38,8 @@ def shape_alone(path: Path) -> io.BytesIO:
     """The file without materials, lights, cameras and animations, for trimesh.
 
     Raises:
-        ValueError: it is no XML, or has a kind of shape that is not read; does not name the file.
+        ValueError: it is no XML, has a kind of shape that is not read, or vertices that are not finite; does not name
+            the file.
     """
     try:
         root = ElementTree.parse(path).getroot()
@@ -49,7 +54,33 @@ def shape_alone(path: Path) -> io.BytesIO:
             raise ValueError(f"it holds {_UNREAD[_name(element)]} (<{_name(element)}>), which is not read")
         if _name(element) in ("triangles", "polylist", "polygons"):
             element.attrib.pop("material", None)
+    _check_finite(root)
     return io.BytesIO(ElementTree.tostring(root))
+
+
+def _check_finite(root: ElementTree.Element) -> None:
+    """The reader behind trimesh puts 0 in place of a coordinate that is not a number."""
+    sources = {element.get("id"): element for element in root.iter() if _name(element) == "source"}
+    bad = total = 0
+    for element in root.iter():
+        if _name(element) != "input" or element.get("semantic") != "POSITION":
+            continue
+        source = sources.get(element.get("source", "").removeprefix("#"), ElementTree.Element("source"))
+        for array in source.iter():
+            if _name(array) == "float_array":
+                values = [_number(word) for word in (array.text or "").split()]
+                points = np.resize(values, (len(values) // 3, 3))
+                bad += int(np.sum(~(np.abs(points) <= _MOST).all(axis=1)))
+                total += len(points)
+    if bad:
+        raise ValueError(f"it holds {NOT_FINITE}: {bad} of {total}")
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:  # as "-1.#IND", which some compilers write for nan
+        return np.nan
 
 
 def _name(element: ElementTree.Element) -> str:

@@ -23,6 +23,7 @@ _ROOTS = {  # root elements of XML files
     "sdf": ("SDF, Gazebo's format", _SDF),
     "gazebo": ("SDF, Gazebo's format", _SDF),
     "COLLADA": ("a COLLADA mesh", _FROM_MESH),
+    "mujocoinclude": ("a part of an MJCF", "load the file that includes it, whose root element is <mujoco>"),
     "srdf": ("SRDF", "it says which links may touch; load the URDF that it belongs to"),
 }
 _BEGINNINGS = (  # of files that are not XML

@@ -75,7 +75,7 @@ def limits_of(
         ]
         for name in open_joints:
             remarks.add(kind.format(name=open_joints[0]), f"joint {name!r}")
-    check_limits(names, final["velocity_limits"], final["effort_limits"], remarks)
+    check_limits(joints, final["velocity_limits"], final["effort_limits"], remarks)
     usual = np.full(len(names), DEFAULT_ACCELERATION_LIMIT)
     accelerations = _per_coordinate(
         usual if acceleration is None else acceleration, "acceleration_limits", names, usual

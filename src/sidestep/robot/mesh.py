@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sidestep.robot.collada_file import shape_alone
+from sidestep.robot.collada_file import NOT_FINITE, shape_alone
 from sidestep.robot.mesh_file import fault_of, kind_of
 
 if TYPE_CHECKING:  # they are imported where a mesh is made: they take longer to import than a robot to load
     import coal
     import trimesh
+
+_AS_WRITTEN = ("glb", "gltf")  # formats of which trimesh leaves vertices apart that are written apart
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:
@@ -21,7 +23,8 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     The format is that of the content, where it tells. COLLADA is read without its materials.
 
     Raises:
-        ValueError: the file cannot be read as a mesh, or holds no triangles; says why.
+        ValueError: the file cannot be read as a mesh, holds no triangles, or has vertices that are not finite; says
+            why.
     """
     import trimesh
 
@@ -32,14 +35,31 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     try:
         if kind == "dae":
             # a broken part raises: trimesh would leave it out
-            mesh = trimesh.load_mesh(shape_alone(path), file_type="dae", ignore_broken=False)
+            scene = trimesh.load_scene(shape_alone(path), file_type="dae", ignore_broken=False, process=False)
         else:
-            mesh = trimesh.load_mesh(path, file_type=kind or None)
+            scene = trimesh.load_scene(path, file_type=kind or None, process=False)
+        parts = [part for part in scene.geometry.values() if isinstance(part, trimesh.Trimesh)]
+        not_finite = [_not_finite(part) for part in parts]
+        if not any(not_finite):
+            for part in parts if kind not in _AS_WRITTEN else ():
+                part.process()  # merges vertices; it would leave out triangles of such ones without a word
+            mesh = scene.to_mesh()
+            not_finite = [_not_finite(mesh)]
     except Exception as error:  # the readers behind trimesh raise anything; the user needs the file's name
         raise ValueError(f"mesh file '{path}' cannot be read: {error}") from error
+    if any(not_finite):
+        raise ValueError(
+            f"mesh file '{path}' holds {NOT_FINITE}: {sum(not_finite)} of "
+            f"{sum(len(part.vertices) for part in parts)}; its surface would have holes: export it again"
+        )
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise ValueError(f"mesh file '{path}' holds no triangles")
     return mesh
+
+
+def _not_finite(mesh: trimesh.Trimesh) -> int:
+    """How many vertices have a coordinate that is nan or inf."""
+    return int(np.sum(~np.isfinite(np.asarray(mesh.vertices, dtype=float).reshape(-1, 3)).all(axis=1)))
 
 
 def simplified(mesh: trimesh.Trimesh, cell: float) -> trimesh.Trimesh:

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 _STL_HEADER = 84  # bytes: 80 of text, 4 of the number of triangles
 _STL_TRIANGLE = 50  # bytes
-_TAIL = 4096  # bytes at the end in which the last element of a text file is looked for
+_TAIL = 4096  # bytes at an end of a file, in which its header or last element is looked for
 _MOST_TEXT = 2_000_000  # bytes of a text file whose vertices are read for its size: a tenth of a second
 _OBJ_VERTEX = re.compile(rb"^v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_OBJ_FACE = re.compile(rb"^\s*f[ \t]", re.MULTILINE)
+_PLY_FACES = re.compile(rb"^element[ \t]+face[ \t]+(\d+)", re.MULTILINE)
 _STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
 _COLLADA_END = re.compile(rb"</(?:\w+:)?COLLADA\s*>")
 _LFS = b"version https://git-lfs"
@@ -44,9 +46,18 @@ def fault_of(path: Path) -> str:
         return "holds no triangles" if b"endsolid" in tail else "is truncated: it ends in its header"
     elif kind == "dae" and _COLLADA_END.search(tail) is None:
         return "is truncated: it does not end with </COLLADA>"
+    elif kind == "obj" and size <= _MOST_TEXT and _OBJ_FACE.search(path.read_bytes()) is None:
+        return "holds no triangles"
+    elif kind == "ply" and (faces := _PLY_FACES.search(_beginning(path))) is not None and int(faces[1]) == 0:
+        return "holds no triangles: its header says 0"
     elif kind == "glb" and len(head) >= 12 and size < int.from_bytes(head[8:12], "little"):
         return f"is truncated: its header says {int.from_bytes(head[8:12], 'little')} bytes, {size} are there"
     return ""
+
+
+def _beginning(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_TAIL)
 
 
 def kind_of(path: Path) -> str:

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sidestep.robot.degrees import warn_of_degrees
+from sidestep.robot.formats import other_root
 from sidestep.robot.link import Array, Inertial, Link
+from sidestep.robot.mjcf_compile import Compiled, compiled
 from sidestep.robot.mjcf_geometry import shapes_of
 from sidestep.robot.mjcf_joints import (
     SLIDE_VELOCITY,
@@ -24,7 +27,7 @@ from sidestep.robot.mjcf_joints import (
     name_of,
 )
 from sidestep.robot.pose import about_axis, from_quaternion, pose_at
-from sidestep.robot.source import is_text, read_xml
+from sidestep.robot.source import is_text
 from sidestep.robot.urdf import Urdf, UrdfJoint, UrdfMimic
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
@@ -32,7 +35,6 @@ if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
 
 WORLD = "world"  # MuJoCo's name of body 0, here that of the root link
 _PROLOGUE = re.compile(r"(?:\s|<\?.*?\?>|<!--.*?-->|<![A-Z][^>]*>)*<([\w:.-]+)", re.DOTALL)
-_INCLUDE = re.compile(r"""<include\s[^>]*?file\s*=\s*["']([^"']+)""")
 _LISTED = 6  # names in a warning
 
 
@@ -82,22 +84,27 @@ def warn_of_defaults(
 
 def is_mjcf(source: str | Path) -> bool:
     """Whether the root element of a file, or of XML text, is `<mujoco>`; False without such a file."""
+    return _root_element(source) == "mujoco"
+
+
+def _root_element(source: str | Path) -> str:
+    """The name of the root element; "" without one."""
     if is_text(source):
         text = source
     elif Path(source).is_file():
         text = Path(source).read_bytes().decode("utf-8-sig", errors="replace")
     else:
-        return False
+        return ""
     first = _PROLOGUE.match(text)
-    return first is not None and first[1] == "mujoco"
+    return "" if first is None else first[1]
 
 
 def no_mjcf(source: str | Path) -> Exception:
     """The error for a source that is not MJCF."""
-    if is_text(source):
-        return ValueError("the text is no MJCF: its root element must be <mujoco>")
-    if Path(source).is_file():
-        return ValueError(f"{source} is no MJCF: its root element must be <mujoco>")
+    if is_text(source) or Path(source).is_file():
+        label = "the text" if is_text(source) else source
+        hint = other_root(_root_element(source))
+        return ValueError(f"{label} is no MJCF: its root element must be <mujoco>{hint}")
     return FileNotFoundError(f"robot description {Path(source).resolve()} does not exist or is not a file")
 
 
@@ -105,54 +112,22 @@ def read_mjcf(source: str | Path) -> Mjcf:
     """Reads what `is_mjcf` takes.
 
     Raises:
-        FileNotFoundError: a file that it refers to is missing.
+        FileNotFoundError: a file that it refers to is missing; a visual mesh or texture is left out.
         ValueError: MuJoCo refuses it, or nothing in it moves.
         ModuleNotFoundError: MuJoCo is not installed; says how to install it.
     """
-    import mujoco
-
-    text = is_text(source)
-    label = "MJCF string" if text else str(Path(source).resolve())
-    try:
-        spec = mujoco.MjSpec.from_string(source) if text else _parsed(Path(source).resolve())
-        spec.compiler.fusestatic = False  # fixed bodies are links, with names
-        spec.compiler.discardvisual = False
-        model = spec.compile()
-    except ValueError as error:
-        kind = FileNotFoundError if "opening file" in str(error) else ValueError
-        raise kind(f"{label} is refused by MuJoCo: {error}") from error
-    return _Reader(model, label, spec.modelname).read()
-
-
-def _parsed(path: Path) -> mujoco.MjSpec:
-    """MuJoCo reads files of two suffixes alone; of another it gets the text, and what that includes."""
-    import mujoco
-
-    if path.suffix.lower() in (".xml", ".urdf"):
-        return mujoco.MjSpec.from_file(str(path))
-    text = read_xml(path)
-    spec = mujoco.MjSpec.from_string(text, include=_included(text, path.parent))
-    spec.modelfiledir = str(path.parent)
-    return spec
-
-
-def _included(text: str, folder: Path) -> dict[str, bytes]:
-    """The files that MJCF text includes, and those that they include, by the names they are referred to."""
-    found: dict[str, bytes] = {}
-    for name in _INCLUDE.findall(text):
-        if (folder / name).is_file() and name not in found:
-            found[name] = (folder / name).read_bytes()
-            found |= _included(found[name].decode("utf-8", errors="replace"), folder)
-    return found
+    label = "MJCF string" if is_text(source) else str(Path(source).resolve())
+    whole = compiled(source, label)
+    warn_of_degrees(label, whole.degrees, stacklevel=3)
+    return _Reader(whole, label).read()
 
 
 @dataclass
 class _Reader:
     """Turns one compiled model into links and joints."""
 
-    model: mujoco.MjModel
+    whole: Compiled
     label: str
-    name: str
     links: dict[str, Link] = field(default_factory=dict)
     joints: dict[str, UrdfJoint] = field(default_factory=dict)
     link_of: dict[int, str] = field(default_factory=dict)  # body -> its link
@@ -161,6 +136,10 @@ class _Reader:
     locked: list[str] = field(default_factory=list)  # ball and free joints
     shown: list[str] = field(default_factory=list)  # links of which visual shapes stand for collision shapes
     ignored: list[str] = field(default_factory=list)  # shapes without volume
+
+    def __post_init__(self) -> None:
+        self.model: mujoco.MjModel = self.whole.model
+        self.undrawn = {int(body.id) for body in self.whole.left_out.bodies}
 
     def read(self) -> Mjcf:
         model = self.model
@@ -179,10 +158,12 @@ class _Reader:
             (self.ignored, "shapes without volume are left out: {}"),
             (self._loops(), "links {} close loops, which are left open; lock the joints in between"),
         )
+        if self.whole.left_out.files:
+            remarks.append(self.whole.left_out.remark())
         for remark in [*(text.format(_listed(names)) for names, text in texts if names), *remarks]:
             warnings.warn(f"{self.label}: {remark}", RuntimeWarning, stacklevel=4)
         return Mjcf(
-            Urdf(self.name or "robot", self.label, self.links, self.joints, WORLD),
+            Urdf(self.whole.name or "robot", self.label, self.links, self.joints, WORLD),
             self._excluded(),
             self._keyframes(),
             tuple(self.no_velocity),
@@ -266,14 +247,14 @@ class _Reader:
             title = name_of(model, "joint", joint)
             whole = joint == moving[-1] and not anchor.any()
             child = name if whole else self._new_link(f"{name}_at_{title}")
-            limit = limit_of(model, joint, driven)
+            limit = limit_of(model, joint, driven, self.whole.ranges)
             if not driven.velocity.get(joint):
                 self.no_velocity.append(title)
             if limit.effort is None or not np.isfinite(limit.effort):
                 self.no_effort.append(title)
             self.joints[title] = UrdfJoint(
                 name=title,
-                type="prismatic" if not turns else "revolute" if model.jnt_limited[joint] else "continuous",
+                type="prismatic" if not turns else "revolute" if np.isfinite(limit.upper) else "continuous",
                 parent=parent,
                 child=child,
                 placement=X @ pose_at(anchor) @ _moved(turns, axis, -reference),
@@ -292,6 +273,8 @@ class _Reader:
             self._fix(parent, name, X)
         collisions, visuals, without_volume = shapes_of(model, self._geoms_of(body))
         self.ignored.extend(f"{name} ({kind})" for kind in without_volume)
+        if body in self.undrawn:
+            visuals = []  # whole or not at all: half a link would be drawn
         if visuals and not collisions:
             self.shown.append(name)
         self.links[name] = Link(name, self._inertial(body), tuple(collisions), tuple(visuals))

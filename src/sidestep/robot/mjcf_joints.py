@@ -134,11 +134,16 @@ def _commanded_velocity(model: mujoco.MjModel, index: int) -> float | None:
     return float(np.abs(model.actuator_ctrlrange[index]).max())
 
 
-def limit_of(model: mujoco.MjModel, joint: int, driven: Actuation) -> UrdfLimit:
-    """Limits of a hinge or slide; a default velocity and no end of effort where the file gives none."""
+def limit_of(
+    model: mujoco.MjModel, joint: int, driven: Actuation, ranges: Mapping[int, tuple[float, float]]
+) -> UrdfLimit:
+    """Limits of a hinge or slide; a default velocity and no end of effort where the file gives none.
+
+    `ranges` are position limits, by joint, that the file gives and the model does not apply.
+    """
     import mujoco
 
-    lower, upper = -math.inf, math.inf
+    lower, upper = ranges.get(joint, (-math.inf, math.inf))
     if model.jnt_limited[joint]:
         lower, upper = (float(end) for end in model.jnt_range[joint])
     effort = driven.effort.get(joint, math.inf)

@@ -20,7 +20,7 @@ from sidestep.robot.limits import LimitValues
 from sidestep.robot.link import Array, Geometry, Link
 from sidestep.robot.mjcf import is_mjcf, no_mjcf, read_mjcf, warn_of_defaults
 from sidestep.robot.plausibility import arm_length, warn_of_sizes
-from sidestep.robot.source import read_description
+from sidestep.robot.source import XacroValue, read_description
 from sidestep.robot.srdf import read_extras, read_states, srdf_of
 from sidestep.robot.tool import tree_with_tool
 from sidestep.robot.tree import KinematicTree, at_postures, build_tree
@@ -69,7 +69,7 @@ class Robot(_core.Robot):
         jerk_limits: LimitValues | None = None,
         effort_rate_limits: LimitValues | None = None,
         name: str | None = None,
-        xacro_arguments: Mapping[str, str] | None = None,
+        xacro_arguments: Mapping[str, XacroValue] | None = None,
         srdf: str | Path | None = None,
     ) -> Robot:
         """Reads a robot from a URDF or xacro file, or from URDF text; an MJCF of any suffix as `from_mjcf` does.
@@ -101,7 +101,7 @@ class Robot(_core.Robot):
             jerk_limits: [rad/s^3 | m/s^3]; 100/s times the acceleration limits by default.
             effort_rate_limits: [Nm/s | N/s]; none by default.
             name: in place of the file's.
-            xacro_arguments: values of `<xacro:arg>`.
+            xacro_arguments: values of `<xacro:arg>`: texts, numbers, True or False.
             srdf: a file in place of the one beside it.
 
         Raises:

@@ -12,17 +12,27 @@ import types
 import warnings
 import xml.etree.ElementTree as ElementTree
 import xml.parsers.expat as expat
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TypeGuard
+from typing import TypeAlias, TypeGuard
+
+import numpy as np
 
 from sidestep.robot.formats import macros_alone, other_root, refuse_content
 from sidestep.robot.packages import Packages
 
 _XACRO_MARKS = ("ros.org/wiki/xacro", "ros.org/xacro")  # namespaces that xacro documents declare
 _SUBSTITUTION = re.compile(r"\$\((?:find|arg|env|optenv|dirname|eval)\b[^)]*\)")
+_EXPRESSION = re.compile(r"\$\{[^}]*\}")
+_ARGUMENT = re.compile(r"""<xacro:arg\s[^>]*?\bname\s*=\s*["']([^"']+)""")
+_CONDITIONAL_INCLUDE = re.compile(
+    r"<xacro:(if|unless)\b(?:(?!</xacro:\1>).)*?<xacro:include\b", re.DOTALL
+)  # one that may not have been read
+_AGAIN = 10  # times that xacro includes a file before it gives up, if that includes itself
+XacroValue: TypeAlias = str | float | bool
 
 
 @dataclass(frozen=True)
@@ -40,12 +50,16 @@ def is_text(source: str | Path) -> TypeGuard[str]:
 
 
 def read_description(
-    source: str | Path, *, package_dirs: Sequence[str | Path], xacro_arguments: Mapping[str, str] | None
+    source: str | Path,
+    *,
+    package_dirs: Sequence[str | Path],
+    xacro_arguments: Mapping[str, XacroValue] | None,
 ) -> Description:
     """Reads a URDF or xacro file, or a string that starts with `<`, and expands xacro where the text uses it.
 
     Raises:
-        FileNotFoundError: no such file. ValueError: malformed XML, a failed xacro expansion.
+        FileNotFoundError: no such file. ValueError: malformed XML, a failed xacro expansion, an argument that the
+            file does not have.
     """
     directories = tuple(Path(directory).resolve() for directory in package_dirs)
     for directory in directories:
@@ -62,13 +76,13 @@ def read_description(
         label, text, folder = str(path), read_xml(path), path.parent
     packages = Packages(directories, folder)
     root = parse_xml(text, label)
-    if _uses_xacro(root):
+    if _uses_xacro(root, text, label):
         macros = [
             (element.get("name", ""), element.get("params", ""))
             for element in root.iter()
             if isinstance(element.tag, str) and element.tag.endswith("}macro")
         ]
-        root = parse_xml(_expand(text, label, folder, packages, dict(xacro_arguments or {})), label)
+        root = parse_xml(_expand(text, label, folder, packages, _as_text(xacro_arguments or {})), label)
         if macros and root.find("link") is None:
             raise ValueError(macros_alone(label, macros))
     elif xacro_arguments:
@@ -139,11 +153,13 @@ def _tree(text: str) -> ElementTree.Element:
     return builder.close()
 
 
-def _uses_xacro(root: ElementTree.Element) -> bool:
+def _uses_xacro(root: ElementTree.Element, text: str, label: str) -> bool:
     """Whether elements of xacro, or its substitutions such as `$(find NAME)`, are in a description.
 
-    A namespace that is declared and not used does not show.
+    A namespace that is declared and not used does not show. Expressions `${…}` in attributes count where the
+    namespace is declared or the file is called .xacro: elsewhere they may be meant for another program.
     """
+    xacro = label.lower().endswith(".xacro") or any(mark in text for mark in _XACRO_MARKS)
     for element in root.iter():
         if not isinstance(element.tag, str):  # a comment
             continue
@@ -151,13 +167,48 @@ def _uses_xacro(root: ElementTree.Element) -> bool:
             return True
         if any(_SUBSTITUTION.search(value) for value in (*element.attrib.values(), element.text or "")):
             return True
+        if xacro and any(_EXPRESSION.search(value) for value in element.attrib.values()):
+            return True
     return False
+
+
+def _as_text(arguments: Mapping[str, XacroValue]) -> dict[str, str]:
+    """Values of `<xacro:arg>` as xacro takes them: text, true and false in lower case."""
+    texts = {}
+    for name, value in arguments.items():
+        if isinstance(value, bool | np.bool_):
+            texts[name] = "true" if value else "false"
+        elif isinstance(value, str | int | float | np.integer | np.floating):
+            texts[name] = str(value)
+        else:
+            raise ValueError(
+                f"xacro_arguments: {name!r} is {value!r}, must be a text, a number, True or False"
+            )
+    return texts
+
+
+class _Arguments(dict[str, str]):
+    """The values of arguments, which note what xacro asks for."""
+
+    def __init__(self, values: Mapping[str, str]) -> None:
+        super().__init__(values)
+        self.asked: set[str] = set()
+
+    def __contains__(self, name: object) -> bool:
+        self.asked.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.asked.add(name)
+        return super().__getitem__(name)
 
 
 def _expand(text: str, label: str, folder: Path | None, packages: Packages, arguments: dict[str, str]) -> str:
     import xacro
 
     messages = io.StringIO()  # xacro prints its warnings; they go into the error, or nowhere
+    known = _Arguments(arguments)
+    already = len(xacro.all_includes)
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(label)
         if folder is None:
@@ -165,10 +216,41 @@ def _expand(text: str, label: str, folder: Path | None, packages: Packages, argu
             path.write_text(text, encoding="utf-8")
         try:
             with contextlib.redirect_stderr(messages), _findable(packages, text, label):
-                return str(xacro.process_file(str(path), mappings=arguments).toxml())
+                expanded = str(xacro.process_file(str(path), mappings=known).toxml())
         except Exception as error:  # xacro evaluates expressions, so any exception can come out of it
             detail = f"{error} {messages.getvalue()}".strip()
+            if isinstance(error, RecursionError):
+                detail = _endless(xacro.all_includes[already:]) or detail
             raise ValueError(f"{label}: xacro expansion failed: {type(error).__name__}: {detail}") from error
+    _check_arguments(arguments, known.asked, label, [text, *_texts(xacro.all_includes[already:])])
+    return expanded
+
+
+def _endless(included: Sequence[str]) -> str:
+    """Which file includes itself, "" if none does."""
+    name, count = Counter(included).most_common(1)[0] if included else ("", 0)
+    return f"{name} is included in itself, by <xacro:include>" if count > _AGAIN else ""
+
+
+def _texts(files: Sequence[str]) -> list[str]:
+    return [Path(file).read_text("utf-8", "replace") for file in set(files) if Path(file).is_file()]
+
+
+def _check_arguments(given: Mapping[str, str], asked: set[str], label: str, texts: Sequence[str]) -> None:
+    """Refuses arguments that no file of a description has; warns where a file that was not read may have them."""
+    names = asked.union(*(_ARGUMENT.findall(text) for text in texts))
+    unknown = [name for name in given if name not in names]
+    if not unknown:
+        return
+    said = (
+        f"{label}: xacro_arguments has {', '.join(map(repr, unknown))}, which no <xacro:arg> defines; "
+        f"those of the file are: {', '.join(sorted(names)) or 'none'}"
+    )
+    if not any(_CONDITIONAL_INCLUDE.search(text) for text in texts):
+        raise ValueError(said)
+    warnings.warn(
+        f"{said}; files that are included on a condition may have more", RuntimeWarning, stacklevel=5
+    )
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -91,17 +92,25 @@ def srdf_beside(path: Path, robot: str) -> Path | None:
     It stands beside the file, or in `srdf` or `config` near it, and its `<robot name>` is the robot's. Of several it is
     that with the file's stem.
     """
+    return _beside(path, robot)[0]
+
+
+def _beside(path: Path, robot: str) -> tuple[Path | None, list[str]]:
+    """The SRDF as of `srdf_beside`; where there is none, those that cannot be read and seem to be it, and why."""
     folders = [path.parent, path.parent / "srdf", path.parent.parent / "srdf", path.parent.parent / "config"]
     stem = path.name.split(".")[0]
     found = [file for folder in folders if folder.is_dir() for file in sorted(folder.glob("*.srdf"))]
+    broken = []
     for file in sorted(found, key=lambda file: file.stem != stem):
         try:
             root, _ = _root(file)
-        except ValueError:  # broken, or a template: nobody asked for it
+        except ValueError as error:  # broken, or a template
+            if file.stem == stem or f'<robot name="{robot}"'.encode() in file.read_bytes():
+                broken.append(str(error))
             continue
         if root.tag == "robot" and root.get("name") == robot:
-            return file
-    return None
+            return file, []
+    return None, broken
 
 
 def srdf_of(srdf: str | Path | None, urdf: str | Path, robot: str) -> str | Path | None:
@@ -112,8 +121,18 @@ def srdf_of(srdf: str | Path | None, urdf: str | Path, robot: str) -> str | Path
 def read_extras(
     srdf: str | Path | None, urdf: str | Path, robot: str, joints: Sequence[str], links: Iterable[str]
 ) -> tuple[dict[str, NDArray[np.float64]], tuple[Pair, ...]]:
-    """Postures and pairs that may touch, of an SRDF or the one beside a URDF (`srdf_beside`); none without one."""
+    """Postures and pairs that may touch, of an SRDF or the one beside a URDF (`srdf_beside`); none without one.
+
+    Warns of one beside it that cannot be read.
+    """
     file = srdf_of(srdf, urdf, robot)
+    if not file and not is_text(urdf):
+        for fault in _beside(Path(urdf), robot)[1]:
+            warnings.warn(
+                f"{fault}; the SRDF was not read: postures and pairs that may touch are missing",
+                RuntimeWarning,
+                stacklevel=3,
+            )
     if not file:
         return {}, ()
     postures = {name: np.array(values) for name, values in read_postures(file, joints).items()}

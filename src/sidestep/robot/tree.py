@@ -15,7 +15,7 @@ from sidestep.robot.degrees import DEGREES_HINT, degrees_hint, looks_like_degree
 from sidestep.robot.drives import Drive, drives_of, joint_motion, swept_links
 from sidestep.robot.limits import LimitValues, limits_of, position_bounds, stands_still
 from sidestep.robot.link import Array, Link
-from sidestep.robot.plausibility import check_meshes
+from sidestep.robot.plausibility import check_lengths, check_meshes
 from sidestep.robot.pose import checked_pose, from_roll_pitch_yaw, pose_at
 from sidestep.robot.urdf import Urdf, UrdfJoint
 
@@ -122,6 +122,7 @@ def build_tree(
     )
     driven = swept_links(urdf, kept, locks, ranges, poses)
     links = tuple(driven.get(link, urdf.links[link]) for link in placed)
+    check_lengths(links, kept, joints, urdf.remarks)
     check_meshes(links, joints, urdf.remarks)
     frames = tuple(Frame(link, joint=index, placement=X) for link, (index, X) in placed.items())
     return KinematicTree(

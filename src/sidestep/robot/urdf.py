@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import warnings
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from sidestep.robot.degrees import DEGREES_HINT, looks_like_degrees
+from sidestep.robot.degrees import looks_like_degrees, warn_of_degrees
 from sidestep.robot.elements import attribute, number, numbers, placement, short, words
 from sidestep.robot.link import Array, Inertial, Link
 from sidestep.robot.plausibility import check_inertia
@@ -117,12 +116,12 @@ def parse_urdf(description: Description) -> Urdf:
     root = _root(links, joints, description.label)
     if faults:
         raise (FileNotFoundError if missing else ValueError)("\n".join(faults))
-    _warn_of_degrees(description, joints)
+    warn_of_degrees(description.label, _odd_angles(description, joints), stacklevel=3)
     return Urdf(description.root.get("name", "robot"), description.label, links, joints, root, remarks)
 
 
-def _warn_of_degrees(description: Description, joints: dict[str, UrdfJoint]) -> None:
-    """One warning of all angles of a description that look like degrees: limits, and angles of <origin>."""
+def _odd_angles(description: Description, joints: dict[str, UrdfJoint]) -> list[str]:
+    """Angles of a description that look like degrees: limits, and angles of <origin>."""
     odd = [
         f"{side} limit {value:g} of joint {joint.name!r}"
         for joint in joints.values()
@@ -136,11 +135,7 @@ def _warn_of_degrees(description: Description, joints: dict[str, UrdfJoint]) -> 
         rpy = "" if origin is None else origin.get("rpy", "")
         if any(looks_like_degrees(float(part)) for part in words(rpy)):
             odd.append(f"rpy {rpy!r} of <{element.tag}> {element.get('name', '')!r}")
-    if odd:
-        more = f" and {len(odd) - 3} more" if len(odd) > 3 else ""
-        warnings.warn(
-            f"{description.label}: {', '.join(odd[:3])}{more} {DEGREES_HINT}", RuntimeWarning, stacklevel=4
-        )
+    return odd
 
 
 def _root(links: dict[str, Link], joints: dict[str, UrdfJoint], label: str) -> str:
