@@ -79,7 +79,33 @@ std::string in_short(const Eigen::VectorXd& numbers) {
   return "[" + text + "]";
 }
 
+void raise_type(nb::handle value, const char* name, const char* allowed) {
+  constexpr std::size_t longest = 60;
+  std::string given = nb::repr(value).c_str();
+  if (given.size() > longest || given.find('\n') != std::string::npos) {
+    given.clear();
+  }
+  std::string words = std::string(name) + " is ";
+  if (value.is_none()) {
+    words += "None";
+  } else {
+    words += given.empty() ? "of type " : given + ", of type ";
+    words += nb::cast<std::string>(value.type().attr("__name__"));
+  }
+  throw nb::type_error((words + ", must be " + allowed).c_str());
+}
+
+std::string as_text(nb::handle value, const char* name, const char* allowed) {
+  if (!nb::isinstance<nb::str>(value)) {
+    raise_type(value, name, allowed);
+  }
+  return nb::cast<std::string>(value);
+}
+
 nb::object real_array(nb::handle value, const char* name) {
+  if (value.is_none()) {
+    raise_type(value, name, "an array of real numbers");
+  }
   const nb::module_ numpy = nb::module_::import_("numpy");
   try {
     if (!is_plain_array(value) && is_masked(value, numpy)) {

@@ -32,6 +32,21 @@ nb::object real_array(nb::handle value, const char* name);
 using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 Array as_array(nb::handle value, const char* name);
 
+/// Raises TypeError that names the argument, what was given and what is allowed.
+[[noreturn]] void raise_type(nb::handle value, const char* name, const char* allowed);
+
+/// The object of the core that an argument is; otherwise raises TypeError as above.
+template <class T>
+const T& as_instance(nb::handle value, const char* name, const char* allowed) {
+  if (!nb::isinstance<T>(value)) {
+    raise_type(value, name, allowed);
+  }
+  return nb::cast<const T&>(value);
+}
+
+/// The text that an argument is; otherwise raises TypeError as above.
+std::string as_text(nb::handle value, const char* name, const char* allowed);
+
 /// A number for a `__repr__`, such as "0.0312", "inf" or "nan".
 std::string in_short(double number);
 /// Numbers for a `__repr__`, such as "[0.1, -0.524]".
@@ -42,7 +57,7 @@ Eigen::VectorXd as_vector(nb::handle value, const char* name, Eigen::Index size 
 
 /// The same, of finite numbers; raises ValueError with the first entry that is not. Not for the control loop, where a
 /// state that is not finite is a status.
-Eigen::VectorXd as_finite_vector(nb::handle value, const char* name, Eigen::Index size);
+Eigen::VectorXd as_finite_vector(nb::handle value, const char* name, Eigen::Index size = -1);
 
 /// A scalar or a vector of `size` entries, as a vector.
 Eigen::VectorXd as_filled_vector(nb::handle value, const char* name, Eigen::Index size);

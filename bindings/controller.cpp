@@ -4,6 +4,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <limits>
 
 #include "arguments.hpp"
 #include "system.hpp"
@@ -180,6 +181,31 @@ void bind_command(nb::module_& m) {
       });
 }
 
+constexpr const char* an_arm = "an Arm, such as Arm.load('fr3')";
+
+/// Warns of what is implausibly large or heavy.
+void check_held(const Attachment& object) {
+  constexpr double largest = 5.0, heaviest = 500.0;  // [m], [kg]
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (std::size_t k = 0; k < object.cover.centres.size(); ++k) {
+    const Eigen::Vector3d reach = object.cover.shapes[k].rowwise().norm();
+    low = low.cwiseMin(object.cover.centres[k] - reach);
+    high = high.cwiseMax(object.cover.centres[k] + reach);
+  }
+  const double size = (high - low).maxCoeff();
+  const auto warn = [&object](const std::string& doubt) {
+    if (PyErr_WarnEx(PyExc_RuntimeWarning, ("attach '" + object.name + "': " + doubt).c_str(), 1) != 0) {
+      throw nb::python_error();
+    }
+  };
+  if (size > largest) {
+    warn("it is " + in_short(size) + " m long; is its geometry in metres?");
+  }
+  if (object.inertial.mass > heaviest) {
+    warn("its mass is " + in_short(object.inertial.mass) + " kg; is that in kg?");
+  }
+}
+
 /// What the thread of `step` alone may read, refused while another one has the controller.
 template <class Get>
 auto of_last_step(Get get) {
@@ -200,8 +226,10 @@ void bind_controller(nb::module_& m) {
                          "Goals and obstacles may be set from any thread. Raises ValueError that names the setting at fault.")
       .def(
           "__init__",
-          [](Controller* self, const Arm& arm, const std::optional<ControllerSettings>& settings) {
-            new (self) Controller(arm, settings.value_or(ControllerSettings{}));
+          [](Controller* self, nb::handle of, nb::handle with) {
+            const Arm& arm = as_instance<Arm>(of, "arm", an_arm);
+            new (self) Controller(arm, with.is_none() ? ControllerSettings{}
+                                                      : as_instance<ControllerSettings>(with, "settings", "ControllerSettings or None"));
             if (self->has_torque() && !arm.has_dynamics()) {
               const std::string words = "arm '" + arm.name() + "' has no inertias, so torque output needs the arm's own mass matrix and "
                                         "bias in every step: step(q, v, mass_matrix, bias)";
@@ -210,11 +238,12 @@ void bind_controller(nb::module_& m) {
               }
             }
           },
-          nb::arg("arm"), nb::arg("settings") = nb::none())
+          nb::arg("arm").none(), nb::arg("settings") = nb::none(),
+          nb::sig("def __init__(self, arm: Arm, settings: ControllerSettings | None = None) -> None"))
       .def(
           "set_goal",
           [](Controller& self, nb::handle goal) { self.set_goal(as_goal(goal, self.num_coordinates())); },
-          nb::arg("goal"),
+          nb::arg("goal").none(),
           nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None"),
           "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose, or poses\n"
           "of several frames at once, as of two arms. Joints that no pose asks to move stay where they are, and evade. Raises\n"
@@ -222,16 +251,16 @@ void bind_controller(nb::module_& m) {
       .def(
           "set_velocity",
           [](Controller& self, nb::handle v) { self.set_velocity(as_vector(v, "v", self.num_coordinates())); },
-          nb::arg("v"), nb::sig("def set_velocity(self, v: numpy.typing.ArrayLike) -> None"),
+          nb::arg("v").none(), nb::sig("def set_velocity(self, v: numpy.typing.ArrayLike) -> None"),
           "Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. Obstacles steer the\n"
           "arm around them and stop it. After `inputs.timeout` without another order the arm stops. Raises ValueError that\n"
           "names the joint and what is allowed; the order before stays.")
       .def(
           "set_twist",
-          [](Controller& self, const std::string& frame, nb::handle twist, bool local) {
-            self.set_twist(frame, Vector6d(as_vector(twist, "twist", 6)), local);
+          [](Controller& self, nb::handle frame, nb::handle twist, bool local) {
+            self.set_twist(as_text(frame, "frame", "the name of a link of the arm"), Vector6d(as_vector(twist, "twist", 6)), local);
           },
-          nb::arg("frame"), nb::arg("twist"), nb::arg("local") = false,
+          nb::arg("frame").none(), nb::arg("twist").none(), nb::arg("local") = false,
           nb::sig("def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False) -> None"),
           "The same for the twist (6,) of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of\n"
           "the world or, `local`, its own; rows as in `Robot.jacobian`. The arm slides along singular configurations and limits.\n"
@@ -243,7 +272,7 @@ void bind_controller(nb::module_& m) {
             const Eigen::MatrixXd rows = as_matrix(q, "q", at.size(), self.num_coordinates());
             self.set_trajectory(rows.transpose(), at, as_enum<TrajectoryBehaviour>(behaviour, "behaviour"));
           },
-          nb::arg("q"), nb::arg("times"), nb::arg("behaviour") = "keep_path",
+          nb::arg("q").none(), nb::arg("times").none(), nb::arg("behaviour").none() = "keep_path",
           nb::sig("def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, "
                   "behaviour: TrajectoryBehaviour | str = 'keep_path') -> None"),
           "Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing; cubics between them. A first\n"
@@ -253,18 +282,19 @@ void bind_controller(nb::module_& m) {
       .def("clear_goal", &Controller::clear_goal, "The arm comes to rest where it is, and goes on evading.")
       .def(
           "set_obstacles", [](Controller& self, nb::handle obstacles) { self.set_obstacles(as_obstacles(obstacles)); },
-          nb::arg("obstacles"),
+          nb::arg("obstacles").none(),
           nb::sig("def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | "
                   "collections.abc.Sequence[Obstacles | sidestep.obstacles.Shape]) -> None"),
           "From the next step on: points, a shape, or a list of both, see `sidestep.obstacles.obstacles_from_shapes`, which\n"
           "covers shapes by balls without gaps. They move on by their velocities until they are set again.")
       .def(
           "set_arm",
-          [](Controller& self, const Arm& arm) {
+          [](Controller& self, nb::handle other) {
+            const Arm& arm = as_instance<Arm>(other, "arm", an_arm);
             const nb::gil_scoped_release others;
             self.set_arm(arm);
           },
-          nb::arg("arm"),
+          nb::arg("arm").none(), nb::sig("def set_arm(self, arm: Arm) -> None"),
           "Another body, inertias and pairs for the same joints and limits, as a finer cover that is ready later: prepared beside\n"
           "the loop in some tenths of a second, taken over by the next step. Objects stay attached; goals are planned for anew.\n"
           "Raises ValueError that says what differs.")
@@ -275,13 +305,18 @@ void bind_controller(nb::module_& m) {
             if (is_made != geometry.is_none()) {
               throw nb::value_error("attach: give a name and a geometry, or an Attachment alone");
             }
+            if (!is_made && nb::isinstance(geometry, nb::module_::import_("sidestep.obstacles").attr("Plane"))) {
+              throw nb::value_error((std::string("attach ") + nb::repr(object).c_str() + ": a Plane has no end and cannot be held, "
+                                     "allowed: Box, Capsule, Cylinder, MeshShape, Sphere, or points (N, 3)").c_str());
+            }
             const Attachment made = is_made ? nb::cast<Attachment>(object)
                                             : nb::cast<Attachment>(nb::module_::import_("sidestep.arm.attachment")
                                                                        .attr("attachment")(object, geometry, **options));
+            check_held(made);
             const nb::gil_scoped_release others;
             self.attach(made);
           },
-          nb::arg("object"), nb::arg("geometry") = nb::none(), nb::arg("options"),
+          nb::arg("object").none(), nb::arg("geometry") = nb::none(), nb::arg("options"),
           nb::sig("def attach(self, object: str | Attachment, geometry: sidestep.obstacles.Shape | numpy.typing.ArrayLike | None = None, "
                   "**options: typing.Any) -> None"),
           "An object that a link holds from the next step on: attach(\"cup\", Cylinder(0.04, 0.1), link=\"fr3_hand\", pose=X,\n"
@@ -291,18 +326,19 @@ void bind_controller(nb::module_& m) {
           "holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.")
       .def(
           "detach",
-          [](Controller& self, const std::string& name) {
+          [](Controller& self, nb::handle object) {
+            const std::string name = as_text(object, "name", "the name of an object that is attached");
             const nb::gil_scoped_release others;
             self.detach(name);
           },
-          nb::arg("name"), "Lets an object go from the next step on. Raises ValueError that lists what is attached.")
+          nb::arg("name").none(), nb::sig("def detach(self, name: str) -> None"), "Lets an object go from the next step on. Raises ValueError that lists what is attached.")
       .def_prop_ro("attached", &Controller::attached, "The names of the objects that are attached.")
       .def_prop_ro("arm", &Controller::arm, "The arm (of the core), with what is attached.")
       .def_prop_ro("obstacles", of_last_step([](const Controller& self) { return Obstacles(self.obstacles()); }),
                    "A copy of what the last step saw; `name_of(command.point)` of it is the name of what is nearest.")
       .def(
           "step",
-          [](Controller& self, const ArrayLike& q, const ArrayLike& v, nb::handle mass_matrix, nb::handle bias) {
+          [](Controller& self, nb::handle q, nb::handle v, nb::handle mass_matrix, nb::handle bias) {
             const int nv = self.num_coordinates();
             const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv);
             if (mass_matrix.is_none() != bias.is_none()) {
@@ -315,7 +351,7 @@ void bind_controller(nb::module_& m) {
             const Eigen::MatrixXd M = as_matrix(mass_matrix, "mass_matrix", nv, nv);
             return Command(self.step(position, velocity, M, as_vector(bias, "bias", nv)));
           },
-          nb::arg("q"), nb::arg("v"), nb::arg("mass_matrix") = nb::none(), nb::arg("bias") = nb::none(),
+          nb::arg("q").none(), nb::arg("v").none(), nb::arg("mass_matrix") = nb::none(), nb::arg("bias") = nb::none(),
           nb::sig("def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
                   "mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command"),
           "One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)\n"
@@ -379,7 +415,7 @@ void bind_controller(nb::module_& m) {
       });
   m.def(
       "integrate",
-      [](Controller& controller, const ArrayLike& q, const ArrayLike& v, int steps, nb::handle goal, double tolerance) {
+      [](Controller& controller, nb::handle q, nb::handle v, int steps, nb::handle goal, double tolerance) {
         const int nv = controller.num_coordinates();
         const Eigen::VectorXd position = as_vector(q, "q", nv), velocity = as_vector(v, "v", nv),
                               end = goal.is_none() ? Eigen::VectorXd() : as_vector(goal, "goal", nv);
@@ -388,7 +424,7 @@ void bind_controller(nb::module_& m) {
           return integrate(controller, position, velocity, steps, end, tolerance, interrupted);
         });
       },
-      nb::arg("controller"), nb::arg("q"), nb::arg("v"), nb::kw_only(), nb::arg("steps"), nb::arg("goal") = nb::none(),
+      nb::arg("controller"), nb::arg("q").none(), nb::arg("v").none(), nb::kw_only(), nb::arg("steps"), nb::arg("goal") = nb::none(),
       nb::arg("tolerance") = 0.0,
       nb::sig("def integrate(controller: Controller, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, *, steps: int, "
               "goal: numpy.typing.ArrayLike | None = None, tolerance: float = 0.0) -> MotionRecord"),

@@ -1,5 +1,6 @@
 #include <nanobind/stl/string.h>
 
+#include <cmath>
 #include <limits>
 
 #include "system.hpp"
@@ -31,6 +32,10 @@ Goal as_goal(nb::handle value, Eigen::Index nv) {
     }
     return goal;
   }
+  if (value.is_none()) {
+    raise_type(value, "goal", "a configuration, a JointGoal, a PoseGoal or a list of PoseGoal; clear_goal() of a Controller takes "
+                              "its goal away");
+  }
   return JointGoal(as_vector(value, "goal", nv));
 }
 
@@ -40,10 +45,19 @@ Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
   const Array array = as_array(value, "pose");
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   if (position_only && array.ndim() == 1) {
-    pose.translation() = as_vector(value, "pose", 3);
+    pose.translation() = as_finite_vector(value, "pose", 3);
     return pose;
   }
   const Eigen::MatrixXd matrix = as_matrix(value, "pose", 4, 4);
+  for (Eigen::Index row = 0; row < 4; ++row) {
+    for (Eigen::Index column = 0; column < 4; ++column) {
+      if (!std::isfinite(matrix(row, column))) {
+        throw nb::value_error(("pose[" + std::to_string(row) + ", " + std::to_string(column) + "] is " +
+                               std::to_string(matrix(row, column)) + ", must be a finite number")
+                                  .c_str());
+      }
+    }
+  }
   pose.linear() = matrix.topLeftCorner<3, 3>();
   pose.translation() = matrix.topRightCorner<3, 1>();
   return pose;
@@ -55,18 +69,18 @@ void bind_goals(nb::module_& m) {
   nb::class_<JointGoal>(m, "JointGoal",
                         "A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.\n"
                         "position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] and acceleration (nv,) [rad/s^2] of a goal that moves,\n"
-                        "zero by default.")
+                        "zero by default. Raises ValueError on sizes, and names the first number that is not finite.")
       .def(
           "__init__",
           [](JointGoal* self, const ArrayLike& position, nb::handle velocity, nb::handle acceleration) {
-            Eigen::VectorXd q = as_vector(position, "position");
+            Eigen::VectorXd q = as_finite_vector(position, "position");
             const Eigen::Index nv = q.size();
             const auto rate = [nv](nb::handle value, const char* name) {
-              return value.is_none() ? Eigen::VectorXd(Eigen::VectorXd::Zero(nv)) : as_vector(value, name, nv);
+              return value.is_none() ? Eigen::VectorXd(Eigen::VectorXd::Zero(nv)) : as_finite_vector(value, name, nv);
             };
             new (self) JointGoal(std::move(q), rate(velocity, "velocity"), rate(acceleration, "acceleration"));
           },
-          nb::arg("position"), nb::arg("velocity") = nb::none(), nb::arg("acceleration") = nb::none(),
+          nb::arg("position").none(), nb::arg("velocity") = nb::none(), nb::arg("acceleration") = nb::none(),
           nb::sig("def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None, "
                   "acceleration: numpy.typing.ArrayLike | None = None) -> None"))
       .def_prop_ro("position", [](const JointGoal& g) { return to_numpy(g.position); })
@@ -83,19 +97,20 @@ void bind_goals(nb::module_& m) {
       "drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin\n"
       "[m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.\n"
       "Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is\n"
-      "none, a stiffness out of range. A pose that is not finite or out of reach gives a status in the step.")
+      "none, a number that is not finite, a stiffness out of range. A pose out of reach gives a status in the step.")
       .def(
           "__init__",
-          [](PoseGoal* self, const Robot& robot, const std::string& frame, const ArrayLike& pose, bool position_only,
+          [](PoseGoal* self, nb::handle made_for, nb::handle frame, const ArrayLike& pose, bool position_only,
              double position_stiffness, double orientation_stiffness, nb::handle rest, double posture_stiffness,
              nb::handle twist) {
+            const Robot& robot = as_instance<Robot>(made_for, "robot", "a Robot, as Arm.robot is");
             const int nv = robot.num_coordinates();
-            new (self) PoseGoal(robot, frame, as_pose(pose, position_only),
+            new (self) PoseGoal(robot, as_text(frame, "frame", "the name of a link of the robot"), as_pose(pose, position_only),
                                 {position_only, position_stiffness, orientation_stiffness,
-                                 rest.is_none() ? Eigen::VectorXd() : as_vector(rest, "rest", nv), posture_stiffness},
-                                twist.is_none() ? Vector6d(Vector6d::Zero()) : Vector6d(as_vector(twist, "twist", 6)));
+                                 rest.is_none() ? Eigen::VectorXd() : as_finite_vector(rest, "rest", nv), posture_stiffness},
+                                twist.is_none() ? Vector6d(Vector6d::Zero()) : Vector6d(as_finite_vector(twist, "twist", 6)));
           },
-          nb::arg("robot"), nb::arg("frame"), nb::arg("pose"), nb::kw_only(), nb::arg("position_only") = false,
+          nb::arg("robot").none(), nb::arg("frame").none(), nb::arg("pose").none(), nb::kw_only(), nb::arg("position_only") = false,
           nb::arg("position_stiffness") = PoseGoalSettings().position_stiffness,
           nb::arg("orientation_stiffness") = PoseGoalSettings().orientation_stiffness, nb::arg("rest") = nb::none(),
           nb::arg("posture_stiffness") = 0.0, nb::arg("twist") = nb::none(),

@@ -18,6 +18,31 @@ namespace sidestep::python {
 namespace {
 
 constexpr std::size_t most_names = 4;
+constexpr double nowhere = 1e7;  // [m] map coordinates do not go beyond this; a point that does stands for nothing seen
+constexpr double far = 100.0;    // [m] points of which none is nearer are warned of
+
+/// Refuses points that cannot be meant, and warns where none is near, as of points in millimetres. What is near ends the search.
+void check_plausible(const Obstacles& obstacles) {
+  const Eigen::Matrix3Xd& p = obstacles.points();
+  const Eigen::RowVectorXd distance = p.cwiseAbs().colwise().maxCoeff();
+  Eigen::Index at = 0;
+  if (distance.maxCoeff(&at) > nowhere) {
+    throw nb::value_error(("obstacles: point " + std::to_string(at) + " is at " + in_short(p.col(at)) +
+                           " m, allowed: up to 1e7 m; leave out what stands for nothing seen")
+                              .c_str());
+  }
+  for (Eigen::Index i = 0; i < p.cols(); ++i) {
+    if (distance[i] - obstacles.radii()[i] <= far) {
+      return;
+    }
+  }
+  distance.minCoeff(&at);
+  const std::string words = "obstacles: all points are farther than " + in_short(far) + " m, the nearest is at " +
+                            in_short(p.col(at)) + " m; are they in millimetres? They must be in metres";
+  if (PyErr_WarnEx(PyExc_RuntimeWarning, words.c_str(), 1) != 0) {
+    throw nb::python_error();
+  }
+}
 
 /// For example "Obstacles(1012 points, of 'table', 'cup')".
 std::string in_words(const Obstacles& obstacles) {
@@ -39,7 +64,7 @@ std::string in_words(const Obstacles& obstacles) {
 void bind_obstacles(nb::module_& m) {
   m.def(
       "real_array", [](nb::handle value, const std::string& name) { return real_array(value, name.c_str()); },
-      nb::arg("value"), nb::arg("name"),
+      nb::arg("value").none(), nb::arg("name"),
       nb::sig("def real_array(value: numpy.typing.ArrayLike, name: str) -> numpy.typing.NDArray[numpy.float64]"),
       "`value` as an array of float64, not copied where it is one. Raises TypeError that names the argument and its dtype for\n"
       "complex numbers, booleans, dates, text and objects, ValueError for masked entries.");
@@ -48,16 +73,21 @@ void bind_obstacles(nb::module_& m) {
                         "Obstacle points in the world, each a ball with a radius, moving with a constant velocity.")
       .def(
           "__init__",
-          [](Obstacles* self, const ArrayLike& points, const ArrayLike& radii, const ArrayLike& velocities) {
+          [](Obstacles* self, nb::handle points, nb::handle radii, nb::handle velocities) {
             Eigen::Matrix3Xd p = as_points(points, "points");
             Eigen::VectorXd r = as_filled_vector(radii, "radii", p.cols());
             Eigen::Matrix3Xd s = velocities.is_none() ? Eigen::Matrix3Xd(Eigen::Matrix3Xd::Zero(3, p.cols()))
                                                       : as_points(velocities, "velocities");
-            new (self) Obstacles(std::move(p), std::move(r), std::move(s));
+            Obstacles made(std::move(p), std::move(r), std::move(s));
+            check_plausible(made);
+            new (self) Obstacles(std::move(made));
           },
-          nb::arg("points"), nb::arg("radii") = 0.0, nb::arg("velocities").none() = nb::none(),
+          nb::arg("points").none(), nb::arg("radii").none() = 0.0, nb::arg("velocities") = nb::none(),
+          nb::sig("def __init__(self, points: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike = 0.0, "
+                  "velocities: numpy.typing.ArrayLike | None = None) -> None"),
           "points (N, 3) [m]; radii scalar or (N,) [m], >= 0; velocities (N, 3) [m/s] or None for rest.\n"
-          "Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).")
+          "Radii are at most 1e9 m, coordinates at most 1e7 m. Raises ValueError that names a bad point; an empty cloud is\n"
+          "refused (see none()). Warns where every point is farther than 100 m, as points in millimetres are.")
       .def_static("none", &Obstacles::none, "A workspace that is known to be free.")
       .def("__len__", &Obstacles::size)
       .def("__repr__", [](const Obstacles& o) { return in_words(o); })

@@ -217,7 +217,8 @@ class Obstacles:
     def __init__(self, points: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike = 0.0, velocities: numpy.typing.ArrayLike | None = None) -> None:
         """
         points (N, 3) [m]; radii scalar or (N,) [m], >= 0; velocities (N, 3) [m/s] or None for rest.
-        Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).
+        Radii are at most 1e9 m, coordinates at most 1e7 m. Raises ValueError that names a bad point; an empty cloud is
+        refused (see none()). Warns where every point is farther than 100 m, as points in millimetres are.
         """
 
     @staticmethod
@@ -540,7 +541,7 @@ class JointGoal:
     """
     A configuration as a goal: U = (q - q*)^T K (q - q*) / 2 with the system's stiffness K.
     position q* (nv,) [rad]; velocity dq*/dt (nv,) [rad/s] and acceleration (nv,) [rad/s^2] of a goal that moves,
-    zero by default.
+    zero by default. Raises ValueError on sizes, and names the first number that is not finite.
     """
 
     def __init__(self, position: numpy.typing.ArrayLike, velocity: numpy.typing.ArrayLike | None = None, acceleration: numpy.typing.ArrayLike | None = None) -> None: ...
@@ -565,7 +566,7 @@ class PoseGoal:
     drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin
     [m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.
     Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is
-    none, a stiffness out of range. A pose that is not finite or out of reach gives a status in the step.
+    none, a number that is not finite, a stiffness out of range. A pose out of reach gives a status in the step.
     """
 
     def __init__(self, robot: Robot, frame: str, pose: numpy.typing.ArrayLike, *, position_only: bool = False, position_stiffness: float = 4.0, orientation_stiffness: float = 0.5, rest: numpy.typing.ArrayLike | None = None, posture_stiffness: float = 0.0, twist: numpy.typing.ArrayLike | None = None) -> None: ...

@@ -105,7 +105,26 @@ def test_what_is_wrong_is_named():
             controller.attach("cup", geometry, **{"link": "fr3_hand", **options})
     with pytest.raises(ValueError, match="a name and a geometry"):
         controller.attach("cup")
+    with pytest.raises(
+        ValueError, match=r"attach 'cup': a Plane .* allowed: Box, Capsule, Cylinder, MeshShape, Sphere, or"
+    ):
+        controller.attach("cup", ss.Plane([0, 0, 0], [0, 0, 1]), link="fr3_hand")
     assert controller.attached == []
+    with pytest.raises(TypeError, match="name is None, must be the name of an object that is attached"):
+        controller.detach(None)
+
+
+def test_what_is_hardly_in_metres_or_kilograms_is_warned_of(recwarn):
+    controller = ss.Controller(ss.Arm.load("fr3"), ss.ControllerSettings(synchronous=True))
+    with pytest.warns(RuntimeWarning, match=r"attach 'pole': it is 8 m long; is its geometry in metres\?"):
+        controller.attach("pole", Sphere(4.0), link="fr3_hand")
+    controller.detach("pole")
+    with pytest.warns(RuntimeWarning, match=r"attach 'cup': its mass is 600 kg; is that in kg\?"):
+        controller.attach("cup", Sphere(0.05), link="fr3_hand", mass=600.0)
+    controller.detach("cup")
+    recwarn.clear()
+    controller.attach("tool", Sphere(0.5), link="fr3_hand", mass=20.0)
+    assert not recwarn.list
 
 
 @pytest.mark.parametrize("rests_on", ["table", "*"])

@@ -81,8 +81,14 @@ def test_a_goal_that_is_refused_leaves_the_one_before(robot: ss.Robot, arm: ss.A
     outside[3] = 1.0
     with pytest.raises(ValueError, match=r"joint 'fr3_joint4' is 1\.0+, allowed: -"):
         controller.set_goal(outside)
-    with pytest.raises(ValueError, match="the goal must be finite"):
-        controller.set_goal(np.full(7, np.nan))
+    lost = robot.neutral.copy()
+    lost[4] = np.nan
+    with pytest.raises(ValueError, match=r"position of joint 'fr3_joint5' is nan, allowed: finite numbers"):
+        controller.set_goal(lost)
+    other = ss.Robot.named("panda")
+    pose = ss.PoseGoal(other, "panda_hand", other.pose(other.neutral, "panda_hand"))
+    with pytest.raises(ValueError, match=r"frame 'panda_hand' is made for another robot than 'fr3'"):
+        controller.set_goal(pose)
     assert controller.step(robot.neutral, np.zeros(7)).activity == ss.Activity.arrived
 
 

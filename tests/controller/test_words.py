@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -205,3 +206,78 @@ def test_a_thread_that_holds_a_controller_at_exit_is_no_message() -> None:
     )
     assert done.stdout.strip() == "Controller(arm 'planar3', 3 coordinates)"
     assert done.stderr == ""
+
+
+def test_before_the_first_step_it_says_that_there_was_none() -> None:
+    c = controller()
+    assert c.explain() == "no step was made yet: call step with the measured state, once a period"
+    c.step([0.0, np.nan, 0.0], np.zeros(3))
+    assert "the position of this step is unusable" in c.explain()
+
+
+def test_goals_that_are_not_finite_are_refused_when_they_are_made() -> None:
+    with pytest.raises(ValueError, match=r"^position\[1\] is nan, must be a finite number$"):
+        ss.JointGoal([0.0, np.nan, 0.0])
+    for name in ("velocity", "acceleration"):
+        with pytest.raises(ValueError, match=rf"^{name}\[2\] is inf, must be a finite number$"):
+            ss.JointGoal(np.zeros(3), **{name: [0.0, 0.0, np.inf]})
+    robot = ss.Robot.named("planar3")
+    frame = robot.frames[-1].name
+    pose = np.eye(4)
+    pose[1, 3] = np.nan
+    with pytest.raises(ValueError, match=r"^pose\[1, 3\] is nan, must be a finite number$"):
+        ss.PoseGoal(robot, frame, pose)
+    with pytest.raises(ValueError, match=r"^pose\[2\] is inf, must be a finite number$"):
+        ss.PoseGoal(robot, frame, [0.0, 0.0, np.inf], position_only=True)
+    with pytest.raises(ValueError, match=r"^twist\[5\] is nan"):
+        ss.PoseGoal(robot, frame, np.eye(4), twist=[0.0] * 5 + [np.nan])
+    with pytest.raises(ValueError, match=r"^rest\[0\] is nan"):
+        ss.PoseGoal(robot, frame, np.eye(4), rest=[np.nan, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda c: ss.Controller("fr3"),
+            "arm is 'fr3', of type str, must be an Arm, such as Arm.load('fr3')",
+        ),
+        (lambda c: ss.Controller(None), "arm is None, must be an Arm"),
+        (
+            lambda c: ss.Controller(c.arm, {"period": 0.001}),
+            "settings is {'period': 0.001}, of type dict, must be",
+        ),
+        (
+            lambda c: c.set_goal(None),
+            "goal is None, must be a configuration, a JointGoal, a PoseGoal or a list",
+        ),
+        (lambda c: c.set_velocity(None), "v is None, must be an array of real numbers"),
+        (lambda c: c.set_twist(None, np.zeros(6)), "frame is None, must be the name of a link"),
+        (lambda c: c.set_twist("link3", None), "twist is None, must be an array of real numbers"),
+        (lambda c: c.set_trajectory(None, [0.0]), "q is None, must be an array of real numbers"),
+        (
+            lambda c: c.set_obstacles(None),
+            "obstacles are of type NoneType, must be a shape, Obstacles or a list",
+        ),
+        (lambda c: c.set_arm("fr3"), "arm is 'fr3', of type str, must be an Arm"),
+        (lambda c: c.step(None, np.zeros(3)), "q is None, must be an array of real numbers"),
+        (lambda c: c.step(np.zeros(3), None), "v is None, must be an array of real numbers"),
+        (
+            lambda c: ss.integrate(c, None, np.zeros(3), steps=1),
+            "q is None, must be an array of real numbers",
+        ),
+        (lambda c: ss.JointGoal(None), "position is None, must be an array of real numbers"),
+        (lambda c: ss.PoseGoal("fr3", "link3", np.eye(4)), "robot is 'fr3', of type str, must be a Robot"),
+        (
+            lambda c: ss.PoseGoal(ss.Robot.named("planar3"), 3, np.eye(4)),
+            "frame is 3, of type int, must be the name",
+        ),
+    ],
+)
+def test_arguments_of_a_wrong_type_are_named_in_one_line(
+    call: Callable[[ss.Controller], object], message: str
+) -> None:
+    with pytest.raises(TypeError) as caught:
+        call(controller())
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

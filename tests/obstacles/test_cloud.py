@@ -110,6 +110,11 @@ def test_clouds_that_are_not_in_metres_are_warned_of(
     scaled = load_point_cloud(tmp_path / "mm.npy", scale=0.001)
     np.testing.assert_allclose(scaled.points, POINTS, rtol=1e-6)
     assert not recwarn.list
+    np.save(tmp_path / "all.npy", 1000.0 * (POINTS + 2.0))
+    with pytest.warns(RuntimeWarning) as caught:
+        load_point_cloud(tmp_path / "all.npy")
+    assert len(caught) == 1  # said once, with the file's name
+    assert "all.npy" in str(caught[0].message)
     for scale in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match=f"scale is {scale}, must be positive and finite"):
             load_point_cloud(tmp_path / "mm.npy", scale=scale)
@@ -213,7 +218,7 @@ def test_a_header_without_end_is_refused(tmp_path: Path) -> None:
 def test_an_array_that_announces_more_than_it_holds_is_refused_at_once(tmp_path: Path) -> None:
     np.save(tmp_path / "cloud.npy", POINTS)
     swapped(tmp_path / "cloud.npy", b"(50, 3), }" + b" " * 9, b"(99999999999, 3), }")
-    with pytest.raises(ValueError, match="cannot be read: mmap length is greater than"):
+    with pytest.raises(ValueError, match=r"it is cut short: it announces an array \(99999999999, 3\)"):
         load_point_cloud(tmp_path / "cloud.npy")
 
 
@@ -278,3 +283,24 @@ def test_a_file_can_be_merged_as_it_is_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(obstacles.radii, reach)
     with pytest.raises(ValueError, match="voxel is 0"):
         load_point_cloud(tmp_path / "cloud.npy", voxel=0.0)
+
+
+@pytest.mark.parametrize("suffix", ["npy", "npz", "ply", "pcd", "csv", "xyz"])
+def test_a_git_lfs_pointer_is_named_as_such(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"cloud.{suffix}"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:aa\nsize 12345\n")
+    with pytest.raises(ValueError, match=rf"'.*cloud\.{suffix}' is a Git LFS pointer, .*run `git lfs pull`"):
+        load_point_cloud(path)
+
+
+def test_every_cut_of_a_file_is_one_clear_error(written: Callable[[np.ndarray], Path]) -> None:
+    path = written(POINTS)
+    content = path.read_bytes()
+    for size in range(0, len(content) - 16, 37):
+        path.write_bytes(content[:size])
+        with pytest.raises(ValueError, match=f"point cloud '.*{path.name}'") as caught:
+            load_point_cloud(path)
+        words = str(caught.value)
+        assert "\n" not in words
+        for foreign in ("mmap", "zip file", "pydantic", "http", "buffer", "numpy.core", "invalid literal"):
+            assert foreign not in words, words

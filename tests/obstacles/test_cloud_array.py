@@ -87,6 +87,13 @@ def test_integers_are_numbers(tmp_path: Path) -> None:
         (np.array([]), "holds no point; where nothing is seen, use Obstacles.none()"),
         (np.ones((3, 48, 64)), "the coordinates come first: save numpy.moveaxis(array, 0, -1)"),
         (np.ones((48, 64), np.uint16), "a depth image holds no points: turn it into some by the camera's"),
+        (np.ones((3, 10)), "(3, 10) and look transposed; they stand in columns: save array.T; if every"),
+        (np.ones((6, 10)), "(6, 10) and look transposed"),
+        (np.ones((3, 5)), "(3, 5) and look transposed"),
+        (
+            np.ones((3, 5, 10)),
+            "look transposed; the coordinates come first: save numpy.moveaxis(array, 0, -1)",
+        ),
         (np.ones(3), "have shape (3,), expected (N, 3) or (H, W, 3), or up to 16 columns beginning with"),
     ],
 )
@@ -125,5 +132,25 @@ def test_an_archive_that_announces_more_than_it_holds_is_refused(tmp_path: Path)
     old, new = b"(50, 3), }" + b" " * 9, b"(99999999999, 3), }"
     assert old in content
     (tmp_path / "cloud.npz").write_bytes(content.replace(old, new))
-    with pytest.raises(ValueError, match=r"which is more than its bytes hold|Bad CRC"):
+    with pytest.raises(ValueError, match=r"which is more than its bytes hold|it is damaged or cut short"):
         load_point_cloud(tmp_path / "cloud.npz")
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 4), (3, 10, 3), (2, 6), (7, 6)])
+def test_few_points_are_read_where_rows_can_be_points(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    array = np.random.default_rng(3).uniform(-1.0, 1.0, shape)
+    np.save(tmp_path / "few.npy", array)
+    points = load_point_cloud(tmp_path / "few.npy").points
+    np.testing.assert_array_equal(points, array.reshape(-1, shape[-1])[:, :3])
+
+
+def test_an_archive_that_is_damaged_says_so(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "cloud.npz", points=POINTS)
+    content = (tmp_path / "cloud.npz").read_bytes()
+    middle = len(content) // 2
+    for damaged in (content[:middle], content[:middle] + bytes(20) + content[middle + 20 :], b""):
+        (tmp_path / "cloud.npz").write_bytes(damaged)
+        with pytest.raises(
+            ValueError, match=r"cloud\.npz' cannot be read: it is no NumPy archive, or it is damaged"
+        ):
+            load_point_cloud(tmp_path / "cloud.npz")

@@ -137,3 +137,21 @@ def test_a_type_that_is_none_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path, FLOATS, encoding="binary", columns=("x y z", "4 4 4", "F F D", ""))
     with pytest.raises(ValueError, match="TYPE is 'F F D'; it must be F, I or U for each of the FIELDS"):
         load_point_cloud(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("DATA ascii", "DATA zip", "DATA is 'zip', must be one of ascii, binary, binary_compressed$"),
+        ("SIZE 4 4 4", "SIZE 4 4 x", "SIZE and COUNT must be whole numbers$"),
+        ("4 5 6", "4 5", "line 10 is '4 5', with 2 of the 3 columns that are needed$"),
+        ("4 5 6", "4 5 six", "line 10 is '4 5 six'; 'six' is no number$"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_with_its_line(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA ascii\n"
+    (tmp_path / "cloud.pcd").write_text((head + "1 2 3\n10.25 20.5 30.75\n4 5 6\n").replace(old, new))
+    with pytest.raises(ValueError, match=rf"cloud\.pcd' cannot be read: {message}"):
+        load_point_cloud(tmp_path / "cloud.pcd")

@@ -110,7 +110,11 @@ def test_cells_without_a_number_are_counted(tmp_path: Path, text: str) -> None:
         ("1 2 three\n4 5 6\n", "'1 2 three' is neither titles nor a point; allowed: x y z and more"),
         ("a wall\nand a table\n", "line 1 is 'a wall'; allowed: x y z and more"),
         ("1 2 3; 4 5 6\n", "line 1 is '1 2 3; 4 5 6'; allowed: x y z and more"),
-        ("1,2,3\n4,5\n", "invalid column index 2 at row 2"),
+        ("1,2,3\n4,5\n", "line 2 is '4,5', with 2 of the 3 columns that are needed$"),
+        ("# made\n\n1 2 3\n\n4 5\n", "line 5 is '4 5', with 2 of the 3 columns that are needed$"),
+        ("1 2 3\nhello world x\n", "line 2 is 'hello world x'; 'hello' is no number$"),
+        ("1;2;3\n4;5;six\n", "line 2 is '4;5;six'; 'six' is no number$"),
+        ("1 2 3 4 5 6\n" * 3, r"its points have shape \(3, 6\) and look transposed"),
     ],
 )
 def test_lines_that_are_no_points_are_never_passed_over(tmp_path: Path, text: str, message: str) -> None:

@@ -58,3 +58,37 @@ def test_a_motion_that_overflows_leaves_the_arm_seeing():
     after = system.acceleration(q, 0 * q, q, obstacles)
     assert np.isfinite(after.clearances.values).any()
     np.testing.assert_array_equal(after.clearances.values, seen)
+
+
+def test_coordinates_that_stand_for_nothing_seen_are_refused() -> None:
+    for value in (1.1e7, 1e30, -float(np.finfo(np.float32).max)):
+        with pytest.raises(
+            ValueError, match=r"obstacles: point 1 is at \[0, .*, 0\] m, allowed: up to 1e7 m"
+        ):
+            ss.Obstacles([[0.5, 0.0, 0.0], [0.0, value, 0.0]])
+
+
+def test_points_of_which_none_is_near_are_warned_of(recwarn: pytest.WarningsRecorder) -> None:
+    points = np.array([[0.5, 0.6, 0.7], [0.9, 0.2, 0.3]])
+    with pytest.warns(
+        RuntimeWarning, match=r"farther than 100 m, the nearest is at \[500, 600, 700\] m; are they"
+    ):
+        far = ss.Obstacles(1000.0 * points, 0.01)
+    np.testing.assert_array_equal(far.points, 1000.0 * points)
+    recwarn.clear()
+    ss.Obstacles(points)
+    ss.Obstacles(np.vstack([1000.0 * points, points]))  # one wall that is far
+    ss.Obstacles([[150.0, 0.0, 0.0]], 149.0)  # a ball that reaches to the arm
+    assert not recwarn.list
+
+
+def test_what_is_no_array_is_named() -> None:
+    for make in (
+        lambda: ss.Obstacles(None),  # type: ignore[arg-type]
+        lambda: ss.Obstacles([[1.0, 0.0, 0.0]], None),  # type: ignore[arg-type]
+        lambda: ss.Sphere(0.1, None),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(
+            TypeError, match=r"(points|radii|pose) is None, must be an array of real numbers$"
+        ):
+            make()

@@ -412,3 +412,43 @@ def test_limits_by_joint_go_with_a_file() -> None:
     )
     with pytest.raises(ScenarioError, match="effort_limits go with 'urdf', not with a named robot"):
         assemble(parse(text.replace("planar2}", "planar2, effort_limits: {joint1: 1}}")))
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "message"),
+    [
+        (
+            "{type: sphere, radius: 0.05}, position: [910, 760, 0]",
+            "obstacles[0].position is [910.0, 760.0, 0.0], ",
+        ),
+        (
+            "{type: sphere, radius: 50}, position: [0.9, 0.8, 0]",
+            "obstacles[0].shape: the sphere is more than 100 m",
+        ),
+        (
+            "{type: box, size: [60, 80, 70]}, position: [0.9, 0.8, 0]",
+            "the box is more than 60 m wide; is it in met",
+        ),
+        (
+            "{type: cylinder, radius: 20, length: 90}, position: [0.9, 0.8, 0]",
+            "the cylinder is more than 40 m wide; is it in metres?",
+        ),
+        (
+            "{type: sphere, radius: 0.05}, position: [0.9, 0.8, 0], motion: {to: [0, 400, 0], begin: 0, end: 1}",
+            "obstacles[0].motion.to is [0.0, 400.0, 0.0], farther than 100 m; is it in metres?",
+        ),
+    ],
+)
+def test_obstacles_that_are_hardly_in_metres_are_warned_of(obstacle: str, message: str) -> None:
+    with pytest.warns(RuntimeWarning, match=re.escape(message)):
+        assemble(with_obstacle(f"{{shape: {obstacle}}}"))
+
+
+def test_floors_walls_and_halls_are_not_warned_of(recwarn: pytest.WarningsRecorder) -> None:
+    for shape in (
+        "{type: box, size: [80, 80, 0.2]}",
+        "{type: plane, extent: 30}",
+        "{type: sphere, radius: 2}",
+    ):
+        assemble(with_obstacle(f"{{shape: {shape}, position: [0, 0, -3]}}"))
+    assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]

@@ -2,9 +2,11 @@
 #include "sidestep/controller/controller.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "impl.hpp"
 
@@ -12,6 +14,44 @@ namespace sidestep {
 namespace {
 
 constexpr double pose_position_share = 2.0, pose_rotation_share = 0.5;  // of the stiffness, per m² and per rad²
+
+/// Throws what is wrong with the sizes and numbers of a goal, or the robot that it was made for.
+[[noreturn]] void refuse_goal(const JointGoal& goal, const Robot& robot) {
+  const std::vector<std::string>& joints = robot.coordinate_names();
+  using Part = std::pair<const char*, const Eigen::VectorXd*>;
+  for (const auto& [name, part] :
+       {Part("position", &goal.position), Part("velocity", &goal.velocity), Part("acceleration", &goal.acceleration)}) {
+    const std::string what = std::string("controller: goal: ") + name;
+    if (static_cast<std::size_t>(part->size()) != joints.size()) {
+      throw std::invalid_argument(what + " has " + std::to_string(part->size()) +
+                                  " entries, allowed: " + std::to_string(joints.size()) + ", one for each joint");
+    }
+    for (Eigen::Index j = 0; j < part->size(); ++j) {
+      if (!std::isfinite((*part)[j])) {
+        throw std::invalid_argument(what + " of joint '" + joints[static_cast<std::size_t>(j)] + "' is " +
+                                    std::to_string((*part)[j]) + ", allowed: finite numbers");
+      }
+    }
+  }
+  throw std::invalid_argument("controller: goal: it is not one for arm '" + robot.name() + "'");
+}
+
+void refuse_goal(const PoseGoal& goal, const Robot& robot) {
+  const std::string what = "controller: goal: the pose goal of frame '" + goal.frame().name + "' ";
+  if (!goal.is_for(robot)) {
+    throw std::invalid_argument(what + "is made for another robot than '" + robot.name() + "', allowed: one made for it");
+  }
+  using Part = std::pair<const char*, bool>;
+  for (const auto& [name, finite] : {Part("pose", goal.pose.matrix().allFinite()), Part("twist", goal.twist.allFinite()),
+                                     Part("rest", goal.settings.rest.allFinite())}) {
+    if (!finite) {
+      throw std::invalid_argument(what + "has a " + name + " that is not finite, allowed: finite numbers");
+    }
+  }
+  for (const PoseGoal& other : goal.others) {
+    refuse_goal(other, robot);
+  }
+}
 
 }  // namespace
 
@@ -28,8 +68,7 @@ void Controller::Impl::set_goal(std::optional<Goal> goal) {
     }
     const GoalFault fault = check(*goal, robot);
     if (fault == GoalFault::invalid) {
-      throw std::invalid_argument("controller: the goal must be finite, of " + std::to_string(robot.num_coordinates()) +
-                                  " coordinates, and made for arm '" + robot.name() + "'");
+      std::visit([&](const auto& one) { refuse_goal(one, robot); }, *goal);
     }
     if (fault == GoalFault::outside_limits) {
       const Eigen::VectorXd& position = std::get<JointGoal>(*goal).position;

@@ -214,6 +214,9 @@ Diagnosis Controller::Impl::diagnosis() const {
 
 std::string Controller::Impl::explain() const {
   std::string text;
+  if (tick_ == 0) {
+    return "no step was made yet: call step with the measured state, once a period";
+  }
   if (command.status == SafetyStatus::stopping) {
     text = command.program == TorqueStatus::fallback_solver
                ? "braking to a stop: the program was not solved"

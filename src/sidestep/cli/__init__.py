@@ -23,7 +23,7 @@ from sidestep.extras import MissingExtraError
 
 app = typer.Typer(
     name="sidestep",
-    help="Reactive whole-arm obstacle avoidance for any manipulator with a URDF.",
+    help="Reactive whole-arm obstacle avoidance for any manipulator with a URDF or MJCF.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,

@@ -8,7 +8,7 @@ from sidestep.cli.output import JsonOption, console, write_json
 
 
 def robots(json: JsonOption = None) -> None:
-    """List the robots that go by a name; any other is loaded by the path of its URDF."""
+    """List the robots that go by a name; any other is loaded by the path of its URDF or MJCF."""
     from sidestep.robot import robots as known_robots
 
     entries = known_robots()

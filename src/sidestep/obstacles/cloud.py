@@ -19,6 +19,7 @@ from sidestep.obstacles.voxels import merge_in_voxels
 from sidestep.robot.pose import moved
 
 FAR = 10.0  # [m] half of a cloud beyond this, or a point beyond ten times it, is warned of
+LFS = b"version https://git-lfs"  # begins what stands for a file that Git LFS has not fetched
 NOWHERE = 1e7  # [m] map coordinates do not go beyond this; a point that does stands for nothing seen
 TINY = 0.01  # [m] a cloud that was scaled and does not reach beyond this is warned of
 
@@ -69,6 +70,11 @@ def load_point_cloud(
         )
     if viewpoint and suffix != ".pcd":
         raise ValueError(f"point cloud '{path}' has no viewpoint; only .pcd files have one")
+    with path.open("rb") as stream:
+        if stream.read(len(LFS)) == LFS:
+            raise ValueError(
+                f"point cloud '{path}' is a Git LFS pointer, not the cloud; run `git lfs pull` in its repository"
+            )
     try:
         points = READERS[suffix](path)
         with np.errstate(invalid="ignore", over="ignore"):  # of points that stand for nothing seen
@@ -92,7 +98,9 @@ def load_point_cloud(
     radii = np.full(len(points), float(radius))
     if voxel is not None:
         points, radii = merge_in_voxels(points, radii, voxel=voxel)
-    return Obstacles(points, radii=radii)
+    with warnings.catch_warnings():  # it was said above, with the file's name
+        warnings.filterwarnings("ignore", "obstacles: all points are farther", RuntimeWarning)
+        return Obstacles(points, radii=radii)
 
 
 def _kept(points: Points) -> tuple[NDArray[np.bool_], str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from pathlib import Path
 from typing import IO
 
@@ -20,14 +21,24 @@ MAGIC = b"\x93NUMPY"
 def read_npy(path: Path) -> Points:
     """Points (N, 3) of an array in a .npy file; nothing is ever unpickled."""
     with path.open("rb") as stream:
-        _check_header(stream)
-    return array_points(
-        np.load(path, allow_pickle=False, mmap_mode="r")
-    )  # compares shape and size of the file
+        shape, dtype = _check_header(stream)
+        announced, held = math.prod(shape) * dtype.itemsize, path.stat().st_size - stream.tell()
+    if announced > held:
+        raise ValueError(
+            f"it is cut short: it announces an array {shape} of {announced} bytes and holds {held}"
+        )
+    return array_points(np.load(path, allow_pickle=False, mmap_mode="r"))
 
 
 def read_npz(path: Path) -> Points:
     """Points (N, 3) of the only array of a .npz file, or of the one called points or xyz."""
+    try:
+        return _points_of_archive(path)
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+        raise ValueError("it is no NumPy archive, or it is damaged or cut short") from error
+
+
+def _points_of_archive(path: Path) -> Points:
     with zipfile.ZipFile(path) as archive:
         held = [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
         chosen = held if len(held) == 1 else [name for name in NAMES if name in held]
@@ -54,7 +65,10 @@ def _check_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
     if not magic.startswith(MAGIC):
         raise ValueError("it is no NumPy file; write it by numpy.save(path, points)")
     reader = np.lib.format.read_array_header_1_0 if magic[-2] == 1 else np.lib.format.read_array_header_2_0
-    shape, _, dtype = reader(stream)
+    try:
+        shape, _, dtype = reader(stream)
+    except (ValueError, TypeError) as error:
+        raise ValueError("its header is damaged or cut short") from error
     if dtype.hasobject:
         raise ValueError(
             "it holds Python objects, which are never unpickled; save numbers: numpy.save(path, points.astype(float))"
@@ -81,7 +95,21 @@ def array_points(values: object) -> Points:
             f"its points have shape {array.shape}, expected (N, 3) or (H, W, 3), or up to {MAX_COLUMNS} columns "
             f"beginning with x, y, z, or fields x, y, z{_advice(array.shape)}"
         )
+    check_rows(array.shape)
     return np.array(array.reshape(-1, array.shape[-1])[:, :3], dtype=np.float64)
+
+
+def check_rows(shape: tuple[int, ...]) -> None:
+    """Refuses what would read as few points with many columns, and is more likely points that stand in columns.
+
+    Raises ValueError for (N, C) with N < C, and for (3, H, W), where C and W are more than 4.
+    """
+    few = 3 <= shape[0] < shape[-1] if len(shape) == 2 else shape[0] == 3
+    if few and shape[-1] > 4:
+        raise ValueError(
+            f"its points have shape {shape} and look transposed{_advice(shape)}; if every row is a point, save "
+            "x, y, z alone: array[..., :3]"
+        )
 
 
 def _coordinates(array: NDArray[np.void], names: dict[str, str]) -> NDArray[np.generic]:

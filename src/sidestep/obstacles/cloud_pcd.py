@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from sidestep.obstacles.cloud_array import Points, array_points
 from sidestep.obstacles.cloud_header import MAX_HEADER, read_header
+from sidestep.obstacles.cloud_text import fault_in
 from sidestep.robot.pose import from_quaternion, pose_at
 
+ENCODINGS = ("ascii", "binary", "binary_compressed")
 COMPRESSION = 100  # at most, of the compression of PCD files: 264 bytes from 3
 
 
@@ -50,8 +52,14 @@ def read_pcd(path: Path) -> Points:
 def _read_lines(path: Path, header: _Header) -> Points:
     columns = [sum(header.counts[:index]) for index in header.indices()]
     content = path.read_bytes()[header.num_bytes :].decode("utf-8", errors="replace")
-    lines = [line for line in content.splitlines() if line.strip()]
-    return np.loadtxt(lines, usecols=columns, ndmin=2) if lines else np.zeros((0, 3))
+    lines = content.splitlines()
+    if not content.strip():
+        return np.zeros((0, 3))
+    try:
+        return np.loadtxt([line for line in lines if line.strip()], usecols=columns, ndmin=2)
+    except ValueError as error:
+        head = path.read_bytes()[: header.num_bytes].count(b"\n")
+        raise ValueError(fault_in(lines, mark=None, columns=columns, first=head + 1)) from error
 
 
 def _read_rows(path: Path, header: _Header) -> NDArray[np.void]:
@@ -73,7 +81,10 @@ def _read_rows(path: Path, header: _Header) -> NDArray[np.void]:
 def _read_compressed(path: Path, header: _Header) -> Points:
     from pypcd4.pypcd4 import PointCloud
 
-    cloud = PointCloud.from_path(path).pc_data
+    try:
+        cloud = PointCloud.from_path(path).pc_data
+    except Exception as error:  # pypcd4 raises anything
+        raise ValueError("its points do not fit its header; the file is damaged or cut short") from error
     names = [header.words["FIELDS"][index] for index in header.indices()]
     return np.column_stack([np.asarray(cloud[name], dtype=np.float64) for name in names])
 
@@ -98,7 +109,13 @@ def _read_header(path: Path) -> _Header:
     """The header; refuses what announces more than the file holds, before anything of that size is made."""
     lines, begin = read_header(path, b"DATA")
     words = {line[0].upper(): line[1:] for line in lines if line}
-    sizes, counts = ([int(word) for word in words.get(key, ())] for key in ("SIZE", "COUNT"))
+    encoding = " ".join(words["DATA"]).lower()
+    if encoding not in ENCODINGS:
+        raise ValueError(f"DATA is {encoding!r}, must be one of {', '.join(ENCODINGS)}")
+    try:
+        sizes, counts = ([int(word) for word in words.get(key, ())] for key in ("SIZE", "COUNT"))
+    except ValueError as error:
+        raise ValueError("SIZE and COUNT must be whole numbers") from error
     counts = counts or [1] * len(sizes)
     for key in ("WIDTH", "HEIGHT", "POINTS"):
         value = " ".join(words.get(key, ["1"]))
@@ -109,7 +126,6 @@ def _read_header(path: Path) -> _Header:
     for key, values in (("SIZE", sizes), ("COUNT", counts)):
         if len(values) != len(words.get("FIELDS", ())) or min(values, default=1) < 1:
             raise ValueError(f"{key} is {values}; it must be a positive number for each of the FIELDS")
-    encoding = " ".join(words["DATA"]).lower()
     size = path.stat().st_size
     room = size - begin
     of_a_point = sum(counts)

@@ -17,8 +17,11 @@ def read_ply(path: Path) -> Points:
     num_vertices = _check_size(path)
     if num_vertices == 0:
         return np.zeros((0, 3))
-    with path.open("rb") as stream:
-        contents = load_ply(stream, fix_texture=False, skip_materials=True)
+    try:
+        with path.open("rb") as stream:
+            contents = load_ply(stream, fix_texture=False, skip_materials=True)
+    except Exception as error:  # trimesh raises anything
+        raise ValueError("its points do not fit its header; the file is damaged or cut short") from error
     faces = contents.get("faces")
     if faces is not None and len(faces):
         raise ValueError(

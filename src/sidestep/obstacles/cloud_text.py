@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sidestep.obstacles.cloud_array import Points, array_points
+from sidestep.obstacles.cloud_array import Points, array_points, check_rows
 
 COMMENTS = ("#", "//", "%")
 AXES = (("x", "y", "z"), ("points:0", "points:1", "points:2"))  # the second: ParaView
@@ -32,11 +32,32 @@ def read_text(path: Path) -> Points:
         body = [line.replace(",", ".") for line in body]  # 0,5;1,5;2,5
     read = partial(_table, [line for line in body if line.strip()], mark, columns)
     try:
-        return array_points(read())
-    except ValueError:
-        if mark is None:
-            raise
-        return array_points(read(converters=_number))  # slower; knows empty cells
+        try:
+            points = read()
+        except ValueError:
+            if mark is None:
+                raise
+            points = read(converters=_number)  # slower; knows empty cells
+    except ValueError as error:
+        raise ValueError(fault_in(body, mark=mark, columns=columns, first=first + 1)) from error
+    if _axes(titles) is None:
+        check_rows((len(points), count))
+    return array_points(points)
+
+
+def fault_in(lines: Sequence[str], *, mark: str | None, columns: Sequence[int], first: int) -> str:
+    """What is wrong with the first of some lines that is no point; the number of the first line is `first`."""
+    for index, line in enumerate(lines):
+        cells = _cells(line, mark)
+        if not any(cells):
+            continue
+        where = f"line {first + index} is {line[:80]!r}"
+        if len(cells) <= max(columns):
+            return f"{where}, with {len(cells)} of the {max(columns) + 1} columns that are needed"
+        for column in columns:
+            if cells[column] and not _is_number(cells[column]):
+                return f"{where}; {cells[column][:20]!r} is no number"
+    return f"not every line is a point; {ALLOWED}"
 
 
 def _table(

@@ -25,6 +25,7 @@ from sidestep.robot.mesh import read_mesh
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario.config import controller_settings_of
 from sidestep.scenario.perception import View, cloud_balls, seen_at, view_of
+from sidestep.scenario.plausibility import warn_of
 from sidestep.scenario.scenario import (
     BasePose,
     JointState,
@@ -102,6 +103,7 @@ def assemble(scenario: Scenario, *, progress: Progress | None = None) -> Assembl
         name = item.name or f"obstacle{index}"
         things = _at(f"obstacles[{index}]", scenario, partial(solids, scenario, item, name))
         objects += things
+        warn_of(item, things[0], f"{scenario.name}: obstacles[{index}]")
         for thing in things:
             look = partial(view_of, item, thing, bare=scenario.method == "custom")
             views.append(_at(f"obstacles[{index}]", scenario, look))
