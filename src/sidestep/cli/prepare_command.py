@@ -22,7 +22,9 @@ from sidestep.cli.output import QuietOption, console
 
 
 def prepare(
-    source: Annotated[str, typer.Argument(help="A name from `sidestep robots`, or a URDF, xacro or MJCF file.")],
+    source: Annotated[
+        str, typer.Argument(help="A name from `sidestep robots`, or a URDF, xacro or MJCF file.")
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Arm file to write (.arm).")],
     package_dir: PackageDirOption = None,
     tip: TipOption = None,
