@@ -20,7 +20,6 @@ constexpr int looks_again = 16;          // in a step
 constexpr int first_strides = 16;        // of a stop
 constexpr double rounded = 1e-6;         // relative
 constexpr int slower_stops = 3;          // each with half the acceleration
-constexpr double hard_share = 0.7;       // of the acceleration limits, from which a torque's stop is looked for
 constexpr int pause = 16;                // [periods] after a torque's stop was looked for in vain
 
 }  // namespace
@@ -60,8 +59,7 @@ bool Failsafe::keep(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Ei
   // As much of the change as the limits allow.
   const double share = smooth_share(last, a);
   pause_ = std::max(0, pause_ - 1);
-  const bool hard = share < 1.0 || (a.array().abs() > hard_share * limits_.acceleration.array()).any();
-  if (torque != nullptr && (!hard || pause_ > 0)) {
+  if (pause_ > 0) {
     known_ = false;
     return false;
   }

@@ -26,8 +26,7 @@ struct StopTorque {
 /// moves farther than R·|Δq|, see BodyClearance::reach, so that clearances are known to be as far above the floors, or where that
 /// is less than a spacing as large as the floor, above zero. What was looked at for one stop serves the next ones.
 ///
-/// Torques that change slowly take long stops. With them a stop is looked for only where the motion comes near a limit of
-/// acceleration or would break one of jerk; and where there is none, not again for a few periods.
+/// Torques that change slowly take long stops. Where there is none, none is looked for in a few periods, as that takes long.
 ///
 /// One thread at a time; nothing here allocates after construction.
 class Failsafe {

@@ -23,6 +23,7 @@ constexpr int num_balls = 150;
 JointLimits jerk_limited() {
   JointLimits limits = test::arm_limits(nv);
   limits.jerk.setConstant(300.0);
+  limits.effort_rate.setConstant(1000.0);
   return limits;
 }
 
@@ -44,7 +45,7 @@ struct Worst {
 };
 
 /// Drives it to and fro at random, at full speed.
-Worst drive(unsigned seed, double seconds) {
+Worst drive(unsigned seed, double seconds, ControllerSettings::Output output) {
   const JointLimits limits = jerk_limited();
   const Arm arm = covered_arm(limits);
   Random random(seed);
@@ -52,7 +53,7 @@ Worst drive(unsigned seed, double seconds) {
   for (Eigen::Index j = 0; j < nv; ++j) {
     q[j] = random.uniform(-0.8, 0.8);
   }
-  const ControllerSettings settings = repeatable_settings(ControllerSettings::Output::acceleration);
+  const ControllerSettings settings = repeatable_settings(output);
   Controller empty(arm, settings), controller(arm, settings);
   controller.set_obstacles(narrow(random, empty, q));
   Worst worst;
@@ -82,11 +83,13 @@ Worst drive(unsigned seed, double seconds) {
 
 BOOST_AUTO_TEST_CASE(no_drive_into_obstacles_breaks_a_limit) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
-    const Worst worst = drive(seed, 6.0);
-    BOOST_TEST(worst.jerk < 1.0 + 1e-6);
-    BOOST_TEST(worst.acceleration < 1.0 + 1e-6);
-    BOOST_TEST(worst.clearance > 0.0);
-    BOOST_TEST(worst.clearance < 0.02);  // it came near
+    for (const auto output : {ControllerSettings::Output::acceleration, ControllerSettings::Output::torque}) {
+      const Worst worst = drive(seed, 6.0, output);
+      BOOST_TEST(worst.jerk < 1.0 + 1e-6);
+      BOOST_TEST(worst.acceleration < 1.0 + 1e-6);
+      BOOST_TEST(worst.clearance > 0.0);
+      BOOST_TEST(worst.clearance < 0.02);  // it came near
+    }
   }
 }
 
