@@ -75,6 +75,7 @@ def test_a_ball_follows_the_mouse(studio: Studio, looker: Looker) -> None:
     )
     np.testing.assert_allclose(there(), wanted, atol=0.02)  # [m] in the plane that it was in
     looker.check("ball follows the mouse")
+    looker.page.wait_for_timeout(500.0)  # what the page says of the box and of the mouse may overtake each other
     rest = there()
     looker.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.6 * box["height"])
     looker.page.wait_for_timeout(500.0)
