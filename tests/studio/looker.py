@@ -130,7 +130,14 @@ class Looker:
 
     def check(self, label: str) -> None:
         """Clicks the box beside a label."""
-        self.click(f"xpath=//label[normalize-space()='{label}']/following::input[@type='checkbox'][1]")
+        self.click(self._checkbox(label))
+
+    def is_checked(self, label: str) -> bool:
+        """Whether the box beside a label is checked, as the browser shows it."""
+        return bool(self.page.locator(self._checkbox(label)).is_checked())
+
+    def _checkbox(self, label: str) -> str:
+        return f"xpath=//label[normalize-space()='{label}']/following::input[@type='checkbox'][1]"
 
     def drag(self, begin: np.ndarray, end: np.ndarray, *, key: str | None = None) -> None:
         """Draws with the mouse from a point (3,) of the world to another, perhaps with a key held."""

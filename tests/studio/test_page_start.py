@@ -74,8 +74,8 @@ def test_a_ball_follows_the_mouse(studio: Studio, looker: Looker) -> None:
         np.array(camera.position), ray_through(*shares, camera), place, normal / np.linalg.norm(normal)
     )
     np.testing.assert_allclose(there(), wanted, atol=0.02)  # [m] in the plane that it was in
+    until(lambda: looker.is_checked("ball follows the mouse"), "the page's news of the ball")
     looker.check("ball follows the mouse")
-    looker.page.wait_for_timeout(500.0)  # what the page says of the box and of the mouse may overtake each other
     rest = there()
     looker.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.6 * box["height"])
     looker.page.wait_for_timeout(500.0)
