@@ -212,16 +212,19 @@ def test_the_curved_space_is_drawn_with_the_way_on_it(studio: Studio, looker: Lo
     assert differ(without, looker.image()).sum() > 1500  # [px] of a square of 1.2 m
     end = run_to(studio, 1.0)
     until(lambda: studio.view.shown[0] == end.time, "the end")
-    robot, heights = studio.view.robot, surface.heights
-    assert heights is not None
-    here = on_surface(robot, (0, 1), end.q, heights)
+    robot, goal = studio.view.robot, end.goal
+    assert goal is not None
+
+    def lies_on_it(mark: str, q: np.ndarray) -> bool:  # the surface is computed anew, and the marks follow
+        heights = surface.heights
+        return heights is not None and np.allclose(
+            surface.place_of(mark), on_surface(robot, (0, 1), q, heights), rtol=0.0, atol=1e-9
+        )
+
+    until(lambda: lies_on_it("state", end.q) and lies_on_it("goal", goal), "state and goal on the surface")
     way = np.array(surface.trail)
+    here = surface.place_of("state")
     np.testing.assert_allclose(way[-1, :2], here[:2], atol=0.006)  # [m] points of the way are 5 mm apart
-    np.testing.assert_allclose(surface.place_of("state"), here, atol=1e-9)
-    assert end.goal is not None
-    np.testing.assert_allclose(
-        surface.place_of("goal"), on_surface(robot, (0, 1), end.goal, heights), atol=1e-9
-    )
     studio.send(m.SetPoseGoal(robot.pose(np.array([0.3, 0.9]), studio.view.tip)))
     until(lambda: last(studio).goal_pose is not None, "a pose")
     mark = lambda: on_surface(robot, (0, 1), last(studio).posture.q, surface.heights)  # type: ignore[arg-type]  # noqa: E731
