@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -63,8 +64,11 @@ void DisturbanceObserver::update(const Eigen::VectorXd& before, const Eigen::Vec
                                  const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix,
                                  const Eigen::VectorXd& bias) noexcept {
   acceleration_ = (after - before) / period_;
-  // A velocity that leaps, by an impact or where a simulation starts anew, says nothing about the model.
-  if (((acceleration_ - predicted).cwiseAbs().cwiseMin(acceleration_.cwiseAbs()).array() > most_unexpected_.array()).any()) {
+  // A velocity that leaps once, by an impact or where a simulation starts anew, says nothing about the model. A push goes on.
+  const bool leapt = std::exchange(
+      leaps_,
+      ((acceleration_ - predicted).cwiseAbs().cwiseMin(acceleration_.cwiseAbs()).array() > most_unexpected_.array()).any());
+  if (leaps_ && !leapt) {
     return;
   }
   for (Eigen::Index j = 0; j < disturbance_.size(); ++j) {

@@ -27,7 +27,7 @@ class DisturbanceObserver {
 
   /// One period: velocity (nv) [/s] at its begin and end, the torque (nv) [Nm | N] that was sent, the acceleration (nv) that
   /// was predicted for it, the model's mass matrix (nv × nv) and bias (nv) there. What is not finite changes nothing, nor does a
-  /// velocity that leaps, as by an impact: by more than a tenth of its limit beyond what was predicted.
+  /// velocity that leaps once, as by an impact: by more than a tenth of its limit beyond what was predicted.
   void update(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::VectorXd& torque,
               const Eigen::VectorXd& predicted, const Eigen::MatrixXd& mass_matrix, const Eigen::VectorXd& bias) noexcept;
 
@@ -55,6 +55,7 @@ class DisturbanceObserver {
   Eigen::VectorXd most_disturbance_, most_unexpected_, most_rotor_;
   Eigen::VectorXd disturbance_, rotors_, acceleration_;
   std::vector<Joint> joints_;
+  bool leaps_ = false;    // the velocity did in the last period
   std::size_t next_ = 0;  // whose inertia is found in this period
 };
 
