@@ -79,6 +79,12 @@ std::string in_short(const Eigen::VectorXd& numbers) {
   return "[" + text + "]";
 }
 
+void warn(const std::string& words) {
+  if (PyErr_WarnEx(PyExc_RuntimeWarning, words.c_str(), 1) != 0) {
+    throw nb::python_error();
+  }
+}
+
 void raise_type(nb::handle value, const char* name, const char* allowed) {
   constexpr std::size_t longest = 60;
   std::string given = nb::repr(value).c_str();

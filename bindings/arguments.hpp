@@ -32,6 +32,9 @@ nb::object real_array(nb::handle value, const char* name);
 using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 Array as_array(nb::handle value, const char* name);
 
+/// Gives a RuntimeWarning; throws where Python makes it an error.
+void warn(const std::string& words);
+
 /// Raises TypeError that names the argument, what was given and what is allowed.
 [[noreturn]] void raise_type(nb::handle value, const char* name, const char* allowed);
 

@@ -193,16 +193,11 @@ void check_held(const Attachment& object) {
     high = high.cwiseMax(object.cover.centres[k] + reach);
   }
   const double size = (high - low).maxCoeff();
-  const auto warn = [&object](const std::string& doubt) {
-    if (PyErr_WarnEx(PyExc_RuntimeWarning, ("attach '" + object.name + "': " + doubt).c_str(), 1) != 0) {
-      throw nb::python_error();
-    }
-  };
   if (size > largest) {
-    warn("it is " + in_short(size) + " m long; is its geometry in metres?");
+    warn("attach '" + object.name + "': it is " + in_short(size) + " m long; is its geometry in metres?");
   }
   if (object.inertial.mass > heaviest) {
-    warn("its mass is " + in_short(object.inertial.mass) + " kg; is that in kg?");
+    warn("attach '" + object.name + "': its mass is " + in_short(object.inertial.mass) + " kg; is that in kg?");
   }
 }
 
@@ -231,11 +226,8 @@ void bind_controller(nb::module_& m) {
             new (self) Controller(arm, with.is_none() ? ControllerSettings{}
                                                       : as_instance<ControllerSettings>(with, "settings", "ControllerSettings or None"));
             if (self->has_torque() && !arm.has_dynamics()) {
-              const std::string words = "arm '" + arm.name() + "' has no inertias, so torque output needs the arm's own mass matrix and "
-                                        "bias in every step: step(q, v, mass_matrix, bias)";
-              if (PyErr_WarnEx(PyExc_RuntimeWarning, words.c_str(), 1) != 0) {
-                throw nb::python_error();
-              }
+              warn("arm '" + arm.name() + "' has no inertias, so torque output needs the arm's own mass matrix and "
+                                        "bias in every step: step(q, v, mass_matrix, bias)");
             }
           },
           nb::arg("arm").none(), nb::arg("settings") = nb::none(),

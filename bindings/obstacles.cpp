@@ -18,30 +18,26 @@ namespace sidestep::python {
 namespace {
 
 constexpr std::size_t most_names = 4;
-constexpr double nowhere = 1e7;  // [m] map coordinates do not go beyond this; a point that does stands for nothing seen
-constexpr double far = 100.0;    // [m] points of which none is nearer are warned of
+constexpr double far = 100.0;  // [m] points of which none is nearer are warned of
 
-/// Refuses points that cannot be meant, and warns where none is near, as of points in millimetres. What is near ends the search.
-void check_plausible(const Obstacles& obstacles) {
+/// Warns where no point is near, as of points in millimetres. The first that is near ends the search. Cameras may mark what they
+/// do not see by the largest number.
+void warn_of_far(const Obstacles& obstacles) {
   const Eigen::Matrix3Xd& p = obstacles.points();
-  const Eigen::RowVectorXd distance = p.cwiseAbs().colwise().maxCoeff();
-  Eigen::Index at = 0;
-  if (distance.maxCoeff(&at) > nowhere) {
-    throw nb::value_error(("obstacles: point " + std::to_string(at) + " is at " + in_short(p.col(at)) +
-                           " m, allowed: up to 1e7 m; leave out what stands for nothing seen")
-                              .c_str());
-  }
+  Eigen::Index nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
   for (Eigen::Index i = 0; i < p.cols(); ++i) {
-    if (distance[i] - obstacles.radii()[i] <= far) {
+    const double distance = p.col(i).cwiseAbs().maxCoeff() - obstacles.radii()[i];
+    if (distance <= far) {
       return;
     }
+    if (distance < least) {
+      nearest = i;
+      least = distance;
+    }
   }
-  distance.minCoeff(&at);
-  const std::string words = "obstacles: all points are farther than " + in_short(far) + " m, the nearest is at " +
-                            in_short(p.col(at)) + " m; are they in millimetres? They must be in metres";
-  if (PyErr_WarnEx(PyExc_RuntimeWarning, words.c_str(), 1) != 0) {
-    throw nb::python_error();
-  }
+  warn("obstacles: all points are farther than " + in_short(far) + " m, the nearest is at " + in_short(p.col(nearest)) +
+       " m; are they in millimetres? They must be in metres");
 }
 
 /// For example "Obstacles(1012 points, of 'table', 'cup')".
@@ -79,15 +75,15 @@ void bind_obstacles(nb::module_& m) {
             Eigen::Matrix3Xd s = velocities.is_none() ? Eigen::Matrix3Xd(Eigen::Matrix3Xd::Zero(3, p.cols()))
                                                       : as_points(velocities, "velocities");
             Obstacles made(std::move(p), std::move(r), std::move(s));
-            check_plausible(made);
+            warn_of_far(made);
             new (self) Obstacles(std::move(made));
           },
           nb::arg("points").none(), nb::arg("radii").none() = 0.0, nb::arg("velocities") = nb::none(),
           nb::sig("def __init__(self, points: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike = 0.0, "
                   "velocities: numpy.typing.ArrayLike | None = None) -> None"),
           "points (N, 3) [m]; radii scalar or (N,) [m], >= 0; velocities (N, 3) [m/s] or None for rest.\n"
-          "Radii are at most 1e9 m, coordinates at most 1e7 m. Raises ValueError that names a bad point; an empty cloud is\n"
-          "refused (see none()). Warns where every point is farther than 100 m, as points in millimetres are.")
+          "Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).\n"
+          "Warns where every point is farther than 100 m, as points in millimetres are.")
       .def_static("none", &Obstacles::none, "A workspace that is known to be free.")
       .def("__len__", &Obstacles::size)
       .def("__repr__", [](const Obstacles& o) { return in_words(o); })

@@ -217,8 +217,8 @@ class Obstacles:
     def __init__(self, points: numpy.typing.ArrayLike, radii: numpy.typing.ArrayLike = 0.0, velocities: numpy.typing.ArrayLike | None = None) -> None:
         """
         points (N, 3) [m]; radii scalar or (N,) [m], >= 0; velocities (N, 3) [m/s] or None for rest.
-        Radii are at most 1e9 m, coordinates at most 1e7 m. Raises ValueError that names a bad point; an empty cloud is
-        refused (see none()). Warns where every point is farther than 100 m, as points in millimetres are.
+        Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).
+        Warns where every point is farther than 100 m, as points in millimetres are.
         """
 
     @staticmethod

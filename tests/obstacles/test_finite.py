@@ -60,14 +60,6 @@ def test_a_motion_that_overflows_leaves_the_arm_seeing():
     np.testing.assert_array_equal(after.clearances.values, seen)
 
 
-def test_coordinates_that_stand_for_nothing_seen_are_refused() -> None:
-    for value in (1.1e7, 1e30, -float(np.finfo(np.float32).max)):
-        with pytest.raises(
-            ValueError, match=r"obstacles: point 1 is at \[0, .*, 0\] m, allowed: up to 1e7 m"
-        ):
-            ss.Obstacles([[0.5, 0.0, 0.0], [0.0, value, 0.0]])
-
-
 def test_points_of_which_none_is_near_are_warned_of(recwarn: pytest.WarningsRecorder) -> None:
     points = np.array([[0.5, 0.6, 0.7], [0.9, 0.2, 0.3]])
     with pytest.warns(

@@ -47,6 +47,13 @@ Failsafe::Failsafe(const BodyClearance& body, const JointLimits& limits, double 
       looked_at_(Eigen::MatrixXd::Zero(next_q_.size(), most_looked)),
       looked_room_(Eigen::VectorXd::Zero(most_looked)) {}
 
+void StopTorque::of(const Eigen::VectorXd& a, Eigen::VectorXd& torque) const noexcept {
+  torque = bias;
+  for (Eigen::Index j = 0; j < a.size(); ++j) {
+    torque += a[j] * mass.col(j);
+  }
+}
+
 void Failsafe::look_anew() noexcept {
   stale_.fill(true);
   checks_ = most_looked / looks_again;
@@ -130,10 +137,7 @@ double Failsafe::smooth_share(const Eigen::VectorXd& last, const Eigen::VectorXd
 }
 
 bool Failsafe::is_within_effort(const Eigen::VectorXd& a, const StopTorque& torque) noexcept {
-  force_ = torque.bias;
-  for (Eigen::Index j = 0; j < a.size(); ++j) {
-    force_ += a[j] * torque.mass.col(j);
-  }
+  torque.of(a, force_);
   return (force_.array().abs() <= limits_.effort.array()).all();
 }
 

@@ -15,6 +15,9 @@ struct StopTorque {
   const Eigen::MatrixXd& mass;
   const Eigen::VectorXd& bias;
   double jerk_share;  ///< of the jerk limits, with which torques keep their rate
+
+  /// Writes M a + h.
+  void of(const Eigen::VectorXd& a, Eigen::VectorXd& torque) const noexcept;
 };
 
 /// Lets a motion go on only to states from which a stop is known that keeps every limit and touches nothing; where it would go

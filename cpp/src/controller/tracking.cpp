@@ -189,10 +189,7 @@ void Controller::Impl::keep_failsafe() noexcept {
   solution.slack.setZero();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (torque) {
-    solution.torque = bias_;
-    for (Eigen::Index j = 0; j < q_.size(); ++j) {
-      solution.torque += solution.acceleration[j] * mass_.col(j);
-    }
+    taken.of(solution.acceleration, solution.torque);
     reference_torque_ = solution.torque;
   }
   command.program = TorqueStatus::limited;

@@ -83,7 +83,7 @@ BOOST_AUTO_TEST_CASE(a_constant_disturbance_is_found_with_the_time_constant) {
 BOOST_AUTO_TEST_CASE(a_disturbance_is_bounded_by_its_share_of_the_effort_limits) {
   DisturbanceObserver observer(limits_of_two(), observer_period, observer_time, share);
   Plant plant;
-  plant.disturbance << -100.0, 100.0;
+  plant.disturbance << -500.0, 500.0;
   for (int k = 0; k < 500; ++k) {
     plant.step(observer, Eigen::Vector2d::Zero());
   }

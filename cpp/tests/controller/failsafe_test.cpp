@@ -88,7 +88,7 @@ BOOST_AUTO_TEST_CASE(no_drive_into_obstacles_breaks_a_limit) {
       BOOST_TEST(worst.jerk < 1.0 + 1e-6);
       BOOST_TEST(worst.acceleration < 1.0 + 1e-6);
       BOOST_TEST(worst.clearance > 0.0);
-      BOOST_TEST(worst.clearance < 0.02);  // it came near
+      BOOST_TEST(worst.clearance < 0.01);  // it came near
     }
   }
 }

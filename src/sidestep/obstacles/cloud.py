@@ -16,10 +16,10 @@ from sidestep.obstacles.cloud_pcd import read_pcd, read_viewpoint
 from sidestep.obstacles.cloud_ply import read_ply
 from sidestep.obstacles.cloud_text import read_text
 from sidestep.obstacles.voxels import merge_in_voxels
+from sidestep.robot.formats import LFS_POINTER
 from sidestep.robot.pose import moved
 
 FAR = 10.0  # [m] half of a cloud beyond this, or a point beyond ten times it, is warned of
-LFS = b"version https://git-lfs"  # begins what stands for a file that Git LFS has not fetched
 NOWHERE = 1e7  # [m] map coordinates do not go beyond this; a point that does stands for nothing seen
 TINY = 0.01  # [m] a cloud that was scaled and does not reach beyond this is warned of
 
@@ -71,7 +71,7 @@ def load_point_cloud(
     if viewpoint and suffix != ".pcd":
         raise ValueError(f"point cloud '{path}' has no viewpoint; only .pcd files have one")
     with path.open("rb") as stream:
-        if stream.read(len(LFS)) == LFS:
+        if stream.read(len(LFS_POINTER)) == LFS_POINTER:
             raise ValueError(
                 f"point cloud '{path}' is a Git LFS pointer, not the cloud; run `git lfs pull` in its repository"
             )

@@ -40,14 +40,14 @@ _SUFFIXES = {
     **dict.fromkeys((".stl", ".obj", ".ply", ".glb", ".gltf"), ("a mesh", _FROM_MESH)),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), ("a USD file", _FROM_USD)),
 }
-_LFS = b"version https://git-lfs"
+LFS_POINTER = b"version https://git-lfs"  # begins what stands for a file that Git LFS has not fetched
 
 
 def refuse_content(path: Path) -> None:
     """Raises ValueError for a file that is no XML, with what it is and how to convert it."""
     with path.open("rb") as file:
         head = file.read(256)
-    if head.startswith(_LFS):
+    if head.startswith(LFS_POINTER):
         raise ValueError(
             f"{path} is a Git LFS pointer, not the file itself; run `git lfs pull` in its repository"
         )

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sidestep.robot.formats import LFS_POINTER
+
 _STL_HEADER = 84  # bytes: 80 of text, 4 of the number of triangles
 _STL_TRIANGLE = 50  # bytes
 _TAIL = 4096  # bytes at an end of a file, in which its header or last element is looked for
@@ -18,7 +20,6 @@ _OBJ_FACE = re.compile(rb"^\s*f[ \t]", re.MULTILINE)
 _PLY_FACES = re.compile(rb"^element[ \t]+face[ \t]+(\d+)", re.MULTILINE)
 _STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
 _COLLADA_END = re.compile(rb"</(?:\w+:)?COLLADA\s*>")
-_LFS = b"version https://git-lfs"
 
 
 def fault_of(path: Path) -> str:
@@ -30,7 +31,7 @@ def fault_of(path: Path) -> str:
         head = file.read(_STL_HEADER)
         file.seek(max(size - _TAIL, 0))
         tail = file.read()
-    if head.startswith(_LFS):
+    if head.startswith(LFS_POINTER):
         return "is a Git LFS pointer, not the mesh; run `git lfs pull` in its repository"
     kind = kind_of(path)
     if kind == "stl" and _is_binary_stl(path):
