@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from sidestep.bench.method import Method
+from sidestep.cli.bench_encounters_command import drives, faults, moving
 from sidestep.cli.bench_output import (
     DurationOption,
     FailuresOption,
@@ -38,6 +39,9 @@ from sidestep.cli.output import JsonOption, QuietOption, console, write_json
 app = typer.Typer(help="Benchmarks on random and on published problems.", no_args_is_help=True)
 app.command("motionbenchmaker")(motion_bench_maker)
 app.command("dynamic")(dynamic)
+app.command("drives")(drives)
+app.command("moving")(moving)
+app.command("faults")(faults)
 app.command("step")(step)
 app.command("compare")(compare)
 app.command("peers")(peers)

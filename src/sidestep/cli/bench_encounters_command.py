@@ -1,0 +1,218 @@
+"""`sidestep bench drives`, `sidestep bench moving` and `sidestep bench faults`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, TypeAlias
+
+import typer
+
+from sidestep.cli.bench_output import JobsOption, SeedOption, TorqueOption, figures_table, with_bar
+from sidestep.cli.output import JsonOption, QuietOption, console, write_json
+
+Row = dict[str, Any]
+RobotsOption: TypeAlias = Annotated[
+    list[str] | None, typer.Option("--robot", help="A name from `sidestep robots`; may be repeated.")
+]
+FileOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--file", help="Rows as they come (JSON lines); a run that was cut off goes on from there."),
+]
+ShardOption: TypeAlias = Annotated[
+    str, typer.Option(metavar="K/N", help="Only the K-th of N equal parts, for several machines.")
+]
+
+
+def drives(
+    robot: RobotsOption = None,
+    count: Annotated[int, typer.Option(min=1, help="Drives of each robot.")] = 12,
+    moving: Annotated[
+        float, typer.Option(min=0.0, metavar="SPEED", help="Of half of the balls [m/s].")
+    ] = 0.0,
+    torque: Annotated[bool, typer.Option("--torque", help="Torque output, not acceleration.")] = False,
+    seed: SeedOption = 0,
+    file: FileOption = None,
+    shard: ShardOption = "1/1",
+    jobs: JobsOption = None,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Random velocity drives of 3 s among 25 balls; half of them may move.
+
+    Judged on exact meshes between samples. Steps beyond limits count before the first contact. Exit code: 0 when no
+    drive touches anything from which there is a way out, and velocity, position and torque limits are kept; else 1.
+    """
+    from sidestep.bench import DriveSettings, default_jobs, drive_table, parse_shard, run_drives
+
+    settings = DriveSettings(
+        **({"robots": tuple(robot)} if robot else {}), torque=torque, moving=moving, count=count, seed=seed
+    )
+    rows = _rows(
+        "drives",
+        quiet,
+        json,
+        lambda show: run_drives(
+            settings, file=file, shard=parse_shard(shard), jobs=jobs or default_jobs(), progress=show
+        ),
+    )
+    table = drive_table(rows)
+    shown = figures_table(
+        "robot", "drives", "contacts", "way out", "speeds [rad/s]", "self", "jerk", "acceleration", "others"
+    )
+    for name, cell in table.items():
+        beyond = cell["beyond"]
+        others = sum(beyond[key] for key in ("position", "velocity", "torque", "torque rate"))
+        shown.add_row(
+            name,
+            *(str(cell[key]) for key in ("drives", "contacts", "with_way_out")),
+            ", ".join(f"{speed:g}" for speed in cell["contact_speeds"]),
+            *(
+                str(value)
+                for value in (cell["self_contacts"], beyond["jerk"], beyond["acceleration"], others)
+            ),
+        )
+    bad = any(
+        cell["with_way_out"]
+        or cell["self_contacts"]
+        or any(cell["beyond"][key] for key in ("position", "velocity", "torque", "torque rate"))
+        for cell in table.values()
+    )
+    _end(shown, {"bench": "drives", "table": table, "rows": rows}, json, quiet, bad=bad)
+
+
+def moving(
+    robot: RobotsOption = None,
+    told: Annotated[
+        list[str] | None, typer.Option(help="exact, wrong, untold or late; may be repeated.")
+    ] = None,
+    speed: Annotated[list[float] | None, typer.Option(help="[m/s]; may be repeated.")] = None,
+    runs: Annotated[int, typer.Option(min=1, help="In each cell.")] = 4,
+    torque: TorqueOption = False,
+    seed: SeedOption = 0,
+    file: FileOption = None,
+    shard: ShardOption = "1/1",
+    jobs: JobsOption = None,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """A ball or a capsule comes at an arm that holds still or moves, and the controller is told more or less of it.
+
+    Told at 30 Hz: exact; wrong, with a velocity 30 % off; untold, without velocity; late, 50 to 100 ms old. FR3 and
+    UR10 run every cell, other arms exact and untold. Judged on exact meshes between samples; for each contact a way out
+    is searched. Exit code: 0 when nothing was touched from which there was a way out, else 1.
+    """
+    from sidestep.bench import MovingSettings, Told, default_jobs, moving_table, parse_shard, run_moving
+
+    for item in told or ():
+        if item not in list(Told):
+            raise ValueError(f"--told is {item!r}; allowed: {', '.join(Told)}")
+    given: dict[str, Any] = {}
+    if robot:
+        given["robots"] = tuple(robot)
+    if told:
+        given["told"] = tuple(Told(item) for item in told)
+    if speed:
+        given["speeds"] = tuple(speed)
+    settings = MovingSettings(**given, runs=runs, torque=torque, seed=seed)
+    rows = _rows(
+        "moving",
+        quiet,
+        json,
+        lambda show: run_moving(
+            settings, file=file, shard=parse_shard(shard), jobs=jobs or default_jobs(), progress=show
+        ),
+    )
+    table = moving_table(rows)
+    columns = list(dict.fromkeys(name for cells in table.values() for name in cells))
+    shown = figures_table("contacts (way out) / runs", *columns)
+    for name, cells in table.items():
+        shown.add_row(
+            name,
+            *(
+                f"{cells[c]['contacts']} ({cells[c]['with_way_out']}) / {cells[c]['runs']}"
+                if c in cells
+                else "-"
+                for c in columns
+            ),
+        )
+    bad = any(
+        cell["with_way_out"] or cell["self_contacts"] for cells in table.values() for cell in cells.values()
+    )
+    _end(shown, {"bench": "moving", "table": table, "rows": rows}, json, quiet, bad=bad)
+
+
+def faults(
+    robot: RobotsOption = None,
+    case: Annotated[list[str] | None, typer.Option(help="One fault; may be repeated [default: all].")] = None,
+    runs: Annotated[int, typer.Option(min=1, help="Of each fault and robot.")] = 2,
+    acceleration: Annotated[
+        bool, typer.Option("--acceleration", help="Acceleration output, carried out exactly, not torque.")
+    ] = False,
+    seed: SeedOption = 0,
+    file: FileOption = None,
+    shard: ShardOption = "1/1",
+    jobs: JobsOption = None,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Joint goals among 25 solids for 6 s, while something is wrong with the cloud, the measured state or the arm.
+
+    In MuJoCo under torque. Judged on exact meshes between samples; limits count before the first contact. Exit code:
+    0 when nothing was touched, else 1.
+    """
+    from sidestep.bench import FaultSettings, default_jobs, fault_table, parse_shard, run_faults
+
+    given: dict[str, Any] = {}
+    if robot:
+        given["robots"] = tuple(robot)
+    if case:
+        given["cases"] = tuple(case)
+    settings = FaultSettings(**given, runs=runs, torque=not acceleration, seed=seed)
+    rows = _rows(
+        "faults",
+        quiet,
+        json,
+        lambda show: run_faults(
+            settings, file=file, shard=parse_shard(shard), jobs=jobs or default_jobs(), progress=show
+        ),
+    )
+    table = fault_table(rows)
+    limits = ("position", "velocity", "torque", "torque rate")
+    shown = figures_table("fault", "runs", "contacts", "silent", "self", *limits)
+    for name, cell in table.items():
+        shown.add_row(
+            name,
+            *(str(cell[key]) for key in ("runs", "contacts", "silent", "self_contacts")),
+            *("{} ({:g})".format(*cell["beyond"][key]) if key in cell["beyond"] else "0" for key in limits),
+        )
+    bad = any(cell["contacts"] or cell["self_contacts"] for cell in table.values())
+    _end(shown, {"bench": "faults", "table": table, "rows": rows}, json, quiet, bad=bad)
+
+
+def _rows(
+    title: str,
+    quiet: bool,
+    json: str | None,
+    run: Callable[[Callable[[int, int, str], None]], list[Row]],
+) -> list[Row]:
+    return with_bar(console(quiet=quiet, to_stderr=json == "-"), title, run)
+
+
+def _end(shown: object, document: Row, json: str | None, quiet: bool, *, bad: bool) -> NoReturn:
+    from sidestep import __version__
+    from sidestep.bench.parallel import cpu_name
+
+    console(quiet=quiet, to_stderr=json == "-").print(shown)
+    if json is not None:
+        write_json(_finite({**document, "cpu": cpu_name(), "version": __version__}), json)
+    raise typer.Exit(1 if bad else 0)
+
+
+def _finite(value: Any) -> Any:
+    """Without infinities, which JSON does not have: None in their place."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and value in (float("inf"), float("-inf")) else value
