@@ -45,7 +45,7 @@ SEEN_EVERY = 33  # periods between two sets of obstacles: 30 Hz
 GOAL_EVERY = 1500  # periods between two goals of an arm that moves
 OFF = 0.3  # share by which a wrong velocity is wrong
 LATE = (0.05, 0.10)  # [s] by which positions are old
-TRIES = 5000
+TRIES, STARTS = 500, 100  # solids drawn for a start, and starts
 APART = 0.012  # [m] of links from each other at the start
 
 
@@ -175,9 +175,8 @@ class EncounterMaker:
         rng = np.random.default_rng(
             (seed, sum(task.robot.encode()), round(1e3 * task.speed), task.holds, task.run)
         )
-        start = self._start(rng)
         distance = float(np.clip(1.5 * task.speed, 0.7, 1.5))
-        solid = self._solid(rng, start, task.speed, distance)
+        start, solid = self._start_and_solid(rng, task.speed, distance)
         velocity = solid.velocity
         goals = [self.configuration(rng) for _ in range(20)]
         off = 1.0 + OFF * rng.choice((-1.0, 1.0))
@@ -217,8 +216,22 @@ class EncounterMaker:
     def _lowest(self, q: Array) -> float:
         return min(float(self.robot.pose(q, link)[2, 3]) for link in self._links)
 
-    def _solid(self, rng: np.random.Generator, start: Array, speed: float, distance: float) -> SceneObject:
-        """What comes: straight at a link, not at the shoulder, from a place that is free."""
+    def _start_and_solid(
+        self, rng: np.random.Generator, speed: float, distance: float
+    ) -> tuple[Array, SceneObject]:
+        for _ in range(STARTS):
+            start = self._start(rng)
+            solid = self._solid(rng, start, speed, distance)
+            if solid is not None:
+                return start, solid
+        raise ValueError(
+            f"none of {STARTS} configurations has something come at it from a place that is free"
+        )
+
+    def _solid(
+        self, rng: np.random.Generator, start: Array, speed: float, distance: float
+    ) -> SceneObject | None:
+        """What comes: straight at a link, not at the shoulder, from a place that is free; None: not found."""
         capsule, radius = rng.uniform() < 0.5, float(rng.uniform(*RADII))
         length = float(rng.uniform(*LENGTHS)) if capsule else 0.0
         for _ in range(TRIES):
@@ -238,7 +251,7 @@ class EncounterMaker:
             solid = SceneObject.from_shape("solid", shape, motion="moving", velocity=speed * direction)
             if self._exact.among([solid]).distance(start).distance > FROM_ARM:
                 return solid
-        raise ValueError(f"none of {TRIES} solids comes at the arm from a place that is free")
+        return None
 
 
 def _shape(solid: SceneObject, time: float, velocity: Array) -> Shape:
