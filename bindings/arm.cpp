@@ -162,6 +162,23 @@ void bind_arm(nb::module_& m) {
           [](const Arm& arm, const std::filesystem::path& path) { with_os_errors(path, [&] { arm.save(path); }); },
           nb::arg("path"), nb::sig("def save(self, path: str | os.PathLike[str]) -> None"),
           "Writes an .arm file in one piece. Raises OSError.")
+      .def(
+          "__getstate__",
+          [](const Arm& arm) {
+            const std::vector<std::byte> bytes = arm.bytes();
+            return nb::bytes(bytes.data(), bytes.size());
+          })
+      .def("__setstate__",
+           [](Arm& arm, const nb::bytes& bytes) {
+             new (&arm) Arm(Arm::from_bytes({static_cast<const std::byte*>(bytes.data()), bytes.size()}));
+           })
+      .def(
+          "__eq__",
+          [](const Arm& arm, nb::handle other) {
+            return nb::isinstance<Arm>(other) && arm.content_hash() == nb::cast<const Arm&>(other).content_hash();
+          },
+          nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"), "By the content, see content_hash.")
+      .def("__hash__", [](const Arm& arm) { return std::hash<std::string>()(arm.content_hash()); })
       .def_prop_ro("name", &Arm::name, "The name of the robot.")
       .def_prop_ro("num_coordinates", &Arm::num_coordinates, "Number of joint coordinates nv.")
       // Copies: what Python keeps beside an arm must not keep the arm alive, or neither would ever be freed.

@@ -91,8 +91,7 @@ void bind_settings_tree(nb::module_& m) {
       .def_rw("tracking", &S::tracking)
       .def_rw("inputs", &S::inputs)
       .def_rw("output", &S::output)
-      .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.")
-      .def("__copy__", [](const S& s) { return S(s); });
+      .def("validate", &S::validate, "Raises ValueError that names the setting, its value and what is allowed.");
   optional_part(c, "speed_limits", "SpeedLimitSettings", &ControllerSettings::speed_limits);
   optional_part(c, "planner", "OnlinePlannerSettings", &ControllerSettings::planner);
   optional_part(c, "look_ahead", "LookAheadSettings", &ControllerSettings::look_ahead);
@@ -337,18 +336,22 @@ void bind_controller(nb::module_& m) {
               throw nb::value_error("mass_matrix and bias go together: give both or none");
             }
             const Controller::Use use(self);
-            if (mass_matrix.is_none()) {
-              return Command(self.step(position, velocity));
+            Command command = mass_matrix.is_none() ? self.step(position, velocity)
+                                                    : self.step(position, velocity, as_matrix(mass_matrix, "mass_matrix", nv, nv),
+                                                                as_vector(bias, "bias", nv));
+            if (self.stepped_in_turn()) {
+              throw std::runtime_error(
+                  "several threads step this controller in turn: give each loop a controller of its own, or step from one thread");
             }
-            const Eigen::MatrixXd M = as_matrix(mass_matrix, "mass_matrix", nv, nv);
-            return Command(self.step(position, velocity, M, as_vector(bias, "bias", nv)));
+            return command;
           },
           nb::arg("q").none(), nb::arg("v").none(), nb::arg("mass_matrix") = nb::none(), nb::arg("bias") = nb::none(),
           nb::sig("def step(self, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
                   "mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command"),
           "One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)\n"
           "[Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError\n"
-          "while a RealTimeRun or `integrate` has the controller; so does what tells of the last step.")
+          "while a RealTimeRun or `integrate` has the controller, as does what tells of the last step, and where several\n"
+          "threads step it in turn.")
       .def_prop_ro("command", of_last_step([](const Controller& self) { return Command(self.command()); }), "Of the last step.")
       .def("explain", of_last_step([](const Controller& self) { return self.explain(); }),
            "One sentence: what the last command does and why, and what to do about it.")

@@ -86,6 +86,22 @@ void bind_goals(nb::module_& m) {
       .def_prop_ro("position", [](const JointGoal& g) { return to_numpy(g.position); })
       .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); })
       .def_prop_ro("acceleration", [](const JointGoal& g) { return to_numpy(g.acceleration); })
+      .def("__getstate__",
+           [](const JointGoal& g) { return nb::make_tuple(to_numpy(g.position), to_numpy(g.velocity), to_numpy(g.acceleration)); })
+      .def("__setstate__",
+           [](JointGoal& g, const nb::tuple& state) {
+             new (&g) JointGoal(as_finite_vector(state[0], "position"), as_finite_vector(state[1], "velocity"),
+                                as_finite_vector(state[2], "acceleration"));
+           })
+      .def("__eq__",
+           [](const JointGoal& g, nb::handle other) {
+             if (!nb::isinstance<JointGoal>(other)) {
+               return false;
+             }
+             const auto& o = nb::cast<const JointGoal&>(other);
+             return g.position == o.position && g.velocity == o.velocity && g.acceleration == o.acceleration;
+           },
+           nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__repr__", [](const JointGoal& g) { return "JointGoal(" + in_short(g.position) + (is_moving(g) ? ", moves)" : ")"); });
 
   nb::class_<PoseGoal>(

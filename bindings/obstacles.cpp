@@ -85,6 +85,26 @@ void bind_obstacles(nb::module_& m) {
           "Radii are at most 1e9 m. Raises ValueError that names the first bad point; an empty cloud is refused (see none()).\n"
           "Warns where every point is farther than 100 m, as points in millimetres are.")
       .def_static("none", &Obstacles::none, "A workspace that is known to be free.")
+      .def("__getstate__",
+           [](const Obstacles& o) {
+             nb::list names, counts;
+             for (const auto& [name, count] : o.groups()) {
+               names.append(std::string(name));
+               counts.append(count);
+             }
+             return nb::make_tuple(to_numpy_points(o.points()), to_numpy(o.radii()), to_numpy_points(o.velocities()), names, counts);
+           })
+      .def("__setstate__",
+           [](Obstacles& self, const nb::tuple& state) {
+             Eigen::Matrix3Xd points = as_points(state[0], "points");
+             if (points.cols() == 0) {
+               new (&self) Obstacles(Obstacles::none());
+               return;
+             }
+             Obstacles made(std::move(points), as_vector(state[1], "radii"), as_points(state[2], "velocities"));
+             new (&self) Obstacles(made.named(nb::cast<std::vector<std::string>>(state[3]), nb::cast<std::vector<Eigen::Index>>(state[4])));
+           })
+      .def("__copy__", [](const Obstacles& o) { return Obstacles(o); })
       .def("__len__", &Obstacles::size)
       .def("__repr__", [](const Obstacles& o) { return in_words(o); })
       .def_prop_ro("points", [](const Obstacles& o) { return to_numpy_points(o.points()); })

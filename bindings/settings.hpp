@@ -59,10 +59,23 @@ struct Part {
   std::function<nb::object(const Settings&)> get;
 };
 
-/// A part that is a class of its own, perhaps one that may be left out; type: of Python.
+template <class Value>
+struct Inner {
+  using type = Value;
+};
+template <class Value>
+struct Inner<std::optional<Value>> {
+  using type = Value;
+};
+
+/// A part that is a class of its own, perhaps one that may be left out, or a dict of its settings; type: of Python.
 template <class Settings, class Value>
 Part<Settings> part(const char* name, const std::string& type, Value Settings::*member) {
-  return {name, type, [name, type, member](Settings& settings, nb::handle value) {
+  return {name, type, [name, type, member](Settings& settings, nb::handle given) {
+            nb::object value = nb::borrow(given);
+            if (nb::isinstance<nb::dict>(given)) {
+              value = nb::type<typename Inner<Value>::type>()(**nb::borrow<nb::kwargs>(given));
+            }
             if (!nb::try_cast<Value>(value, settings.*member)) {
               throw nb::type_error((std::string(name) + " is " + nb::repr(value).c_str() + ", must be " + type).c_str());
             }
@@ -70,7 +83,49 @@ Part<Settings> part(const char* name, const std::string& type, Value Settings::*
           [member](const Settings& settings) { return nb::cast(settings.*member); }};
 }
 
-/// A class with a keyword and a property for every field, and a keyword for every part.
+/// The dict of all fields and parts; parts that are settings of their own are dicts in it.
+template <class Settings>
+nb::dict to_dict(const Settings& settings, const std::vector<Part<Settings>>& parts) {
+  nb::dict all;
+  for (const Field<Settings>& field : fields<Settings>()) {
+    all[field.name] = get_field(settings, field);
+  }
+  for (const Part<Settings>& each : parts) {
+    const nb::object value = each.get(settings);
+    all[each.name.c_str()] = nb::hasattr(value, "to_dict") ? value.attr("to_dict")() : value;
+  }
+  return all;
+}
+
+/// Sets fields and parts by their names; refuses others.
+template <class Settings>
+void set_all(Settings& settings, const char* name, const std::vector<Part<Settings>>& parts, const nb::dict& values) {
+  for (const auto& [key, value] : values) {
+    const auto wanted = nb::cast<std::string>(key);
+    std::string known;
+    bool found = false;
+    for (const Field<Settings>& field : fields<Settings>()) {
+      known += (known.empty() ? "" : ", ") + std::string(field.name);
+      if (wanted == field.name) {
+        set_field(settings, field, value);
+        found = true;
+      }
+    }
+    for (const Part<Settings>& each : parts) {
+      known += ", " + each.name;
+      if (wanted == each.name) {
+        each.set(settings, value);
+        found = true;
+      }
+    }
+    if (!found) {
+      throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + known).c_str());
+    }
+  }
+}
+
+/// A class with a keyword and a property for every field, and a keyword for every part. It is equal, copied and pickled by
+/// the values of all.
 template <class Settings>
 nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::string& summary,
                                    std::vector<Part<Settings>> parts = {}) {
@@ -91,28 +146,7 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
   nb::class_<Settings> c(m, name, kept(text));
   c.def("__init__", [name, parts](Settings* self, const nb::kwargs& values) {
     new (self) Settings();
-    for (const auto& [key, value] : values) {
-      const auto wanted = nb::cast<std::string>(key);
-      std::string known;
-      bool found = false;
-      for (const Field<Settings>& field : fields<Settings>()) {
-        known += (known.empty() ? "" : ", ") + std::string(field.name);
-        if (wanted == field.name) {
-          set_field(*self, field, value);
-          found = true;
-        }
-      }
-      for (const Part<Settings>& each : parts) {
-        known += ", " + each.name;
-        if (wanted == each.name) {
-          each.set(*self, value);
-          found = true;
-        }
-      }
-      if (!found) {
-        throw nb::type_error((std::string(name) + " has no setting '" + wanted + "'; it has: " + known).c_str());
-      }
-    }
+    set_all(*self, name, parts, values);
     if constexpr (checked) {
       self->validate();
     }
@@ -137,6 +171,24 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
         return std::string(name) + "(" + text + ")";
       },
       "What differs from the defaults.");
+  c.def(
+       "to_dict", [parts](const Settings& self) { return to_dict(self, parts); }, nb::sig("def to_dict(self) -> dict[str, typing.Any]"),
+       kept(std::string("All settings as a dict of numbers, texts and dicts, for YAML or JSON: ") + name + "(**d) gives them again."))
+      .def("__getstate__", [parts](const Settings& self) { return to_dict(self, parts); })
+      .def("__setstate__",
+           [name, parts](Settings& self, const nb::dict& values) {
+             new (&self) Settings();
+             set_all(self, name, parts, values);
+           })
+      .def("__copy__", [](const Settings& self) { return Settings(self); })
+      .def(
+          "__eq__",
+          [parts](const Settings& self, nb::handle other) {
+            return nb::isinstance<Settings>(other) &&
+                   to_dict(self, parts).equal(to_dict(nb::cast<const Settings&>(other), parts));
+          },
+          nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"));
+  c.attr("__hash__") = nb::none();  // they can be changed
   for (const Field<Settings>& field : fields<Settings>()) {
     const std::string own = field.name;
     c.def_prop_rw(

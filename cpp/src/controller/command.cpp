@@ -32,7 +32,7 @@ Command::Command(int num_coordinates)
       wanted(torque),
       acceleration(torque),
       velocity(torque),
-      position(torque),
+      position(Eigen::VectorXd::Constant(num_coordinates, std::numeric_limits<double>::quiet_NaN())),
       disturbance(torque),
       rotors(torque),
       limits(static_cast<std::size_t>(num_coordinates), Limit::none) {}

@@ -113,6 +113,7 @@ void Controller::Impl::set_obstacles(Obstacles obstacles) {
 Controller::Controller(Arm arm, ControllerSettings settings)
     : settings_(std::move(settings)),
       command_(arm.num_coordinates()),
+      refused_(arm.num_coordinates()),
       impl_(std::make_unique<Impl>(arm, settings_, command_)),
       newest_(impl_.get()),
       whole_(std::move(arm)),
@@ -153,18 +154,31 @@ void Controller::set_obstacles(Obstacles obstacles) {
 }
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept {
+  if (!stepper_.enter()) {
+    return refused_;
+  }
   take_over();
-  return impl_->step(q, v, nullptr, nullptr);
+  const Command& command = impl_->step(q, v, nullptr, nullptr);
+  stepper_.leave();
+  return command;
 }
 
 const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
                                 ConstVectorRef bias) noexcept {
+  if (!stepper_.enter()) {
+    return refused_;
+  }
   take_over();
-  return impl_->step(q, v, &mass_matrix, &bias);
+  const Command& command = impl_->step(q, v, &mass_matrix, &bias);
+  stepper_.leave();
+  return command;
 }
 
 const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacles(); }
-std::string Controller::explain() const { return impl_->explain(); }
+std::string Controller::explain() const {
+  return (stepper_.in_turn() ? "several threads step this controller in turn: give each loop a controller of its own; " : "") +
+         impl_->explain();
+}
 Arm Controller::arm() const {
   const std::lock_guard lock(setters_);
   return newest().arm;

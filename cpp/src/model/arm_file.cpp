@@ -537,13 +537,17 @@ Arm Arm::load(const std::filesystem::path& path) {
   }
 }
 
-void Arm::save(const std::filesystem::path& path) const {
+std::vector<std::byte> Arm::bytes() const {
   const Content& content = *content_;
-  const std::vector<std::byte> bytes =
-      encode_arm({content.robot, content.body, content.pairs, content.tables, content.inertials, content.details});
+  return encode_arm({content.robot, content.body, content.pairs, content.tables, content.inertials, content.details});
+}
+
+Arm Arm::from_bytes(std::span<const std::byte> bytes) { return decode_arm(bytes); }
+
+void Arm::save(const std::filesystem::path& path) const {
   TemporaryFile temporary(path);
   errno = 0;
-  if (!temporary.write(bytes)) {
+  if (!temporary.write(bytes())) {
     throw_system_error("cannot write arm file", path);
   }
   std::error_code failed;

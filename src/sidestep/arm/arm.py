@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from sidestep import _core
 from sidestep.arm.shipped_arms import SUFFIX, shipped_file
+from sidestep.arm.telling import Telling, somebody_watches
 from sidestep.extras import MissingExtraError
 
 if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without them
@@ -101,7 +101,8 @@ class Arm(_core.Arm):
                 cover the arm like the fine one, but has fewer and larger ellipsoids, so the arm keeps farther away. If
                 the user's cache has the fine arm, that is used.
             progress: called as progress(stage, item, done, in_all) while an arm is prepared; the stage is "cover",
-                "tables" or "pairs", the item a link or a pair of links.
+                "tables" or "pairs", the item a link or a pair of links. By default at a terminal and in a notebook a
+                line on stderr tells how far it is, and then the `summary`; elsewhere nothing does.
             cache: whether to read prepared parts from the user's cache and write them there (SIDESTEP_CACHE_DIR
                 overrides its place): the arm, the cover of each link, and the table and contact of each pair of links.
                 Other arms share them.
@@ -145,8 +146,12 @@ class Arm(_core.Arm):
             arm = cls(_core.Arm.read(shipped), description=describe)
             arm._request = source, given
             return arm
-        how = _How(tuple(allowed), dict(components or {}), draft, progress, cache)
-        return cls._prepared(describe, path.name, how, (source, given))
+        telling = Telling(path.name) if progress is None and somebody_watches() else None
+        how = _How(tuple(allowed), dict(components or {}), draft, telling or progress, cache)
+        arm = cls._prepared(describe, path.name, how, (source, given))
+        if telling is not None:
+            telling.end(arm.summary())
+        return arm
 
     @classmethod
     def from_robot(
@@ -186,10 +191,23 @@ class Arm(_core.Arm):
     def robot(self) -> _core.Robot:
         """The kinematic tree; a `Robot` with meshes where the arm comes from a robot, a description or a name.
 
-        Of an `.arm` file it is the core's, without meshes. So it is where the extra `prepare` is not installed; and,
-        with a warning, where the robot's package is not installed or has other meshes by now.
+        Of an `.arm` file it has no meshes. So it is where the extra `prepare` or the robot's package is not installed,
+        and where that has other meshes by now. What needs meshes says then why there are none.
         """
         return self._robot
+
+    def summary(self) -> str:
+        """What was read and prepared, for people: joints with their limits, reach, mass, tip, and what was assumed."""
+        from sidestep.arm.summary import summary_of
+
+        return summary_of(self)
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By the content, and by what it was prepared from; an arm of `from_robot` comes back without meshes."""
+        return _restored, (self.__getstate__(), self._request, self._is_draft)
 
     @cached_property
     def body(self) -> Body:
@@ -226,21 +244,15 @@ class Arm(_core.Arm):
     def _robot(self) -> _core.Robot:
         core = super().robot
         if self._description is None:
-            return core
+            return RobotWithoutMeshes(core, "an .arm file has none; load the robot's description for them")
         try:
             robot = self._description()
-        except MissingExtraError:
-            return core
-        except FileNotFoundError as error:
-            warnings.warn(f"arm {self.name!r} has no meshes: {error}", RuntimeWarning, stacklevel=4)
-            return core
+        except (MissingExtraError, FileNotFoundError) as error:
+            return RobotWithoutMeshes(core, str(error))
         if robot.fingerprint != self.provenance.fingerprint:
-            warnings.warn(
-                f"arm {self.name!r} has no meshes: the installed description is another one than it was prepared from",
-                RuntimeWarning,
-                stacklevel=4,
+            return RobotWithoutMeshes(
+                core, "the installed description is another one than it was prepared from"
             )
-            return core
         return robot
 
     @classmethod
@@ -283,6 +295,48 @@ class Arm(_core.Arm):
         arm._request = request[0], {**request[1], "allowed": how.allowed, "components": how.components}
         arm._is_draft = draft
         return arm
+
+
+class RobotWithoutMeshes(_core.Robot):
+    """The kinematic tree of an arm whose meshes are not here; what needs them is told why.
+
+    Args:
+        core: the tree. reason: why there are no meshes.
+    """
+
+    def __init__(self, core: _core.Robot, reason: str) -> None:
+        super().__init__(
+            core.name,
+            joints=core.joints,
+            frames=core.frames,
+            coordinate_names=core.coordinate_names,
+            limits=core.limits,
+        )
+        self.reason = reason
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise AttributeError(f"robot {self.name!r} has no {name!r}, because it has no meshes: {self.reason}")
+
+
+def _restored(content: bytes, request: tuple[str | Path, Mapping[str, Any]] | None, is_draft: bool) -> Arm:
+    """A pickled arm; its description is read again when meshes are asked for."""
+    core = _core.Arm.__new__(_core.Arm)
+    core.__setstate__(content)  # type: ignore[attr-defined]
+    describe = None
+    if request is not None:
+        source, given = request
+        own = {key: value for key, value in given.items() if key not in ("allowed", "components")}
+
+        def describe() -> Robot:
+            from sidestep.robot.any_source import robot_from
+
+            return robot_from(source, own)
+
+    arm = Arm(core, description=describe)
+    arm._request, arm._is_draft = request, is_draft
+    return arm
 
 
 @dataclass(frozen=True)

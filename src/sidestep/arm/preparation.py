@@ -19,7 +19,6 @@ from sidestep.robot import Robot
 
 Pair: TypeAlias = tuple[str, str]
 Progress: TypeAlias = Callable[[str, str, int, int], None]
-"""Called as progress(stage, item, done, in_all) while an arm is prepared, see `Arm.load`."""
 """Called as progress(stage, item, done, in_all): "cover" and a link, "tables" or "pairs" and a pair of links."""
 
 # Of the largest eigenvalue of the mass matrix: below it a coordinate moves no mass. A gripper's smallest is 1e-7 of it.
@@ -122,9 +121,19 @@ def _warn_of_touching(check: SelfCollision) -> None:
 
 
 def _of_stage(stage: str, progress: Progress | None) -> CoverProgress | None:
+    """Tells of a stage where it has come further: a search that looks at the same numbers again has not."""
     if progress is None:
         return None
-    return lambda item, done, in_all: progress(stage, item, done, in_all)
+    farthest = -1.0
+
+    def tell(item: str, done: int, in_all: int) -> None:
+        nonlocal farthest
+        share = done / max(1, in_all)
+        if share > farthest:
+            farthest = share
+            progress(stage, item, done, in_all)
+
+    return tell
 
 
 def _inertials(robot: Robot) -> Sequence[_core.Inertial]:

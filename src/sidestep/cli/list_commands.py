@@ -8,7 +8,11 @@ from sidestep.cli.output import JsonOption, console, write_json
 
 
 def robots(json: JsonOption = None) -> None:
-    """List the robots that go by a name; any other is loaded by the path of its URDF or MJCF."""
+    """List the robots that go by a name; any other is loaded by the path of its URDF or MJCF.
+
+    Each moves without any other package; meshes come with the package of its robot.
+    """
+    from sidestep.arm.shipped_arms import shipped_file
     from sidestep.robot import robots as known_robots
 
     entries = known_robots()
@@ -18,17 +22,25 @@ def robots(json: JsonOption = None) -> None:
     from rich import box
     from rich.table import Table
 
-    table = Table("robot", "joints", "what it is", "from the package", "here", box=box.SIMPLE, pad_edge=False)
+    table = Table("robot", "joints", "what it is", "moves", "meshes", box=box.SIMPLE, pad_edge=False)
     for entry in entries:
-        here = "[green]yes[/green]" if entry.available else "[yellow]no[/yellow]"
+        loads = entry.available or shipped_file(entry.name) is not None
+        yes, no = "[green]yes[/green]", "[yellow]no[/yellow]"
         table.add_row(
-            f"[bold]{entry.name}[/bold]", str(entry.num_coordinates), entry.description, entry.package, here
+            f"[bold]{entry.name}[/bold]",
+            str(entry.num_coordinates),
+            entry.description,
+            yes if loads else no,
+            yes if entry.available else no,
         )
     terminal = console()
     terminal.print(table)
+    terminal.print(
+        "moves: Arm.load takes the name; meshes: for pictures, simulation, exact distances", highlight=False
+    )
     for entry in entries:
         if not entry.available:
-            terminal.print(f"{entry.name}: {entry.reason}", highlight=False, markup=False)
+            terminal.print(f"meshes of {entry.name}: {entry.reason}", highlight=False, markup=False)
 
 
 def scenarios(json: JsonOption = None) -> None:

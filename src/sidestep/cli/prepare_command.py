@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from sidestep.cli.bench_output import with_bar
 from sidestep.cli.limit_options import (
     AccelerationLimitOption,
     EffortLimitOption,
@@ -68,9 +70,6 @@ def prepare(
 
     terminal = console(quiet=quiet, to_stderr=True)
 
-    def show(stage: str, item: str, done: int, in_all: int) -> None:
-        terminal.print(f"{stage}: {item} ({done} of {in_all})", highlight=False, soft_wrap=True)
-
     given = reading_options(
         package_dir, tip, locked, effort_limit, velocity_limit, acceleration_limit, jerk_limit
     )
@@ -80,6 +79,14 @@ def prepare(
             f"--components is {wrong[0]!r}; allowed: LINK=NUMBER with a whole number of at least 1"
         )
     given["components"] = {link: int(number) for link, number in numbers.items()}
-    arm = Arm.load(source, draft=draft, cache=cache, progress=show, **given)
+
+    def prepared(show: Callable[[int, int, str], None]) -> Arm:
+        def tell(stage: str, item: str, done: int, in_all: int) -> None:
+            show(done, in_all, f"{stage} {item}")
+
+        return Arm.load(source, draft=draft, cache=cache, progress=tell, **given)
+
+    arm = with_bar(terminal, f"preparing {Path(source).name}", prepared)
     arm.save(out)
+    terminal.print(arm.summary(), highlight=False, markup=False, soft_wrap=True)
     terminal.print(f"Arm: {out} ({arm.num_coordinates} coordinates)", highlight=False, soft_wrap=True)

@@ -12,6 +12,7 @@
 #include "sidestep/controller/command.hpp"
 #include "sidestep/controller/joint_trajectory.hpp"
 #include "sidestep/controller/settings.hpp"
+#include "sidestep/controller/single_stepper.hpp"
 #include "sidestep/system/goal.hpp"
 #include "sidestep/planning/online_planner.hpp"
 #include "sidestep/model/arm.hpp"
@@ -41,7 +42,7 @@ class Controller {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// Reserves a controller for one thread or run, in programs where two parts might call `step`; `step` does not check.
+  /// Claims a controller for one run, in programs where two parts might call `step`.
   class Use {
    public:
     /// Throws std::runtime_error if it is reserved already.
@@ -102,11 +103,16 @@ class Controller {
   std::vector<std::string> attached() const;
 
   /// Computes the command of one period at q [rad | m] and v [rad/s | m/s] (nv). A wrong size or a value that is not finite
-  /// gives a damped stop with the status `stopping`.
+  /// gives a damped stop with the status `stopping`. So does a call while another thread is inside `step`: that call gets a
+  /// command of its own, at rest and without a position, and changes nothing.
   const Command& step(ConstVectorRef q, ConstVectorRef v) noexcept;
   /// The same with the arm's own mass matrix (nv × nv) and bias (nv) [Nm | N] there; for torque output.
   const Command& step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
                       ConstVectorRef bias) noexcept;
+
+  /// Whether the last steps came from several threads in turn, as from two loops that share a controller. Only for the thread
+  /// of `step`.
+  bool stepped_in_turn() const noexcept { return stepper_.in_turn(); }
 
   /// The command of the last step; always the same object.
   const Command& command() const noexcept { return command_; }
@@ -156,6 +162,8 @@ class Controller {
 
   const ControllerSettings settings_;
   Command command_;
+  const Command refused_;  // of a thread that steps while another one does
+  SingleStepper stepper_;
   std::unique_ptr<Impl> impl_;           // of the thread of `step`
   std::atomic<Impl*> next_{nullptr};     // which it takes over in the next step
   std::atomic<Impl*> retired_{nullptr};  // those before, for another thread to destroy

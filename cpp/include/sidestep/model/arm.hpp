@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -62,6 +64,11 @@ class Arm {
 
   /// Writes an `.arm` file in one piece: a reader sees the old file or the new one. Throws std::system_error.
   void save(const std::filesystem::path& path) const;
+
+  /// The bytes of an `.arm` file.
+  std::vector<std::byte> bytes() const;
+  /// The arm of such bytes. Throws std::invalid_argument that says what is wrong and what to do.
+  static Arm from_bytes(std::span<const std::byte> bytes);
 
   const std::string& name() const noexcept { return robot().name(); }
   int num_coordinates() const noexcept { return robot().num_coordinates(); }

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <atomic>
+#include <thread>
+
+namespace sidestep {
+
+/// Finds out whether several threads step one controller, which has one thread's state. No lock, no allocation.
+class SingleStepper {
+ public:
+  /// Begins a step. False where another thread is inside one: then this one must not touch the controller.
+  bool enter() noexcept {
+    if (inside_.exchange(true, std::memory_order_acquire)) {
+      return false;
+    }
+    const std::thread::id now = std::this_thread::get_id();
+    changed_ = last_ != std::thread::id() && now != last_;
+    same_ = changed_ ? 0 : same_ + 1;
+    if (changed_) {
+      ++changes_;
+    } else if (same_ > settled) {
+      changes_ = 0;
+    }
+    last_ = now;
+    return true;
+  }
+  /// Ends the step of the thread that is inside.
+  void leave() noexcept { inside_.store(false, std::memory_order_release); }
+  /// Whether the last step came from another thread than the one before, and that again and again: two loops that share a
+  /// controller, each with a state of its own. Handing a loop over to another thread is none.
+  bool in_turn() const noexcept { return changed_ && changes_ > most_changes; }
+
+ private:
+  static constexpr int settled = 1000;    // steps of one thread after which earlier changes do not count
+  static constexpr int most_changes = 2;  // of threads: to another one, and back
+
+  std::atomic<bool> inside_{false};
+  std::thread::id last_;
+  int changes_ = 0, same_ = 0;
+  bool changed_ = false;
+};
+
+}  // namespace sidestep
