@@ -11,9 +11,10 @@ import sidestep as ss
 from sidestep.arm.preparation import _of_stage
 from sidestep.arm.telling import Telling
 
-URDF = """<robot name="two"><link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
-<link name="l1"><inertial><mass value="2.5"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-<collision><origin xyz="0.2 0 0"/><geometry><box size="0.4 0.05 0.05"/></geometry></collision></link>
+BOX = '<collision><origin xyz="{} 0 0"/><geometry><box size="{} 0.05 0.05"/></geometry></collision>'
+URDF = f"""<robot name="two"><link name="base">{BOX.format(0, 0.1)}</link>
+<link name="l1"><inertial><mass value="2.5"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>{BOX.format(0.2, 0.4)}</link>
 <joint name="j1" type="revolute"><parent link="base"/><child link="l1"/><origin xyz="0 0 0.2"/><axis xyz="0 0 1"/>
 <limit lower="-2" upper="1.5" velocity="1.25" effort="50"/></joint></robot>"""
 
