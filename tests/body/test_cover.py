@@ -199,13 +199,28 @@ def test_a_longer_search_covers_more_closely(planar: Robot) -> None:
 
     mesh = planar.collision_mesh("link2")
     assert mesh is not None
-    problem = LinkProblem(np.asarray(mesh.triangles), seed=0)
-    quick, finished = problem.solve(3), problem.finish(3)
-    # 21.0 mm and 68 mm, then 19.8 mm and 56 mm, were measured
-    assert finished.measured.mean < quick.measured.mean
-    assert finished.measured.maximum < 0.9 * quick.measured.maximum
-    assert problem.finish(3) is finished
-    assert problem.trade_off() == (TradeOff(3, finished.measured.mean, finished.measured.maximum),)
+    gains = []
+    for seed in range(3):
+        problem = LinkProblem(np.asarray(mesh.triangles), seed=seed)
+        quick = problem.excess(3)
+        finished = problem.finish(3)
+        problem.trials.clear()
+        gains.append(quick - problem.excess(3))
+        assert problem.finish(3) is finished
+        assert problem.trade_off() == (TradeOff(3, finished.measured.mean, finished.measured.maximum),)
+    # What the search minimises, a trade of mean and maximum, is never worse: 33.3, 34.3, 29.6, then 30.2, 28.0, 29.6
+    # were measured. Which seeds gain is chance.
+    assert min(gains) >= 0.0
+    assert max(gains) > 1.0
+
+
+def test_the_size_of_a_square_bar_does_not_depend_on_rounding() -> None:
+    bar = np.asarray(trimesh.creation.box((0.5, 0.08, 0.08)).triangles)
+    for seed in range(
+        3
+    ):  # noise as of another order of sums: it must not choose the axes of a square section
+        noisy = bar + np.random.default_rng(seed).uniform(-1e-16, 1e-16, bar.shape)
+        assert LinkSurface(noisy).size == pytest.approx(0.08, abs=1e-12)  # rounding
 
 
 def test_a_rearrangement_splits_one_ellipsoid_and_leaves_another_out_or_shifts_all() -> None:

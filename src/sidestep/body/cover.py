@@ -19,6 +19,7 @@ from sidestep.body.cover_surface import Array
 from sidestep.body.fitting import LinkFit, assess, mahalanobis_squared
 from sidestep.body.mixture import Mixture
 from sidestep.body.sampling import check_components, links_with_geometry, sample_link
+from sidestep.robot.matrices import determinant, principal_axes, product
 
 if TYPE_CHECKING:
     import trimesh
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from sidestep.body.cover_store import CoverStore
     from sidestep.robot import Robot
 
-ALGORITHM_VERSION = 5  # part of the cache's key: a cover of another algorithm is made again
+ALGORITHM_VERSION = 6  # part of the cache's key: a cover of another algorithm is made again
 MAX_COMPONENTS = 80
 FIXED_ALLOWANCE = 2.0  # in the mean, its square beyond MAX_AIM, of links that only self-collision sees
 LOOKAHEAD = 3  # numbers tried ahead: one more ellipsoid can be useless where two more are not
@@ -288,7 +289,7 @@ def _assess(robot: Robot, link: str, problem: LinkProblem, number: int) -> tuple
     measured = overshoot(surface, ellipsoids, directions=directions) if directions else solution.measured
     closed = bool(mesh.is_watertight)
     volume = abs(float(mesh.volume if closed else mesh.convex_hull.volume))
-    axes = np.linalg.svd(ellipsoids.shapes, compute_uv=False)
+    squares = [principal_axes(product(shape, shape.T))[0] for shape in ellipsoids.shapes]  # of the semi-axes
     cover = LinkCover(
         link=link,
         num_components=number,
@@ -301,7 +302,7 @@ def _assess(robot: Robot, link: str, problem: LinkProblem, number: int) -> tuple
         / volume,
         volume_of="mesh" if closed else "hull",
         interior_coverage=interior_coverage(surface, ellipsoids),
-        slimness=float((axes[:, 2] / axes[:, 0]).min()),
+        slimness=float(min(np.sqrt(each[0] / each[2]) for each in squares)),
         trade_off=problem.trade_off(),
     )
     return cover, ellipsoids
@@ -318,8 +319,8 @@ def cover_mixtures(
     """The covers of links as mixtures of solid ellipsoids, with the levels of their boundaries (K,)."""
     results = []
     for cover, ellipsoids in cover_links(robot, settings, progress, cached=cached, only=only):
-        volumes = np.abs(np.linalg.det(ellipsoids.shapes))
-        covariances = ellipsoids.shapes @ ellipsoids.shapes.transpose(0, 2, 1) / SOLID_LEVEL
+        volumes = np.abs(determinant(ellipsoids.shapes))
+        covariances = product(ellipsoids.shapes, ellipsoids.shapes.transpose(0, 2, 1)) / SOLID_LEVEL
         fit, mixture = density_fit(
             robot,
             cover.link,
@@ -353,5 +354,5 @@ def density_fit(
 
 def _log_likelihood(points: Array, mixture: Mixture) -> float:
     exponents = -0.5 * mahalanobis_squared(points, mixture)
-    norms = np.log(mixture.weights) - 0.5 * np.linalg.slogdet(2.0 * np.pi * mixture.covariances)[1]
+    norms = np.log(mixture.weights) - 0.5 * np.log(determinant(2.0 * np.pi * mixture.covariances))
     return float(logsumexp(exponents + norms, axis=1).mean())

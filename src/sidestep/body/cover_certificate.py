@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from sidestep.body.cover_refine import Ellipsoids
 from sidestep.body.cover_surface import Array, bisect
+from sidestep.robot.matrices import determinant
 
 BATCH = 200_000  # triangles examined at once: bounds the memory
 
@@ -86,7 +88,7 @@ def grow(ellipsoids: Ellipsoids, pieces: Array) -> Ellipsoids:
     corners = ellipsoids.squared_radii(pieces.reshape(-1, 3)).reshape(count, len(pieces), -1)
     farthest = functools.reduce(np.maximum, np.moveaxis(corners, 2, 0))
     radii = np.sqrt(farthest[:, (farthest > 1.0).all(axis=0)])
-    sizes = np.cbrt(np.abs(np.linalg.det(ellipsoids.shapes)))
+    sizes = np.array([math.cbrt(abs(volume)) for volume in determinant(ellipsoids.shapes)])
     growth = (radii - 1.0) * sizes[:, None]
     radii = radii[:, growth.min(axis=0).argsort()[::-1]]
     factors = np.ones(count)

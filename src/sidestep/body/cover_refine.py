@@ -9,6 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from sidestep import _core
 from sidestep.body.cover_surface import Array, LinkSurface
+from sidestep.robot.matrices import determinant, inverse, principal_axes, product
+
+_AT_ONCE = 4096  # points whose radii are computed together: they stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +29,22 @@ class Ellipsoids:
         return np.asarray(np.sqrt(self.squared_radii(points)).T)
 
     def squared_radii(self, points: Array) -> Array:
-        """Their squares, (K, N)."""
-        inverse = np.linalg.inv(self.shapes)
-        offsets = np.einsum("kij,kj->ki", inverse, self.centres).reshape(-1, 1)
-        flat = inverse.reshape(-1, 3) @ points.T
-        flat -= offsets
-        flat *= flat
-        x, y, z = (flat[axis::3] for axis in range(3))
-        return np.asarray(x + y + z)
+        """Their squares, (K, N): by plain sums, so that the same points are inside on every processor."""
+        squares = np.empty((len(self), len(points)))
+        rows = inverse(self.shapes)
+        for start in range(0, len(points), _AT_ONCE):
+            x, y, z = np.ascontiguousarray(points[start : start + _AT_ONCE].T)
+            for k, centre in enumerate(self.centres):
+                dx, dy, dz = x - centre[0], y - centre[1], z - centre[2]
+                found = squares[k, start : start + _AT_ONCE]
+                found[:] = 0.0
+                for a, b, c in rows[k]:
+                    u = a * dx
+                    u += b * dy
+                    u += c * dz
+                    u *= u
+                    found += u
+        return squares
 
     def scaled(self, factors: Array) -> Ellipsoids:
         return Ellipsoids(self.centres, self.shapes * factors[:, None, None])
@@ -41,8 +52,8 @@ class Ellipsoids:
     def boundary(self, directions: Array) -> tuple[Array, Array]:
         """Boundary points (K, J, 3) of unit directions (J, 3) and their share of the area (K, J) [m^2]."""
         points = self.centres[:, None] + np.einsum("kij,nj->kni", self.shapes, directions)
-        stretch = np.linalg.norm(np.einsum("kji,nj->kni", np.linalg.inv(self.shapes), directions), axis=2)
-        determinants = np.abs(np.linalg.det(self.shapes))
+        stretch = np.linalg.norm(np.einsum("kji,nj->kni", inverse(self.shapes), directions), axis=2)
+        determinants = np.abs(determinant(self.shapes))
         return points, 4.0 * np.pi / len(directions) * determinants[:, None] * stretch
 
 
@@ -105,7 +116,7 @@ def refine(
         values=surface.field.values,
         points=points,
         multipliers=np.zeros(len(points)) if multipliers is None else multipliers,
-        directions=sphere_directions(settings.directions) @ turns.transpose(0, 2, 1),
+        directions=product(sphere_directions(settings.directions), turns.transpose(0, 2, 1)),
         centres=start.centres,
         shapes=start.shapes,
         steps=settings.steps,
@@ -136,10 +147,11 @@ def initial(surface: LinkSurface, samples: Array, number: int, seed: int) -> Ell
         own = cloud[label == k]
         if len(own) < 5:
             own = cloud[rng.choice(len(cloud), 20)]
-        cov = np.cov(own.T) + (0.02 * surface.size) ** 2 * np.eye(3)
-        w, e = np.linalg.eigh(cov)
-        centres.append(own.mean(axis=0))
-        shapes.append(e @ np.diag(np.sqrt(4.0 * w)) @ e.T)
+        middle = own.mean(axis=0)
+        spread = np.einsum("ni,nj->ij", own - middle, own - middle) / (len(own) - 1)
+        w, e = principal_axes(spread + (0.02 * surface.size) ** 2 * np.eye(3))
+        centres.append(middle)
+        shapes.append(product(e * np.sqrt(4.0 * w), e.T))
     return Ellipsoids(np.array(centres), np.array(shapes))
 
 
@@ -164,12 +176,14 @@ def rearranged(
     drawn = points[rng.choice(len(points), p=weights / weights.sum())]
     split = int(ellipsoids.radii(drawn[None])[0].argmin())
     left_out = int((split + rng.integers(1, count)) % count)
-    directions, axes, _ = np.linalg.svd(ellipsoids.shapes[split])
+    shape = ellipsoids.shapes[split]
+    squares, directions = principal_axes(product(shape, shape.T))
+    axes, directions = np.sqrt(squares[::-1]), directions[:, ::-1]
     along = 0 if rng.random() < 0.5 else int(rng.integers(3))  # the longest in half the cases, else any
     offset = 0.5 * axes[along] * directions[:, along]
     axes[along] *= HALF
     centres, shapes = ellipsoids.centres.copy(), ellipsoids.shapes.copy()
     centres[left_out] = centres[split] + offset
     centres[split] -= offset
-    shapes[[split, left_out]] = directions @ np.diag(axes) @ directions.T
+    shapes[[split, left_out]] = product(directions * axes, directions.T)
     return Ellipsoids(centres, shapes)

@@ -10,6 +10,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from sidestep._core import distance_to_triangles
+from sidestep.robot.matrices import principal_axes, product
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -129,8 +130,8 @@ class LinkSurface:
         self.area = float(areas.sum())
         corners = triangles.reshape(-1, 3)
         centred = corners - corners.mean(axis=0)
-        axes = np.linalg.eigh(centred.T @ centred)[1]
-        self.size = float(np.sort(np.ptp(corners @ axes, axis=0))[1])
+        axes = principal_axes(np.einsum("ni,nj->ij", centred, centred))[1]
+        self.size = float(np.sort(np.ptp(product(corners, axes), axis=0))[1])
         # right-angled isosceles pieces with a longest edge e have the area e^2 / 4
         self.piece_size = float(np.sqrt(4.0 * self.area / detail.pieces))
         self.pieces = bisect_to_size(self.triangles, self.piece_size)

@@ -20,6 +20,7 @@ from sidestep.body.selection import (
     CriterionCurve,
     criterion_curve,
 )
+from sidestep.robot.matrices import inverse
 
 if TYPE_CHECKING:
     from sidestep.robot import Robot
@@ -155,7 +156,7 @@ def fit_links(
 def mahalanobis_squared(points: NDArray[np.float64], mixture: Mixture) -> NDArray[np.float64]:
     """(y - mu_k)^T Sigma_k^-1 (y - mu_k) for points (N, 3) and every component: (N, K)."""
     offsets = points[:, None, :] - mixture.means[None, :, :]
-    precisions = np.linalg.inv(mixture.covariances)
+    precisions = inverse(mixture.covariances)
     return np.asarray(np.einsum("nki,kij,nkj->nk", offsets, precisions, offsets))
 
 

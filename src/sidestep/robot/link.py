@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from sidestep.robot.matrices import determinant, product, transformed
 from sidestep.robot.mesh import read_mesh
 from sidestep.robot.mesh_file import kind_of
 
@@ -75,8 +76,7 @@ class Geometry:
         import trimesh
 
         if self.path is not None:
-            mesh = _file_mesh(self.path).copy()
-            mesh.apply_transform(np.diag([*self.scale, 1.0]))
+            mesh = _placed(_file_mesh(self.path), np.diag([*self.scale, 1.0]))
         elif self.kind == "box":
             mesh = trimesh.creation.box(extents=self.size)
         elif self.kind == "cylinder":
@@ -87,11 +87,13 @@ class Geometry:
             )
         else:
             mesh = trimesh.creation.icosphere(radius=self.size[0], subdivisions=_SUBDIVISIONS)
-        mesh.apply_transform(self.placement)
+        mesh = _placed(mesh, self.placement)
         if self.sweeps:
             corners = np.asarray(mesh.convex_hull.vertices)
             hulls = [
-                trimesh.convex.convex_hull((corners @ X[:, :3, :3].mT + X[:, None, :3, 3]).reshape(-1, 3))
+                trimesh.convex.convex_hull(
+                    (product(corners, X[:, :3, :3].mT) + X[:, None, :3, 3]).reshape(-1, 3)
+                )
                 for X in self.sweeps
             ]
             mesh = cast("trimesh.Trimesh", trimesh.util.concatenate(hulls))
@@ -123,6 +125,16 @@ class Link:
         )
 
 
+def _placed(mesh: trimesh.Trimesh, X: Array) -> trimesh.Trimesh:
+    """A mesh after a transform X (4, 4), by plain sums; its triangles are turned where X mirrors."""
+    import trimesh
+
+    if np.array_equal(X, np.eye(4)):
+        return mesh.copy()
+    faces = mesh.faces if determinant(X[:3, :3]) > 0.0 else np.fliplr(mesh.faces)
+    return trimesh.Trimesh(transformed(mesh.vertices.view(np.ndarray), X), faces, process=False)
+
+
 @lru_cache(maxsize=256)
 def _file_mesh(path: Path) -> trimesh.Trimesh:
     """The triangles of a mesh file in metres. COLLADA: its unit is applied, its up axis is not, as in ROS."""
@@ -130,5 +142,5 @@ def _file_mesh(path: Path) -> trimesh.Trimesh:
 
     mesh = read_mesh(path)
     if kind_of(path) == "dae" and mesh.units is not None:
-        mesh.apply_transform(np.diag([*[trimesh.units.unit_conversion(mesh.units, "meters")] * 3, 1.0]))
+        mesh = _placed(mesh, np.diag([*[trimesh.units.unit_conversion(mesh.units, "meters")] * 3, 1.0]))
     return mesh

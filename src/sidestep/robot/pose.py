@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import real_array
+from sidestep.robot.matrices import product
 
 Array = npt.NDArray[np.float64]
 
@@ -20,14 +21,14 @@ def about_axis(axis: Array, angle: float) -> Array:
     R = 1 + sin(angle) K + (1 - cos(angle)) K^2 with K x = axis × x."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Array = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+    rotation: Array = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * product(cross, cross)
     return rotation
 
 
 def from_roll_pitch_yaw(rpy: Sequence[float]) -> Array:
     """The rotation (3, 3) by roll, pitch, yaw [rad] about the fixed x, y and z axes, in this order."""
     x, y, z = np.eye(3)
-    return about_axis(z, rpy[2]) @ about_axis(y, rpy[1]) @ about_axis(x, rpy[0])
+    return product(product(about_axis(z, rpy[2]), about_axis(y, rpy[1])), about_axis(x, rpy[0]))
 
 
 def from_quaternion(quaternion: Array) -> Array:
