@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 Contents = TypeVar("Contents")
 
 CACHE_VARIABLE = "SIDESTEP_CACHE_DIR"
+CACHE_VERSION = (
+    2  # up to 0.2.0 a mesh written anew could leave the body of the old one under the new one's hash
+)
 
 
 def cache_root() -> Path:
@@ -91,6 +94,7 @@ def cache_path(robot: Robot, settings: FitSettings | CoverSettings) -> Path:
         "method": type(settings).__name__,
         "settings": asdict(settings),
         "format_version": body_file.FORMAT_VERSION,
+        "cache_version": CACHE_VERSION,
     }
     if isinstance(settings, CoverSettings):
         content["algorithm_version"] = ALGORITHM_VERSION

@@ -19,6 +19,8 @@ from sidestep.robot.pose import about_axis, checked_pose, moved, pose_at
 if TYPE_CHECKING:
     import trimesh
 
+    from sidestep.robot.mesh import MeshFile
+
 Points = NDArray[np.float64]
 Balls = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -329,12 +331,12 @@ class MeshShape:
     def balls(self, excess: float = EXCESS) -> Balls:
         """Balls inside the solid where the mesh is closed, else on its triangles.
 
-        A mesh may take seconds. The balls of a file are kept until it changes or the program ends.
+        A mesh may take seconds. The balls of a file's content are kept until the program ends.
         """
+        from sidestep.robot.mesh import MeshFile
+
         x, y, z = np.broadcast_to(np.asarray(self.scale, dtype=np.float64), 3).tolist()
-        file = Path(self.path).resolve()
-        changed = file.stat().st_mtime_ns
-        return _moved_balls(_mesh_balls(file, changed, (x, y, z), excess), self.pose)
+        return _moved_balls(_mesh_balls(MeshFile(Path(self.path)), (x, y, z), excess), self.pose)
 
     def mesh(self) -> trimesh.Trimesh:
         """The triangles of the file in the world [m].
@@ -342,10 +344,10 @@ class MeshShape:
         Raises:
             ValueError: if the file cannot be read as a mesh, or holds no triangles.
         """
-        return _placed(
-            _scaled_mesh(Path(self.path), np.broadcast_to(np.asarray(self.scale, dtype=np.float64), 3)),
-            self.pose,
-        )
+        from sidestep.robot.mesh import MeshFile
+
+        scale = np.broadcast_to(np.asarray(self.scale, dtype=np.float64), 3)
+        return _placed(_scaled_mesh(MeshFile(Path(self.path)), scale), self.pose)
 
 
 # The balls of a solid in its own frame are found once: obstacles are told many times a second.
@@ -354,18 +356,15 @@ _plane_balls = lru_cache(maxsize=256)(solid_cover.plane_balls)
 _cylinder_balls = lru_cache(maxsize=256)(solid_cover.cylinder_balls)
 
 
-@lru_cache(maxsize=64)
-def _mesh_balls(file: Path, changed: int, scale: tuple[float, float, float], excess: float) -> Balls:
-    """Of a mesh file that changed last at a time [ns]."""
+@lru_cache(maxsize=64)  # by content: a MeshFile equals each of the same bytes
+def _mesh_balls(file: MeshFile, scale: tuple[float, float, float], excess: float) -> Balls:
     from sidestep.obstacles import mesh_cover
 
     return mesh_cover.mesh_balls(_scaled_mesh(file, np.array(scale)), excess)
 
 
-def _scaled_mesh(path: Path, scale: NDArray[np.float64]) -> trimesh.Trimesh:
-    from sidestep.robot.mesh import read_mesh
-
-    mesh = read_mesh(path)
+def _scaled_mesh(file: MeshFile, scale: NDArray[np.float64]) -> trimesh.Trimesh:
+    mesh = file.triangles().copy()
     mesh.apply_transform(np.diag([*scale, 1.0]))
     return mesh
 

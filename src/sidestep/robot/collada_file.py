@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,15 +33,15 @@ _UNREAD = {  # elements with a shape that the reader behind trimesh passes over
 }
 
 
-def shape_alone(path: Path) -> io.BytesIO:
-    """The file without materials, lights, cameras and animations, for trimesh.
+def shape_alone(content: bytes) -> io.BytesIO:
+    """A file's content without materials, lights, cameras and animations, for trimesh.
 
     Raises:
         ValueError: it is no XML, has a kind of shape that is not read, or vertices that are not finite; does not name
             the file.
     """
     try:
-        root = ElementTree.parse(path).getroot()
+        root = ElementTree.parse(io.BytesIO(content)).getroot()
     except ElementTree.ParseError as error:
         raise ValueError(f"it is no well-formed XML: {error}") from error
     for element in list(root.iter()):

@@ -44,7 +44,7 @@ def fingerprint_of(robot: _core.Robot, links: Sequence[Link]) -> str:
             if geometry.sweeps:
                 add(*geometry.sweeps)
             if geometry.path is not None:
-                add(hashlib.sha256(geometry.path.read_bytes()).hexdigest())
+                add(geometry.file.digest)
     return digest.hexdigest()
 
 

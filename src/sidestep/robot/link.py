@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sidestep.robot.matrices import determinant, product, transformed
-from sidestep.robot.mesh import read_mesh
-from sidestep.robot.mesh_file import kind_of
+from sidestep.robot.mesh import MeshFile
 
 if TYPE_CHECKING:  # trimesh is imported where a mesh is made: it takes longer to import than a robot to load
     import trimesh
@@ -72,11 +71,22 @@ class Geometry:
         return self._mesh
 
     @cached_property
+    def file(self) -> MeshFile:
+        """The mesh file as it is when it is first asked for: hash and triangles are of one content.
+
+        Raises:
+            ValueError: it is no mesh of a file.
+        """
+        if self.path is None:
+            raise ValueError(f"a {self.kind} has no mesh file")
+        return MeshFile(self.path)
+
+    @cached_property
     def _mesh(self) -> trimesh.Trimesh:
         import trimesh
 
         if self.path is not None:
-            mesh = _placed(_file_mesh(self.path), np.diag([*self.scale, 1.0]))
+            mesh = _placed(_in_metres(self.file), np.diag([*self.scale, 1.0]))
         elif self.kind == "box":
             mesh = trimesh.creation.box(extents=self.size)
         elif self.kind == "cylinder":
@@ -117,7 +127,8 @@ class Link:
     def same_geometry(self, other: Link) -> bool:
         """Whether another link has the same shapes at the same places."""
         return len(self.geometries) == len(other.geometries) and all(
-            (a.kind, a.size, a.path) == (b.kind, b.size, b.path)
+            (a.kind, a.size, a.path is None) == (b.kind, b.size, b.path is None)
+            and (a.path is None or a.file == b.file)
             and np.array_equal(a.placement, b.placement)
             and np.array_equal(a.scale, b.scale)
             and np.array_equal(np.array(a.sweeps), np.array(b.sweeps))
@@ -135,12 +146,11 @@ def _placed(mesh: trimesh.Trimesh, X: Array) -> trimesh.Trimesh:
     return trimesh.Trimesh(transformed(mesh.vertices.view(np.ndarray), X), faces, process=False)
 
 
-@lru_cache(maxsize=256)
-def _file_mesh(path: Path) -> trimesh.Trimesh:
+def _in_metres(file: MeshFile) -> trimesh.Trimesh:
     """The triangles of a mesh file in metres. COLLADA: its unit is applied, its up axis is not, as in ROS."""
     import trimesh
 
-    mesh = read_mesh(path)
-    if kind_of(path) == "dae" and mesh.units is not None:
+    mesh = file.triangles()
+    if file.kind == "dae" and mesh.units is not None:
         mesh = _placed(mesh, np.diag([*[trimesh.units.unit_conversion(mesh.units, "meters")] * 3, 1.0]))
     return mesh

@@ -2,19 +2,83 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
+import json
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 import numpy as np
 
 from sidestep.robot.collada_file import NOT_FINITE, shape_alone
-from sidestep.robot.mesh_file import fault_of, kind_of
+from sidestep.robot.mesh_file import fault_in, kind_in
 
 if TYPE_CHECKING:  # they are imported where a mesh is made: they take longer to import than a robot to load
     import coal
     import trimesh
 
 _AS_WRITTEN = ("glb", "gltf")  # formats of which trimesh leaves vertices apart that are written apart
+
+
+class MeshFile:
+    """A mesh file as it was when it was read: hash and triangles come from one read.
+
+    Triangles are shared with each file of the same content, until 256 others have been read.
+
+    Args:
+        path: a file that trimesh reads (.stl, .obj, .dae, .ply, .glb …).
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        content = path.read_bytes()
+        self.kind = kind_in(content, path.suffix)
+        self._content: bytes | None = content
+        self._buffers = _buffers(content, path.parent) if self.kind == "gltf" else {}
+        self._mesh: trimesh.Trimesh | None = None
+        digest = hashlib.sha256(content)
+        for buffer in self._buffers.values():
+            digest.update(buffer)
+        #: Hash (64 hex digits) of the content, with that of the buffers beside it in glTF.
+        self.digest = digest.hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, MeshFile) and (self.digest, self.kind) == (other.digest, other.kind)
+
+    def __hash__(self) -> int:
+        return hash((self.digest, self.kind))
+
+    def triangles(self) -> trimesh.Trimesh:
+        """The triangles in the file's coordinates; copy them before you change them. Raises as `read_mesh`."""
+        if self._mesh is None:
+            self._mesh = _shared(self)
+        self._content = None  # not needed again
+        return self._mesh
+
+    def read(self) -> trimesh.Trimesh:
+        """The triangles in the file's coordinates, anew. Raises as `read_mesh`."""
+        content = self._content
+        if content is None:
+            assert self._mesh is not None  # it was read before the content was dropped
+            return self._mesh.copy()
+        return _read(self.path, content, self.kind, self._buffers)
+
+
+@lru_cache(maxsize=256)  # by content
+def _shared(file: MeshFile) -> trimesh.Trimesh:
+    return file.read()
+
+
+def _buffers(content: bytes, folder: Path) -> dict[str, bytes]:
+    """The files beside a glTF that hold its vertices, by their names in it; those that are there."""
+    try:
+        names = [buffer.get("uri", "") for buffer in json.loads(content).get("buffers", ())]
+        files = {name: folder / unquote(name) for name in names if name and not name.startswith("data:")}
+    except (ValueError, AttributeError, TypeError):  # no glTF: the reader says so
+        return {}
+    return {name: file.read_bytes() for name, file in files.items() if file.is_file()}
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:
@@ -26,18 +90,26 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
         ValueError: the file cannot be read as a mesh, holds no triangles, or has vertices that are not finite; says
             why.
     """
+    return MeshFile(path).read()
+
+
+def _read(path: Path, content: bytes, kind: str, buffers: dict[str, bytes]) -> trimesh.Trimesh:
     import trimesh
 
-    fault = fault_of(path)
+    fault = fault_in(content, path.suffix)
     if fault:
         raise ValueError(f"mesh file '{path}' {fault}")
-    kind = kind_of(path)
     try:
         if kind == "dae":
             # a broken part raises: trimesh would leave it out
-            scene = trimesh.load_scene(shape_alone(path), file_type="dae", ignore_broken=False, process=False)
+            scene = trimesh.load_scene(
+                shape_alone(content), file_type="dae", ignore_broken=False, process=False
+            )
         else:
-            scene = trimesh.load_scene(path, file_type=kind or None, process=False)
+            resolver: Any = buffers or trimesh.resolvers.FilePathResolver(str(path))
+            scene = trimesh.load_scene(
+                io.BytesIO(content), file_type=kind or None, resolver=resolver, process=False
+            )
         parts = [part for part in scene.geometry.values() if isinstance(part, trimesh.Trimesh)]
         not_finite = [_not_finite(part) for part in parts]
         if not any(not_finite):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import mmap
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,19 +25,42 @@ _STL_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
 _COLLADA_END = re.compile(rb"</(?:\w+:)?COLLADA\s*>")
 
 
+Content: TypeAlias = bytes | mmap.mmap  # of a file
+
+
 def fault_of(path: Path) -> str:
     """What is wrong with a mesh file, "" if nothing is seen; looks at its size, beginning and end."""
-    size = path.stat().st_size
+    with _mapped(path) as content:
+        return fault_in(content, path.suffix)
+
+
+def extents_of(path: Path) -> NDArray[np.float64] | None:
+    """The edges (3,) of the box around a mesh, in the file's unit; None where that takes reading it as a mesh."""
+    with _mapped(path) as content:
+        return _extents_in(content, path.suffix)
+
+
+@contextlib.contextmanager
+def _mapped(path: Path) -> Iterator[Content]:
+    """The content of a file, of which only what is looked at is read."""
+    with path.open("rb") as file:
+        if path.stat().st_size == 0:  # which cannot be mapped
+            yield b""
+            return
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            yield content
+
+
+def fault_in(content: Content, suffix: str) -> str:
+    """What is wrong with the content of a mesh file, "" if nothing is seen; `suffix` of the file's name."""
+    size = len(content)
     if size == 0:
         return "is empty (0 bytes)"
-    with path.open("rb") as file:
-        head = file.read(_STL_HEADER)
-        file.seek(max(size - _TAIL, 0))
-        tail = file.read()
+    head, tail = content[:_STL_HEADER], content[max(size - _TAIL, 0) :]
     if head.startswith(LFS_POINTER):
         return "is a Git LFS pointer, not the mesh; run `git lfs pull` in its repository"
-    kind = kind_of(path)
-    if kind == "stl" and _is_binary_stl(path):
+    kind = kind_in(content, suffix)
+    if kind == "stl" and _is_binary_stl(content):
         count = int.from_bytes(head[80:84], "little")
         if count == 0:
             return "holds no triangles: its header says 0"
@@ -47,25 +73,19 @@ def fault_of(path: Path) -> str:
         return "holds no triangles" if b"endsolid" in tail else "is truncated: it ends in its header"
     elif kind == "dae" and _COLLADA_END.search(tail) is None:
         return "is truncated: it does not end with </COLLADA>"
-    elif kind == "obj" and size <= _MOST_TEXT and _OBJ_FACE.search(path.read_bytes()) is None:
+    elif kind == "obj" and size <= _MOST_TEXT and _OBJ_FACE.search(content) is None:
         return "holds no triangles"
-    elif kind == "ply" and (faces := _PLY_FACES.search(_beginning(path))) is not None and int(faces[1]) == 0:
+    elif kind == "ply" and (faces := _PLY_FACES.search(content[:_TAIL])) is not None and int(faces[1]) == 0:
         return "holds no triangles: its header says 0"
     elif kind == "glb" and len(head) >= 12 and size < int.from_bytes(head[8:12], "little"):
         return f"is truncated: its header says {int.from_bytes(head[8:12], 'little')} bytes, {size} are there"
     return ""
 
 
-def _beginning(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(_TAIL)
-
-
-def kind_of(path: Path) -> str:
+def kind_in(content: Content, suffix: str) -> str:
     """The format of a mesh file, as the suffix of its name would be: by content where it tells, else by name."""
-    with path.open("rb") as file:
-        head = file.read(1024)
-    suffix = path.suffix.lower().lstrip(".")
+    head = content[:1024]
+    suffix = suffix.lower().lstrip(".")
     if head.startswith(b"glTF"):
         return "glb"
     if head.startswith((b"ply\n", b"ply\r")):
@@ -77,24 +97,23 @@ def kind_of(path: Path) -> str:
     if head.lstrip().startswith(b"solid") and b"facet" in head:
         return "stl"
     whole = _STL_HEADER + _STL_TRIANGLE * int.from_bytes(head[80:84], "little")
-    if len(head) >= _STL_HEADER and path.stat().st_size == whole:
+    if len(head) >= _STL_HEADER and len(content) == whole:
         return "stl"
     return suffix
 
 
-def extents_of(path: Path) -> NDArray[np.float64] | None:
-    """The edges (3,) of the box around a mesh, in the file's unit; None where that takes reading it as a mesh."""
-    kind = kind_of(path)
-    if kind == "obj" or (kind == "stl" and not _is_binary_stl(path)):
-        if path.stat().st_size > _MOST_TEXT:
+def _extents_in(content: Content, suffix: str) -> NDArray[np.float64] | None:
+    kind = kind_in(content, suffix)
+    if kind == "obj" or (kind == "stl" and not _is_binary_stl(content)):
+        if len(content) > _MOST_TEXT:
             return None
-        return _size((_OBJ_VERTEX if kind == "obj" else _STL_VERTEX).findall(path.read_bytes()))
+        return _size((_OBJ_VERTEX if kind == "obj" else _STL_VERTEX).findall(content))
     if kind != "stl":
         return None
-    content = np.memmap(path, dtype=np.uint8, mode="r")[_STL_HEADER:]
-    count = len(content) // _STL_TRIANGLE
-    rows = content[: count * _STL_TRIANGLE].reshape(count, _STL_TRIANGLE)
+    count = max(len(content) - _STL_HEADER, 0) // _STL_TRIANGLE
+    rows = np.ndarray((count, _STL_TRIANGLE), np.uint8, content, offset=_STL_HEADER if count else 0)
     corners = np.ascontiguousarray(rows[:, 12:48]).view("<f4").reshape(-1, 3)
+    del rows  # a map is not closed while an array looks at it
     return _size(corners)
 
 
@@ -109,13 +128,12 @@ def _size(corners: NDArray[np.float32] | Sequence[tuple[bytes, ...]]) -> NDArray
     return np.asarray(array.max(axis=0) - array.min(axis=0), dtype=np.float64)
 
 
-def _is_binary_stl(path: Path) -> bool:
+def _is_binary_stl(content: Content) -> bool:
     """Whether an STL is not text: many binary ones begin with "solid" as text does."""
-    with path.open("rb") as file:
-        head = file.read(1024)
+    head = content[:1024]
     if not head.lstrip().startswith(b"solid"):
         return True
-    size = path.stat().st_size
+    size = len(content)
     if len(head) >= _STL_HEADER and size == _STL_HEADER + _STL_TRIANGLE * int.from_bytes(
         head[80:84], "little"
     ):

@@ -44,7 +44,11 @@ def compiled(source: str | Path, label: str) -> Compiled:
     Raises:
         FileNotFoundError: a file that it refers to is missing. ValueError: MuJoCo refuses it. Begins with `label`.
     """
+    import mujoco
+
     left_out = LeftOut()
+    # MuJoCo's own cache takes a file for unchanged that was written anew.
+    mujoco.mj_clearCache(mujoco.mj_getCache())
     try:
         spec = _spec(source)
         model = spec.compile()

@@ -82,12 +82,16 @@ def _mesh_file(model: mujoco.MjModel, mesh: int) -> Path:
     return _stored(vertices, model.mesh_face[at : at + faces], str(model.mesh(mesh).name) or f"mesh{mesh}")
 
 
-@cache
 def _unit_sphere() -> Path:
+    return _stored(*_unit_sphere_surface(), "unit_sphere")  # again where the cache was emptied
+
+
+@cache
+def _unit_sphere_surface() -> tuple[Array, npt.NDArray[np.integer]]:
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=_SUBDIVISIONS)
-    return _stored(np.asarray(ball.vertices), np.asarray(ball.faces), "unit_sphere")
+    return np.asarray(ball.vertices), np.asarray(ball.faces)
 
 
 def _stored(vertices: Array, faces: npt.NDArray[np.integer], name: str) -> Path:
