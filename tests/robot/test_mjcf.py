@@ -195,6 +195,9 @@ def test_joint_equalities_are_mimics_of_the_actuated_joint(actuated: str, leader
     )
     robot = Robot.from_mjcf(xml, **LIMITS)
     assert robot.coordinate_names == [leader]
+    # 0 <= left <= 0.04 and 0 <= right <= 0.1 both hold
+    bounds = {"right": (0.0, 0.056), "left": (0.012, 0.04)}[leader]
+    np.testing.assert_allclose([robot.limits.lower[0], robot.limits.upper[0]], bounds, atol=EXACT)
     q = np.array([0.02])
     at = {joint.name: joint.multiplier * q[joint.coordinate] + joint.offset for joint in robot.joints}
     # MuJoCo: left - 0.01 = 0.002 + 0.5 (right - 0)

@@ -33,6 +33,58 @@ def test_mimic_chains_keep_the_source_coordinate() -> None:
     assert "follower" not in joints  # it mimics the locked joint, so it is locked too
 
 
+LED = """<robot name="led"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="leader" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+  <limit lower="-1" upper="1" velocity="2" effort="50"/></joint>
+<joint name="follower" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+  <limit {limit} effort="7"/><mimic joint="leader" {mimic}/></joint>
+<joint name="last" type="{last}"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
+  <limit lower="-0.2" upper="0.2" velocity="3" effort="7"/><mimic joint="follower" multiplier="0.5"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("limit", "mimic", "last", "bounds", "velocity"),
+    [
+        ('lower="-0.6" upper="0.9" velocity="3"', 'multiplier="3"', "fixed", (-0.2, 0.3), 1.0),
+        ('lower="-0.6" upper="0.9" velocity="3"', 'multiplier="-3" offset="0.3"', "fixed", (-0.2, 0.3), 1.0),
+        ('lower="-0.6" upper="0.9"', 'multiplier="0.1"', "fixed", (-1.0, 1.0), 2.0),
+        ('lower="0" upper="0" velocity="9"', 'multiplier="3"', "fixed", (-1.0, 1.0), 2.0),
+        # through a chain: last = 1.5 leader
+        ('lower="-9" upper="9"', 'multiplier="3"', "prismatic", (-0.2 / 1.5, 0.2 / 1.5), 2.0),
+        ('lower="-9" upper="9" velocity="9"', 'multiplier="0"', "fixed", (-1.0, 1.0), 2.0),
+    ],
+)
+def test_the_limits_of_a_mimic_joint_bound_the_one_that_it_follows(
+    limit: str, mimic: str, last: str, bounds: tuple[float, float], velocity: float
+) -> None:
+    limits = Robot.from_urdf(LED.format(limit=limit, mimic=mimic, last=last)).limits
+    np.testing.assert_allclose([limits.lower[0], limits.upper[0]], bounds, atol=1e-15)  # rounding
+    np.testing.assert_allclose(limits.velocity, [velocity], rtol=1e-15)  # rounding
+    assert limits.effort[0] == 50.0  # the one that follows has no drive
+
+
+def test_a_velocity_that_is_passed_keeps_to_the_limit_of_a_mimic_joint() -> None:
+    text = LED.format(limit='lower="-9" upper="9" velocity="3"', mimic='multiplier="-3"', last="fixed")
+    assert Robot.from_urdf(text, velocity_limits=5.0).limits.velocity[0] == 1.0
+    assert Robot.from_urdf(text, velocity_limits=0.5).limits.velocity[0] == 0.5
+
+
+@pytest.mark.parametrize("mimic", ['offset="2.5"', 'multiplier="0" offset="2.5"'])
+def test_limits_that_a_mimic_joint_leaves_no_place_are_named(mimic: str) -> None:
+    text = LED.format(limit='lower="-0.6" upper="0.9" velocity="3"', mimic=mimic, last="fixed")
+    with pytest.raises(
+        ValueError, match=r"'leader' .* its own \[-1, 1\], \[-0.6, 0.9\] of 'follower' = [01] q \+ 2.5"
+    ):
+        Robot.from_urdf(text)
+    assert Robot.from_urdf(text.replace("</robot>", MORE), locked={"leader": 0.0}).coordinate_names == [
+        "more"
+    ]
+
+
+MORE = """<link name="d"/><joint name="more" type="revolute"><parent link="base"/><child link="d"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="2" effort="5"/></joint></robot>"""
+
+
 def test_tip_keeps_the_way_and_what_is_rigid_on_it() -> None:
     robot = Robot.from_urdf(EVERY_JOINT, tip="palm")
     assert [link.name for link in robot.links] == [

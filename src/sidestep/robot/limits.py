@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sidestep._core import JointLimits, real_array
+from sidestep.robot.drives import Drive
 from sidestep.robot.link import Array
 from sidestep.robot.plausibility import check_limits
-from sidestep.robot.remarks import Remarks
-from sidestep.robot.urdf import UrdfJoint
+from sidestep.robot.urdf import Urdf, UrdfJoint
 
 LimitValues: TypeAlias = ArrayLike | Mapping[str, float]
 """A number for every joint, one per coordinate (nv,), or some by the names of their joints."""
@@ -37,18 +37,28 @@ NO_POSITION = (
 
 
 def limits_of(
-    joints: Sequence[UrdfJoint],
+    urdf: Urdf,
+    names: list[str],
     *,
-    label: str,
-    remarks: Remarks,
+    drives: Mapping[str, Drive],
     acceleration: LimitValues | None,
     velocity: LimitValues | None,
     effort: LimitValues | None,
     jerk: LimitValues | None,
     effort_rate: LimitValues | None,
 ) -> JointLimits:
-    """The limits of the joints that have a coordinate each; arguments as in `Robot.from_urdf`."""
-    names = [joint.name for joint in joints]
+    """The limits of the joints that have a coordinate each, as their own and those of joints that mimic them allow.
+
+    Positions and velocities of a joint that mimics another bound that one. Its effort limit does not: it has no drive.
+
+    Args:
+        urdf: the description. names: of the joints that have a coordinate. drives: of every joint that moves.
+            The others as in `Robot.from_urdf`.
+
+    Raises:
+        ValueError: limits that leave a joint nothing, or a limit that is wrong, with what is allowed.
+    """
+    joints, label, remarks = [urdf.joints[name] for name in names], urdf.label, urdf.remarks
     bounds = [position_bounds(joint) for joint in joints]
     for joint, (lower, upper) in zip(joints, bounds, strict=True):
         if not lower < upper:
@@ -58,6 +68,7 @@ def limits_of(
             )
         if without_position_limits(joint):
             remarks.add(NO_POSITION, f"joint {joint.name!r}")
+    bounds = [_bounded_by_followers(urdf, name, own, drives) for name, own in zip(names, bounds, strict=True)]
     written = {
         "velocity_limits": [math.inf if j.limit is None else j.limit.velocity for j in joints],
         "effort_limits": [math.inf if j.limit is None else j.limit.effort for j in joints],
@@ -75,6 +86,9 @@ def limits_of(
         ]
         for name in open_joints:
             remarks.add(kind.format(name=open_joints[0]), f"joint {name!r}")
+    final["velocity_limits"] = np.minimum(
+        final["velocity_limits"], [_velocity_of_followers(urdf, name, drives) for name in names]
+    )
     check_limits(joints, final["velocity_limits"], final["effort_limits"], remarks)
     usual = np.full(len(names), DEFAULT_ACCELERATION_LIMIT)
     accelerations = _per_coordinate(
@@ -99,6 +113,52 @@ def position_bounds(joint: UrdfJoint) -> tuple[float, float]:
     if joint.limit is None or without_position_limits(joint):
         return -math.inf, math.inf
     return joint.limit.lower, joint.limit.upper
+
+
+def _followers(urdf: Urdf, name: str, drives: Mapping[str, Drive]) -> list[tuple[UrdfJoint, Drive]]:
+    """The joints that mimic the joint `name`, also over others."""
+    return [
+        (urdf.joints[follower], drive)
+        for follower, drive in drives.items()
+        if drive.source == name and follower != name
+    ]
+
+
+def _bounded_by_followers(
+    urdf: Urdf, name: str, own: tuple[float, float], drives: Mapping[str, Drive]
+) -> tuple[float, float]:
+    """Position limits `own` of a joint, less what takes those that mimic it beyond theirs."""
+    lower, upper = own
+    said = [f"its own [{lower:g}, {upper:g}]"]
+    for follower, drive in _followers(urdf, name, drives):
+        least, most = position_bounds(follower)
+        if least == most == 0.0:
+            continue  # what exporters write where they know none
+        said.append(f"[{least:g}, {most:g}] of {follower.name!r} = {drive.multiplier:g} q + {drive.offset:g}")
+        if drive.multiplier == 0.0:
+            if not least <= drive.offset <= most:
+                lower, upper = math.inf, -math.inf
+            continue
+        ends = sorted((bound - drive.offset) / drive.multiplier for bound in (least, most))
+        lower, upper = max(lower, ends[0]), min(upper, ends[1])
+    if not lower < upper:
+        raise ValueError(
+            f"{urdf.label}: joint {name!r} = q has no place within the limits of itself and of the joints that mimic "
+            f"it: {', '.join(said)}; correct them, or lock {name!r}"
+        )
+    return lower, upper
+
+
+def _velocity_of_followers(urdf: Urdf, name: str, drives: Mapping[str, Drive]) -> float:
+    """Velocity of a joint at which the first of those that mimic it is as fast as it may be [rad/s | m/s]."""
+    return min(
+        (
+            follower.limit.velocity / abs(drive.multiplier)
+            for follower, drive in _followers(urdf, name, drives)
+            if follower.limit is not None and follower.limit.velocity is not None and drive.multiplier != 0.0
+        ),
+        default=math.inf,
+    )
 
 
 def without_position_limits(joint: UrdfJoint) -> bool:

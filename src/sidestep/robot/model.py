@@ -80,7 +80,8 @@ class Robot(_core.Robot):
 
         An SRDF beside the file says which links may touch, and named postures.
 
-        Limits are a number for all joints, one per coordinate (nv,), or `{joint: value}` for some of them.
+        Limits are a number for all joints, one per coordinate (nv,), or `{joint: value}` for some of them. A joint that
+        mimics another bounds that one by its own position and velocity limits.
 
         Args:
             source: a path, or the XML text itself (starts with `<`).

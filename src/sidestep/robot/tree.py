@@ -111,9 +111,9 @@ def build_tree(
         placed[joint.child] = (len(joints) - 1, np.eye(4))
 
     limits = limits_of(
-        [urdf.joints[name] for name in names],
-        label=urdf.label,
-        remarks=urdf.remarks,
+        urdf,
+        names,
+        drives=drives,
         acceleration=acceleration_limits,
         velocity=velocity_limits,
         effort=effort_limits,
