@@ -159,7 +159,9 @@ void bind_command(nb::module_& m) {
       .def_prop_ro("rotors", [](const Command& c) { return to_numpy(c.rotors); },
                    "(nv,) inertia that it found and the model lacks [kg m^2 | kg].")
       .def_ro("tracking_error", &Command::tracking_error, "Largest difference of the arm from the reference [rad | m].")
-      .def_ro("deviation", &Command::deviation, "Of the reference from a trajectory, in the farthest joint [rad | m].")
+      .def_ro("deviation", &Command::deviation, "Distance of the reference from the straight lines between a trajectory's samples, in the farthest joint [rad | m]: the\n"
+              "nearest of the lines within 0.05 s of where the trajectory's clock is. On the way to a first sample after zero: from\n"
+              "that way. How late it is: `delay`.")
       .def_ro("delay", &Command::delay, "How far the trajectory's clock is behind [s].")
       .def_ro("clearance", &Command::clearance, "The least of the covering body [m], exact below the activation distances; inf: far; nan: unknown.")
       .def_ro("coordinate", &Command::coordinate, "Whose that is, see Controller.labels; -1: none within reach.")
@@ -266,8 +268,11 @@ void bind_controller(nb::module_& m) {
           nb::arg("q").none(), nb::arg("times").none(), nb::arg("behaviour").none() = "keep_path",
           nb::sig("def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, "
                   "behaviour: TrajectoryBehaviour | str = 'keep_path') -> None"),
-          "Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing; cubics between them. A first\n"
-          "time after zero leaves that long to get to the first sample, which need not be where the arm is. `keep_path` slows\n"
+          "Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing. Cubics between them keep\n"
+          "monotone samples monotone and dwells still, and are within 0.01 rad (2 mm) of the straight lines. A first time after\n"
+          "zero, 3600 s at most, leaves that long to get to the first sample, which need not be where the arm is. Stamps that\n"
+          "limits do not allow because samples bunch up move by up to 0.2 s; where it is still too fast, the clock slows down.\n"
+          "Joints without limits take the short way from sample to sample, at most half a turn. `keep_path` slows\n"
           "down and waits before what blocks the path, `steer` goes around and rejoins; `command.deviation` and `command.delay`\n"
           "say how far off and behind it is. Raises ValueError that names sample, joint, value and what is allowed.")
       .def("clear_goal", &Controller::clear_goal, "The arm comes to rest where it is, and goes on evading.")

@@ -32,15 +32,19 @@ void Controller::Impl::begin_trajectory(TrajectoryOrder& order) noexcept {
   begin_v_ = v_;
   order.path.begin_at(q_, v_);
   clock_ = Clock{};
-  // At the rate at which the arm moves along it already, or which it has at once.
-  order.path.sample(0.0, path_q_, path_v_, path_a_);
+  clock_.rate = starting_rate(order.path, 0.0);
+}
+
+// The rate at which the arm moves along the path already, or which it has at once.
+double Controller::Impl::starting_rate(const JointTrajectory& path, double s) noexcept {
+  path.sample(s, path_q_, path_v_, path_a_);
   const double square = path_v_.squaredNorm(), along = path_v_.dot(v_);
   const double moves = along < square ? std::max(0.0, along / square) : 1.0;
   double at_once = 1.0;
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
     at_once = std::min(at_once, sudden * most_a_[j] / std::abs(path_v_[j]));
   }
-  clock_.rate = std::min(order.path.rate(0.0), std::max(moves, at_once));
+  return std::min(path.rate(s), std::max(moves, at_once));
 }
 
 void Controller::Impl::follow_trajectory(const TrajectoryOrder& order) noexcept {
@@ -76,15 +80,21 @@ void Controller::Impl::run_clock(const TrajectoryOrder& order) noexcept {
   const double T = settings.period;
   Clock& c = clock_;
   // On to now, as the last period said.
+  const bool leads = order.path.stands_at_first() && c.time < order.path.first();
   c.time = std::min(order.path.duration(), c.time + std::max(0.0, T * c.rate + 0.5 * T * T * c.change));
   c.rate = std::clamp(c.rate + T * c.change, 0.0, 1.0);
+  if (leads && c.time >= order.path.first()) {
+    c.time = order.path.first();
+    c.rate = starting_rate(order.path, c.time);
+    c.change = 0.0;
+  }
   order.path.sample(c.time, path_q_, path_v_, path_a_);
   if (!(c.time < order.path.duration())) {
     c.rate = c.change = 0.0;
     c.blocked = false;
     return;
   }
-  c.delay = std::max(0.0, order_age_ - c.time);
+  c.delay = std::max(0.0, order_age_ - order.path.stamp(c.time));
   // How fast the rate may change, and how fast its change.
   double most = steepest, fastest = infinity, lag = 0.0;
   const JointLimits& limits = arm.robot().limits();

@@ -173,6 +173,7 @@ class Controller::Impl : private StepState {
   void scale_to_limits(Eigen::VectorXd& velocity) const noexcept;
   void begin_trajectory(TrajectoryOrder& order) noexcept;
   void follow_trajectory(const TrajectoryOrder& order) noexcept;
+  double starting_rate(const JointTrajectory& path, double s) noexcept;
   void run_clock(const TrajectoryOrder& order) noexcept;
   void look_along(const JointTrajectory& path, double window) noexcept;
   bool keeps_path() const noexcept {

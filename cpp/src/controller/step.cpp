@@ -120,8 +120,9 @@ void Controller::Impl::report(bool known) noexcept {
     command.rotors = observer_->rotors();
   }
   command.deviation = command.delay = 0.0;
-  if (trajectory_order() && known && !begins_input_) {
-    command.deviation = (path_q_ - q_).cwiseAbs().maxCoeff();
+  if (const TrajectoryOrder* order = trajectory_order(); order != nullptr && known && !begins_input_) {
+    command.deviation =
+        clock_.time < order->path.first() ? (path_q_ - q_).cwiseAbs().maxCoeff() : order->path.deviation(clock_.time, q_);
     command.delay = clock_.delay;
   }
   command.wanted = wanted_;

@@ -50,7 +50,8 @@ struct Command {
   Eigen::VectorXd disturbance;             ///< (nv) force that the observer compensates, for torque output [Nm | N]
   Eigen::VectorXd rotors;                  ///< (nv) estimated inertia that the model lacks [kg m² | kg]
   double tracking_error = 0.0;             ///< largest |q_r − q| [rad | m]
-  double deviation = 0.0;                  ///< of the reference from a trajectory, largest |q_r − q*| [rad | m]
+  double deviation = 0.0;                  ///< of the reference from the straight lines between a trajectory's samples, in the
+                                           ///< farthest joint [rad | m], see JointTrajectory::deviation
   double delay = 0.0;                      ///< how far the trajectory's clock is behind [s]
 
   /// least clearance of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
