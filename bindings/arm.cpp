@@ -11,26 +11,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <system_error>
 
 #include "arguments.hpp"
 #include "module.hpp"
+#include "os_errors.hpp"
 
 namespace sidestep::python {
 namespace {
-
-/// Runs `action`; what the system refuses becomes OSError with the number that Python makes FileNotFoundError and such
-/// of.
-template <class Action>
-auto with_os_errors(const std::filesystem::path& path, Action&& action) {
-  try {
-    return action();
-  } catch (const std::system_error& error) {
-    const nb::object arguments = nb::make_tuple(error.code().value(), error.code().message(), path);
-    PyErr_SetObject(PyExc_OSError, arguments.ptr());
-    throw nb::python_error();
-  }
-}
 
 /// Dynamics with the memory they work in, for one thread (the GIL is held).
 struct Dynamics {
