@@ -38,6 +38,22 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
   tree_ = PointTree(points_, radii_, velocities_);
 }
 
+Obstacles Obstacles::in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities,
+                              std::vector<int> order) {
+  Obstacles made(std::move(points), std::move(radii), std::move(velocities));
+  std::vector<int> sorted = order;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t n = 0; n < sorted.size(); ++n) {
+    if (sorted.size() != static_cast<std::size_t>(made.size()) || sorted[n] != static_cast<int>(n)) {
+      throw std::invalid_argument("obstacles: the order has another number than each point once");
+    }
+  }
+  if (order != made.tree_.order()) {
+    made.tree_ = PointTree(made.points_, made.radii_, made.velocities_, std::move(order));
+  }
+  return made;
+}
+
 Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const {
   if (names.size() != counts.size()) {
     throw std::invalid_argument("obstacles: " + std::to_string(names.size()) + " names and " + std::to_string(counts.size()) +

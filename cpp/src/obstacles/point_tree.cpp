@@ -82,7 +82,11 @@ std::size_t groups(std::size_t count, int of) {
 }  // namespace
 
 PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities)
-    : order_(spatial_order(points)), fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
+    : PointTree(points, radii, velocities, spatial_order(points)) {}
+
+PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
+                     std::vector<int> order)
+    : order_(std::move(order)), fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
   if (order_.empty()) {
     return;
   }

@@ -22,6 +22,11 @@ class Obstacles {
   /// 1. Throws std::invalid_argument that names the first point at fault. For a free workspace use `none()`.
   Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities);
 
+  /// The same with the points in the order that queries use, see PointTree::order: as they were when points that have moved since
+  /// were given. For recordings. Throws also where that is none of these points.
+  static Obstacles in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities,
+                            std::vector<int> order);
+
   /// A workspace that is known to be free.
   static Obstacles none() { return Obstacles(); }
 

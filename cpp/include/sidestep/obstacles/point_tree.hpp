@@ -31,6 +31,9 @@ class PointTree {
   PointTree() = default;
   /// points (3 × N) [m], radii (N) [m], velocities (3 × N) [m/s].
   PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities);
+  /// The same in an order of the points that is given.
+  PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
+            std::vector<int> order);
 
   int size() const noexcept { return static_cast<int>(order_.size()); }
   bool moves() const noexcept { return fastest_ > 0.0; }
