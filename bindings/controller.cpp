@@ -10,6 +10,8 @@
 #include "system.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
+#include "os_errors.hpp"
+#include "recording.hpp"
 #include "settings.hpp"
 #include "sidestep/controller/motion.hpp"
 
@@ -357,6 +359,18 @@ void bind_controller(nb::module_& m) {
           "[Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError\n"
           "while a RealTimeRun or `integrate` has the controller, as does what tells of the last step, and where several\n"
           "threads step it in turn.")
+      .def(
+          "record",
+          [](Controller& self, const std::filesystem::path& path) {
+            const Controller::Use use(self);
+            with_os_errors(path, [&] { self.record(path); });
+            return RecordingInProgress{&self, path, {}};
+          },
+          nb::arg("path"), nb::keep_alive<0, 1>(), nb::sig("def record(self, path: str | os.PathLike) -> Recording"),
+          "Records every input of every step and its command to a file, from which `replay` gives the same commands bit for bit.\n"
+          "Before the first step; `with controller.record(path):` ends it with the block, else it ends with the controller. Steps\n"
+          "allocate nothing for it and wait for nobody; where the disk is too slow it ends, and the steps after that are counted. Raises\n"
+          "RuntimeError after the first step or where one was recorded already, OSError where the file cannot be written.")
       .def_prop_ro("command", of_last_step([](const Controller& self) { return Command(self.command()); }), "Of the last step.")
       .def("explain", of_last_step([](const Controller& self) { return self.explain(); }),
            "One sentence: what the last command does and why, and what to do about it.")

@@ -18,6 +18,7 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_batch(m);
   sidestep::python::bind_guidance(m);
   sidestep::python::bind_arm(m);
+  sidestep::python::bind_recording(m);
   sidestep::python::bind_controller(m);
   sidestep::python::bind_real_time(m);
 }

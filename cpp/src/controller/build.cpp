@@ -62,7 +62,7 @@ std::shared_ptr<const GeometricSystem> make_system(const Arm& arm, const Barrier
 }
 
 std::unique_ptr<OnlinePlanner> make_guide(const Arm& arm, const BodyClearance& body, const ControllerSettings& settings,
-                                          bool torque) {
+                                          bool torque, bool works) {
   if (!settings.planner) {
     return nullptr;
   }
@@ -79,6 +79,7 @@ std::unique_ptr<OnlinePlanner> make_guide(const Arm& arm, const BodyClearance& b
     guide.dynamics.emplace(arm.dynamics());
   }
   guide.synchronous = settings.synchronous;
+  guide.works = works;
   return std::make_unique<OnlinePlanner>(body, guide);
 }
 
@@ -186,7 +187,7 @@ StepState::StepState(const Robot& robot)
       path_a_(q_),
       trajectory_(at_rest(robot)) {}
 
-Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
+Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool workers)
     : StepState(a.robot()),
       arm(std::move(a)),
       settings((s.validate(), std::move(s))),
@@ -244,7 +245,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
                                 std::to_string(most_of_impedance) + " joints");
   }
   frequency_ = std::min(settings.tracking.frequency, most_per_period / settings.period);
-  guide = make_guide(arm, body_, settings, torque);
+  guide = make_guide(arm, body_, settings, torque, workers);
   const Robot of_reference = within_margins(arm.robot(), settings, settings.speed);
   const Robot of_arm = within_margins(arm.robot(), settings, 1.0);
   const int speed_rows = settings.speed_limits ? speed_rows_.max_size() : 0;
@@ -295,7 +296,7 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c)
       metric_coordinates_.push_back(static_cast<Eigen::Index>(k));
     }
   }
-  if (!settings.synchronous) {
+  if (workers && !settings.synchronous) {
     thread_ = std::thread([this] { run(); });
   }
 }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "impl.hpp"
+#include "recorder.hpp"
 
 namespace sidestep {
 
@@ -39,6 +40,8 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
   }
   goal_orders_.update();
   GoalOrder& order = goal_orders_.current();
+  taken_.goal = order.number;
+  taken_.obstacles = obstacle_orders_.current().number;
   if (order.number == goal_number_) {
     std::swap(order.order, before.goal_orders_.current().order);
     goal_ = before.goal_ == nullptr               ? nullptr
@@ -115,12 +118,23 @@ void Controller::change(const Arm& whole, std::vector<Held> held) {
     fresh->let_rest(at_rest);
     fresh->lifted = new Impl(std::move(lifted_arm), settings_, command_);
   }
+  install(std::move(fresh), whole, std::move(held));
+}
+
+void Controller::install(std::unique_ptr<Impl> fresh, const Arm& whole, std::vector<Held> held) {
   std::unique_ptr<Impl> passed_over;  // ends after the lock
   Impl* old = nullptr;
   {
     const std::lock_guard lock(setters_);
     Impl& last = newest();
     Impl* const lifted = fresh->lifted;
+    fresh->arm_number = ++arm_count_;
+    if (lifted != nullptr) {
+      lifted->arm_number = ++arm_count_;
+    }
+    if (recorder_) {
+      recorder_->add_arm(*fresh, held);
+    }
     fresh->take_orders_of(last);
     if (lifted != nullptr) {
       lifted->take_orders_of(last);

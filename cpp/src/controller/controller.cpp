@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "impl.hpp"
+#include "recorder.hpp"
 
 namespace sidestep {
 namespace {
@@ -110,11 +111,18 @@ void Controller::Impl::set_obstacles(Obstacles obstacles) {
   obstacle_orders_.put({++obstacle_count_, std::move(obstacles)});
 }
 
-Controller::Controller(Arm arm, ControllerSettings settings)
+Controller::Controller(Arm arm, ControllerSettings settings) : Controller(std::move(arm), std::move(settings), true) {
+  if (const std::filesystem::path path = next_of_folder(whole_.name()); !path.empty()) {
+    record(path);
+    recorder_->forget_if_empty();
+  }
+}
+
+Controller::Controller(Arm arm, ControllerSettings settings, bool workers)
     : settings_(std::move(settings)),
       command_(arm.num_coordinates()),
       refused_(arm.num_coordinates()),
-      impl_(std::make_unique<Impl>(arm, settings_, command_)),
+      impl_(std::make_unique<Impl>(arm, settings_, command_, workers)),
       newest_(impl_.get()),
       whole_(std::move(arm)),
       has_torque_(impl_->torque) {}
@@ -153,25 +161,59 @@ void Controller::set_obstacles(Obstacles obstacles) {
   tell([&](Impl& impl) { impl.set_obstacles(obstacles); });
 }
 
-const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept {
+const Command& Controller::step(ConstVectorRef q, ConstVectorRef v) noexcept { return step_with(q, v, nullptr, nullptr); }
+
+const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
+                                ConstVectorRef bias) noexcept {
+  return step_with(q, v, &mass_matrix, &bias);
+}
+
+const Command& Controller::step_with(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
+                                     const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept {
   if (!stepper_.enter()) {
     return refused_;
   }
+  Recorder* const recorder = records_.load(std::memory_order_acquire);
+  if (recorder != nullptr) {
+    recorder->begin_step(q, v, mass_matrix, bias);
+  }
   take_over();
-  const Command& command = impl_->step(q, v, nullptr, nullptr);
+  const Command& command = impl_->step(q, v, mass_matrix, bias);
+  if (recorder != nullptr) {
+    recorder->end_step(*impl_);
+  }
   stepper_.leave();
   return command;
 }
 
-const Command& Controller::step(ConstVectorRef q, ConstVectorRef v, Eigen::Ref<const Eigen::MatrixXd> mass_matrix,
-                                ConstVectorRef bias) noexcept {
-  if (!stepper_.enter()) {
-    return refused_;
+void Controller::record(const std::filesystem::path& path) {
+  const std::lock_guard lock(setters_);
+  if (recorder_) {
+    throw std::runtime_error("controller: it has been recorded already; make another controller for another recording");
   }
-  take_over();
-  const Command& command = impl_->step(q, v, &mass_matrix, &bias);
-  stepper_.leave();
-  return command;
+  recorder_ = std::make_unique<Recorder>(path, *impl_, setters_);
+  recorder_->note(newest());
+  if (newest_ != impl_.get()) {
+    recorder_->add_arm(*newest_, held_);
+  }
+  records_.store(recorder_.get(), std::memory_order_release);
+}
+
+RecordingSummary Controller::stop_recording() {
+  {
+    const std::lock_guard lock(setters_);
+    if (records_.exchange(nullptr) == nullptr) {
+      throw std::runtime_error("controller: nothing is recorded; begin with `record`");
+    }
+    recorder_->close();
+  }
+  return recorder_->finish();
+}
+
+void Controller::note_requests() {
+  if (recorder_) {
+    recorder_->note(newest());
+  }
 }
 
 const Obstacles& Controller::obstacles() const noexcept { return impl_->obstacles(); }

@@ -31,8 +31,9 @@ constexpr double lifted_room = 0.005;  // [m] from which on what rested is lifte
 /// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
 class Controller::Impl : private StepState {
  public:
-  /// Writes its commands to `command`, of which it is the only writer while it steps.
-  Impl(Arm arm, ControllerSettings settings, Command& command);
+  /// Writes its commands to `command`, of which it is the only writer while it steps. Without `workers` it starts no thread, and
+  /// what a step takes over is put into its buffers before: for a replay.
+  Impl(Arm arm, ControllerSettings settings, Command& command, bool workers = true);
   ~Impl();
 
   /// Takes over the orders of another one whose arm has the same joints; before the first step of this one.
@@ -80,8 +81,11 @@ class Controller::Impl : private StepState {
   Impl* before = nullptr;              // of those that wait for another thread to destroy them
   std::atomic<Impl*> lifted{nullptr};  // to go on with once what rests is lifted; its own until then
   std::unique_ptr<OnlinePlanner> guide;
+  std::uint64_t arm_number = 0;  // of the arms of a controller, in the order in which they were prepared
 
  private:
+  friend class Recorder;
+  friend class Replay;
   struct VelocityOrder {
     Eigen::VectorXd velocity;
   };
@@ -93,6 +97,7 @@ class Controller::Impl : private StepState {
   struct TrajectoryOrder {
     JointTrajectory path;
     TrajectoryBehaviour behaviour;
+    std::shared_ptr<const TrajectorySamples> samples;  // as they were given
   };
   /// What the arm is to do, as it was set.
   using Order = std::variant<std::monostate, Goal, VelocityOrder, TwistOrder, TrajectoryOrder>;
@@ -142,6 +147,14 @@ class Controller::Impl : private StepState {
     std::uint64_t goal_number = 0;
     bool avoid = false;
     AvoidanceTrajectory trajectory;
+  };
+  /// What a step took over from other threads beside its orders: a recording keeps it, and a replay gives it again. Null: nothing.
+  struct Taken {
+    std::uint64_t goal = 0, obstacles = 0;  // numbers of the orders when this arm took over; 0: it did not
+    const FoundPosture* posture = nullptr;
+    const Activations* activations = nullptr;
+    const FoundTrajectory* trajectory = nullptr;
+    const OnlinePlanner::Answer* answer = nullptr;
   };
 
   void put(Order order);
@@ -265,6 +278,7 @@ class Controller::Impl : private StepState {
   std::array<char, 160> shown_fault_{};  // what the worker failed with; empty: nothing
 
   // Of the step.
+  Taken taken_;
   std::optional<RigidBodyDynamics> dynamics_;
   std::optional<RigidBodyDynamics::Workspace> dynamics_workspace_;
   std::optional<TorqueController> torque_program_, tracking_program_;  // of the reference, of the arm
@@ -328,6 +342,7 @@ void Controller::tell(Action&& action) {
   if (lifted_ == nullptr || newest_->lifted.load() != nullptr) {
     action(*newest_);
   }
+  note_requests();
 }
 
 template <class Action>

@@ -88,6 +88,7 @@ void Controller::Impl::choose_reference() noexcept {
   if (pose != nullptr) {
     if (!settings.synchronous && postures_.update()) {
       const FoundPosture& found = postures_.current();
+      taken_.posture = &found;
       if (found.goal_number == goal_number_ && found.attempt == posture_attempt_) {
         take_posture(found.posture);
       }
@@ -108,6 +109,7 @@ void Controller::Impl::choose_reference() noexcept {
   }
   if (guide) {
     guide_status_ = guide->step(q_, time_, path_reference_);
+    taken_.answer = guide->taken();
     reference.position = path_reference_.position;
     reference.velocity = path_reference_.velocity;
     reference.acceleration = path_reference_.acceleration;
@@ -165,11 +167,14 @@ void Controller::Impl::leave_room(bool looks) noexcept {
     if (looks) {
       keep_room();
     }
-  } else if (activations_.update() || looks) {
-    const Activations& found = activations_.current();
-    const bool ours = found.goal_number == goal_number_ && found.posture_attempt == posture_attempt_;
-    workspace.activations = ours ? found.values : system->activations();
-    target_blocked_ = ours && found.target_blocked;
+  } else {
+    const Activations* const fresh = taken_.activations = activations_.update() ? &activations_.current() : nullptr;
+    if (fresh != nullptr || looks) {
+      const Activations& found = activations_.current();
+      const bool ours = found.goal_number == goal_number_ && found.posture_attempt == posture_attempt_;
+      workspace.activations = ours ? found.values : system->activations();
+      target_blocked_ = ours && found.target_blocked;
+    }
   }
 }
 
@@ -222,7 +227,8 @@ void Controller::Impl::avoid() noexcept {
     if (avoiding_) {
       trajectory_.advance(settings.period);
     }
-    pending_ = trajectories_.update() || pending_;
+    taken_.trajectory = trajectories_.update() ? &trajectories_.current() : nullptr;
+    pending_ = taken_.trajectory != nullptr || pending_;
     const FoundTrajectory& found = trajectories_.current();
     const double late = time_ - (found.time + settings.look_ahead->delay);
     if (pending_ && late > -0.5 * settings.period) {

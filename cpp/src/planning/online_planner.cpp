@@ -55,7 +55,7 @@ OnlinePlanner::OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& sett
       obstacles_(newest_),
       watch_(body_),
       margin_(settings.planner.margin) {
-  if (!settings_.synchronous) {
+  if (settings_.works && !settings_.synchronous) {
     planner_.interrupt_when([this] {
       newer_ = states_.update() || newer_;
       return stopping_.load() || states_.get().goal_number != seen_goal_ || overtaken();
@@ -106,7 +106,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
   reference.acceleration.setZero(goal_.size());
   reference.places.col(0) = goal_;
   reference.num_places = 1;
-  reference.arrives = false;
+  reference.arrives = takes_ = false;
   if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite() || !std::isfinite(time)) {
     reference.position = goal_;
     if (q.size() == goal_.size()) {
@@ -144,7 +144,8 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     }
   }
 
-  const Answer& answer = answers_.get();
+  takes_ = answers_.update();
+  const Answer& answer = answers_.current();
   const bool ours = answer.goal_number == goal_number_;
   if (ours && answer.status == PlanStatus::found) {
     if (answer.route_number != followed_) {

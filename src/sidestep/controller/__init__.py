@@ -18,6 +18,11 @@ from sidestep._core import (
     PoseGoal,
     RealTimeRecord,
     RealTimeRun,
+    Recording,
+    RecordingHeader,
+    RecordingSummary,
+    ReplayDifference,
+    ReplayResult,
     SafetySettings,
     SafetyStatus,
     SpeedLimitSettings,
@@ -27,6 +32,8 @@ from sidestep._core import (
     controller_settings_fields,
     integrate,
     integrate_batch,
+    read_recording_header,
+    replay,
 )
 
 __all__ = [
@@ -47,6 +54,11 @@ __all__ = [
     "PoseGoal",
     "RealTimeRecord",
     "RealTimeRun",
+    "Recording",
+    "RecordingHeader",
+    "RecordingSummary",
+    "ReplayDifference",
+    "ReplayResult",
     "SafetySettings",
     "SafetyStatus",
     "SpeedLimitSettings",
@@ -56,4 +68,6 @@ __all__ = [
     "controller_settings_fields",
     "integrate",
     "integrate_batch",
+    "read_recording_header",
+    "replay",
 ]

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <atomic>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -11,6 +12,7 @@
 
 #include "sidestep/controller/command.hpp"
 #include "sidestep/controller/joint_trajectory.hpp"
+#include "sidestep/controller/recording.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/controller/single_stepper.hpp"
 #include "sidestep/system/goal.hpp"
@@ -20,6 +22,8 @@
 #include "sidestep/obstacles/obstacles.hpp"
 
 namespace sidestep {
+
+class Recorder;
 
 /// The controller turns the arm's state into a safe command, once per period.
 ///
@@ -114,6 +118,17 @@ class Controller {
   /// of `step`.
   bool stepped_in_turn() const noexcept { return stepper_.in_turn(); }
 
+  /// Records every input of every step and its command to a file from which `replay` gives the same commands, see recording.hpp. From
+  /// the thread of `step`, before the first step: later steps depend on what was before. Replaces a file. Throws
+  /// std::runtime_error after the first step or where one was recorded already, std::system_error where it cannot be written.
+  ///
+  /// Steps still allocate nothing and wait for nobody: a thread writes what they put into a ring of 16 MiB. Where that is full, the
+  /// recording ends and the steps after it are counted as lost. A `synchronous` controller waits instead.
+  void record(const std::filesystem::path& path);
+  /// Ends the recording, and says what it holds. Throws std::runtime_error where nothing is recorded, std::system_error where
+  /// writing failed.
+  RecordingSummary stop_recording();
+
   /// The command of the last step; always the same object.
   const Command& command() const noexcept { return command_; }
   /// The obstacles of the last step; name_of(command().point) names the nearest. Only for the thread of `step`.
@@ -146,6 +161,9 @@ class Controller {
 
  private:
   class Impl;
+  friend class Recorder;
+  friend class Replay;
+  Controller(Arm arm, ControllerSettings settings, bool workers);
   template <class Action>
   void tell(Action&& action);
   void take_over() noexcept;
@@ -157,6 +175,10 @@ class Controller {
   Impl& newest() const noexcept;
   void forget_lifted() noexcept;
   void change(const Arm& whole, std::vector<Held> held);
+  void install(std::unique_ptr<Impl> fresh, const Arm& whole, std::vector<Held> held);
+  void note_requests();
+  const Command& step_with(ConstVectorRef q, ConstVectorRef v, const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix,
+                           const Eigen::Ref<const Eigen::VectorXd>* bias) noexcept;
 
   static void destroy(Impl* newest) noexcept;
 
@@ -174,6 +196,9 @@ class Controller {
   Arm whole_;                   // without what is attached
   std::vector<Held> held_;
   bool has_torque_;
+  std::uint64_t arm_count_ = 0;  // of arms after the first
+  std::unique_ptr<Recorder> recorder_;
+  std::atomic<Recorder*> records_{nullptr};  // of the thread of `step`: null once the recording has ended
   std::atomic<bool> in_use_{false};
 };
 

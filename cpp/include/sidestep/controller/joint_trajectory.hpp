@@ -13,6 +13,12 @@ enum class TrajectoryBehaviour {
   steer,      ///< go around, and rejoin
 };
 
+/// The samples of a trajectory: q (nv × K) [rad | m] at times (K) [s].
+struct TrajectorySamples {
+  Eigen::MatrixXd q;
+  Eigen::VectorXd times;
+};
+
 /// Joint positions over time: a cubic on every span. The velocity at a sample is the slope of the parabola through it and its
 /// neighbours, lowered to twice the smaller slope of both spans (M. Steffen, A simple method for monotonic interpolation in one
 /// dimension, Astronomy and Astrophysics 239, 1990): monotone samples stay monotone, dwells still. Where a joint turns it goes

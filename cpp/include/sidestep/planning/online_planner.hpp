@@ -46,6 +46,8 @@ struct OnlinePlannerConfig {
   std::uint64_t seed = 0;
   /// Plans in `step()`, at times given by `period` alone, so that a motion is the same every time; else in a thread.
   bool synchronous = false;
+  /// Plans at all, where it is not synchronous. Without, the loop takes over what `give` hands it: for replays.
+  bool works = true;
 
   /// Throws std::invalid_argument that names the setting at fault.
   void validate() const;
@@ -126,6 +128,18 @@ class OnlinePlanner {
   const OnlinePlannerConfig& settings() const noexcept { return settings_; }
   const BodyClearance& body() const noexcept { return body_; }
 
+  /// What the planner tells the loop.
+  struct Answer {
+    std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
+    PlanStatus status = PlanStatus::no_path;
+    double progress = 0.0;                   // on the route, that is asked for within the patience [rad | m]
+    std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
+  };
+  /// The answer that the last `step` took over, null if there was no new one. For the loop; valid until its next step.
+  const Answer* taken() const noexcept { return takes_ ? &answers_.current() : nullptr; }
+  /// What the next `step` takes over, of a planner that does not work by itself.
+  void give(Answer answer) { answers_.put(std::move(answer)); }
+
  private:
   static constexpr double usual_progress = 0.0202;  // [rad | m] within the patience, below which the arm is stuck
 
@@ -136,13 +150,6 @@ class OnlinePlanner {
     std::uint64_t goal_number = 0;   // 0: none
     std::uint64_t route_number = 0;  // that it follows
     std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
-  };
-  /// What the planner tells the loop.
-  struct Answer {
-    std::uint64_t goal_number = 0, route_number = 0, path_number = 0;
-    PlanStatus status = PlanStatus::no_path;
-    double progress = 0.0;                   // on the route, that is asked for within the patience [rad | m]
-    std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
   };
 
   void run();
@@ -169,7 +176,7 @@ class OnlinePlanner {
   Eigen::VectorXd goal_, last_q_, velocity_;
   std::uint64_t goal_number_ = 0;
   double begin_ = 0.0, last_time_ = 0.0, next_look_ = 0.0;
-  bool started_ = false;
+  bool started_ = false, takes_ = false;
   ProgressMonitor progress_;
   TimedPathFollower follower_;
   std::uint64_t stops_ = 0, followed_ = 0, measured_ = 0;

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "sidestep/controller/controller.hpp"
+
+namespace sidestep::python {
+
+/// A recording of a controller that outlives it.
+struct RecordingInProgress {
+  Controller* controller;
+  std::filesystem::path path;
+  std::optional<RecordingSummary> summary;  // once it has ended
+
+  RecordingSummary stop();
+};
+
+}  // namespace sidestep::python

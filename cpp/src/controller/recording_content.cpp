@@ -1,0 +1,252 @@
+#include "recording_content.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <utility>
+
+#include "../model/arm_file.hpp"
+
+namespace sidestep::recording {
+namespace {
+
+std::string in_full(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+bool same(double a, double b) noexcept {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) || (std::isnan(a) && std::isnan(b));
+}
+
+/// The number of an enum, and its name where it has one.
+template <class Enum>
+std::string in_words(std::int32_t value) {
+  const std::string number = std::to_string(value);
+  if constexpr (requires(Enum e) { to_string(e); }) {
+    return std::string(to_string(static_cast<Enum>(value))) + " (" + number + ")";
+  } else if constexpr (requires(Enum e) { name(e); }) {
+    return std::string(name(static_cast<Enum>(value))) + " (" + number + ")";
+  }
+  return number;
+}
+
+using Value = std::variant<double, std::int32_t, Eigen::VectorXd, std::vector<Limit>>;
+
+Value read_value(Decoder& in, FieldKind kind) {
+  switch (kind) {
+    case FieldKind::number: return in.take<double>();
+    case FieldKind::whole: return in.take<std::int32_t>();
+    case FieldKind::numbers: return in.take<Eigen::VectorXd>();
+    case FieldKind::limits: return in.take<std::vector<Limit>>();
+  }
+  throw std::invalid_argument("a field of a command has an unknown kind");
+}
+
+template <class T>
+constexpr FieldKind kind_of() {
+  if constexpr (std::is_same_v<T, double>) {
+    return FieldKind::number;
+  } else if constexpr (std::is_same_v<T, Eigen::VectorXd>) {
+    return FieldKind::numbers;
+  } else if constexpr (std::is_same_v<T, std::vector<Limit>>) {
+    return FieldKind::limits;
+  } else {
+    static_assert(std::is_enum_v<T> || std::is_same_v<T, int> || std::is_same_v<T, bool>, "give this field a FieldKind");
+    return FieldKind::whole;
+  }
+}
+
+/// The settings of each part with the beginning of their names, and those that may be left out.
+template <class Settings, class Part, class Optional>
+void each_part(Settings& s, Part&& part, Optional&& optional) {
+  part("", s);
+  part("barriers.", s.barriers);
+  part("safety.", s.safety);
+  part("arrival.", s.arrival);
+  part("tracking.", s.tracking);
+  part("inputs.", s.inputs);
+  if (optional("speed_limits", s.speed_limits)) {
+    part("speed_limits.", *s.speed_limits);
+  }
+  if (optional("planner", s.planner)) {
+    part("planner.", *s.planner);
+    part("planner.search.", s.planner->search);
+    part("planner.route.", s.planner->route);
+  }
+  if (optional("look_ahead", s.look_ahead)) {
+    part("look_ahead.", *s.look_ahead);
+  }
+  if (optional("local_minimum", s.local_minimum)) {
+    part("local_minimum.", *s.local_minimum);
+  }
+}
+
+}  // namespace
+
+std::vector<FieldRecord> fields_of_commands() {
+  std::vector<FieldRecord> fields;
+  const Command command(0);
+  each_field(command, [&](const char* name, const auto& value) {
+    fields.push_back({name, kind_of<std::remove_cvref_t<decltype(value)>>()});
+  });
+  return fields;
+}
+
+std::optional<ReplayDifference> first_difference(const std::vector<FieldRecord>& fields, std::span<const std::byte> recorded,
+                                                 const Command& replayed) {
+  Bytes again;
+  Encoder<Bytes> out(again);
+  write_command(out, replayed);
+  if (std::equal(again.bytes.begin(), again.bytes.end(), recorded.begin(), recorded.end())) {
+    return std::nullopt;
+  }
+  std::map<std::string, Value> before;
+  Decoder in(recorded);
+  for (const FieldRecord& field : fields) {
+    before.emplace(field.name, read_value(in, field.kind));
+  }
+  std::optional<ReplayDifference> found;
+  const auto differs = [&](std::string field, std::string was, std::string is) {
+    found = ReplayDifference{0, std::move(field), std::move(was), std::move(is)};
+  };
+  each_field(replayed, [&](const char* name, const auto& value) {
+    using T = std::remove_cvref_t<decltype(value)>;
+    const auto it = before.find(name);
+    if (found || it == before.end()) {
+      return;
+    }
+    if constexpr (kind_of<T>() == FieldKind::number) {
+      const auto* was = std::get_if<double>(&it->second);
+      if (was != nullptr && !same(*was, value)) {
+        differs(name, in_full(*was), in_full(value));
+      }
+    } else if constexpr (kind_of<T>() == FieldKind::whole) {
+      const auto* was = std::get_if<std::int32_t>(&it->second);
+      if (was != nullptr && *was != static_cast<std::int32_t>(value)) {
+        differs(name, in_words<T>(*was), in_words<T>(static_cast<std::int32_t>(value)));
+      }
+    } else if constexpr (kind_of<T>() == FieldKind::numbers) {
+      const auto* was = std::get_if<Eigen::VectorXd>(&it->second);
+      if (was != nullptr && was->size() != value.size()) {
+        differs(name, std::to_string(was->size()) + " entries", std::to_string(value.size()) + " entries");
+      }
+      for (Eigen::Index j = 0; was != nullptr && !found && j < value.size(); ++j) {
+        if (!same((*was)[j], value[j])) {
+          differs(name + ("[" + std::to_string(j) + "]"), in_full((*was)[j]), in_full(value[j]));
+        }
+      }
+    } else {
+      const auto* was = std::get_if<std::vector<Limit>>(&it->second);
+      if (was != nullptr && *was != value) {
+        const std::size_t j =
+            static_cast<std::size_t>(std::mismatch(was->begin(), was->end(), value.begin(), value.end()).first - was->begin());
+        const auto bits = [j](const std::vector<Limit>& limits) {
+          return j < limits.size() ? std::to_string(static_cast<unsigned>(limits[j])) : std::string("none");
+        };
+        differs(name + ("[" + std::to_string(j) + "]"), bits(*was), bits(value));
+      }
+    }
+  });
+  return found;
+}
+
+std::vector<SettingRecord> to_records(const ControllerSettings& settings) {
+  std::vector<SettingRecord> records{
+      {"output", static_cast<double>(settings.output), static_cast<std::uint64_t>(settings.output)}};
+  each_part(
+      settings,
+      [&](const std::string& prefix, const auto& part) {
+        for (const auto& field : fields<std::remove_cvref_t<decltype(part)>>()) {
+          std::visit(
+              [&](auto member) {
+                const auto value = part.*member;
+                const bool whole = !std::is_same_v<std::remove_cvref_t<decltype(value)>, double>;
+                records.push_back(
+                    {prefix + field.name, static_cast<double>(value), whole ? static_cast<std::uint64_t>(value) : 0});
+              },
+              field.member);
+        }
+      },
+      [&](const std::string& name, const auto& part) {
+        records.push_back({name, part ? 1.0 : 0.0, part ? 1u : 0u});
+        return part.has_value();
+      });
+  return records;
+}
+
+ControllerSettings to_settings(const std::vector<SettingRecord>& records, std::vector<std::string>& notes) {
+  std::map<std::string, SettingRecord> left;
+  for (const SettingRecord& record : records) {
+    left.emplace(record.name, record);
+  }
+  const auto take = [&](const std::string& name) -> std::optional<SettingRecord> {
+    auto node = left.extract(name);
+    if (node.empty()) {
+      notes.push_back("setting " + name + " is not in the recording: its default is taken");
+      return std::nullopt;
+    }
+    return node.mapped();
+  };
+  ControllerSettings settings;
+  if (const auto output = take("output")) {
+    settings.output = static_cast<ControllerSettings::Output>(output->whole);
+  }
+  each_part(
+      settings,
+      [&](const std::string& prefix, auto& part) {
+        for (const auto& field : fields<std::remove_cvref_t<decltype(part)>>()) {
+          const auto found = take(prefix + field.name);
+          if (!found) {
+            continue;
+          }
+          std::visit(
+              [&](auto member) {
+                using T = std::remove_cvref_t<decltype(part.*member)>;
+                if constexpr (std::is_same_v<T, double>) {
+                  part.*member = found->value;
+                } else {
+                  part.*member = static_cast<T>(found->whole);
+                }
+              },
+              field.member);
+        }
+      },
+      [&](const std::string& name, auto& part) {
+        const auto found = take(name);
+        if (found && found->whole == 0) {
+          part.reset();
+        } else if (!part) {
+          part.emplace();
+        }
+        return part.has_value();
+      });
+  for (const auto& [name, record] : left) {
+    notes.push_back("setting " + name + ", recorded as " + in_full(record.value) + ", is unknown here");
+  }
+  return settings;
+}
+
+const char* sidestep_version() noexcept { return SIDESTEP_VERSION; }
+
+std::string arm_bytes(const Arm& arm) {
+  const ArmDetails details{arm.proof(), arm.allowed_pairs(), arm.provenance()};
+  const std::vector<std::byte> bytes =
+      encode_arm({arm.robot(), arm.body(), arm.pairs(), arm.tables(), arm.inertials(), details});
+  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+Arm arm_of(const std::string& bytes) { return decode_arm(std::as_bytes(std::span<const char>(bytes))); }
+
+std::vector<std::byte> chunk(std::string_view tag, std::span<const std::byte> content) {
+  Bytes out;
+  Encoder<Bytes> encode(out);
+  out.write(tag.data(), tag.size());
+  encode(static_cast<std::uint64_t>(content.size()));
+  out.write(content.data(), content.size());
+  encode(crc32(out.bytes));
+  return std::move(out.bytes);
+}
+
+}  // namespace sidestep::recording
