@@ -14,6 +14,7 @@ from sidestep.cli import (
     fit_command,
     list_commands,
     prepare_command,
+    replay_command,
     reproduce_command,
     run_command,
     show_command,
@@ -39,6 +40,7 @@ app.command("schema")(list_commands.schema)
 app.command("robots")(list_commands.robots)
 app.command("fit")(fit_command.fit)
 app.command("prepare")(prepare_command.prepare)
+app.command("replay")(replay_command.replay)
 app.command("reproduce")(reproduce_command.reproduce)
 app.add_typer(bench_command.app, name="bench")
 

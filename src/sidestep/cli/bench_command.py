@@ -35,6 +35,7 @@ from sidestep.cli.limit_options import (
     reading_options,
 )
 from sidestep.cli.output import JsonOption, QuietOption, console, write_json
+from sidestep.cli.replay_command import record
 
 app = typer.Typer(help="Benchmarks on random and on published problems.", no_args_is_help=True)
 app.command("motionbenchmaker")(motion_bench_maker)
@@ -48,6 +49,7 @@ app.command("peers")(peers)
 app.command("qp")(qp)
 app.command("points")(points)
 app.command("realtime")(realtime)
+app.command("record")(record)
 
 
 @app.command("reach")
