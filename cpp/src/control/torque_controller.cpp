@@ -149,7 +149,9 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       wanted_(Eigen::VectorXd::Zero(nv_)),
       bias_(Eigen::VectorXd::Zero(nv_)),
       rate_lower_(bias_),
-      rate_upper_(bias_) {
+      rate_upper_(bias_),
+      torque_lower_(bias_),
+      torque_upper_(bias_) {
   // Over x = (q̈, s): q̈ - s <= upper, q̈ + s >= lower, the torque rows, normals q̈ >= lower; s >= 0.
   comfort_data_.A.topLeftCorner(nv_, nv_).setIdentity();
   comfort_data_.A.block(0, nv_, nv_, nv_).diagonal().setConstant(-1.0);
@@ -212,6 +214,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
     solution.upper.setConstant(not_a_number);
   }
 
+  set_torque_window(last);
   TorqueStatus status = TorqueStatus::fallback_invalid_input;
   rows_.clear();
   row_multipliers_.setZero();
@@ -227,9 +230,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
   report_clearance(second.clearances, solution);
   if (q_known && v_known && mass_known && bias_known) {
     write_torque_rows(last);
-    const bool rates =
-        last.torque != nullptr && limits_.effort_rate.array().isFinite().any() && solution.least_clearance >= 0.0;
-    if (rates && last.acceleration != nullptr) {
+    const bool keeps_rate = last.torque != nullptr && limits_.effort_rate.array().isFinite().any();
+    const bool rates = keeps_rate && solution.least_clearance >= 0.0;
+    if (keeps_rate && last.acceleration != nullptr) {
       jerk_lower_ = *last.acceleration - settings_.period * limits_.jerk;
       jerk_upper_ = *last.acceleration + settings_.period * limits_.jerk;
     }
@@ -241,7 +244,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       const bool limited = limits_.effort.array().isFinite().any();
       const RateLimits next{jerk_lower_, jerk_upper_, rate_lower_, rate_upper_};
       const LastMotion motion{last.acceleration != nullptr ? *last.acceleration : velocity_, share, last.early && rates, closes,
-                              rates ? &next : nullptr};
+                              keeps_rate ? &next : nullptr};
       const LastMotion* const before = last.acceleration != nullptr ? &motion : nullptr;
       rows_.update(*clearances, velocity_, limits_, bounds_, settings_.period, limited ? &braking : nullptr, before);
       if (two) {
@@ -264,7 +267,6 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       jerk_lower_.setConstant(-infinity);
       jerk_upper_.setConstant(infinity);
     }
-    const LastCommand without_rate{nullptr, nullptr, last.gravity};
     write_cost();
     bool solved = solve_within_bounds(bounds_.smooth_lower, bounds_.smooth_upper, true, solution), kept = true, back = false;
     if (!solved && smooth && solution.least_clearance >= 0.0 && rows_.draw_on_reserves(settings_.period)) {
@@ -276,8 +278,7 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
     }
     if (!solved && smooth) {
       // As near as can be to what jerk and torque rate allow: the task has no say in what is beyond. Jerk gives way, or the bounds of
-      // a state that noise and disturbances change faster than torque may. The torque's rate stays, since motors take no other, until a
-      // clearance is lost.
+      // a state that noise and disturbances change faster than torque may. The torque's rate stays, since motors take no other.
       wanted_ = wanted_.cwiseMax(bounds_.smooth_lower).cwiseMin(bounds_.smooth_upper);
       write_cost();
       kept = false;
@@ -289,7 +290,6 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
       }
       solved = solve_within_bounds(wide_lower_, wide_upper_, false, solution);
       if (!solved && last.torque != nullptr && !rates) {
-        write_torque_rows(without_rate);
         solved = solve_within_bounds(bounds_.lower, bounds_.upper, false, solution);
       }
     }
@@ -300,9 +300,6 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
                : free && row_multipliers_.isZero(0.0) && speed_multipliers_.isZero(0.0) ? TorqueStatus::ok
                                                                                         : TorqueStatus::limited;
     } else {
-      if (!rates) {
-        write_torque_rows(without_rate);
-      }
       if (solution.least_clearance < 0.0) {
         rows_.put_off_ways_back(settings_.period);
       }
@@ -375,28 +372,42 @@ double TorqueController::jerk_share() const noexcept {
   return share;
 }
 
+void TorqueController::set_torque_window(const LastCommand& last) noexcept {
+  torque_lower_ = -limits_.effort;
+  torque_upper_ = limits_.effort;
+  if (last.torque == nullptr) {
+    return;
+  }
+  for (int i = 0; i < nv_; ++i) {
+    const double before = (*last.torque)[i], step = limits_.effort_rate[i] * settings_.period;
+    torque_lower_[i] = std::clamp(before - step, -limits_.effort[i], limits_.effort[i]);
+    torque_upper_[i] = std::clamp(before + step, -limits_.effort[i], limits_.effort[i]);
+  }
+}
+
 void TorqueController::write_torque_rows(const LastCommand& last) noexcept {
   hard_data_.A.topRows(nv_) = mass_;
   rate_lower_ = -limits_.effort - bias_;
   rate_upper_ = limits_.effort - bias_;
-  if (last.gravity != nullptr) {
-    for (int i = 0; i < nv_; ++i) {
-      const double g = (*last.gravity)[i], lower = rate_lower_[i] + g, upper = rate_upper_[i] + g;
-      if (std::abs(g) < limits_.effort[i]) {
-        rate_lower_[i] = std::max(rate_lower_[i], lower);
-        rate_upper_[i] = std::min(rate_upper_[i], upper);
-      }
+  // Each window is clamped into those before it, so that a torque is left: effort, rate, and both again without gravity.
+  const auto narrow = [this](int i, double lower, double upper) {
+    const double least = rate_lower_[i], most = rate_upper_[i];
+    rate_lower_[i] = std::clamp(lower, least, most);
+    rate_upper_[i] = std::clamp(upper, rate_lower_[i], most);
+  };
+  for (int i = 0; i < nv_; ++i) {
+    const double before = last.torque == nullptr ? 0.0 : (*last.torque)[i] - bias_[i];
+    const double step = last.torque == nullptr ? infinity : limits_.effort_rate[i] * settings_.period;
+    if (step < infinity) {
+      narrow(i, before - step, before + step);
     }
-  }
-  if (last.torque != nullptr) {
-    for (int i = 0; i < nv_; ++i) {
-      const double step = limits_.effort_rate[i] * settings_.period, before = (*last.torque)[i] - bias_[i];
-      const double change = last.gravity_change == nullptr ? 0.0 : (*last.gravity_change)[i];
-      const double lower = std::max(before, before + change) - step, upper = std::min(before, before + change) + step;
-      if (lower <= upper && upper >= rate_lower_[i] && lower <= rate_upper_[i]) {
-        rate_lower_[i] = std::max(rate_lower_[i], lower);
-        rate_upper_[i] = std::min(rate_upper_[i], upper);
-      }
+    if (last.gravity != nullptr && std::abs((*last.gravity)[i]) < limits_.effort[i]) {
+      const double g = (*last.gravity)[i];
+      narrow(i, -limits_.effort[i] - bias_[i] + g, limits_.effort[i] - bias_[i] + g);
+    }
+    if (step < infinity && last.gravity_change != nullptr) {
+      const double change = (*last.gravity_change)[i];
+      narrow(i, before + change - step, before + change + step);
     }
   }
   hard_data_.row_lower.head(nv_) = rate_lower_;
@@ -589,9 +600,13 @@ void TorqueController::stop(bool mass_known, TorqueSolution& solution) noexcept 
   }
   for (int i = 0; i < nv_; ++i) {
     const double wanted = solution.torque[i], effort = limits_.effort[i];
-    solution.torque[i] = std::isfinite(wanted) ? std::clamp(wanted, -effort, effort) : 0.0;
+    solution.torque[i] = std::clamp(std::isfinite(wanted) ? wanted : 0.0, torque_lower_[i], torque_upper_[i]);
     if (solution.torque[i] != wanted) {
-      solution.active[static_cast<std::size_t>(i)] = wanted > 0.0 ? Limit::torque_upper : Limit::torque_lower;
+      const bool up = !(wanted <= 0.0), by_rate = up ? torque_upper_[i] < effort : torque_lower_[i] > -effort;
+      solution.active[static_cast<std::size_t>(i)] =
+          by_rate ? (wanted > solution.torque[i] ? Limit::torque_rate_upper : Limit::torque_rate_lower)
+          : up    ? Limit::torque_upper
+                  : Limit::torque_lower;
     }
   }
   if (mass_known) {

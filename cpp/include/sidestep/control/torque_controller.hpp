@@ -133,9 +133,9 @@ struct TorqueControllerSettings {
 ///
 /// The torque is eliminated by the first constraint. What is sacrificed, in this order: the task, which is the cost;
 /// jerk; limits of Cartesian speed, and of velocity and acceleration up to the overruns (unless hard_bounds); clearances; the
-/// overruns and position limits; torque limits never. Where effort has a rate, jerk is lowered by a share with which torques keep
-/// it whatever the joints do; that share gives way first, the rate and the jerk limits themselves only to bounds that they do not
-/// reach, or where a clearance is below zero. A first program has every constraint hard. If it is infeasible, the same is solved
+/// overruns and position limits; torque limits and the torque's rate never. Where effort has a rate, jerk is lowered by a share with
+/// which torques keep it whatever the joints do; that share gives way first, the jerk limits themselves only to bounds that they do
+/// not reach, or where a clearance is below zero. A first program has every constraint hard. If it is infeasible, the same is solved
 /// without jerk (or with the limits themselves) for the acceleration nearest to what jerk allows. If that is infeasible, a second
 /// one adds slack to the bounds, and one slack to all limits of Cartesian speed, within a box of the overruns and of position
 /// limits, at the cost p's with a price p far above the task's. If that is infeasible, or a clearance below zero is in the way, a third one finds the shortfalls r of the
@@ -146,8 +146,8 @@ struct TorqueControllerSettings {
 ///
 /// The damped stop. If only the wanted acceleration is unusable, the same program is solved with a = -v/stop_time; if
 /// clearances are unusable, the same without them.
-/// Otherwise torque = M a + h with a = -v/stop_time within the bounds, clipped to the effort limits; if M is unusable,
-/// h - D v clipped; an unusable h is replaced by the last usable one (zero before the first), an unusable v by zero.
+/// Otherwise torque = M a + h with a = -v/stop_time within the bounds, clipped to the effort limits and to what the rate allows; if M
+/// is unusable, h - D v clipped; an unusable h is replaced by the last usable one (zero before the first), an unusable v by zero.
 /// Every fallback is counted.
 ///
 /// `solve` allocates nothing and never throws. One object per thread.
@@ -201,7 +201,10 @@ class TorqueController {
     QuadraticProgram program;
   };
 
-  /// Writes the torque rows: within the effort limits, and near the last torque unless null.
+  /// Writes what effort and rate leave of the torque; never empty.
+  void set_torque_window(const LastCommand& last) noexcept;
+  /// Writes the torque rows: within the effort limits, and near the last torque unless null. Of windows that do not meet, effort
+  /// comes before its rate, and both before the same without gravity.
   void write_torque_rows(const LastCommand& last) noexcept;
   void write_cost() noexcept;
   /// Writes the speed rows that the box does not satisfy, from row `first` on; their slack is variable `slack`, unless < 0.
@@ -265,9 +268,10 @@ class TorqueController {
   // Where torques keep a rate, of the programs after the first too, left only where bounds or torques do not reach it; else infinite.
   Eigen::VectorXd jerk_lower_, jerk_upper_;
   Eigen::MatrixXd mass_, mass_cholesky_;
-  Eigen::VectorXd weighted_;                  // a column of the mass matrix, by the cost of torques
-  Eigen::VectorXd velocity_, wanted_, bias_;  // usable copies of the input
-  Eigen::VectorXd rate_lower_, rate_upper_;   // of the torque less the bias, by effort and rate
+  Eigen::VectorXd weighted_;                     // a column of the mass matrix, by the cost of torques
+  Eigen::VectorXd velocity_, wanted_, bias_;     // usable copies of the input
+  Eigen::VectorXd rate_lower_, rate_upper_;      // of the torque less the bias, by effort and rate
+  Eigen::VectorXd torque_lower_, torque_upper_;  // of the torque, by effort and rate: those of the damped stop
   std::int64_t counts_[7] = {};
 };
 
