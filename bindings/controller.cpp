@@ -131,6 +131,7 @@ void bind_command(nb::module_& m) {
       .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
       .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.")
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
+      .value("tracking_lost", SafetyStatus::tracking_lost, "The arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position agrees with no motion: the arm comes to rest.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");
   nb::enum_<Activity>(m, "Activity", "What a controller is about.")
@@ -278,6 +279,10 @@ void bind_controller(nb::module_& m) {
           "down and waits before what blocks the path, `steer` goes around and rejoins; `command.deviation` and `command.delay`\n"
           "say how far off and behind it is. Raises ValueError that names sample, joint, value and what is allowed.")
       .def("clear_goal", &Controller::clear_goal, "The arm comes to rest where it is, and goes on evading.")
+      .def("restart", &Controller::restart,
+           "The next step begins where the arm is, as a first one does: call it where something else has moved the arm. The goal\n"
+           "stays. Without it the same happens once five measured positions in a row agree with each other and not with the\n"
+           "command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.")
       .def(
           "set_obstacles", [](Controller& self, nb::handle obstacles) { self.set_obstacles(as_obstacles(obstacles)); },
           nb::arg("obstacles").none(),

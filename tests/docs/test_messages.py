@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "reference" / "messages.md").read_text(encoding="utf-8")
 SOURCES = (
     "controller/explain.cpp",
+    "controller/measurement.cpp",
     "controller/following.cpp",
     "controller/speed.cpp",
     "system/diagnosis.cpp",
@@ -31,10 +32,10 @@ def phrases() -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("kind", [ss.SafetyStatus, ss.Activity])
-def test_every_status_and_activity_is_there(kind: type) -> None:
+@pytest.mark.parametrize(("kind", "number"), [(ss.SafetyStatus, 7), (ss.Activity, 6)])
+def test_every_status_and_activity_is_there(kind: type, number: int) -> None:
     names = [item.name for item in kind]
-    assert len(names) == 6
+    assert len(names) == number
     assert [name for name in names if f"| `{name}` |" not in PAGE] == []
 
 

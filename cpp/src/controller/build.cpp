@@ -158,6 +158,7 @@ StepState::StepState(const Robot& robot)
       last_arm_q_(Eigen::VectorXd::Constant(q_.size(), std::numeric_limits<double>::quiet_NaN())),
       last_arm_v_(q_),
       turns_(q_),
+      measurement_{q_, q_, q_, q_, q_, q_},
       reference_torque_(q_),
       last_torque_(q_),
       last_acceleration_(q_),

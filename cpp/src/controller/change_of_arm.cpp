@@ -101,6 +101,9 @@ void Controller::take_over() noexcept {
     while (!retired_.compare_exchange_weak(last->before, last, std::memory_order_release, std::memory_order_relaxed)) {
     }
   }
+  if (restarts_.load(std::memory_order_relaxed) && restarts_.exchange(false, std::memory_order_acquire)) {
+    impl_->restart();
+  }
 }
 
 void Controller::change(const Arm& whole, std::vector<Held> held) {

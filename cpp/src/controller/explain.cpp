@@ -233,6 +233,10 @@ std::string Controller::Impl::explain() const {
       text += "if points lie on the arm itself, filter the arm out of the cloud; ";
     }
   }
+  text += explain_measurement();
+  if (!measurement_.agrees) {
+    return text;
+  }
   {
     const std::lock_guard lock(mutex_);
     if (shown_fault_[0] != '\0') {

@@ -56,6 +56,8 @@ class Controller::Impl : private StepState {
     return *shown_obstacles_;
   }
   std::string explain() const;
+  /// The next step with a usable state begins where the arm is. In the thread of `step`.
+  void restart() noexcept { begins_anew_ = true; }
   Eigen::VectorXd target() const;
   /// Makes objects keep off obstacles that they rest on only as far as they do now.
   void let_rest(const std::vector<RestingObject>& objects);
@@ -207,6 +209,22 @@ class Controller::Impl : private StepState {
   using MassMatrix = const Eigen::Ref<const Eigen::MatrixXd>*;
   using Bias = const Eigen::Ref<const Eigen::VectorXd>*;
   void begin_reference() noexcept;
+  /// Compares the sample with where the arm can be. One that cannot be is bridged by the prediction; where several in a row, or the
+  /// first after a pause, disagree with the reference, it begins anew.
+  void judge_sample() noexcept;
+  /// Whether the sample is near the reference, can be reached from the last one that was taken, and from the last sample.
+  void compare_sample(double elapsed, bool& is_near, bool& is_possible, bool& is_steady) const noexcept;
+  /// Bridges a sample that is an old one again.
+  void check_repetition() noexcept;
+  /// Replaces velocities that leap alone.
+  void check_velocity() noexcept;
+  /// Begins where the arm is what a first step begins; the goal stays.
+  void begin_anew() noexcept;
+  /// Of a sample that was bridged: the clearances and the error that are reported.
+  void look_at_sample() noexcept;
+  /// The last guard of the torque's rate, for what comes from elsewhere than the program.
+  void keep_torque_rate() noexcept;
+  std::string explain_measurement() const;
   void follow_arm() noexcept;
   void observe() noexcept;
   void take_dynamics(const KinematicState& state, MassMatrix mass_matrix, Bias bias) noexcept;

@@ -66,6 +66,11 @@ void Controller::Impl::choose_reference() noexcept {
     reference.velocity.setZero();
     reference.acceleration.setZero();
   };
+  if (!measurement_.agrees) {  // what was told begins once the arm is known to be there
+    pulls_ = waits_ = false;
+    rest_at(q_);
+    return;
+  }
   if (begins_input_) {
     begin_input();
   }

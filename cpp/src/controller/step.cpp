@@ -22,8 +22,12 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   if (!known) {
     stop(mass_matrix, bias, q, v);
     report(false);
+    if (has_last_torque_) {
+      last_torque_ = command.torque;
+    }
     return command;
   }
+  judge_sample();
   measured_.draft() = arm_q_;
   measured_.submit();
   observe();
@@ -48,7 +52,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   } else if (keeps_path() && !is_fallback(status)) {
     wanted_ = pulled_ + workspace.recovery;
   }
-  if (is_stale()) {
+  if (is_stale() || !measurement_.agrees) {
     wanted_ = -v_ / settings.stop_time;
   }
   wanted_ += coupling_;
@@ -56,6 +60,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   keep_failsafe();
   advance_reference();
   track(mass_matrix, bias);
+  look_at_sample();
   report(true);
   if (!settings.synchronous && (looks || wakes_worker_)) {
     write_snapshot();
@@ -113,6 +118,7 @@ void Controller::Impl::report(bool known) noexcept {
   command.torque.setZero();
   if (torque) {
     command.torque = tracked_.torque;
+    keep_torque_rate();
   }
   write_gravity(known);
   if (observer_) {
@@ -141,8 +147,13 @@ void Controller::Impl::report(bool known) noexcept {
     command.status = SafetyStatus::stopping;
     command.system = StepStatus::invalid_state;
     command.activity = is_stale() ? Activity::stale : has_goal() ? Activity::waiting : Activity::no_goal;
-    command.velocity.setZero();
-    command.position = last_arm_q_ - turns_;
+    if (drives_track_ && known_before_) {
+      command.velocity = next_v_;
+      command.position = next_q_ - turns_;
+    } else {
+      command.velocity.setZero();
+      command.position = last_arm_q_ - turns_;
+    }
     return;
   }
   command.velocity = next_v_;
@@ -177,6 +188,9 @@ void Controller::Impl::report(bool known) noexcept {
     case TorqueStatus::fallback_invalid_input:
     case TorqueStatus::fallback_solver: command.status = SafetyStatus::stopping; break;
   }
+  if (measurement_.is_far) {
+    command.status = std::max(command.status, SafetyStatus::tracking_lost);
+  }
   if (is_fallback(command.system)) {
     command.status = SafetyStatus::stopping;
   }
@@ -196,7 +210,7 @@ void Controller::Impl::write_gravity(bool known) noexcept {
 
 bool Controller::Impl::at_goal() noexcept {
   const ArrivalSettings& near = settings.arrival;
-  if (arm_v_.cwiseAbs().maxCoeff() > near.speed) {
+  if (!measurement_.agrees || arm_v_.cwiseAbs().maxCoeff() > near.speed) {
     return false;
   }
   if (const PoseGoal* pose = pose_goal()) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -23,6 +24,24 @@ struct StepState {
   Eigen::VectorXd next_q_, next_v_;     // after this period
   Eigen::VectorXd arm_q_, arm_v_, last_arm_q_, last_arm_v_, turns_;  // measured
   bool apart_ = false;                                               // the arm is not exactly where the reference is
+  /// The sample of this step, and whether it can be the arm's.
+  struct Measurement {
+    Eigen::VectorXd q, v, last_q, last_v;  // as measured, in this step and in the last
+    Eigen::VectorXd predicted;             // where the arm is by the last step
+    Eigen::VectorXd turns;                 // of the last sample that was taken
+    int disagreeing = 0;                   // samples in a row
+    int repeated = 0;                      // samples in a row that are the same although the arm moves
+    int leaps = 0;                         // samples in a row whose velocity leaps and whose position does not
+    bool takes_velocity = false;           // that leaps no more than once: without a filter
+    bool agrees = true;                    // with the reference; else the arm comes to rest
+    bool is_bridged = false;               // no motion explains it: the prediction takes its place
+    bool unusable = false;                 // the last one had a wrong size or was not finite
+    bool is_far = false;                   // from the command
+    Eigen::Index farthest = 0;             // joint
+    double moved_until = 0.0;              // [s] until when that is worth a word
+    std::chrono::steady_clock::time_point stepped_at{};
+  } measurement_;
+  bool begins_anew_ = false;  // where the next usable sample is
   bool has_last_torque_ = false;
   Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, expected_v_, last_measured_v_, coupling_, feedback_,
       gravity_, gravity_change_;

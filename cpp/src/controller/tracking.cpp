@@ -63,18 +63,15 @@ void Controller::Impl::begin_reference() noexcept {
 }
 
 void Controller::Impl::follow_arm() noexcept {
-  bool lost = !known_before_;
+  const bool begins = !known_before_ || begins_anew_;
   const double most = drives_track_ ? settings.tracking.servo_lag : settings.tracking.largest_error;
-  command.tracking_error = 0.0;
-  for (Eigen::Index j = 0; j < q_.size() && !lost; ++j) {
-    const double error = std::abs(next_q_[j] - arm_q_[j]);
-    command.tracking_error = std::max(command.tracking_error, error);
-    lost = error > (is_sliding_[static_cast<std::size_t>(j)] ? sliding_share : 1.0) * most;
-  }
-  if (lost) {
+  if (begins && known_before_) {
+    begin_anew();
+  } else if (begins) {
+    begins_anew_ = false;
     begin_reference();
-    command.tracking_error = 0.0;
   }
+  command.tracking_error = begins ? 0.0 : (next_q_ - arm_q_).cwiseAbs().maxCoeff();
   q_ = next_q_;
   v_ = next_v_;
   coupling_.setZero();
@@ -87,16 +84,16 @@ void Controller::Impl::follow_arm() noexcept {
     }
   }
   apart_ = q_ != arm_q_ || v_ != arm_v_;
-  if (apart_ && known_before_ && !lost) {
+  if (apart_ && !begins) {
     // Noise is filtered: the velocity that was predicted, drawn to the measured one.
-    const double share = std::min(1.0, settings.period / settings.tracking.velocity_filter);
+    const double share = measurement_.takes_velocity ? 1.0 : std::min(1.0, settings.period / settings.tracking.velocity_filter);
     expected_v_ = last_arm_v_ + settings.period * last_acceleration_;
     arm_v_ = expected_v_ + share * (arm_v_ - expected_v_);
   }
 }
 
 void Controller::Impl::observe() noexcept {
-  if (!known_before_) {
+  if (!known_before_ || begins_anew_) {
     last_measured_v_ = arm_v_;
   } else if (observer_) {
     observer_->update(last_measured_v_, arm_v_, last_torque_, last_acceleration_, model_mass_, model_bias_);
@@ -284,11 +281,25 @@ void Controller::Impl::write_impedance() noexcept {
 
 void Controller::Impl::stop(const Eigen::Ref<const Eigen::MatrixXd>* mass_matrix, const Eigen::Ref<const Eigen::VectorXd>* bias,
                             ConstVectorRef q, ConstVectorRef v) noexcept {
+  measurement_.unusable = true;
+  if (drives_track_ && known_before_) {  // which follow the reference, wherever the arm is: it comes to rest
+    q_ = next_q_;
+    v_ = next_v_;
+    wanted_ = -v_ / settings.stop_time;
+    static_cast<void>(filter_->apply(q_, v_, wanted_, nullptr, {}, LastCommand{&smooth_a_}, tracked_));
+    solution.acceleration = tracked_.acceleration;
+    solution.fault = q.size() == q_.size() && q.allFinite() ? TorqueFault::velocity : TorqueFault::position;
+    command.program = TorqueStatus::fallback_invalid_input;
+    failsafe_.reset();
+    advance_reference();
+    return;
+  }
   wanted_.setZero();
+  const LastCommand last{nullptr, has_last_torque_ ? &last_torque_ : nullptr};
   if (torque && mass_matrix != nullptr && bias->size() == bias_.size() && bias->allFinite()) {
-    command.program = torque_program_->solve(q, v, wanted_, *mass_matrix, *bias, nullptr, solution);
+    command.program = torque_program_->solve(q, v, wanted_, *mass_matrix, *bias, nullptr, {}, last, solution);
   } else if (torque) {
-    command.program = torque_program_->solve(q, v, wanted_, mass_, bias_, nullptr, solution);
+    command.program = torque_program_->solve(q, v, wanted_, mass_, bias_, nullptr, {}, last, solution);
   } else {
     command.program = filter_->apply(q, v, wanted_, nullptr, solution);
   }

@@ -26,6 +26,7 @@ ACTIVITIES = {
 STATUSES = {
     SafetyStatus.relaxed: "limits gave way to clearances",
     SafetyStatus.margin_lost: "a safety margin is lost",
+    SafetyStatus.tracking_lost: "the arm is not where it was commanded",
     SafetyStatus.stopping: "stopping",
     SafetyStatus.clearance_lost: "clearance lost",
 }

@@ -17,6 +17,8 @@ enum class SafetyStatus {
   relaxed,         ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position
                    ///< or torque limits
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
+  tracking_lost,   ///< the arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position
+                   ///< agrees with no motion: the arm comes to rest
   stopping,        ///< the input is unusable or the program was not solved: a damped stop
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
 };
