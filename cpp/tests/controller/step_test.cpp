@@ -250,6 +250,7 @@ BOOST_AUTO_TEST_CASE(status_and_clearance_tell_the_truth_about_the_covering_body
     // Some of many points just outside, one just inside: a mean of them says nothing of the least.
     const Obstacles obstacles = k % 2 == 0 ? random_balls(random, 1 + k % 8, 0.0) : random_balls(random, 300, 0.0);
     controller.set_obstacles(obstacles);
+    controller.restart();  // the arm does not come here by itself
     const Command& command = controller.step(q, v);
     const double least = least_clearance(arm, q, obstacles);
     BOOST_REQUIRE((command.status == SafetyStatus::clearance_lost) == (least < 0.0));
