@@ -179,6 +179,13 @@ void bind_command(nb::module_& m) {
       .def_ro("program", &Command::program, "TorqueStatus of the quadratic program.")
       .def_ro("avoiding", &Command::avoiding, "Follows a trajectory out of the way of what moves.")
       .def_ro("on_path", &Command::on_path, "Follows a path of the planner.")
+      .def_ro("look_ahead_age", &Command::look_ahead_age,
+              "Time since the state from which the newest look-ahead that is followed was computed [s]: it grows where threads get too\n"
+              "little processor time, or steps come faster than real time. 0: the part is off, or runs inside `step`.")
+      .def_ro("planner_age", &Command::planner_age, "The same of the planner's newest look [s]; 0 also where there is nothing to plan.")
+      .def_ro("pace", &Command::pace,
+              "Share of its speed that the age of the look-ahead leaves the arm, beside what moves: 1 up to `look_ahead.slow_after`\n"
+              "delays, then linear, 0 from `look_ahead.rest_after` delays on.")
       .def("__repr__", [](const Command& c) {
         return std::string("Command(") + to_string(c.status) + ", " + to_string(c.activity) + ", clearance=" + in_short(c.clearance) +
                " m, speed=" + in_short(c.speed) + " m/s)";

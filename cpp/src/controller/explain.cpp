@@ -128,6 +128,15 @@ bool Controller::Impl::finer_covers_may_free(const Obstruction& obstruction) con
   return overshoot > obstruction.depth + settings.safety.margin;
 }
 
+std::string Controller::Impl::explain_age() const {
+  if (!is_slowed_by_age()) {
+    return {};
+  }
+  char text[96];
+  std::snprintf(text, sizeof text, "slowed to %.0f %%: the look-ahead is %.1f s old, ", 100.0 * pace_, command.look_ahead_age);
+  return text + std::string("it gets too little processor time, or steps come faster than real time; ");
+}
+
 std::string Controller::Impl::explain_input() const {
   const bool on_trajectory = trajectory_order() != nullptr;
   const Eigen::Index clearance = command.bound_by >= 0 || on_trajectory ? command.bound_by : held_clearance_;
@@ -139,7 +148,7 @@ std::string Controller::Impl::explain_input() const {
     by = "joint '" + arm.robot().coordinate_names()[static_cast<std::size_t>(held_joint_)] + "' and its " +
          (held_upper_ ? "upper" : "lower") + " limit";
   }
-  const std::string lag = on_trajectory || by.empty() ? "" : explain_lag();
+  const std::string lag = on_trajectory || (by.empty() && pace_ == 1.0) ? "" : explain_lag();
   std::string words = on_trajectory ? "follows a trajectory" : lag.empty() ? "moves at the velocity that it is told" : lag;
   return by.empty() ? words : words + ", bent by the clearance of " + by;
 }
@@ -243,7 +252,7 @@ std::string Controller::Impl::explain() const {
       text += std::string("background work failed: ") + shown_fault_.data() + "; ";
     }
   }
-  text += explain_speed();
+  text += explain_speed() + explain_age();
   const std::string trajectory = explain_trajectory();
   if (!trajectory.empty() && command.activity != Activity::stale) {
     if (command.activity == Activity::waiting) {

@@ -108,7 +108,7 @@ void Controller::Impl::run_clock(const TrajectoryOrder& order) noexcept {
   fastest = std::min(fastest, steepest / rate_foresight);
   double rate = std::max(std::min(1.0, sudden * most),
                          std::min(order.path.rate(c.time), order.path.rate(c.time + rate_foresight * c.rate)));
-  rate *= std::clamp(2.0 - lag / settings.inputs.lead, 0.0, 1.0);
+  rate *= pace_ * std::clamp(2.0 - lag / settings.inputs.lead, 0.0, 1.0);
   if (order.behaviour == TrajectoryBehaviour::keep_path) {
     look_along(order.path, 0.5 * c.rate * c.rate / (braking_share * most) + window_beyond);
     if (c.free < order.path.duration()) {

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <memory>
@@ -57,7 +58,7 @@ class Controller::Impl : private StepState {
   }
   std::string explain() const;
   /// The next step with a usable state begins where the arm is. In the thread of `step`.
-  void restart() noexcept { begins_anew_ = true; }
+  void restart() noexcept { begins_anew_ = taken_.restarts = true; }
   Eigen::VectorXd target() const;
   /// Makes objects keep off obstacles that they rest on only as far as they do now.
   void let_rest(const std::vector<RestingObject>& objects);
@@ -132,6 +133,7 @@ class Controller::Impl : private StepState {
     Eigen::Index num_places = 0;
     bool avoiding = false;
     AvoidanceTrajectory trajectory;
+    std::chrono::steady_clock::time_point written;
   };
   /// Activation distances, and whether the target itself is inside a barrier.
   struct Activations {
@@ -149,14 +151,17 @@ class Controller::Impl : private StepState {
     std::uint64_t goal_number = 0;
     bool avoid = false;
     AvoidanceTrajectory trajectory;
+    double duration = 0.0;  // from the state to here, by the machine's clock [s]
   };
   /// What a step took over from other threads beside its orders: a recording keeps it, and a replay gives it again. Null: nothing.
   struct Taken {
     std::uint64_t goal = 0, obstacles = 0;  // numbers of the orders when this arm took over; 0: it did not
+    bool restarts = false;
     const FoundPosture* posture = nullptr;
     const Activations* activations = nullptr;
     const FoundTrajectory* trajectory = nullptr;
     const OnlinePlanner::Answer* answer = nullptr;
+    const OnlinePlanner::Looked* look = nullptr;
   };
 
   void put(Order order);
@@ -206,6 +211,11 @@ class Controller::Impl : private StepState {
   /// Whether what is in the way may be so for the covering body alone: links overshoot by more than they reach into it.
   bool finer_covers_may_free(const Obstruction& obstruction) const;
   void avoid() noexcept;
+  /// How old the look-ahead and the planner are, and how fast the arm may move at that.
+  void judge_age() noexcept;
+  /// Whether the age of the look-ahead slows the arm.
+  bool is_slowed_by_age() const noexcept { return pace_ < 1.0 && command.activity == Activity::moving; }
+  std::string explain_age() const;
   using MassMatrix = const Eigen::Ref<const Eigen::MatrixXd>*;
   using Bias = const Eigen::Ref<const Eigen::VectorXd>*;
   void begin_reference() noexcept;

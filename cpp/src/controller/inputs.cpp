@@ -91,6 +91,7 @@ void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const Twis
     has_last_wanted_v_ = false;
   }
   scale_to_limits(wanted_v_);
+  wanted_v_ *= pace_;
   JointGoal& goal = std::get<JointGoal>(input_goal_);
   goal.position = q_.cwiseMax(arm.robot().limits().lower).cwiseMin(arm.robot().limits().upper);
   goal.velocity = wanted_v_;

@@ -32,7 +32,8 @@ constexpr double rate_rounding = 1e-9;       // of a torque's largest change, re
 void Controller::Impl::judge_sample() noexcept {
   Measurement& m = measurement_;
   const auto now = std::chrono::steady_clock::now();
-  const double elapsed = std::chrono::duration<double>(now - m.stepped_at).count();
+  const double elapsed = m.elapsed =
+      std::isnan(m.replayed_elapsed) ? std::chrono::duration<double>(now - m.stepped_at).count() : m.replayed_elapsed;
   const bool paused = elapsed > longest_gap, was_unusable = std::exchange(m.unusable, false);
   m.stepped_at = now;
   m.q = arm_q_;

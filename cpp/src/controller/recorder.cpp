@@ -244,6 +244,10 @@ void Recorder::end_step(Controller::Impl& arm) noexcept {
   Controller::Impl::Taken& taken = arm.taken_;
   recording::Encoder<RecordRing> out(ring_);
   out(arm.arm_number, arm.goal_number_, arm.obstacle_number_, taken.goal, taken.obstacles);
+  out(TakenKind::elapsed, arm.measurement_.elapsed);
+  if (taken.restarts) {
+    out(TakenKind::restart);
+  }
   if (!synchronous_) {
     if (const auto* found = taken.posture) {
       const Posture& p = found->posture;
@@ -255,7 +259,10 @@ void Recorder::end_step(Controller::Impl& arm) noexcept {
     }
     if (const auto* found = taken.trajectory) {
       const AvoidanceTrajectory& t = found->trajectory;
-      out(TakenKind::trajectory, found->time, found->goal_number, found->avoid, t.target(), t.position(), t.velocity());
+      out(TakenKind::trajectory, found->time, found->goal_number, found->avoid, found->duration, t.target(), t.position(), t.velocity());
+    }
+    if (const auto* look = taken.look) {
+      out(TakenKind::look, look->time, look->duration);
     }
     if (const auto* answer = taken.answer) {
       out(TakenKind::answer, answer->goal_number, answer->route_number, answer->path_number, answer->status, answer->progress,

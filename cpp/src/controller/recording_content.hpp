@@ -112,14 +112,14 @@ void describe(auto& archive, Of<TimedPath> auto& p) {
 }
 
 /// What of a step follows its inputs: one of these, then its content; `end` is the last.
-enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, answer };
+enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, answer, elapsed, look, restart };
 
 /// Every field of a command with its name. A new field does not compile until it is named here: then recordings have it.
 template <class C, class Visit>
 void each_field(C& command, Visit&& visit) {
   auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors,
          tracking_error, deviation, delay, clearance, coordinate, point, bound_by, distance, speed, speed_limit, limits, system,
-         program, avoiding, on_path] = command;
+         program, avoiding, look_ahead_age, planner_age, pace, on_path] = command;
   visit("status", status);
   visit("activity", activity);
   visit("torque", torque);
@@ -144,6 +144,9 @@ void each_field(C& command, Visit&& visit) {
   visit("system", system);
   visit("program", program);
   visit("avoiding", avoiding);
+  visit("look_ahead_age", look_ahead_age);
+  visit("planner_age", planner_age);
+  visit("pace", pace);
   visit("on_path", on_path);
 }
 

@@ -115,6 +115,7 @@ void Controller::Impl::choose_reference() noexcept {
   if (guide) {
     guide_status_ = guide->step(q_, time_, path_reference_);
     taken_.answer = guide->taken();
+    taken_.look = guide->taken_look();
     reference.position = path_reference_.position;
     reference.velocity = path_reference_.velocity;
     reference.acceleration = path_reference_.acceleration;
@@ -235,9 +236,14 @@ void Controller::Impl::avoid() noexcept {
     taken_.trajectory = trajectories_.update() ? &trajectories_.current() : nullptr;
     pending_ = taken_.trajectory != nullptr || pending_;
     const FoundTrajectory& found = trajectories_.current();
+    if (taken_.trajectory != nullptr) {
+      pending_excess_ = std::max(0.0, found.duration - (time_ - found.time));
+    }
     const double late = time_ - (found.time + settings.look_ahead->delay);
     if (pending_ && late > -0.5 * settings.period) {
       pending_ = false;
+      looked_at_ = found.time;
+      look_excess_ = pending_excess_;
       avoiding_ = found.avoid;
       if (avoiding_) {
         trajectory_ = found.trajectory;
@@ -250,6 +256,20 @@ void Controller::Impl::avoid() noexcept {
   }
   if (avoiding_) {
     std::get<JointGoal>(avoidance_goal_).position = trajectory_.target();
+  }
+}
+
+void Controller::Impl::judge_age() noexcept {
+  if (settings.synchronous) {
+    return;
+  }
+  command.planner_age = guide && has_target_ ? guide->age(time_) : 0.0;
+  command.look_ahead_age = evasion_ ? time_ - looked_at_ + look_excess_ : 0.0;
+  // Where nothing moves near the arm, a look-ahead has nothing to say; and the way out of the way is not slowed.
+  pace_ = evasion_ && disturbed_ && !avoiding_ ? settings.look_ahead->pace(command.look_ahead_age) : 1.0;
+  command.pace = pace_;
+  if (guide && evasion_ && !settings.speed_limits) {
+    guide->limit_pace(pace_);
   }
 }
 

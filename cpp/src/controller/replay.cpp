@@ -330,9 +330,19 @@ void Replay::give_taken(recording::Decoder& in) {
       case TakenKind::trajectory: {
         Impl::FoundTrajectory found = impl.trajectories_.current();
         Eigen::VectorXd target, position, velocity;
-        in(found.time, found.goal_number, found.avoid, target, position, velocity);
+        in(found.time, found.goal_number, found.avoid, found.duration, target, position, velocity);
         found.trajectory = AvoidanceTrajectory(impl.arm.robot().limits(), position, velocity, std::move(target));
         impl.trajectories_.put(std::move(found));
+        break;
+      }
+      case TakenKind::restart: controller_.restart(); break;
+      case TakenKind::elapsed: in(impl.measurement_.replayed_elapsed); break;
+      case TakenKind::look: {
+        OnlinePlanner::Looked look;
+        in(look.time, look.duration);
+        if (impl.guide) {
+          impl.guide->give(look);
+        }
         break;
       }
       case TakenKind::answer: {

@@ -45,7 +45,7 @@ void Controller::Impl::limit_pace(double limit) noexcept {
   }
   leader_.update(arm.robot(), path_reference_.position, path_reference_.velocity);
   const double speed = speed_rows_.fastest(leader_).speed, pace = guide->following().follower.pace;
-  guide->limit_pace(pace > 0.0 && speed > of_limit * limit * pace ? of_limit * limit * pace / speed : 1.0);
+  guide->limit_pace(std::min(pace_, pace > 0.0 && speed > of_limit * limit * pace ? of_limit * limit * pace / speed : 1.0));
 }
 
 std::string Controller::Impl::explain_speed() const {

@@ -42,6 +42,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   choose_reference();
   leave_room(looks);
   avoid();
+  judge_age();
   const Goal& goal = avoiding_ ? avoidance_goal_ : pulls_ ? input_pull_ : *followed_;
   workspace.horizon = arm_workspace_.horizon = avoiding_ ? 0.0 : Horizon::of_obstacles;
   const StepStatus status = system->acceleration(q_, v_, goal, obstacles(), workspace);
@@ -51,6 +52,11 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
     trajectory_.acceleration(q_, v_, settings.period, wanted_);
   } else if (keeps_path() && !is_fallback(status)) {
     wanted_ = pulled_ + workspace.recovery;
+  }
+  if (pace_ < 1.0 && !pulls_ && !is_fallback(status) &&
+      !(guide && followed_ == &reference_ && guide->following().route_number != 0)) {
+    // Paths, trajectories and velocities are slowed themselves. What pulls straight is damped, at no pace like a stop.
+    wanted_ = pace_ * wanted_ - (1.0 - pace_) / settings.stop_time * v_;
   }
   if (is_stale() || !measurement_.agrees) {
     wanted_ = -v_ / settings.stop_time;
@@ -198,6 +204,9 @@ void Controller::Impl::report(bool known) noexcept {
     command.status = SafetyStatus::clearance_lost;
   }
   command.activity = judge_activity();
+  if (is_slowed_by_age()) {
+    command.status = std::max(command.status, SafetyStatus::limited);
+  }
 }
 
 void Controller::Impl::write_gravity(bool known) noexcept {
@@ -292,6 +301,7 @@ void Controller::Impl::write_snapshot() noexcept {
   }
   s.avoiding = avoiding_;
   s.trajectory = trajectory_;
+  s.written = std::chrono::steady_clock::now();
   snapshots_.submit();
 }
 

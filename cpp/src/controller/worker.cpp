@@ -99,6 +99,7 @@ void Controller::Impl::look(const Snapshot& s) {
     if (best) {
       found.trajectory = *best;
     }
+    found.duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - s.written).count();
     trajectories_.submit();
   }
 }

@@ -71,6 +71,9 @@ const std::vector<Field<LookAheadSettings>>& fields() {
       {"delay", &S::delay, "s", 0.005, 5.0, "from one look to the next, from when on what it found is followed"},
       {"clearance", &S::clearance, "m", -0.1, 0.5, "that a predicted motion has to keep from obstacles"},
       {"tries", &S::tries, "-", 1.0, 1e5, "trajectories that are drawn in one look"},
+      {"slow_after", &S::slow_after, "-", 2.0, 1e3,
+       "age of a look, in delays, from which the arm is slowed beside what moves: smaller is safer where processor time is short"},
+      {"rest_after", &S::rest_after, "-", 2.0, 1e4, "age of a look, in delays, at which the arm rests beside what moves"},
   };
   return all;
 }
@@ -79,6 +82,11 @@ void LookAheadSettings::validate() const {
   check_fields("look_ahead: ", *this);
   require(delay <= horizon, "look_ahead: delay", delay, "no longer than the horizon");
   require(period <= delay, "look_ahead: period", period, "no longer than the delay");
+  require(slow_after < rest_after, "look_ahead: slow_after", slow_after, "less than rest_after");
+}
+
+double LookAheadSettings::pace(double age) const noexcept {
+  return std::clamp((rest_after * delay - age) / ((rest_after - slow_after) * delay), 0.0, 1.0);
 }
 
 LookAhead::Stepper::Stepper(const Robot& robot, double period, bool by_torque)

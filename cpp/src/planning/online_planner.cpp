@@ -50,6 +50,7 @@ OnlinePlanner::OnlinePlanner(BodyClearance body, const OnlinePlannerConfig& sett
       here_(body_),
       states_(State{goal_, goal_, goal_}),
       answers_(Answer{}),
+      looked_(Looked{}),
       newest_(std::make_shared<const Obstacles>(Obstacles::none())),
       planner_(body_, settings.planner),
       obstacles_(newest_),
@@ -106,7 +107,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
   reference.acceleration.setZero(goal_.size());
   reference.places.col(0) = goal_;
   reference.num_places = 1;
-  reference.arrives = takes_ = false;
+  reference.arrives = takes_ = takes_look_ = false;
   if (goal_number_ == 0 || q.size() != goal_.size() || !q.allFinite() || !std::isfinite(time)) {
     reference.position = goal_;
     if (q.size() == goal_.size()) {
@@ -135,6 +136,7 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     state.goal_number = goal_number_;
     state.route_number = followed_;
     state.stops = stops_;
+    state.written = std::chrono::steady_clock::now();
     states_.submit();
     if (settings_.synchronous) {
       next_look_ = time + settings_.period;
@@ -144,6 +146,12 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     }
   }
 
+  takes_look_ = looked_.update();
+  if (takes_look_) {
+    const Looked& looked = looked_.current();
+    looked_at_ = looked.time;
+    look_excess_ = std::max(0.0, looked.duration - (time - looked.time));
+  }
   takes_ = answers_.update();
   const Answer& answer = answers_.current();
   const bool ours = answer.goal_number == goal_number_;
@@ -190,6 +198,13 @@ OnlinePlannerStatus OnlinePlanner::step(ConstVectorRef q, double time, Reference
     }
   }
   return time - begin_ > settings_.duration ? OnlinePlannerStatus::timeout : OnlinePlannerStatus::moving;
+}
+
+double OnlinePlanner::age(double time) const noexcept {
+  if (settings_.synchronous || !started_) {
+    return 0.0;
+  }
+  return std::max(0.0, looked_at_ < begin_ ? time - begin_ : time - looked_at_ + look_excess_);
 }
 
 OnlinePlanner::Following OnlinePlanner::following() noexcept {

@@ -21,7 +21,10 @@ void OnlinePlanner::run() {
     static_cast<void>(wake_.try_acquire_for(std::chrono::duration<double>(settings_.period)));
     if ((states_.update() || newer_) && !stopping_.load()) {
       newer_ = false;
-      look_safely(State(states_.get()));  // a copy: newer ones come while it looks
+      const State state = states_.get();  // a copy: newer ones come while it looks
+      look_safely(state);
+      looked_.draft() = {state.time, std::chrono::duration<double>(std::chrono::steady_clock::now() - state.written).count()};
+      looked_.submit();
     }
   }
 }

@@ -72,7 +72,11 @@ struct Command {
   StepStatus system = StepStatus::invalid_state;                ///< of the geometric system
   TorqueStatus program = TorqueStatus::fallback_invalid_input;  ///< of the quadratic program
   bool avoiding = false;                                        ///< follows an avoidance trajectory of the look-ahead
-  bool on_path = false;                                         ///< follows a path of the planner
+  /// Time since the state from which the newest result that is followed was computed [s]: it grows where threads get too little
+  /// processor time, or steps come faster than real time. 0: the part is off, runs inside `step`, or has nothing to do.
+  double look_ahead_age = 0.0, planner_age = 0.0;
+  double pace = 1.0;     ///< share of its speed that the age of the look-ahead leaves the arm, see LookAheadSettings::pace
+  bool on_path = false;  ///< follows a path of the planner
 };
 
 }  // namespace sidestep

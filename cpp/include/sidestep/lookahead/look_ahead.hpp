@@ -28,6 +28,13 @@ struct LookAheadSettings {
   double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
   int tries = 500;           ///< trajectories that are drawn in one look
   std::uint64_t seed = 0;
+  // Of a Controller whose look-ahead runs in a thread. With enough processor time a look is at most two delays and one wake-up old.
+  double slow_after = 3.0;   ///< age of a look from which the arm is slowed, in delays
+  double rest_after = 10.0;  ///< age of a look at which the arm rests, in delays: 1 s, in which a person walks 1.6 m
+
+  /// The share of its speed that an arm may move at beside what moves, with a look of this age [s]: 1 up to slow_after delays,
+  /// then linear, to 0 at rest_after.
+  double pace(double age) const noexcept;
 
   /// Throws std::invalid_argument that names the setting, its value and what is allowed.
   void validate() const;

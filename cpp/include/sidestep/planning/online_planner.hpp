@@ -2,7 +2,9 @@
 
 #include <Eigen/Core>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -99,6 +101,10 @@ class OnlinePlanner {
   /// is `invalid`. Never blocks; allocates nothing unless synchronous.
   [[nodiscard]] OnlinePlannerStatus step(ConstVectorRef q, double time, Reference& reference) noexcept;
 
+  /// Time since the state that the planner has looked at last, or since the goal was set, at a time [s] of the last `step`; in a
+  /// look by the machine's clock where that is longer. 0: synchronous, or no goal. For the loop.
+  double age(double time) const noexcept;
+
   /// The pace that the reference may go at along the path at most, see TimedPathFollower; from the loop.
   void limit_pace(double most) noexcept { follower_.most = most; }
 
@@ -135,10 +141,17 @@ class OnlinePlanner {
     double progress = 0.0;                   // on the route, that is asked for within the patience [rad | m]
     std::shared_ptr<const TimedPath> route;  // kept alive by the planner's side: a slot is only overwritten there
   };
+  /// The newest state that was looked at, and for how long.
+  struct Looked {
+    double time = -std::numeric_limits<double>::infinity(), duration = 0.0;  // [s], the latter by the machine's clock
+  };
   /// The answer that the last `step` took over, null if there was no new one. For the loop; valid until its next step.
   const Answer* taken() const noexcept { return takes_ ? &answers_.current() : nullptr; }
+  /// The look whose age the last `step` took over, likewise.
+  const Looked* taken_look() const noexcept { return takes_look_ ? &looked_.current() : nullptr; }
   /// What the next `step` takes over, of a planner that does not work by itself.
   void give(Answer answer) { answers_.put(std::move(answer)); }
+  void give(Looked look) { looked_.put(look); }
 
  private:
   static constexpr double usual_progress = 0.0202;  // [rad | m] within the patience, below which the arm is stuck
@@ -150,6 +163,7 @@ class OnlinePlanner {
     std::uint64_t goal_number = 0;   // 0: none
     std::uint64_t route_number = 0;  // that it follows
     std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
+    std::chrono::steady_clock::time_point written;
   };
 
   void run();
@@ -176,15 +190,18 @@ class OnlinePlanner {
   Eigen::VectorXd goal_, last_q_, velocity_;
   std::uint64_t goal_number_ = 0;
   double begin_ = 0.0, last_time_ = 0.0, next_look_ = 0.0;
-  bool started_ = false, takes_ = false;
+  bool started_ = false, takes_ = false, takes_look_ = false;
   ProgressMonitor progress_;
   TimedPathFollower follower_;
   std::uint64_t stops_ = 0, followed_ = 0, measured_ = 0;
+  double looked_at_ = -std::numeric_limits<double>::infinity();  // time of the newest state that was looked at [s]
+  double look_excess_ = 0.0;  // by which that look took longer by the machine's clock than by the steps' [s]
   BodyClearance::Workspace here_;
 
   // Between the two.
   TripleBuffer<State> states_;
   TripleBuffer<Answer> answers_;
+  TripleBuffer<Looked> looked_;
   std::counting_semaphore<> wake_{0};
   std::atomic<bool> stopping_{false};
   mutable std::mutex mutex_;  // of what follows; the loop never takes it
