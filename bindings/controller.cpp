@@ -323,8 +323,14 @@ void bind_controller(nb::module_& m) {
                                             : nb::cast<Attachment>(nb::module_::import_("sidestep.arm.attachment")
                                                                        .attr("attachment")(object, geometry, **options));
             check_held(made);
-            const nb::gil_scoped_release others;
-            self.attach(made);
+            std::string doubt;
+            {
+              const nb::gil_scoped_release others;
+              doubt = self.attach(made);
+            }
+            if (!doubt.empty()) {
+              warn(doubt);
+            }
           },
           nb::arg("object").none(), nb::arg("geometry") = nb::none(), nb::arg("options"),
           nb::sig("def attach(self, object: str | Attachment, geometry: sidestep.obstacles.Shape | numpy.typing.ArrayLike | None = None, "
@@ -333,7 +339,8 @@ void bind_controller(nb::module_& m) {
           "mass=0.3, may_touch=[\"fr3_leftfinger\", \"fr3_rightfinger\"]), with the options of `sidestep.arm.attachment`; a\n"
           "shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and\n"
           "its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=[\"table\"] the same\n"
-          "holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.")
+          "holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.\n"
+          "Warns where the object is far away from the link, as with a pose in the world.")
       .def(
           "detach",
           [](Controller& self, nb::handle object) {

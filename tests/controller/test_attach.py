@@ -154,3 +154,39 @@ def test_a_cup_that_stands_on_a_table_may_stay_there_until_it_is_lifted(rests_on
     assert robot.pose(up.q[-1], "fr3_hand_tcp")[2, 3] == pytest.approx(X[2, 3], abs=2e-3)
     with pytest.raises(ValueError, match="rests on 'tabel', which is no obstacle; there are: 'table'"):
         controller.attach("other", cup, rests_on="tabel", **options)
+
+
+def test_an_object_far_from_the_link_that_holds_it_is_doubted(recwarn):
+    arm = ss.Arm.load("fr3")
+    cup, options = Cylinder(0.04, 0.12), {"link": "fr3_hand", "mass": 0.3, "may_touch": FINGERS}
+    in_link = np.eye(4)
+    in_link[2, 3] = 0.12
+    in_world = arm.robot.pose(Q, "fr3_hand") @ in_link
+    controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True, planner=None, look_ahead=None))
+
+    def attach(pose, match=None):
+        recwarn.clear()
+        controller.attach("cup", cup, pose=pose, **options)
+        controller.detach("cup")
+        words = [str(one.message) for one in recwarn.list]
+        assert len(words) == (match is not None)
+        return words[0] if words else ""
+
+    attach(in_link)
+    # Where the arm is nobody has said yet: the distance alone is known, of the hand's surface from the cup's.
+    distance = float(np.linalg.norm(in_world[:3, 3]))
+    words = attach(in_world, match="far")
+    told = float(words.split("it is ")[1].split(" m")[0])
+    assert distance - 0.2 < told < distance  # the hand's longest half is 0.12 m, the cup's 0.07 m
+    assert (
+        "away from link 'fr3_hand' that holds it; pose is that of its frame in the frame of the link" in words
+    )
+    controller.step(Q, np.zeros(7))
+    assert "looks like one in the world" in attach(in_world, match="world")
+    attach(in_link)
+    # A long tool's tip, and a cup in a gripper that the arm lacks, are no more than some hands away.
+    tip = np.eye(4)
+    tip[2, 3] = 0.35
+    attach(tip)
+    tip[2, 3] = 0.8
+    assert "is it one in the world?" in attach(tip, match="far")

@@ -187,7 +187,7 @@ void Controller::set_arm(Arm arm) {
   change(arm, held_);
 }
 
-void Controller::attach(const Attachment& object) {
+std::string Controller::attach(const Attachment& object) {
   const std::lock_guard lock(changes_);
   forget_lifted();
   std::vector<Held> held = held_;
@@ -210,7 +210,9 @@ void Controller::attach(const Attachment& object) {
     sidestep::attach(holding, object);  // for what is wrong with it
     last.resting = resting(holding.robot(), object, last.q, *around, settings_.safety.margin + attached_room);
   }
+  const Eigen::VectorXd q = last.q;
   change(whole_, std::move(held));
+  return doubt(arm(), object, q);
 }
 
 void Controller::detach(const std::string& name) {

@@ -3,10 +3,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
+#include "../settings.hpp"
+#include "sidestep/barrier/ellipsoid_gap.hpp"
+#include "sidestep/kinematics/kinematic_state.hpp"
 #include "sidestep/planning/body_clearance.hpp"
 
 namespace sidestep {
@@ -14,6 +18,12 @@ namespace {
 
 constexpr double solid_level = 5.0;  // yᵀ Σ⁻¹ y on the boundary of a solid ellipsoid of covariance Σ
 constexpr double thinnest = 1e-6;    // [m] of a semi-axis
+// Distance of an object from what holds it that is doubted, in sizes of the holder: a gripper that the arm lacks is in between.
+constexpr double far_sizes = 2.5;
+// Bounds of that size [m]: flanges without a gripper are smaller, long links say nothing of what a hand holds.
+constexpr double least_size = 0.12, most_size = 0.16;
+// Distance that is doubted where the pose, read in the world's frame, puts the object nearer to the link than `at_hand` [m].
+constexpr double apart = 0.15, at_hand = 0.05;
 
 [[noreturn]] void refuse(const Attachment& object, const std::string& why) {
   throw std::invalid_argument("attach '" + object.name + "': " + why);
@@ -62,7 +72,75 @@ Inertial joined(const Inertial& a, const Inertial& b) {
   return both;
 }
 
+/// An ellipsoid {centre + S^½ u : |u| <= 1}.
+struct Ellipsoid {
+  Eigen::Vector3d centre;
+  Eigen::Matrix3d S;
+};
+
+double gap_of(const std::vector<Ellipsoid>& one, const std::vector<Ellipsoid>& other) {
+  double least = infinity;
+  for (const Ellipsoid& a : one) {
+    for (const Ellipsoid& b : other) {
+      least = std::min(least, ellipsoid_gap(b.centre - a.centre, a.S, b.S).value);
+    }
+  }
+  return least;
+}
+
+/// The ellipsoids of an object, in the frame that X takes its own frame to.
+std::vector<Ellipsoid> placed(const Attachment& object, const Eigen::Isometry3d& X) {
+  std::vector<Ellipsoid> all;
+  for (std::size_t k = 0; k < object.cover.centres.size(); ++k) {
+    const Eigen::Matrix3d shape = X.linear() * object.cover.shapes[k];
+    all.push_back({X * object.cover.centres[k], shape * shape.transpose()});
+  }
+  return all;
+}
+
 }  // namespace
+
+std::string doubt(const Arm& holding, const Attachment& object, const Eigen::VectorXd& q) {
+  const Robot& robot = holding.robot();
+  const Body& body = holding.body();
+  const Frame& link = robot.frames()[static_cast<std::size_t>(robot.frame_index(object.link))];
+  std::vector<Ellipsoid> holder;  // in the frame of the joint that moves it
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(infinity), high = -low;
+  for (int k = 0; k < body.num_components(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const Frame& frame = robot.frames()[static_cast<std::size_t>(robot.frame_index(body.links[i]))];
+    if (frame.joint == link.joint && frame.name != object.name) {
+      const Eigen::Matrix3d S = body.levels[k] * frame.X_JF.linear() * body.covariances[i] * frame.X_JF.linear().transpose();
+      const Eigen::Vector3d centre = frame.X_JF * body.means.col(k), reach = S.diagonal().cwiseSqrt();
+      holder.push_back({centre, S});
+      low = low.cwiseMin(centre - reach);
+      high = high.cwiseMax(centre + reach);
+    }
+  }
+  if (holder.empty()) {
+    return {};
+  }
+  const double gap = gap_of(holder, placed(object, link.X_JF * object.X_LA));
+  double in_world = infinity;
+  if (q.size() != 0) {
+    KinematicState state(robot);
+    state.update(robot, q, Eigen::VectorXd::Zero(q.size()));
+    Eigen::Isometry3d X_WJ = Eigen::Isometry3d::Identity();
+    X_WJ.linear() = state.link(link.joint).R_WL;
+    X_WJ.translation() = state.link(link.joint).p_WL;
+    in_world = gap_of(holder, placed(object, X_WJ.inverse() * object.X_LA));
+  }
+  const bool is_of_world = gap > apart && in_world < at_hand;
+  if (!is_of_world && !(gap > far_sizes * std::clamp((high - low).maxCoeff(), least_size, most_size))) {
+    return {};
+  }
+  char away[32];
+  std::snprintf(away, sizeof away, "%.2f m", gap);
+  return "attach '" + object.name + "': it is " + away + " away from link '" + object.link +
+         "' that holds it; pose is that of its frame in the frame of the link" +
+         (is_of_world ? ", and looks like one in the world: give inverse(pose of the link in the world) @ pose"
+                      : "; is it one in the world?");
+}
 
 Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q) {
   const Robot& robot = arm.robot();

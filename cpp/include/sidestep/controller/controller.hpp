@@ -107,7 +107,8 @@ class Controller {
   /// links. An object that rests on obstacles there (Attachment::rests_on) may stay as near to them as it is, see
   /// sidestep::resting, until its whole cover is `lifted_room` away from all obstacles. Throws std::invalid_argument that names
   /// what is wrong, for example an object that rests before the first step; then nothing changes.
-  void attach(const Attachment& object);
+  /// Returns what is implausible about where it is, in words, see sidestep::doubt; empty: nothing.
+  std::string attach(const Attachment& object);
   /// Releases an object. Throws std::invalid_argument that lists the attached objects.
   void detach(const std::string& name);
   /// Names of the attached objects.

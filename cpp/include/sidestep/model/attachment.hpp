@@ -33,6 +33,11 @@ struct Attachment {
 /// joint moves, no ellipsoid or one that is none, an inertia that is none.
 Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q = {});
 
+/// What is implausible about the place of an object that an arm holds, in words that name the distance; empty: nothing. Its cover is
+/// farther from the links that move with its link than 2.5 times their size, that is 0.3 to 0.4 m. Or it is farther than 0.15 m,
+/// and its pose, read in the world's frame, puts it to them at q (nv), where that is not empty.
+std::string doubt(const Arm& holding, const Attachment& object, const Eigen::VectorXd& q = {});
+
 constexpr double attached_room = 0.001;
 
 /// An object that stands on something, and by how much its cover has given way there.
