@@ -193,15 +193,15 @@ def test_deviation_counts_from_the_samples_and_not_from_a_curve() -> None:
     assert largest > 0.02
 
 
-def continuous_arm() -> ss.Arm:
+def continuous_arm(velocity: str = 'velocity="2"') -> ss.Arm:
     """Two links whose joints turn without end."""
     link = """<link name="l{0}"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0"
         iyz="0"/></inertial><collision><origin xyz="0.2 0 0"/><geometry><box size="0.4 0.05 0.05"/></geometry>
         </collision></link>"""
     joint = """<joint name="j{1}" type="continuous"><parent link="l{0}"/><child link="l{1}"/><origin xyz="{2} 0 0"/>
-        <axis xyz="0 0 1"/><limit velocity="2" effort="50"/></joint>"""
-    text = f"""<robot name="turning"><link name="l0"/>{link.format(1)}{link.format(2)}{joint.format(0, 1, 0.0)}
-        {joint.format(1, 2, 0.5)}</robot>"""
+        <axis xyz="0 0 1"/><limit {3} effort="50"/></joint>"""
+    text = f"""<robot name="turning"><link name="l0"/>{link.format(1)}{link.format(2)}
+        {joint.format(0, 1, 0.0, velocity)}{joint.format(1, 2, 0.5, velocity)}</robot>"""
     return ss.Arm.load(text)
 
 
@@ -215,6 +215,16 @@ def test_samples_of_joints_without_limits_are_unwound() -> None:
     assert run.duration < 3.2
     assert off_lines(run.q, true) < BEYOND
     assert run.deviation < BEYOND
+
+
+@pytest.mark.filterwarnings("ignore:.*no velocity limit is given")
+def test_bunched_stamps_without_velocity_limits() -> None:
+    samples, times = recording(bursts_of_three)
+    samples = samples[:, [0, 3]] - samples[0, [0, 3]]
+    run = Run(samples, times, arm=continuous_arm(velocity=""))
+    assert run.arrived
+    assert off_lines(run.q, samples) < TRACKING
+    assert run.duration < 3.5  # true stamps take 3.14 s; 4.95 s where they stay as they are
 
 
 def test_stamps_that_are_dates_and_stamps_that_go_back_are_named() -> None:

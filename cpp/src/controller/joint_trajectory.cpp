@@ -58,8 +58,8 @@ void check_samples(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::Ve
   }
 }
 
-/// Whether limits allow the spans before and after sample k, if it is there at time `at`, with a
-/// share of the acceleration limits.
+/// Whether the velocity limits, and a share of the acceleration limits, allow the spans before and after sample k, if it is
+/// there at time `at`.
 bool is_feasible(const Eigen::MatrixXd& q, Eigen::Index k, double before, double at, double after,
                  const Eigen::VectorXd& velocity, const Eigen::VectorXd& acceleration, double share) {
   for (Eigen::Index j = 0; j < q.rows(); ++j) {
@@ -79,7 +79,9 @@ void spread_bunched_stamps(const Eigen::MatrixXd& q, const Eigen::VectorXd& velo
                            Eigen::Index begin, Eigen::VectorXd& times) {
   const Eigen::VectorXd stamps = times;
   std::vector<bool> bunched(static_cast<std::size_t>(times.size()));  // its stamp moved, or that beside it
-  const auto way = [&](Eigen::Index k) { return (q.col(k + 1) - q.col(k)).cwiseAbs().cwiseQuotient(velocity).maxCoeff(); };
+  const auto way = [&](Eigen::Index k) {  // acceleration limits are finite, velocity limits need not be
+    return (q.col(k + 1) - q.col(k)).cwiseAbs().cwiseQuotient(acceleration).maxCoeff();
+  };
   bool moved = true;
   for (int sweep = 0; moved && sweep < most_sweeps; ++sweep) {
     moved = false;
