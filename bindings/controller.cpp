@@ -132,6 +132,7 @@ void bind_command(nb::module_& m) {
       .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.")
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
       .value("tracking_lost", SafetyStatus::tracking_lost, "The arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position agrees with no motion: the arm comes to rest.")
+      .value("stale", SafetyStatus::stale, "The obstacles are older than obstacle_timeout, or were never set although it is: the arm stops.")
       .value("stopping", SafetyStatus::stopping, "The input is unusable or the program was not solved: a damped stop.")
       .value("clearance_lost", SafetyStatus::clearance_lost, "An ellipsoid of the arm reaches into something.");
   nb::enum_<Activity>(m, "Activity", "What a controller is about.")
@@ -139,8 +140,8 @@ void bind_command(nb::module_& m) {
       .value("moving", Activity::moving, "On the way to its goal, or as it is told.")
       .value("waiting", Activity::waiting, "Until a posture is found, or a trajectory that it keeps to is free.")
       .value("arrived", Activity::arrived, "The goal is reached.")
-      .value("blocked", Activity::blocked, "No way leads to the goal now, see Controller.explain.")
-      .value("stale", Activity::stale, "The obstacles are older than obstacle_timeout: the arm stops.");
+      .value("blocked", Activity::blocked, "No path leads to the goal, for 0.2 s at least, see Controller.explain; the arm goes as near as it can.")
+      .value("stale", Activity::stale, "As SafetyStatus.stale: the arm stops.");
 
   nb::class_<Command>(m, "Command", "What one step of a Controller gives; arrays are copies.")
       .def_ro("status", &Command::status, "How safe the command is.")

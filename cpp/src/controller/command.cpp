@@ -9,6 +9,7 @@ const char* to_string(SafetyStatus status) noexcept {
     case SafetyStatus::relaxed: return "relaxed";
     case SafetyStatus::margin_lost: return "margin_lost";
     case SafetyStatus::tracking_lost: return "tracking_lost";
+    case SafetyStatus::stale: return "stale";
     case SafetyStatus::stopping: return "stopping";
     case SafetyStatus::clearance_lost: return "clearance_lost";
   }

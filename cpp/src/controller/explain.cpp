@@ -268,6 +268,10 @@ std::string Controller::Impl::explain() const {
       return text + "stopped: the velocity is " + age(order_age_, "inputs.timeout", settings.inputs.timeout) +
              "; set_velocity or set_twist must be called more often";
     case Activity::stale:
+      if (obstacle_number_ == 0) {
+        return text +
+               "stopped: obstacle_timeout is set, but obstacles never were; call set_obstacles, with none where nothing is";
+      }
       return text + "stopped: the obstacles are " + age(obstacle_age_, "obstacle_timeout", settings.obstacle_timeout) +
              "; set_obstacles must be called more often";
     case Activity::waiting: return text + "waiting for a posture that reaches the pose";

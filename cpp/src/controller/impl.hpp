@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <exception>
 #include <memory>
@@ -263,7 +264,10 @@ class Controller::Impl : private StepState {
   bool at_goal() noexcept;
   void write_places(Eigen::MatrixXd& places, Eigen::Index& num) const noexcept;
   void write_snapshot() noexcept;
-  bool is_stale() const noexcept { return obstacle_age_ > settings.obstacle_timeout; }
+  /// Also where a timeout was set and obstacles never were: nothing is known to be free.
+  bool is_stale() const noexcept {
+    return obstacle_age_ > settings.obstacle_timeout || (obstacle_number_ == 0 && std::isfinite(settings.obstacle_timeout));
+  }
   bool has_sub_goal() const noexcept { return followed_ != nullptr && followed_ != &reference_ && followed_ != goal_; }
   void keep_room() noexcept;
   bool has_goal() const noexcept { return goal_ != nullptr; }

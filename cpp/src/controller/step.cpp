@@ -211,6 +211,9 @@ void Controller::Impl::report(bool known) noexcept {
 
 void Controller::Impl::write_gravity(bool known) noexcept {
   if (torque && known && dynamics_) {
+  if (is_stale()) {
+    command.status = std::max(command.status, SafetyStatus::stale);
+  }
     command.torque_without_gravity = command.torque - gravity_;
   } else {
     command.torque_without_gravity.setConstant(torque ? std::numeric_limits<double>::quiet_NaN() : 0.0);

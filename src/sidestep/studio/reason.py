@@ -23,7 +23,7 @@ ACTIVITIES = {
     Activity.blocked: "no way to the goal",
     Activity.stale: "stops: obstacles are too old",
 }
-STATUSES = {
+STATUSES = {  # `stale` is told as an activity
     SafetyStatus.relaxed: "limits gave way to clearances",
     SafetyStatus.margin_lost: "a safety margin is lost",
     SafetyStatus.tracking_lost: "the arm is not where it was commanded",

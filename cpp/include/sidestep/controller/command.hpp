@@ -19,6 +19,7 @@ enum class SafetyStatus {
   margin_lost,     ///< not every safety margin or position limit can be kept; nothing is touched
   tracking_lost,   ///< the arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position
                    ///< agrees with no motion: the arm comes to rest
+  stale,           ///< the obstacles are older than `obstacle_timeout`, or were never set although it is: the arm stops
   stopping,        ///< the input is unusable or the program was not solved: a damped stop
   clearance_lost,  ///< an ellipsoid of the arm reaches into an obstacle, a plane or another link
 };
@@ -29,8 +30,8 @@ enum class Activity {
   moving,   ///< on the way to its goal, or at the commanded velocity
   waiting,  ///< until a posture is found, or until its trajectory is free
   arrived,  ///< the goal is reached
-  blocked,  ///< no path leads to the goal now, see `explain`
-  stale,    ///< the obstacles are older than `obstacle_timeout`: the arm stops
+  blocked,  ///< no path leads to the goal, for 0.2 s at least, see `explain`; the arm goes as near as it can
+  stale,    ///< as SafetyStatus::stale: the arm stops
 };
 
 /// Short names, for example "clearance_lost".
