@@ -282,6 +282,9 @@ std::string Controller::Impl::explain() const {
   if (command.system == StepStatus::invalid_goal || command.system == StepStatus::goal_outside_limits) {
     return text + "the goal has left the position limits: it is not followed; set a new goal";
   }
+  if (has_goal() && !moves_ && !has_target_) {
+    return text + "another posture is looked for";
+  }
   if (has_target_ && !posture_found_) {
     const std::lock_guard lock(mutex_);
     if (shown_posture_) {

@@ -261,6 +261,10 @@ class Controller::Impl : private StepState {
   void write_gravity(bool known) noexcept;
   void report(bool known) noexcept;
   Activity judge_activity() noexcept;
+  Way way_to_goal() noexcept;
+  /// Follows `way_to_goal` once it has said the same for a while.
+  void settle_way() noexcept;
+  void forget_way() noexcept;
   bool at_goal() noexcept;
   void write_places(Eigen::MatrixXd& places, Eigen::Index& num) const noexcept;
   void write_snapshot() noexcept;

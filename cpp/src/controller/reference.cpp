@@ -29,12 +29,16 @@ void Controller::Impl::begin_goal() noexcept {
     if (moves_) {
       return;
     }
+    if (target_ != joint->position) {  // the same goal set again is no other
+      forget_way();
+    }
     target_ = joint->position;
     has_target_ = posture_found_ = true;
     if (guide) {
       guide->set_goal(target_);
     }
   } else if (!moves_) {
+    forget_way();
     next_posture(std::get<PoseGoal>(*goal_));
   }
 }

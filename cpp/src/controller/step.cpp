@@ -11,6 +11,14 @@ namespace sidestep {
 namespace {
 
 constexpr double sliding_speed = 0.1;  // of the speed that counts as rest, of joints that slide [m/rad]
+// Time for which the way to a goal stays as it is before the activity says so [s]: several looks of planner and barriers, of
+// 20 ms each. What changes from one look to the next, as from posture to posture, is no verdict.
+constexpr double settling = 0.2;
+constexpr double unfound = 0.5;         // the same of a search that found nothing [s]: barriers may lead on meanwhile
+constexpr double opening = 0.1;         // the same of a way that is open again [s]
+constexpr double settling_looks = 3.0;  // each of them, where looks are farther apart [looks]
+// Time of rest from which an arm that is inside something counts as unable to get out [s]: the reactive layer takes less.
+constexpr double held_inside = 1.0;
 
 }  // namespace
 
@@ -100,6 +108,9 @@ void Controller::Impl::take_orders() noexcept {
     order_age_ = 0.0;
     begins_input_ = goal_ == nullptr && order.order.index() != 0;
     goal_number_ = order.number;
+    if (goal_ == nullptr) {
+      forget_way();
+    }
     has_target_ = posture_found_ = false;
     target_blocked_ = rests_ = false;
     posture_attempt_ = 0;
@@ -197,6 +208,9 @@ void Controller::Impl::report(bool known) noexcept {
   if (measurement_.is_far) {
     command.status = std::max(command.status, SafetyStatus::tracking_lost);
   }
+  if (is_stale()) {
+    command.status = std::max(command.status, SafetyStatus::stale);
+  }
   if (is_fallback(command.system)) {
     command.status = SafetyStatus::stopping;
   }
@@ -211,9 +225,6 @@ void Controller::Impl::report(bool known) noexcept {
 
 void Controller::Impl::write_gravity(bool known) noexcept {
   if (torque && known && dynamics_) {
-  if (is_stale()) {
-    command.status = std::max(command.status, SafetyStatus::stale);
-  }
     command.torque_without_gravity = command.torque - gravity_;
   } else {
     command.torque_without_gravity.setConstant(torque ? std::numeric_limits<double>::quiet_NaN() : 0.0);
@@ -262,18 +273,57 @@ Activity Controller::Impl::judge_activity() noexcept {
   if (moves_) {
     return Activity::moving;
   }
-  if (!has_target_) {
+  if (!has_target_ && posture_attempt_ == 0) {
     return Activity::waiting;
   }
-  rests_ = true;
+  rests_ = has_target_;
   for (Eigen::Index j = 0; j < arm_v_.size(); ++j) {  // a joint may slide no faster than that
     const double share = is_sliding_[static_cast<std::size_t>(j)] ? sliding_speed : 1.0;
     rests_ = rests_ && std::abs(arm_v_[j]) < share * settings.arrival.speed;
   }
-  const bool out_of_reach = !posture_found_;
-  const bool no_way =
-      guide_status_ == OnlinePlannerStatus::no_path || guide_status_ == OnlinePlannerStatus::goal_in_collision || stops_short();
-  return rests_ && (no_way || out_of_reach) ? Activity::blocked : Activity::moving;
+  rest_time_ = rests_ ? rest_time_ + settings.period : 0.0;
+  settle_way();
+  return no_way_ ? Activity::blocked : Activity::moving;
+}
+
+StepState::Way Controller::Impl::way_to_goal() noexcept {
+  if (!has_target_) {
+    return Way::unknown;  // another posture is looked for
+  }
+  if (!posture_found_ || guide_status_ == OnlinePlannerStatus::no_path ||
+      guide_status_ == OnlinePlannerStatus::goal_in_collision || stops_short()) {
+    return Way::none;
+  }
+  if (!guide) {
+    return Way::open;
+  }
+  if (guide_status_ == OnlinePlannerStatus::start_in_collision) {
+    return rest_time_ < held_inside ? Way::unknown : Way::none;
+  }
+  return guide->following().route_number == 0 ? Way::unknown : Way::open;
+}
+
+void Controller::Impl::settle_way() noexcept {
+  const Way now = way_to_goal();
+  if (now != Way::unknown && now != way_) {
+    way_ = now;
+    way_since_ = time_;
+  }
+  if (now == Way::open) {
+    way_settles_ = opening;
+  } else if (now == Way::none) {
+    way_settles_ = guide_status_ == OnlinePlannerStatus::no_path && posture_found_ ? unfound : settling;
+  }
+  if (time_ - way_since_ >= std::max(way_settles_, settling_looks * look_period_)) {
+    no_way_ = way_ == Way::none;
+  }
+}
+
+void Controller::Impl::forget_way() noexcept {
+  way_ = Way::unknown;
+  way_since_ = time_;
+  rest_time_ = 0.0;
+  no_way_ = false;
 }
 
 void Controller::Impl::write_snapshot() noexcept {

@@ -57,6 +57,13 @@ struct StepState {
   bool begins_goal_ = false, wakes_worker_ = false;
   bool known_before_ = false, disturbed_ = false, target_blocked_ = false;
   bool rests_ = false;  // short of a goal that it was on the way to
+  // The way to a goal at rest, as the planner, the posture search and the barriers know it.
+  enum class Way { unknown, open, none };
+  Way way_ = Way::unknown;    // the last that was known
+  double way_since_ = 0.0;    // [s]
+  double way_settles_ = 0.0;  // after so long [s]
+  double rest_time_ = 0.0;    // for how long it has rested short of its goal [s]
+  bool no_way_ = false;       // as reported: `way_`, once it has settled
   std::uint64_t goal_number_ = 0, obstacle_number_ = 0, posture_attempt_ = 0, tick_ = 0;
   bool has_target_ = false, posture_found_ = false, moves_ = false;
   Eigen::VectorXd target_;  // a configuration that the arm is led to
