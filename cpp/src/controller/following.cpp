@@ -177,8 +177,11 @@ std::string Controller::Impl::explain_trajectory() const {
     words += text;
   }
   if (command.deviation > 0.001) {
-    std::snprintf(text, sizeof text, "%s%.2g rad or m off %s", words.empty() ? "" : ", ", command.deviation,
-                  words.empty() ? "the trajectory" : "it");
+    Eigen::Index farthest = 0;
+    (path_q_ - q_).cwiseAbs().maxCoeff(&farthest);
+    const bool slides = is_sliding_[static_cast<std::size_t>(farthest)];
+    std::snprintf(text, sizeof text, "%s%.2g %s off %s", words.empty() ? "" : ", ", (slides ? 1e3 : 1.0) * command.deviation,
+                  slides ? "mm" : "rad", words.empty() ? "the trajectory" : "it");
     words += text;
   }
   if (clock_.blocked && has_input() && order->behaviour == TrajectoryBehaviour::keep_path) {
