@@ -77,3 +77,49 @@ def test_a_rotation_vector_is_the_logarithm() -> None:
     for axis in np.eye(3):
         half = rotation_vector(2.0 * np.outer(axis, axis) - np.eye(3))
         np.testing.assert_allclose(np.abs(half), np.pi * axis, atol=1e-12)
+
+
+def test_the_order_of_a_quaternion_is_stated_by_name() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        q = rng.normal(size=4)
+        q /= np.linalg.norm(q)
+        X = pose_at([0.1, 0.2, 0.3], xyzw=q)
+        # a handful of products of numbers below 1
+        np.testing.assert_allclose(X[:3, :3], Rotation.from_quat(q).as_matrix(), rtol=0, atol=3e-15)
+        # the norm is summed in another order
+        np.testing.assert_allclose(pose_at([0.1, 0.2, 0.3], wxyz=np.roll(q, 1)), X, rtol=0, atol=3e-15)
+        np.testing.assert_array_equal(X[:, 3], [0.1, 0.2, 0.3, 1.0])
+    rounded = pose_at(np.zeros(3), wxyz=[0.707, 0.707, 0.0, 0.0])  # three digits: normalised
+    np.testing.assert_allclose(rounded[:3, :3] @ rounded[:3, :3].T, np.eye(3), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"rotation": [0.0, 0.0, 0.0, 1.0]},
+            r"rotation has shape \(4,\), expected \(3, 3\); .*xyzw=q .* wxyz=q",
+        ),
+        ({"rotation": np.eye(2)}, r"rotation has shape \(2, 2\), expected \(3, 3\)$"),
+        ({"xyzw": [0.0, 0.0, 1.0]}, r"xyzw has shape \(3,\), expected \(4,\)"),
+        (
+            {"xyzw": np.zeros(4)},
+            r"quaternion xyzw \[0\.0, .*\] has norm 0, must be 1; is the message empty\?",
+        ),
+        ({"wxyz": [1.1, 0.0, 0.0, 0.0]}, r"quaternion wxyz \[1\.1, .*\] has norm 1\.1, must be 1$"),
+        ({"wxyz": [np.nan, 0.0, 0.0, 0.0]}, "has norm nan, must be 1"),
+        (
+            {"xyzw": [0.0, 0.0, 0.0, 1.0], "wxyz": [1.0, 0.0, 0.0, 0.0]},
+            "xyzw and wxyz are given, allowed: one",
+        ),
+    ],
+)
+def test_what_is_no_turn_is_named(given: dict[str, object], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        pose_at([0.0, 0.0, 0.0], **given)
+
+
+def test_what_is_no_translation_is_named() -> None:
+    with pytest.raises(ValueError, match=r"translation has shape \(2,\), expected \(3,\)"):
+        pose_at([0.0, 0.0])

@@ -14,6 +14,7 @@ from sidestep.robot.matrices import product
 Array = npt.NDArray[np.float64]
 
 NO_TURN = 1e-9  # sine of an angle that is none, or half a turn
+ROUNDED_NORM = 0.01  # from 1: four entries of a quaternion that are rounded to two digits
 
 
 def about_axis(axis: Array, angle: float) -> Array:
@@ -59,13 +60,62 @@ def rotation_vector(rotation: Array) -> Array:
     return np.asarray(axis * (math.atan2(sine, cosine) / sine if sine > NO_TURN else 1.0))
 
 
-def pose_at(translation: npt.ArrayLike, rotation: npt.ArrayLike | None = None) -> Array:
-    """A pose (4, 4) at a translation (3,) [m], turned by a rotation (3, 3), or not at all."""
+def pose_at(
+    translation: npt.ArrayLike,
+    rotation: npt.ArrayLike | None = None,
+    *,
+    xyzw: npt.ArrayLike | None = None,
+    wxyz: npt.ArrayLike | None = None,
+) -> Array:
+    """A pose (4, 4) at a translation, turned by a rotation or a unit quaternion, or not at all.
+
+    Args:
+        translation: (3,) [m].
+        rotation: (3, 3).
+        xyzw: quaternion (4,) with the real part last, as ROS, SciPy and PyBullet write it.
+        wxyz: quaternion (4,) with the real part first, as MuJoCo, Drake and Eigen's constructor write it.
+
+    Raises:
+        ValueError: a shape is another, more than one turn is given, or a quaternion's norm is not 1 but for rounding to
+            two digits, which is made up for; names the value and what is allowed.
+    """
     X = np.eye(4)
-    X[:3, 3] = real_array(translation, "translation")
+    X[:3, 3] = _shaped(translation, "translation", (3,))
+    given = [
+        name for name, value in (("rotation", rotation), ("xyzw", xyzw), ("wxyz", wxyz)) if value is not None
+    ]
+    if len(given) > 1:
+        raise ValueError(f"pose_at: {' and '.join(given)} are given, allowed: one of them")
     if rotation is not None:
-        X[:3, :3] = real_array(rotation, "rotation")
+        X[:3, :3] = _shaped(rotation, "rotation", (3, 3))
+    elif xyzw is not None:
+        X[:3, :3] = from_quaternion(np.roll(_unit_quaternion(xyzw, "xyzw"), 1))
+    elif wxyz is not None:
+        X[:3, :3] = from_quaternion(_unit_quaternion(wxyz, "wxyz"))
     return X
+
+
+def _shaped(value: npt.ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
+    array: Array = real_array(value, name)
+    if array.shape == shape:
+        return array
+    words = f"pose_at: {name} has shape {array.shape}, expected {shape}"
+    if name == "rotation" and array.shape == (4,):
+        words += (
+            "; state the order of a quaternion: xyzw=q as of ROS and SciPy, or wxyz=q as of MuJoCo and Drake"
+        )
+    raise ValueError(words)
+
+
+def _unit_quaternion(value: npt.ArrayLike, name: str) -> Array:
+    quaternion = _shaped(value, name, (4,))
+    norm = float(np.linalg.norm(quaternion))
+    if not abs(norm - 1.0) <= ROUNDED_NORM:
+        cause = "; is the message empty?" if norm == 0.0 else ""
+        raise ValueError(
+            f"pose_at: quaternion {name} {quaternion.tolist()} has norm {norm:.4g}, must be 1{cause}"
+        )
+    return quaternion / norm
 
 
 def checked_pose(value: npt.ArrayLike, owner: str, *, tolerance: float = 1e-6) -> Array:
