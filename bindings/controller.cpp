@@ -213,6 +213,13 @@ void check_held(const Attachment& object) {
   }
 }
 
+/// Warns of what is hard to believe in the order that was set last, see Plausibility.
+void warn_of_order(const Controller& controller) {
+  if (const std::string question = controller.questions().order; !question.empty()) {
+    warn(question);
+  }
+}
+
 /// What the thread of `step` alone may read, refused while another one has the controller.
 template <class Get>
 auto of_last_step(Get get) {
@@ -246,7 +253,10 @@ void bind_controller(nb::module_& m) {
           nb::sig("def __init__(self, arm: Arm, settings: ControllerSettings | None = None) -> None"))
       .def(
           "set_goal",
-          [](Controller& self, nb::handle goal) { self.set_goal(as_goal(goal, self.num_coordinates())); },
+          [](Controller& self, nb::handle goal) {
+            self.set_goal(as_goal(goal, self.num_coordinates()));
+            warn_of_order(self);
+          },
           nb::arg("goal").none(),
           nb::sig("def set_goal(self, goal: numpy.typing.ArrayLike | JointGoal | PoseGoal | Sequence[PoseGoal]) -> None"),
           "From the next step on: a configuration (nv,) [rad | m] within the limits, or a goal that moves, or a pose, or poses\n"
@@ -254,7 +264,10 @@ void bind_controller(nb::module_& m) {
           "ValueError that names the joint, its value and what is allowed; the goal before stays.")
       .def(
           "set_velocity",
-          [](Controller& self, nb::handle v) { self.set_velocity(as_vector(v, "v", self.num_coordinates())); },
+          [](Controller& self, nb::handle v) {
+            self.set_velocity(as_vector(v, "v", self.num_coordinates()));
+            warn_of_order(self);
+          },
           nb::arg("v").none(), nb::sig("def set_velocity(self, v: numpy.typing.ArrayLike) -> None"),
           "Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. Obstacles steer the\n"
           "arm around them and stop it. After `inputs.timeout` without another order the arm stops. Raises ValueError that\n"
@@ -263,6 +276,7 @@ void bind_controller(nb::module_& m) {
           "set_twist",
           [](Controller& self, nb::handle frame, nb::handle twist, bool local) {
             self.set_twist(as_text(frame, "frame", "the name of a link of the arm"), Vector6d(as_vector(twist, "twist", 6)), local);
+            warn_of_order(self);
           },
           nb::arg("frame").none(), nb::arg("twist").none(), nb::arg("local") = false,
           nb::sig("def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False) -> None"),
@@ -275,6 +289,7 @@ void bind_controller(nb::module_& m) {
             const Eigen::VectorXd at = as_vector(times, "times");
             const Eigen::MatrixXd rows = as_matrix(q, "q", at.size(), self.num_coordinates());
             self.set_trajectory(rows.transpose(), at, as_enum<TrajectoryBehaviour>(behaviour, "behaviour"));
+            warn_of_order(self);
           },
           nb::arg("q").none(), nb::arg("times").none(), nb::arg("behaviour").none() = "keep_path",
           nb::sig("def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, "
@@ -292,7 +307,12 @@ void bind_controller(nb::module_& m) {
            "stays. Without it the same happens once five measured positions in a row agree with each other and not with the\n"
            "command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.")
       .def(
-          "set_obstacles", [](Controller& self, nb::handle obstacles) { self.set_obstacles(as_obstacles(obstacles)); },
+          "set_obstacles", [](Controller& self, nb::handle obstacles) {
+            self.set_obstacles(as_obstacles(obstacles));
+            if (const std::string question = self.questions().obstacles; !question.empty()) {
+              warn(question);
+            }
+          },
           nb::arg("obstacles").none(),
           nb::sig("def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | "
                   "collections.abc.Sequence[Obstacles | sidestep.obstacles.Shape]) -> None"),
@@ -394,6 +414,9 @@ void bind_controller(nb::module_& m) {
       .def_prop_ro("command", of_last_step([](const Controller& self) { return Command(self.command()); }), "Of the last step.")
       .def("explain", of_last_step([](const Controller& self) { return self.explain(); }),
            "One sentence: what the last command does and why, and what to do about it.")
+      .def_prop_ro("questions", [](const Controller& self) { return self.questions().all(); },
+                   "What is hard to believe in the order and the obstacles that were set last, with value and likely cause, such as\n"
+                   "millimetres for metres; setters warn of it, and it is followed all the same. The newest is the last.")
       .def_prop_ro("settings", [](const Controller& self) { return ControllerSettings(self.settings()); }, "A copy.")
       .def_prop_ro("values", of_last_step([](const Controller& self) { return to_numpy(self.workspace().values); }),
                    "(m,) psi of every coordinate at the last step, see labels.")
@@ -429,6 +452,9 @@ void bind_controller(nb::module_& m) {
         return "Controller(arm '" + self.arm().name() + "', " + std::to_string(self.num_coordinates()) + " coordinates)";
       });
 
+  m.def("looks_like_degrees", &looks_like_degrees, nb::arg("angle"),
+        "Whether an angle [rad] is implausible in radians and plausible in degrees: more than one and a half turns, at most\n"
+        "three in degrees, and not a whole number of quarter turns.");
   m.def("unlimited_joints", &unlimited_joints, nb::arg("robot"),
         "(nv) Which coordinates turn without limits, so that a configuration is the same a turn further.");
   nb::class_<MotionRecord>(m, "MotionRecord", "A motion of a controller without physics: row k is what step k began with and gave.")

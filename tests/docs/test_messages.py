@@ -13,6 +13,7 @@ SOURCES = (
     "controller/explain.cpp",
     "controller/measurement.cpp",
     "controller/following.cpp",
+    "controller/plausibility.cpp",
     "controller/speed.cpp",
     "system/diagnosis.cpp",
 )

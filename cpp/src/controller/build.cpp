@@ -208,6 +208,8 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool workers)
       shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())),
       body_(arm.robot(), arm.body(), arm.pairs(), {}, arm.tables(), holding_),
       here_(body_),
+      plausible_(arm.robot(), body_.reach()),
+      unknown_(Eigen::VectorXd::Constant(q_.size(), std::numeric_limits<double>::quiet_NaN())),
       failsafe_(body_, within_margins(arm.robot(), settings, settings.speed).limits(), settings.safety.margin, settings.period),
       drives_track_(settings.output == ControllerSettings::Output::position ||
                     settings.output == ControllerSettings::Output::velocity),

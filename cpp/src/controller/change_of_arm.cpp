@@ -10,12 +10,14 @@ namespace sidestep {
 void Controller::Impl::take_orders_of(Impl& before) {
   Order order;
   std::shared_ptr<const Obstacles> obstacles;
+  Questions questions;
   {
     const std::lock_guard lock(before.mutex_);
     order = before.shown_order_;
     goal_count_ = before.goal_count_;
     obstacle_count_ = before.obstacle_count_;
     obstacles = before.shown_obstacles_;
+    questions = before.questions_;
   }
   if (const Eigen::VectorXd q = before.last_q(); q.size() != 0) {
     measured_.put(q);
@@ -24,6 +26,7 @@ void Controller::Impl::take_orders_of(Impl& before) {
   if (guide && !settings.synchronous) {
     guide->set_obstacles(*obstacles);
   }
+  questions_ = std::move(questions);
   shown_order_ = order;
   shown_obstacles_ = obstacles;
   goal_orders_.put({goal_count_, std::move(order)});

@@ -78,7 +78,8 @@ void Controller::Impl::set_goal(std::optional<Goal> goal) {
         if (position[j] < lower - JointLimits::rounding || position[j] > upper + JointLimits::rounding) {
           throw std::invalid_argument("controller: goal: joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] +
                                       "' is " + std::to_string(position[j]) + ", allowed: " + std::to_string(lower) + " to " +
-                                      std::to_string(upper) + (robot.slides(static_cast<int>(j)) ? " m" : " rad"));
+                                      std::to_string(upper) + (robot.slides(static_cast<int>(j)) ? " m" : " rad") +
+                                      Plausibility::hint(robot, position));
         }
       }
     }
@@ -94,8 +95,24 @@ void Controller::Impl::set_goal(std::optional<Goal> goal) {
   put(goal ? Order(std::move(*goal)) : Order());
 }
 
-void Controller::Impl::put(Order order) {
+std::string Controller::Impl::question_of(const Order& order) const {
+  if (const auto* goal = std::get_if<Goal>(&order)) {
+    return plausible_.question(*goal);
+  }
+  if (const auto* velocity = std::get_if<VelocityOrder>(&order)) {
+    return plausible_.question_velocity(velocity->velocity);
+  }
+  const auto* twist = std::get_if<TwistOrder>(&order);
+  return twist == nullptr ? std::string() : plausible_.question_twist(twist->twist);
+}
+
+void Controller::Impl::put(Order order, std::string question) {
+  if (question.empty()) {
+    question = question_of(order);
+  }
   const std::lock_guard lock(mutex_);
+  questions_.order_is_newer = !question.empty();
+  questions_.order = std::move(question);
   shown_order_ = order;
   shown_posture_.reset();
   goal_orders_.put({++goal_count_, std::move(order)});
@@ -103,11 +120,14 @@ void Controller::Impl::put(Order order) {
 
 void Controller::Impl::set_obstacles(Obstacles obstacles) {
   auto copy = std::make_shared<const Obstacles>(obstacles);
+  std::string question = plausible_.question(obstacles);
   const std::lock_guard lock(mutex_);  // also of the planner's obstacles: the worker must not bring back older ones
   if (guide && !settings.synchronous) {
     guide->set_obstacles(*copy);
   }
   shown_obstacles_ = std::move(copy);
+  questions_.order_is_newer = questions_.order_is_newer && question.empty();
+  questions_.obstacles = std::move(question);
   obstacle_orders_.put({++obstacle_count_, std::move(obstacles)});
 }
 
@@ -242,6 +262,10 @@ std::optional<Obstruction> Controller::goal_obstruction() const {
 OnlinePlanner::Counts Controller::planner_counts() const {
   const std::lock_guard lock(setters_);
   return newest().guide ? newest().guide->counts() : OnlinePlanner::Counts{};
+}
+Questions Controller::questions() const {
+  const std::lock_guard lock(setters_);
+  return newest().questions();
 }
 bool Controller::has_torque() const noexcept { return has_torque_; }
 

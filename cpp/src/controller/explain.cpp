@@ -222,9 +222,17 @@ Diagnosis Controller::Impl::diagnosis() const {
 }
 
 std::string Controller::Impl::explain() const {
+  const std::vector<std::string> open = questions().all();
+  return explain_motion() + (open.empty() ? "" : "; check the units: " + open.back());
+}
+
+std::string Controller::Impl::explain_motion() const {
   std::string text;
   if (tick_ == 0) {
     return "no step was made yet: call step with the measured state, once a period";
+  }
+  if (command.status == SafetyStatus::stopping && impossible_.joint >= 0) {
+    return "braking to a stop: " + plausible_.describe(impossible_);
   }
   if (command.status == SafetyStatus::stopping) {
     text = command.program == TorqueStatus::fallback_solver

@@ -19,6 +19,7 @@
 #include "sidestep/control/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/motion.hpp"
+#include "sidestep/controller/plausibility.hpp"
 #include "sidestep/controller/posture_search.hpp"
 #include "sidestep/barrier/stopping_clearance.hpp"
 #include "sidestep/system/local_minimum_recovery.hpp"
@@ -60,6 +61,10 @@ class Controller::Impl : private StepState {
   std::string explain() const;
   /// The next step with a usable state begins where the arm is. In the thread of `step`.
   void restart() noexcept { begins_anew_ = taken_.restarts = true; }
+  Questions questions() const {
+    const std::lock_guard lock(mutex_);
+    return questions_;
+  }
   Eigen::VectorXd target() const;
   /// Makes objects keep off obstacles that they rest on only as far as they do now.
   void let_rest(const std::vector<RestingObject>& objects);
@@ -165,7 +170,9 @@ class Controller::Impl : private StepState {
     const OnlinePlanner::Looked* look = nullptr;
   };
 
-  void put(Order order);
+  /// `question`: of a trajectory; that of other orders is found here.
+  void put(Order order, std::string question = {});
+  std::string question_of(const Order& order) const;
 
   // Of the step.
   bool take_state(ConstVectorRef q, ConstVectorRef v) noexcept;
@@ -200,6 +207,7 @@ class Controller::Impl : private StepState {
   bool keeps_path() const noexcept {
     return pulls_ && trajectory_order() && trajectory_order()->behaviour == TrajectoryBehaviour::keep_path;
   }
+  std::string explain_motion() const;
   std::string explain_trajectory() const;
   std::string explain_input() const;
   /// How much slower than the velocity or twist that was asked for it moves; empty where it does not.
@@ -311,6 +319,7 @@ class Controller::Impl : private StepState {
   std::uint64_t goal_count_ = 0, obstacle_count_ = 0;
   std::shared_ptr<const Obstacles> shown_obstacles_;
   std::optional<Posture> shown_posture_;
+  Questions questions_;
   std::array<char, 160> shown_fault_{};  // what the worker failed with; empty: nothing
 
   // Of the step.
@@ -322,6 +331,8 @@ class Controller::Impl : private StepState {
   std::optional<LocalMinimumRecovery> escape_;
   BodyClearance body_;
   BodyClearance::Workspace here_;
+  const Plausibility plausible_;
+  Eigen::VectorXd unknown_;  // a state that is none: not finite
   Failsafe failsafe_;
   bool drives_track_ = false;              // the output is position or velocity
   SpeedRows speed_rows_, arm_speed_rows_;  // of the reference, of the arm

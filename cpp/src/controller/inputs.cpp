@@ -49,7 +49,8 @@ void Controller::Impl::set_twist(const std::string& frame, const Vector6d& twist
 
 void Controller::Impl::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour) {
   put(TrajectoryOrder{JointTrajectory(arm.robot(), q, times, most_v_, most_a_), behaviour,
-                      std::make_shared<const TrajectorySamples>(TrajectorySamples{q, times})});
+                      std::make_shared<const TrajectorySamples>(TrajectorySamples{q, times})},
+      plausible_.question_trajectory(q, times));
 }
 
 void Controller::Impl::begin_input() noexcept {

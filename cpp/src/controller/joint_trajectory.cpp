@@ -52,7 +52,8 @@ void check_samples(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::Ve
       if (!(q(j, k) >= lower - JointLimits::rounding && q(j, k) <= upper + JointLimits::rounding && std::isfinite(q(j, k)))) {
         refuse_trajectory("joint '" + robot.coordinate_names()[static_cast<std::size_t>(j)] + "' of sample " +
                           std::to_string(k) + " is " + std::to_string(q(j, k)) + ", allowed: " + std::to_string(lower) +
-                          " to " + std::to_string(upper) + (robot.slides(j) ? " m" : " rad"));
+                          " to " + std::to_string(upper) + (robot.slides(j) ? " m" : " rad") +
+                          Plausibility::hint(robot, q.col(k)));
       }
     }
   }

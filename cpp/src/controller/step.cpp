@@ -28,7 +28,11 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   const bool known = take_state(q, v);
   take_orders();
   if (!known) {
-    stop(mass_matrix, bias, q, v);
+    if (impossible_.joint >= 0) {
+      stop(mass_matrix, bias, unknown_, unknown_);
+    } else {
+      stop(mass_matrix, bias, q, v);
+    }
     report(false);
     if (has_last_torque_) {
       last_torque_ = command.torque;

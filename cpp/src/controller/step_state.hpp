@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "sidestep/control/disturbance_observer.hpp"
+#include "sidestep/controller/plausibility.hpp"
 #include "sidestep/kinematics/robot.hpp"
 #include "sidestep/lookahead/avoidance_trajectory.hpp"
 #include "sidestep/planning/body_clearance.hpp"
@@ -55,6 +56,8 @@ struct StepState {
   Eigen::VectorXd bias_;
   double time_ = 0.0, next_look_ = 0.0, next_posture_ = 0.0, obstacle_age_ = 0.0;
   bool begins_goal_ = false, wakes_worker_ = false;
+  bool plausible_before_ = false;        // a state was measured that an arm can be in
+  Plausibility::Impossible impossible_;  // else what was wrong with the last
   bool known_before_ = false, disturbed_ = false, target_blocked_ = false;
   bool rests_ = false;  // short of a goal that it was on the way to
   // The way to a goal at rest, as the planner, the posture search and the barriers know it.

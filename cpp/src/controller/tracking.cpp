@@ -23,8 +23,16 @@ constexpr double sliding_share = 0.2;   // of the largest error, of joints that 
 }  // namespace
 
 bool Controller::Impl::take_state(ConstVectorRef q, ConstVectorRef v) noexcept {
+  impossible_ = {};
   if (q.size() != q_.size() || v.size() != q_.size() || !q.allFinite() || !v.allFinite()) {
     return false;
+  }
+  if (!plausible_before_) {  // a state in another unit must not move the arm in the first steps
+    impossible_ = plausible_.impossible(q, v);
+    if (impossible_.joint >= 0) {
+      return false;
+    }
+    plausible_before_ = true;
   }
   arm_q_ = q;
   arm_v_ = v;

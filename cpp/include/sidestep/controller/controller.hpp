@@ -12,6 +12,7 @@
 
 #include "sidestep/controller/command.hpp"
 #include "sidestep/controller/joint_trajectory.hpp"
+#include "sidestep/controller/plausibility.hpp"
 #include "sidestep/controller/recording.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/controller/single_stepper.hpp"
@@ -143,6 +144,10 @@ class Controller {
   const Obstacles& obstacles() const noexcept;
   /// One sentence: what the last command does, why, and what to do about it. Only for the thread of `step`; allocates.
   std::string explain() const;
+
+  /// What is hard to believe in the order and the obstacles that were set last, such as millimetres for metres, see Plausibility;
+  /// they are followed all the same. From any thread; allocates.
+  Questions questions() const;
 
   int num_coordinates() const noexcept { return static_cast<int>(command_.position.size()); }
   // The references below are valid until the next change of the arm.
