@@ -60,7 +60,10 @@ class Controller::Impl : private StepState {
   }
   std::string explain() const;
   /// The next step with a usable state begins where the arm is. In the thread of `step`.
-  void restart() noexcept { begins_anew_ = taken_.restarts = true; }
+  void restart() noexcept {
+    begins_anew_ = taken_.restarts = true;
+    plausible_before_ = false;
+  }
   Questions questions() const {
     const std::lock_guard lock(mutex_);
     return questions_;
