@@ -281,3 +281,15 @@ def test_arguments_of_a_wrong_type_are_named_in_one_line(
         call(controller())
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_of_a_link_that_hardly_moves_it_is_not_said_that_it_goes_on():
+    controller = ss.Controller(arm := ss.Arm.load("fr3"), ss.ControllerSettings(synchronous=True))
+    controller.set_obstacles(ss.Box((0.3, 0.3, 0.1), pose_at([0.0, 0.0, 0.1]), name="block"))
+    controller.set_goal(arm.neutral + 0.3)
+    for _ in range(30):  # the planner has looked
+        controller.step(arm.neutral, np.zeros(7))
+    words = controller.explain()
+    assert "no joint but 'fr3_joint1' moves that link" in words
+    assert "take the obstacle away" in words
+    assert "it goes on when that is free" not in words

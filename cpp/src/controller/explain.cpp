@@ -117,6 +117,19 @@ std::string Controller::Impl::explain_target() const {
                               (finer ? ", or cover them more finely" : ""));
 }
 
+std::string Controller::Impl::way_out(const Obstruction& here) const {
+  const Robot& robot = arm.robot();
+  if (here.label.kind == CoordinateLabel::Kind::obstacle) {
+    const int joint = robot.frames()[static_cast<std::size_t>(robot.frame_index(here.label.name))].joint;
+    if (joint < 0 || robot.joints()[static_cast<std::size_t>(joint)].parent < 0) {
+      return joint < 0 ? "; no joint moves that link: take the obstacle away, or out of set_obstacles"
+                       : "; no joint but '" + robot.joints()[static_cast<std::size_t>(joint)].name +
+                             "' moves that link: if it does not get out so, take the obstacle away, or out of set_obstacles";
+    }
+  }
+  return "; it goes on when that is free";
+}
+
 bool Controller::Impl::finer_covers_may_free(const Obstruction& obstruction) const {
   double overshoot = 0.0;
   for (const CoverProof& proof : arm.proof()) {
@@ -305,7 +318,7 @@ std::string Controller::Impl::explain_motion() const {
   if (guide_status_ == OnlinePlannerStatus::start_in_collision) {
     const Obstruction& here = guide->last_plan().obstruction;
     const bool holds = here.label.kind == CoordinateLabel::Kind::effort;
-    return text + "where the arm is, " + describe(here) + (holds ? "" : "; it goes on when that is free");
+    return text + "where the arm is, " + describe(here) + (holds ? "" : way_out(here));
   }
   const std::string at_target = explain_target();
   if (guide_status_ == OnlinePlannerStatus::goal_in_collision || stops_short()) {

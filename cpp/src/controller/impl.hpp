@@ -220,6 +220,8 @@ class Controller::Impl : private StepState {
   Diagnosis diagnosis() const;
   /// What is in the way at the target, as deep as the covering body says; empty where nothing is.
   std::string explain_target() const;
+  /// What to do where the arm is in something now.
+  std::string way_out(const Obstruction& here) const;
   /// Whether what is in the way may be so for the covering body alone: links overshoot by more than they reach into it.
   bool finer_covers_may_free(const Obstruction& obstruction) const;
   void avoid() noexcept;

@@ -41,7 +41,9 @@ MotionRecord integrate(Controller& controller, const Eigen::VectorXd& q, const E
                                 std::to_string(most_steps));
   }
   if (!controller.settings().synchronous) {
-    throw std::invalid_argument("integrate: the controller must be synchronous, as its threads keep the machine's time");
+    throw std::invalid_argument(
+        "integrate: the controller must be synchronous, as its threads keep the machine's time: make it with "
+        "ControllerSettings(synchronous=True), in C++ settings.synchronous = true");
   }
   const double period = controller.settings().period;
   MotionRecord record{Eigen::MatrixXd(steps, nv),
