@@ -148,46 +148,53 @@ double jerk_braking_distance(double v, double a, double A, double J) noexcept {
   return from_rest(first) - time * (first + a * time / 6.0);
 }
 
+ReturnableAcceleration largest_returnable(double room, double speed, double least, double largest, const ScalarLimits& limits,
+                                          double jerk, double period) noexcept {
+  ReturnableAcceleration found{largest};
+  const double step = jerk * period, A = limits.acceleration, half = 0.5 * step;
+  // v + xT <= V, or with y = x - JT/2 > 0:  v + JT²/2 + yT + y²/2J <= V
+  const double left = limits.velocity - speed;
+  double by_velocity = left / period;
+  if (by_velocity > half) {
+    by_velocity = half + jerk * (std::sqrt(std::max(period * period + 2.0 * (left - half * period) / jerk, 0.0)) - period);
+  }
+  if (by_velocity < found.value) {
+    found.value = by_velocity;
+    found.by_velocity = true;
+  }
+  const auto fits = [&](double candidate) {
+    const double next = speed + candidate * period, then = std::max(candidate - half, -A);
+    const double fastest = then > 0.0 ? next + 0.5 * then * then / jerk : next;  // of the profile
+    return (std::max(next, 0.5 * (next + speed)) + 0.5 * std::max(fastest, 0.0)) * period +
+               jerk_braking_distance(next, then, A, jerk) <=
+           room;
+  };
+  if (room < infinity && !fits(found.value)) {
+    found.by_position = true;
+    double low = least, high = found.value;
+    constexpr int halvings = 24;
+    for (int k = 0; k < halvings && high > low; ++k) {
+      const double middle = 0.5 * (low + high);
+      (fits(middle) ? low : high) = middle;
+    }
+    found.value = low;
+  }
+  return found;
+}
+
 SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval,
                                const ScalarLimits& limits, double jerk, double period) noexcept {
-  const double step = jerk * period, A = limits.acceleration;
+  const double step = jerk * period;
   SmoothInterval smooth{interval.lower, interval.upper, interval.lower_limit, interval.upper_limit};
   if (!(step < infinity)) {
     return smooth;
   }
-  // The largest x towards an upper limit, of a state that may be mirrored; `largest` where nothing is in its way.
+  // Of a state that may be mirrored, towards an upper limit.
   const auto viable_up_to = [&](double room, double speed, double least, double largest, Limit at_velocity, Limit at_position,
                                 Limit& limit) {
-    double x = largest;
-    const double half = 0.5 * step;
-    // v + xT <= V, or with y = x - JT/2 > 0:  v + JT²/2 + yT + y²/2J <= V
-    const double left = limits.velocity - speed;
-    double by_velocity = left / period;
-    if (by_velocity > half) {
-      by_velocity = half + jerk * (std::sqrt(std::max(period * period + 2.0 * (left - half * period) / jerk, 0.0)) - period);
-    }
-    if (by_velocity < x) {
-      x = by_velocity;
-      limit = at_velocity;
-    }
-    const auto fits = [&](double candidate) {
-      const double next = speed + candidate * period, then = std::max(candidate - half, -A);
-      const double fastest = then > 0.0 ? next + 0.5 * then * then / jerk : next;  // of the profile
-      return (std::max(next, 0.5 * (next + speed)) + 0.5 * std::max(fastest, 0.0)) * period +
-                 jerk_braking_distance(next, then, A, jerk) <=
-             room;
-    };
-    if (room < infinity && !fits(x)) {
-      limit = at_position;
-      double low = least, high = x;
-      constexpr int halvings = 24;
-      for (int k = 0; k < halvings && high > low; ++k) {
-        const double middle = 0.5 * (low + high);
-        (fits(middle) ? low : high) = middle;
-      }
-      x = low;
-    }
-    return x;
+    const ReturnableAcceleration found = largest_returnable(room, speed, least, largest, limits, jerk, period);
+    limit = found.by_position ? at_position : found.by_velocity ? at_velocity : limit;
+    return found.value;
   };
   Limit upper_limit = Limit::jerk_upper, lower_limit = Limit::jerk_lower;
   const double upper = viable_up_to(limits.upper - q, v, before - step, before + step, Limit::velocity_upper,

@@ -145,7 +145,8 @@ TorqueController::TorqueController(const Robot& robot, TorqueControllerSettings 
       mass_(Eigen::MatrixXd::Zero(nv_, nv_)),
       mass_cholesky_(Eigen::MatrixXd::Zero(nv_, nv_)),
       weighted_(Eigen::VectorXd::Zero(nv_)),
-      velocity_(Eigen::VectorXd::Zero(nv_)),
+      position_(Eigen::VectorXd::Zero(nv_)),
+      velocity_(position_),
       wanted_(Eigen::VectorXd::Zero(nv_)),
       bias_(Eigen::VectorXd::Zero(nv_)),
       rate_lower_(bias_),
@@ -190,6 +191,9 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
                    : !bias_known   ? TorqueFault::bias
                    : !clear        ? TorqueFault::clearances
                                    : TorqueFault::none;
+  if (q_known) {
+    position_ = q;
+  }
   if (v_known) {
     velocity_ = v;
   } else {
@@ -199,6 +203,8 @@ TorqueStatus TorqueController::solve(ConstVectorRef q, ConstVectorRef v, ConstVe
     bias_ = bias;
   }
   const double share = mass_known && last.torque != nullptr ? jerk_share() : 1.0;
+  jerk_share_ = share;
+  acceleration_factor_ = last.acceleration_factor;
   solution.slack.setZero();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   if (q_known && v_known) {

@@ -28,13 +28,26 @@ void TorqueController::widen_bounds() noexcept {
   if (settings_.hard_bounds) {
     return;
   }
-  // To the overruns, which end where position limits do, unless these need more.
+  // To the overruns, which nothing exceeds: neither what position limits ask for nor, where torques change at a limited rate, what could
+  // not be taken back in time. Feedback has its own factor.
   for (int i = 0; i < nv_; ++i) {
-    const double most = settings_.acceleration_overrun * limits_.acceleration[i];
+    const double most = std::max(settings_.acceleration_overrun, acceleration_factor_) * limits_.acceleration[i];
     const double fastest = settings_.velocity_overrun * limits_.velocity[i];
-    const double up = std::max(most, bounds_.position_lower[i]), down = std::max(most, -bounds_.position_upper[i]);
-    double upper = std::max(bounds_.upper[i], std::min((fastest - velocity_[i]) / settings_.period, up));
-    double lower = std::min(bounds_.lower[i], std::max((-fastest - velocity_[i]) / settings_.period, -down));
+    double upper = std::clamp((fastest - velocity_[i]) / settings_.period, -most, most);
+    double lower = std::clamp((-fastest - velocity_[i]) / settings_.period, -most, most);
+    const double jerk = jerk_share_ * limits_.jerk[i];
+    if (limits_.effort_rate[i] < infinity && jerk < infinity) {
+      const ScalarLimits limits{limits_.lower[i] + settings_.position_margin, limits_.upper[i] - settings_.position_margin,
+                                fastest, limits_.acceleration[i]};
+      const double up =
+          largest_returnable(limits.upper - position_[i], velocity_[i], lower, upper, limits, jerk, settings_.period).value;
+      const double down =
+          -largest_returnable(position_[i] - limits.lower, -velocity_[i], -upper, -lower, limits, jerk, settings_.period).value;
+      if (down <= up) {
+        lower = std::clamp(down, lower, upper);
+        upper = std::clamp(up, lower, upper);
+      }
+    }
     const double position_lower = std::min(bounds_.position_lower[i], upper);
     const double position_upper = std::max(bounds_.position_upper[i], lower);
     if (position_lower <= position_upper) {
@@ -135,7 +148,8 @@ bool TorqueController::find_least_shortfalls(TorqueSolution& solution) noexcept 
   }
   allowed_.setZero();
   if (!solve_least(least, false, solution)) {
-    // The torque does not reach the box: widen it by as little as that takes.
+    // The torque does not reach the box: widen it by as little as that takes, and say so.
+    box_reached_ = false;
     widening_data_.H.diagonal().head(nv_).setConstant(regularisation);
     widening_data_.A.bottomLeftCorner(nv_, nv_) = mass_;
     widening_data_.row_lower << wide_lower_, hard_data_.row_lower.head(nv_);
@@ -212,6 +226,7 @@ TorqueStatus TorqueController::solve_relaxed(bool smooth, TorqueSolution& soluti
   } else {
     widen_bounds();
   }
+  box_reached_ = true;
   collect_rows();
   std::fill(solution.active.begin(), solution.active.end(), Limit::none);
   allowed_.setZero();
@@ -231,7 +246,7 @@ TorqueStatus TorqueController::solve_relaxed(bool smooth, TorqueSolution& soluti
   const auto outside = [farthest](double amount, double bound) {
     return std::abs(amount) > slack_tolerance * (1.0 + std::abs(bound) + farthest) ? amount : 0.0;
   };
-  bool bounds_kept = true, safe = true;
+  bool bounds_kept = true, safe = box_reached_;
   for (int i = 0; i < nv_; ++i) {
     double& q_ddot = solution.acceleration[i];
     const double beyond = q_ddot - std::clamp(q_ddot, bounds_.lower[i], bounds_.upper[i]);

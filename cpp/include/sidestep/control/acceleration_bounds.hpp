@@ -103,6 +103,18 @@ bool is_viable(double q, double v, const ScalarLimits& limits, double period, do
 /// both within the acceleration limit. q and v finite, period > 0.
 AccelerationInterval acceleration_interval(double q, double v, const ScalarLimits& limits, double period) noexcept;
 
+/// An acceleration, and which limit it is the largest for; both false: none.
+struct ReturnableAcceleration {
+  double value;
+  bool by_velocity = false, by_position = false;
+};
+
+/// The largest acceleration from `least` to `largest` that can be taken back by `jerk` [/s^3] in time for the upper velocity limit and
+/// an upper position limit that is `room` away, at the velocity `speed`; see the derivation above. `least` where none leaves the room,
+/// less than it where the velocity limit asks for more.
+ReturnableAcceleration largest_returnable(double room, double speed, double least, double largest, const ScalarLimits& limits,
+                                          double jerk, double period) noexcept;
+
 /// Its part within `jerk` [/s^3] of the acceleration `before` of the last period; never empty.
 SmoothInterval smooth_interval(double q, double v, double before, const AccelerationInterval& interval,
                                const ScalarLimits& limits, double jerk, double period) noexcept;

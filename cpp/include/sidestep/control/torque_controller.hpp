@@ -19,7 +19,7 @@ enum class TorqueStatus {
   limited,                 ///< optimal within the limits, and at least one of them is in the way
   relaxed,                 ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances,
                            ///< position or torque limits
-  relaxed_safety,          ///< not all clearances and position limits can be kept (see safety, slack)
+  relaxed_safety,          ///< not all clearances, position limits and overruns can be kept (see safety, slack)
   clearance_lost,          ///< the least clearance is below zero: in contact or inside, whatever the rest
   fallback_invalid_input,  ///< the input is unusable (see fault): damped stop
   fallback_solver,         ///< the quadratic program could not be solved: damped stop
@@ -102,7 +102,7 @@ struct TorqueControllerSettings {
   double slack_weight = 1e3;
   /// For clearances and torque limits the velocity limits give way up to this factor, in [1, inf) [-].
   double velocity_overrun = 1.2;
-  /// And the acceleration limits up to this one, in [1, inf), but for what position limits need [-].
+  /// And the acceleration limits up to this one, in [1, inf) [-]. Where effort has a rate, both as far as it can be taken back in time.
   double acceleration_overrun = 10.0;
   /// What is kept of the clearances, where they are given.
   SafetySettings safety = {};
@@ -268,10 +268,12 @@ class TorqueController {
   // Where torques keep a rate, of the programs after the first too, left only where bounds or torques do not reach it; else infinite.
   Eigen::VectorXd jerk_lower_, jerk_upper_;
   Eigen::MatrixXd mass_, mass_cholesky_;
-  Eigen::VectorXd weighted_;                     // a column of the mass matrix, by the cost of torques
-  Eigen::VectorXd velocity_, wanted_, bias_;     // usable copies of the input
-  Eigen::VectorXd rate_lower_, rate_upper_;      // of the torque less the bias, by effort and rate
-  Eigen::VectorXd torque_lower_, torque_upper_;  // of the torque, by effort and rate: those of the damped stop
+  Eigen::VectorXd weighted_;                             // a column of the mass matrix, by the cost of torques
+  Eigen::VectorXd position_, velocity_, wanted_, bias_;  // usable copies of the input
+  double jerk_share_ = 1.0, acceleration_factor_ = 1.0;  // of the solve under way
+  bool box_reached_ = true;                              // by the torques, in the programs after the first
+  Eigen::VectorXd rate_lower_, rate_upper_;              // of the torque less the bias, by effort and rate
+  Eigen::VectorXd torque_lower_, torque_upper_;          // of the torque, by effort and rate: those of the damped stop
   std::int64_t counts_[7] = {};
 };
 
