@@ -211,6 +211,9 @@ Controller::Impl::Impl(Arm a, ControllerSettings s, Command& c, bool workers)
       plausible_(arm.robot(), body_.reach()),
       unknown_(Eigen::VectorXd::Constant(q_.size(), std::numeric_limits<double>::quiet_NaN())),
       failsafe_(body_, within_margins(arm.robot(), settings, settings.speed).limits(), settings.safety.margin, settings.period),
+      closing_(arm.robot(), arm.body(), settings.barriers.temperature, settings.safety.margin),
+      corrected_(static_cast<int>(q_.size()), system->num_embedding_coordinates()),
+      arm_corrected_(corrected_),
       drives_track_(settings.output == ControllerSettings::Output::position ||
                     settings.output == ControllerSettings::Output::velocity),
       speed_rows_(arm.robot()),

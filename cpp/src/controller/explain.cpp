@@ -234,6 +234,29 @@ Diagnosis Controller::Impl::diagnosis() const {
   return d;
 }
 
+std::string Controller::Impl::explain_closing() const {
+  if (!closing_.changes()) {
+    return {};
+  }
+  Eigen::Index nearest = -1;  // of what closes, or is in doubt and inside its margin
+  for (const Eigen::Index k : metric_coordinates_) {
+    if ((closing_.speed(k) > 0.0 || closing_.is_doubted(k)) && workspace.clearances.nearest[k] >= 0 &&
+        (nearest < 0 || workspace.clearances.least[k] < workspace.clearances.least[nearest])) {
+      nearest = k;
+    }
+  }
+  if (nearest < 0) {
+    return {};
+  }
+  const std::string what = obstacles().words_for(workspace.clearances.nearest[nearest]);
+  if (closing_.is_doubted(nearest)) {
+    return what + " has just appeared inside the margin: it waits to see whether that lasts; ";
+  }
+  char speed[32];
+  std::snprintf(speed, sizeof speed, "%.2g", closing_.speed(nearest));
+  return "gives way to " + what + ", which comes nearer at " + speed + " m/s although no such velocity was told; ";
+}
+
 std::string Controller::Impl::explain() const {
   const std::vector<std::string> open = questions().all();
   return explain_motion() + (open.empty() ? "" : "; check the units: " + open.back());
@@ -273,7 +296,7 @@ std::string Controller::Impl::explain_motion() const {
       text += std::string("background work failed: ") + shown_fault_.data() + "; ";
     }
   }
-  text += explain_speed() + explain_age();
+  text += explain_closing() + explain_speed() + explain_age();
   const std::string trajectory = explain_trajectory();
   if (!trajectory.empty() && command.activity != Activity::stale) {
     if (command.activity == Activity::waiting) {

@@ -24,6 +24,7 @@
 #include "sidestep/barrier/stopping_clearance.hpp"
 #include "sidestep/system/local_minimum_recovery.hpp"
 #include "sidestep/lookahead/look_ahead.hpp"
+#include "closing_estimate.hpp"
 #include "failsafe.hpp"
 #include "step_state.hpp"
 
@@ -180,6 +181,9 @@ class Controller::Impl : private StepState {
   // Of the step.
   bool take_state(ConstVectorRef q, ConstVectorRef v) noexcept;
   void take_orders() noexcept;
+  void take_obstacles() noexcept;
+  /// Leaves out the push out of what is in doubt, where nothing else asks for one.
+  void wait_in_doubt() noexcept;
   void begin_goal() noexcept;
   void next_posture(const PoseGoal& pose) noexcept;
   void take_posture(const Posture& posture) noexcept;
@@ -215,6 +219,8 @@ class Controller::Impl : private StepState {
   std::string explain_input() const;
   /// How much slower than the velocity or twist that was asked for it moves; empty where it does not.
   std::string explain_lag() const;
+  /// What it gives way to though nobody told its velocity; empty where there is nothing.
+  std::string explain_closing() const;
   /// Why the last step moved as it did; how far the goal is counts from the arm to the goal that was set, wherever a path or a
   /// sub-goal leads first.
   Diagnosis diagnosis() const;
@@ -339,6 +345,8 @@ class Controller::Impl : private StepState {
   const Plausibility plausible_;
   Eigen::VectorXd unknown_;  // a state that is none: not finite
   Failsafe failsafe_;
+  ClosingEstimate closing_;                // of obstacles, beyond the velocities that they were told with
+  Clearances corrected_, arm_corrected_;   // by it: of the reference, of the arm
   bool drives_track_ = false;              // the output is position or velocity
   SpeedRows speed_rows_, arm_speed_rows_;  // of the reference, of the arm
   int nearest_point_ = -1;                 // of obstacles

@@ -206,7 +206,7 @@ bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
     }
     const double norm = near.gradients.col(k).norm();
     // Obstacles that come nearer are given way to.
-    const double comes = std::min(0.0, near.rates[k] - near.gradients.col(k).dot(workspace.state().v()));
+    const double comes = std::min(0.0, near.rates[k] - near.gradients.col(k).dot(workspace.state().v())) - closing_.speed(k);
     const double least =
         -comes - clearance_rate * std::max(0.0, near.values[k] - std::min(near.margins[k], settings.safety.margin));
     const double excess = norm > 0.0 ? (least - near.gradients.col(k).dot(wanted_v_)) / norm : 0.0;

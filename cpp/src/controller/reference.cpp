@@ -158,7 +158,8 @@ void Controller::Impl::write_places(Eigen::MatrixXd& places, Eigen::Index& num) 
 
 void Controller::Impl::leave_room(bool looks) noexcept {
   if (looks) {
-    disturbed_ = body_.nearest_moving(q_, obstacles(), moving_foresight, here_) < near_moving;
+    disturbed_ = body_.nearest_moving(q_, obstacles(), moving_foresight, here_) < near_moving ||
+                 closing_.nearest(moving_foresight) < near_moving;
     if (obstacles().tree().moves()) {
       failsafe_.look_anew();
     }

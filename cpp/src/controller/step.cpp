@@ -72,6 +72,8 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   }
   if (is_stale() || !measurement_.agrees) {
     wanted_ = -v_ / settings.stop_time;
+  } else if (closing_.changes()) {
+    wait_in_doubt();
   }
   wanted_ += coupling_;
   solve_reference(mass_matrix, bias);
@@ -95,16 +97,27 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   return command;
 }
 
-void Controller::Impl::take_orders() noexcept {
+void Controller::Impl::take_obstacles() noexcept {
+  if (obstacle_orders_.is_fresh()) {
+    Obstacles& before = obstacle_orders_.current().obstacles;
+    before.advance(settings.period);
+    closing_.leave(arm_q_, before);
+  }
   obstacle_orders_.update();
   if (obstacle_orders_.current().number != obstacle_number_) {
     obstacle_number_ = obstacle_orders_.current().number;
     obstacle_age_ = 0.0;
     failsafe_.look_anew();
+    closing_.take(obstacle_orders_.current().obstacles, time_);
   } else {
     obstacle_age_ += settings.period;
     obstacle_orders_.current().obstacles.advance(settings.period);
   }
+  closing_.advance(time_);
+}
+
+void Controller::Impl::take_orders() noexcept {
+  take_obstacles();
   goal_orders_.update();
   if (goal_orders_.current().number != goal_number_) {
     GoalOrder& order = goal_orders_.current();
@@ -132,6 +145,25 @@ void Controller::Impl::take_orders() noexcept {
     if (goal_ != nullptr && moves_ && !has_input()) {
       advance(*goal_, settings.period);
     }
+  }
+}
+
+void Controller::Impl::wait_in_doubt() noexcept {
+  if (avoiding_ || is_fallback(command.system)) {
+    return;
+  }
+  bool doubted = false;
+  for (std::size_t k = 0; k < system->labels().size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    if (workspace.clearances.values[at] < system->labels()[k].floor) {
+      if (!closing_.is_doubted(at)) {
+        return;
+      }
+      doubted = true;
+    }
+  }
+  if (doubted) {
+    wanted_ -= workspace.recovery;
   }
 }
 

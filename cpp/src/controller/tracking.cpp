@@ -151,7 +151,7 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
   if (apart_) {
     arm_workspace_.activations = workspace.activations;
     if (system->embed(arm_q_, arm_v_, obstacles(), arm_workspace_)) {
-      second = {&arm_workspace_.clearances, &arm_v_};
+      second = {&closing_.corrected(arm_workspace_.clearances, arm_corrected_), &arm_v_};
     }
   }
   if (torque && dynamics_) {
@@ -169,15 +169,15 @@ void Controller::Impl::solve_reference(const Eigen::Ref<const Eigen::MatrixXd>* 
   last.early = torque && !avoiding_;
   limit_speed();
   const SpeedRows* const speed = settings.speed_limits ? &speed_rows_ : nullptr;
+  const Clearances& clearances = closing_.corrected(workspace.clearances, corrected_);
   if (torque) {
     // The arm's own mass matrix is that where it is: the reference's is the model's, where there is one.
     const bool told = mass_matrix != nullptr && (!apart_ || !dynamics_);
     take_dynamics(workspace.state(), told ? mass_matrix : nullptr, told ? bias : nullptr);
-    command.program =
-        torque_program_->solve(q_, v_, wanted_, mass_, bias_, &workspace.clearances, second, last, solution, speed);
+    command.program = torque_program_->solve(q_, v_, wanted_, mass_, bias_, &clearances, second, last, solution, speed);
     reference_torque_ = solution.torque;
   } else {
-    command.program = filter_->apply(q_, v_, wanted_, &workspace.clearances, second, last, solution, speed);
+    command.program = filter_->apply(q_, v_, wanted_, &clearances, second, last, solution, speed);
   }
 }
 
@@ -240,7 +240,7 @@ void Controller::Impl::track(const Eigen::Ref<const Eigen::MatrixXd>* mass_matri
   const bool as_reference =
       command.program != TorqueStatus::clearance_lost &&
       ((feedback_ - a_).cwiseAbs().array() < like_reference * arm.robot().limits().acceleration.array()).all();
-  const Clearances* const clearances = as_reference ? nullptr : &arm_workspace_.clearances;
+  const Clearances* const clearances = as_reference ? nullptr : &closing_.corrected(arm_workspace_.clearances, arm_corrected_);
   TorqueStatus status;
   if (torque) {
     const double room = is_impedance() ? impedance_room : command.tracking_error < close ? 1.0 : feedback_room;

@@ -29,6 +29,9 @@ class TripleBuffer {
   T& draft() noexcept { return slots_[draft_]; }
   void submit() noexcept { draft_ = between_.exchange(static_cast<std::uint8_t>(draft_ | fresh)) & index; }
 
+  /// Whether there is a value that `get` has not given yet.
+  bool is_fresh() const noexcept { return (between_.load(std::memory_order_relaxed) & fresh) != 0; }
+
   /// Takes over the newest value, and says whether there is one that `get` has not given yet.
   bool update() noexcept {
     if ((between_.load(std::memory_order_relaxed) & fresh) == 0) {

@@ -1,0 +1,204 @@
+#include "closing_estimate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "../settings.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double reach = 0.15;  // [m] of clearance: three sets at 10 Hz see 0.3 m/s before it is 0.09 m; farther takes longer
+constexpr double same = 1e-9;   // [m] change of a clearance that is rounding: the same set again
+constexpr double least_spacing = 0.008;  // [s] between changes that are kept; sets that come faster are summed up
+constexpr double longest_spacing = 0.4;  // [s] beyond it two sets do not make a motion
+constexpr double slowest = 0.02;         // [m/s] slower is for the margin, see SafetySettings::margin
+constexpr double fastest = 5.0;          // [m/s] faster is no motion but another obstacle
+constexpr double least_way =
+    0.003;  // [m] lost in a window: beyond the noise of good depth cameras and the softness of the mean
+constexpr double times_noise = 5.0;    // [-] of the noise, lost in a window: more than independent errors lose
+constexpr double while_closing = 0.5;  // [-] of that, once it closes
+constexpr double brisk = 1.0;   // [m/s] beyond it three changes have to agree: points that jump about agree twice by chance
+constexpr double uneven = 0.5;  // [-] of its share in a steady closing by which a change may differ
+constexpr double first_noise = 0.002;   // [m] until changes tell: of depth cameras
+constexpr int remembered = 20;          // changes that the noise is the mean of
+constexpr int assumed = 4;              // of them that count as the first noise at the start
+constexpr double lateness = 2.0;        // [-] spacings after which the next set is late
+constexpr double jump = 0.005;          // [m] change by one set that brings doubt; less may be noise
+constexpr int doubted_sets = 2;         // after the one that brought it: three in a row
+constexpr int most_doublings = 2;       // of them where something flickered
+constexpr double flicker_memory = 2.0;  // [s]
+constexpr double longest_doubt = 0.3;   // [s] three sets at 10 Hz; of what flickered twice and four times as long
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+ClosingEstimate::ClosingEstimate(const Robot& robot, const Body& body, double temperature, double margin)
+    : robot_(robot),
+      field_(robot, body, temperature),
+      margin_(margin),
+      state_(robot),
+      rest_(Eigen::VectorXd::Zero(robot.num_coordinates())),
+      before_(robot.num_coordinates(), field_.size()),
+      now_(before_),
+      tracks_(static_cast<std::size_t>(field_.size()), Track{.noise = first_noise, .differences = assumed}),
+      doubts_(tracks_.size()),
+      speeds_(Eigen::VectorXd::Zero(field_.size())) {}
+
+void ClosingEstimate::evaluate(const Obstacles& obstacles, Clearances& out) noexcept {
+  out.clear();
+  if (obstacles.size() > 0) {
+    field_.evaluate(state_, obstacles, reach, Horizon{}, out.view(0, field_.size()));
+  }
+}
+
+void ClosingEstimate::leave(ConstVectorRef q, const Obstacles& before) noexcept {
+  state_.update(robot_, q, rest_);
+  if (begun_) {
+    evaluate(before, before_);
+  }
+}
+
+void ClosingEstimate::take(const Obstacles& now, double time) noexcept {
+  if (!std::exchange(begun_, true)) {
+    last_set_ = last_kept_ = time;
+    return;
+  }
+  evaluate(now, now_);
+  const double since_set = time - last_set_, since_kept = time - last_kept_;
+  const bool keeps = since_kept >= least_spacing;
+  last_set_ = time;
+  bool other = false;
+  for (Eigen::Index k = 0; k < speeds_.size(); ++k) {
+    const double a = before_.values[k], b = now_.values[k];
+    other = other || (a != b && !(std::abs(a - b) <= same));
+  }
+  for (Eigen::Index k = 0; other && k < speeds_.size(); ++k) {
+    Track& track = tracks_[static_cast<std::size_t>(k)];
+    const double a = before_.values[k], b = now_.values[k];
+    track.pending += a < infinity && b < infinity ? a - b : unknown;
+    if (keeps) {
+      keep(track, since_kept);
+      speeds_[k] = agreed(track, speeds_[k] > 0.0);
+    }
+  }
+  for (Eigen::Index k = 0; k < speeds_.size(); ++k) {
+    doubt(k, before_.values[k], now_.values[k], since_set, time);
+  }
+  if (other && keeps) {
+    last_kept_ = time;
+    late_ = time + lateness * std::min(since_kept, longest_spacing);
+  }
+  num_closing_ = static_cast<int>((speeds_.array() > 0.0).count());
+}
+
+void ClosingEstimate::keep(Track& track, double duration) noexcept {
+  const double change = track.pending;
+  track.pending = 0.0;
+  if (std::isnan(change) || duration > longest_spacing) {
+    track.count = 0;
+    return;
+  }
+  if (track.count > 0) {
+    const double differs = std::abs(change - track.change[0] * duration / track.duration[0]);
+    track.differences = std::min(track.differences + 1, remembered - 1);
+    track.noise += (differs - track.noise) / (track.differences + 1);
+  }
+  std::move_backward(track.change.begin(), track.change.end() - 1, track.change.end());
+  std::move_backward(track.duration.begin(), track.duration.end() - 1, track.duration.end());
+  track.change[0] = change;
+  track.duration[0] = duration;
+  track.count = std::min(track.count + 1, most_changes);
+}
+
+double ClosingEstimate::agreed(const Track& track, bool closes) noexcept {
+  const double least = std::max(least_way, (closes ? while_closing : 1.0) * times_noise * track.noise);
+  double way = track.count > 0 ? track.change[0] : 0.0, time = track.count > 0 ? track.duration[0] : 0.0;
+  for (int n = 2; n <= track.count; ++n) {
+    way += track.change[static_cast<std::size_t>(n) - 1];
+    time += track.duration[static_cast<std::size_t>(n) - 1];
+    const double speed = way / time;
+    if (way < least || speed < slowest || speed > fastest || (speed > brisk && n < 3)) {
+      continue;
+    }
+    bool steady = true;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n) && steady; ++i) {
+      const double share = speed * track.duration[i];
+      steady = std::abs(track.change[i] - share) <= uneven * share + track.noise;
+    }
+    if (steady) {
+      return speed;
+    }
+  }
+  return 0.0;
+}
+
+void ClosingEstimate::doubt(Eigen::Index k, double before, double now, double duration, double time) noexcept {
+  Doubt& doubt = doubts_[static_cast<std::size_t>(k)];
+  if (speeds_[k] > 0.0) {
+    doubt.sets = 0;
+  } else if (!(now < margin_)) {
+    if (doubt.sets > 0) {
+      doubt.flickers = std::min(doubt.flickers + 1, most_doublings);
+      doubt.last = time;
+    }
+    doubt.sets = 0;
+  } else if (before >= margin_ && before - now > jump) {
+    doubt.flickers = time - doubt.last > flicker_memory ? 0 : doubt.flickers;
+    doubt.sets = doubted_sets << doubt.flickers;
+    doubt.until = time + std::min((doubt.sets + 1) * duration, longest_doubt * (1 << doubt.flickers));
+  } else {
+    doubt.sets = std::max(0, doubt.sets - 1);
+  }
+}
+
+void ClosingEstimate::advance(double time) noexcept {
+  time_ = time;
+  if (num_closing_ > 0 && time > late_) {
+    speeds_.setZero();
+    num_closing_ = 0;
+  }
+  num_doubted_ = 0;
+  for (Doubt& doubt : doubts_) {
+    if (doubt.sets > 0 && time > doubt.until) {
+      doubt.sets = 0;
+    }
+    num_doubted_ += doubt.sets > 0;
+  }
+}
+
+const Clearances& ClosingEstimate::corrected(const Clearances& seen, Clearances& out) const noexcept {
+  if (!changes()) {
+    return seen;
+  }
+  out = seen;
+  ClearanceState& approach = out.approach;
+  for (Eigen::Index k = 0; k < speeds_.size(); ++k) {
+    if (out.nearest[k] < 0) {
+      continue;
+    }
+    if (speeds_[k] > 0.0) {  // lost is only what is seen to be
+      approach.values[k] -= std::min(speeds_[k] * (time_ - last_kept_), std::max(approach.values[k], 0.0));
+      approach.rates[k] -= speeds_[k];
+    } else if (is_doubted(k)) {
+      approach.values[k] = std::max(approach.values[k], std::min(margin_, out.margins[k]));
+      out.least[k] = std::max(out.least[k], 0.0);
+    }
+  }
+  return out;
+}
+
+double ClosingEstimate::nearest(double duration) const noexcept {
+  double least = infinity;
+  for (Eigen::Index k = 0; k < speeds_.size(); ++k) {
+    if (speeds_[k] > 0.0) {
+      least = std::min(least, now_.values[k] - speeds_[k] * (time_ - last_kept_ + duration));
+    }
+  }
+  return least;
+}
+
+}  // namespace sidestep
