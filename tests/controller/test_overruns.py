@@ -37,3 +37,23 @@ def test_nothing_exceeds_the_overruns(name: str, seed: int, told: bool) -> None:
     assert fastest <= settings.velocity_overrun * (1.0 + ROUNDING)
     assert hardest <= settings.acceleration_overrun * (1.0 + ROUNDING)
     assert farthest <= 1e-9  # [rad]
+
+
+@pytest.mark.parametrize("output", ["position", "velocity"])
+def test_a_position_command_stays_within_the_limits_under_noise(output: str) -> None:
+    """Measured at its limit, a joint seems to be 1 mrad beyond: that was commanded."""
+    arm = ss.Arm.load("fr3")
+    limits = arm.limits
+    controller = ss.Controller(arm, ss.ControllerSettings(output=output, synchronous=True, planner=None))
+    random = np.random.default_rng(4)
+    q = arm.neutral.copy()
+    q[0], q[5] = limits.upper[0], limits.lower[5]
+    goal = q.copy()
+    controller.set_goal(goal)
+    first = q + np.array([1e-3, 0.0, 0.0, 0.0, 0.0, -1e-3, 0.0])
+    for k in range(300):
+        measured = first if k == 0 else q + 1e-3 * random.normal(size=7)
+        command = controller.step(measured, np.zeros(7))
+        assert (command.position <= limits.upper).all()
+        assert (command.position >= limits.lower).all()
+        q = command.position

@@ -182,6 +182,8 @@ class Controller::Impl : private StepState {
   bool take_state(ConstVectorRef q, ConstVectorRef v) noexcept;
   void take_orders() noexcept;
   void take_obstacles() noexcept;
+  /// The position that is commanded of a joint: at its limit, where the reference is beyond it by no more than noise.
+  double within_limits(double q, Eigen::Index joint) const noexcept;
   /// Leaves out the push out of what is in doubt, where nothing else asks for one.
   void wait_in_doubt() noexcept;
   void begin_goal() noexcept;

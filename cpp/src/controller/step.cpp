@@ -10,6 +10,8 @@
 namespace sidestep {
 namespace {
 
+// Measured positions beyond a limit by less than this are noise [rad], [m]; from farther outside the arm is led back.
+constexpr double position_noise = 0.01, sliding_noise = 0.002;
 constexpr double sliding_speed = 0.1;  // of the speed that counts as rest, of joints that slide [m/rad]
 // Time for which the way to a goal stays as it is before the activity says so [s]: several looks of planner and barriers, of
 // 20 ms each. What changes from one look to the next, as from posture to posture, is no verdict.
@@ -148,6 +150,13 @@ void Controller::Impl::take_orders() noexcept {
   }
 }
 
+double Controller::Impl::within_limits(double q, Eigen::Index joint) const noexcept {
+  const JointLimits& limits = arm.robot().limits();
+  const double within = std::clamp(q, limits.lower[joint], limits.upper[joint]);
+  const double noise = is_sliding_[static_cast<std::size_t>(joint)] ? sliding_noise : position_noise;
+  return std::abs(q - within) < noise ? within : q;
+}
+
 void Controller::Impl::wait_in_doubt() noexcept {
   if (avoiding_ || is_fallback(command.system)) {
     return;
@@ -213,7 +222,9 @@ void Controller::Impl::report(bool known) noexcept {
   if (settings.output == ControllerSettings::Output::velocity) {
     command.velocity += settings.tracking.drift_gain * (q_ - arm_q_);
   }
-  command.position = next_q_ - turns_;
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    command.position[j] = within_limits(next_q_[j], j) - turns_[j];
+  }
   const Clearances* nearest = &workspace.clearances;
   const auto take_nearest = [&](const Clearances& clearances) {
     for (const Eigen::Index k : metric_coordinates_) {
