@@ -148,7 +148,7 @@ def test_a_pause_alone_changes_nothing(arm: ss.Arm, output: str) -> None:
             rows.append(np.concatenate([command.torque, command.position, command.velocity]))
             q, v = moved_on(arm, output, command, q, v)
         motions.append(rows)
-    np.testing.assert_array_equal(*motions)
+    np.testing.assert_array_equal(motions[0], motions[1])
 
 
 @pytest.mark.parametrize("output", ["position", "velocity", "torque", "acceleration"])

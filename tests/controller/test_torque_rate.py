@@ -8,6 +8,7 @@ import pytest
 import sidestep as ss
 
 PERIOD = 0.001
+LAST_LINK = {"fr3": "fr3_rightfinger", "panda": "panda_rightfinger"}
 
 
 @pytest.mark.parametrize("order", [[2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [2.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0]])
@@ -36,12 +37,13 @@ def test_an_arm_that_is_driven_at_a_ball_brakes_within_the_rate(order: list[floa
     assert 0.0045 < least < 0.015  # [m] the margin is 0.005
 
 
-def torques(arm: ss.Arm, settings: ss.ControllerSettings, seed: int, steps: int, lost: bool) -> np.ndarray:
+def torques(name: str, settings: ss.ControllerSettings, seed: int, steps: int, lost: bool) -> np.ndarray:
     """What is sent where one sample in thirty is wrong in position or velocity, is not finite, or follows a blow."""
     rng = np.random.default_rng(seed)
+    arm = ss.Arm.load(name)
     limits, nv = arm.limits, arm.num_coordinates
     controller = ss.Controller(arm, settings)
-    tip = arm.robot.pose(arm.neutral, arm.robot.links[-1].name)[:3, 3]
+    tip = arm.robot.pose(arm.neutral, LAST_LINK[name])[:3, 3]
     around = ss.Obstacles(tip + rng.normal(size=(8, 3)) * 0.15, radii=0.06)
     controller.set_obstacles(around if lost else ss.Obstacles.none())
     middle = (limits.lower + limits.upper) / 2
@@ -87,7 +89,7 @@ def test_torque_keeps_its_rate_whatever_is_measured(name: str, stiffness: float,
     settings = ss.ControllerSettings(synchronous=True)
     settings.tracking.stiffness = stiffness
     for seed in range(4):
-        rate = np.abs(np.diff(torques(arm, settings, seed, 400, lost), axis=0)) / PERIOD
+        rate = np.abs(np.diff(torques(name, settings, seed, 400, lost), axis=0)) / PERIOD
         assert (rate <= arm.limits.effort_rate * (1.0 + 1e-6)).all()  # 1e-6: rounding of the differences
 
 
