@@ -126,8 +126,11 @@ void bind_command(nb::module_& m) {
   nb::enum_<TrajectoryBehaviour>(m, "TrajectoryBehaviour", "What a Controller does with a trajectory where something is in the way.")
       .value("keep_path", TrajectoryBehaviour::keep_path, "Stay on the path: slow down and wait before what blocks it, go on when it is free.")
       .value("steer", TrajectoryBehaviour::steer, "Go around, and rejoin.");
+  nb::enum_<TwistFreedom>(m, "TwistFreedom", "Which part of a twist is not asked for.")
+      .value("none", TwistFreedom::none, "Translation and rotation are both asked for.")
+      .value("rotation", TwistFreedom::rotation, "Only the velocity of the frame's origin is: the frame may turn as it likes.");
   nb::enum_<SafetyStatus>(m, "SafetyStatus", nb::is_arithmetic(), "How safe a command is, by severity. Every command may be sent.")
-      .value("ok", SafetyStatus::ok, "The motion is what the goal asks for.")
+      .value("ok", SafetyStatus::ok, "The motion is what the goal asks for, or within 5 % of the velocity or twist that was asked for.")
       .value("limited", SafetyStatus::limited, "A limit of the arm or a clearance bends it.")
       .value("relaxed", SafetyStatus::relaxed, "Limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position or torque limits.")
       .value("margin_lost", SafetyStatus::margin_lost, "Not every safety margin can be kept; nothing is touched.")
@@ -162,6 +165,11 @@ void bind_command(nb::module_& m) {
                    "(nv,) force that the observer makes up for, of torque outputs [Nm | N].")
       .def_prop_ro("rotors", [](const Command& c) { return to_numpy(c.rotors); },
                    "(nv,) inertia that it found and the model lacks [kg m^2 | kg].")
+      .def_prop_ro("input_change", [](const Command& c) { return to_numpy(c.input_change); },
+                   "(nv,) what is changed of the velocity, twist or trajectory that was asked for [rad/s | m/s]: velocity of the\n"
+                   "reference after this period, less the velocity asked for. Of a twist V: J^+ (J v - V), damped where it is\n"
+                   "singular, so that what the frame does not feel does not count. Of a trajectory: its velocity at the clock, at\n"
+                   "full speed. Zero without one of these.")
       .def_ro("tracking_error", &Command::tracking_error, "Largest difference of the arm from the reference [rad | m].")
       .def_ro("deviation", &Command::deviation, "Distance of the reference from the straight lines between a trajectory's samples, in the farthest joint [rad | m]: the\n"
               "nearest of the lines within 0.05 s of where the trajectory's clock is. On the way to a first sample after zero: from\n"
@@ -269,20 +277,25 @@ void bind_controller(nb::module_& m) {
             warn_of_order(self);
           },
           nb::arg("v").none(), nb::sig("def set_velocity(self, v: numpy.typing.ArrayLike) -> None"),
-          "Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. Obstacles steer the\n"
-          "arm around them and stop it. After `inputs.timeout` without another order the arm stops. Raises ValueError that\n"
-          "names the joint and what is allowed; the order before stays.")
+          "Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. A joint stops at its\n"
+          "position limit while the others go on. Obstacles steer the arm around them and stop it. After `inputs.timeout` without\n"
+          "another order the arm stops. Raises ValueError that names the joint and what is allowed; the order before stays.")
       .def(
           "set_twist",
-          [](Controller& self, nb::handle frame, nb::handle twist, bool local) {
-            self.set_twist(as_text(frame, "frame", "the name of a link of the arm"), Vector6d(as_vector(twist, "twist", 6)), local);
+          [](Controller& self, nb::handle frame, nb::handle twist, bool local, nb::handle free) {
+            self.set_twist(as_text(frame, "frame", "the name of a link of the arm"), Vector6d(as_vector(twist, "twist", 6)), local,
+                           as_enum<TwistFreedom>(free, "free"));
             warn_of_order(self);
           },
-          nb::arg("frame").none(), nb::arg("twist").none(), nb::arg("local") = false,
-          nb::sig("def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False) -> None"),
+          nb::arg("frame").none(), nb::arg("twist").none(), nb::arg("local") = false, nb::arg("free").none() = "none",
+          nb::sig("def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False, "
+                  "free: TwistFreedom | str = 'none') -> None"),
           "The same for the twist (6,) of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of\n"
-          "the world or, `local`, its own; rows as in `Robot.jacobian`. The arm slides along singular configurations and limits.\n"
-          "Raises ValueError that lists the frames that there are.")
+          "the world or, `local`, its own; rows as in `Robot.jacobian`. The frame moves with s times the whole twist, with the\n"
+          "largest s in [0, 1] that joint limits and singular configurations leave. With free=\"rotation\" the rotation is not\n"
+          "asked for, and its three numbers are not read: for arms of less than six joints. Along obstacles the arm slides;\n"
+          "`command.status`, `command.input_change` and `explain` say so. Raises ValueError that lists the frames that there are,\n"
+          "or the names of what can be left free.")
       .def(
           "set_trajectory",
           [](Controller& self, nb::handle q, nb::handle times, nb::handle behaviour) {

@@ -37,6 +37,7 @@ Command::Command(int num_coordinates)
       position(Eigen::VectorXd::Constant(num_coordinates, std::numeric_limits<double>::quiet_NaN())),
       disturbance(torque),
       rotors(torque),
+      input_change(torque),
       limits(static_cast<std::size_t>(num_coordinates), Limit::none) {}
 
 }  // namespace sidestep

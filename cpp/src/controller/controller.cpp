@@ -168,8 +168,8 @@ void Controller::set_goal(Goal goal) {
 void Controller::set_velocity(const Eigen::VectorXd& v) {
   tell([&](Impl& impl) { impl.set_velocity(v); });
 }
-void Controller::set_twist(const std::string& frame, const Vector6d& twist, bool local) {
-  tell([&](Impl& impl) { impl.set_twist(frame, twist, local); });
+void Controller::set_twist(const std::string& frame, const Vector6d& twist, bool local, TwistFreedom free) {
+  tell([&](Impl& impl) { impl.set_twist(frame, twist, local, free); });
 }
 void Controller::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour) {
   tell([&](Impl& impl) { impl.set_trajectory(q, times, behaviour); });

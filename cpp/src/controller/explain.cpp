@@ -11,8 +11,6 @@
 namespace sidestep {
 namespace {
 
-constexpr double least_lag = 0.05;  // share of an asked velocity that is missed and told
-
 std::string millimetres(double metres) {
   char text[32];
   std::snprintf(text, sizeof text, "%.0f mm", 1e3 * std::abs(metres));
@@ -27,6 +25,8 @@ std::string age(double seconds, const char* setting, double timeout) {
   return old + std::string(" s old, more than ") + setting + " (" + most + ")";
 }
 
+}  // namespace
+
 std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
   switch (label.kind) {
     case CoordinateLabel::Kind::obstacle: return "link '" + label.name + "' and " + obstacle;
@@ -38,8 +38,6 @@ std::string parties(const CoordinateLabel& label, const std::string& obstacle) {
   }
   return "a potential";
 }
-
-}  // namespace
 
 Eigen::VectorXd Controller::Impl::target() const { return has_target_ ? Eigen::VectorXd(target_ - turns_) : Eigen::VectorXd(); }
 
@@ -148,65 +146,6 @@ std::string Controller::Impl::explain_age() const {
   char text[96];
   std::snprintf(text, sizeof text, "slowed to %.0f %%: the look-ahead is %.1f s old, ", 100.0 * pace_, command.look_ahead_age);
   return text + std::string("it gets too little processor time, or steps come faster than real time; ");
-}
-
-std::string Controller::Impl::explain_input() const {
-  const bool on_trajectory = trajectory_order() != nullptr;
-  const Eigen::Index clearance = command.bound_by >= 0 || on_trajectory ? command.bound_by : held_clearance_;
-  std::string by;
-  if (clearance >= 0) {
-    by = parties(system->labels()[static_cast<std::size_t>(clearance)],
-                 obstacles().words_for(workspace.clearances.nearest[clearance]));
-  } else if (!on_trajectory && held_joint_ >= 0) {
-    by = "joint '" + arm.robot().coordinate_names()[static_cast<std::size_t>(held_joint_)] + "' and its " +
-         (held_upper_ ? "upper" : "lower") + " limit";
-  }
-  const std::string lag = on_trajectory || (by.empty() && pace_ == 1.0) ? "" : explain_lag();
-  std::string words = on_trajectory ? "follows a trajectory" : lag.empty() ? "moves at the velocity that it is told" : lag;
-  return by.empty() ? words : words + ", bent by the clearance of " + by;
-}
-
-std::string Controller::Impl::explain_lag() const {
-  const Order& order = goal_orders_.current().order;
-  char text[64];
-  if (const auto* velocity = std::get_if<VelocityOrder>(&order)) {
-    Eigen::VectorXd asked = velocity->velocity;
-    scale_to_limits(asked);
-    Eigen::Index most = 0;  // the joint that lacks the largest share of its limit
-    const Eigen::VectorXd got = next_v_.array() * asked.array().sign(), lack = asked.cwiseAbs() - got;
-    lack.cwiseQuotient(most_v_).maxCoeff(&most);
-    if (lack[most] <= least_lag * std::abs(asked[most])) {
-      return {};
-    }
-    const bool slides = is_sliding_[static_cast<std::size_t>(most)];
-    std::snprintf(text, sizeof text, slides ? "%.3f of %.3f m/s of joint '" : "%.2f of %.2f rad/s of joint '", got[most],
-                  std::abs(velocity->velocity[most]));
-    return "slower than asked: " + std::string(text) + arm.robot().coordinate_names()[static_cast<std::size_t>(most)] + "'";
-  }
-  const auto* twist = std::get_if<TwistOrder>(&order);
-  if (twist == nullptr) {
-    return {};
-  }
-  KinematicState state(arm.robot());
-  state.update(arm.robot(), q_, next_v_);
-  const KinematicState::Link& link = state.link(twist->frame.joint);
-  const Eigen::Vector3d p = link.p_WL + link.R_WL * twist->frame.X_JF.translation();
-  const Eigen::Matrix3d R =
-      twist->local ? Eigen::Matrix3d(link.R_WL * twist->frame.X_JF.linear()) : Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d linear = R * twist->twist.head<3>(), angular = R * twist->twist.tail<3>();
-  const double speed = linear.norm(), rate = angular.norm();
-  const double got_speed = speed > 0.0 ? linear.dot(link.velocity.linear + link.velocity.angular.cross(p)) / speed : 0.0;
-  const double got_rate = rate > 0.0 ? angular.dot(link.velocity.angular) / rate : 0.0;
-  const double lack = speed > 0.0 ? 1.0 - got_speed / speed : 0.0, turn_lack = rate > 0.0 ? 1.0 - got_rate / rate : 0.0;
-  if (std::max(lack, turn_lack) <= least_lag) {
-    return {};
-  }
-  if (lack >= turn_lack) {
-    std::snprintf(text, sizeof text, "%.3f of %.3f m/s of frame '", got_speed, speed);
-  } else {
-    std::snprintf(text, sizeof text, "%.2f of %.2f rad/s of frame '", got_rate, rate);
-  }
-  return "slower than asked: " + std::string(text) + twist->frame.name + "'";
 }
 
 Diagnosis Controller::Impl::diagnosis() const {

@@ -91,6 +91,7 @@ void Controller::Impl::run_clock(const TrajectoryOrder& order) noexcept {
   order.path.sample(c.time, path_q_, path_v_, path_a_);
   if (!(c.time < order.path.duration())) {
     c.rate = c.change = 0.0;
+    c.allowed = 1.0;
     c.blocked = false;
     return;
   }
@@ -116,6 +117,7 @@ void Controller::Impl::run_clock(const TrajectoryOrder& order) noexcept {
       rate = std::min(rate, std::sqrt(2.0 * braking_share * most * std::max(0.0, room)));
     }
   }
+  c.allowed = rate;
   const double left = rate - c.rate;
   const double wanted = std::copysign(std::min({most, std::sqrt(fastest * std::abs(left)), 0.5 * std::abs(left) / T}), left);
   c.change = std::clamp(wanted, c.change - fastest * T, c.change + fastest * T);

@@ -30,6 +30,9 @@
 
 namespace sidestep {
 
+/// For example "link 'hand' and 'ball'".
+std::string parties(const CoordinateLabel& label, const std::string& obstacle);
+
 constexpr double lifted_room = 0.005;  // [m] from which on what rested is lifted
 
 /// What the step, the setters and the worker of a Controller share. Members are grouped by the thread that owns them.
@@ -48,7 +51,7 @@ class Controller::Impl : private StepState {
 
   void set_goal(std::optional<Goal> goal);
   void set_velocity(const Eigen::VectorXd& v);
-  void set_twist(const std::string& frame, const Vector6d& twist, bool local);
+  void set_twist(const std::string& frame, const Vector6d& twist, bool local, TwistFreedom free);
   void set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour);
   void set_obstacles(Obstacles obstacles);
   const Obstacles& obstacles() const noexcept { return obstacle_orders_.current().obstacles; }
@@ -106,6 +109,7 @@ class Controller::Impl : private StepState {
     Frame frame;
     Vector6d twist;
     bool local;
+    TwistFreedom free;
   };
   struct TrajectoryOrder {
     JointTrajectory path;
@@ -205,9 +209,38 @@ class Controller::Impl : private StepState {
   void follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept;
   void pull(const Eigen::VectorXd& velocity, const Eigen::VectorXd& acceleration) noexcept;
   void keep_bounds(const Eigen::VectorXd& velocity) noexcept;
+  /// A bound of the wanted velocity that it does not keep: g·v ≥ least, or of a joint ±v ≤ most.
+  struct Bound {
+    Eigen::Index joint = -1, clearance = -1;
+    double excess = 0.0, least = 0.0, length = 1.0;
+  };
+  double joint_room(Eigen::Index j, bool up) const noexcept;
+  Bound find_worst(bool clearances, bool joints) const noexcept;
+  bool hold(const Bound& bound, Eigen::Index held) noexcept;
   bool hold_worst(Eigen::Index held) noexcept;
+  using FrameJacobian = Eigen::Matrix<double, Eigen::Dynamic, 6>;  // transposed
+  static void write_jacobian(const KinematicState& state, const TwistOrder& order, FrameJacobian& transposed) noexcept;
+  void take_twist(const TwistOrder& order) noexcept;
   void solve_twist(const TwistOrder& order) noexcept;
-  void scale_to_limits(Eigen::VectorXd& velocity) const noexcept;
+  void step_off_singular(const TwistOrder& order) noexcept;
+  void scale_twist(const TwistOrder& order) noexcept;
+  /// The share of the wanted velocity at which no singular value falls too fast to the one where a twist comes to rest.
+  double keep_off_singular(const TwistOrder& order, const Eigen::Matrix<double, 6, 6>& directions, const Vector6d& sigma,
+                           const Vector6d& asked, const Vector6d& drop, Reduction& reduction) noexcept;
+  void slide(const Vector6d& twist) noexcept;
+  /// Writes to `path_a_` with which acceleration v goes to the wanted velocity.
+  void respond(const Eigen::VectorXd& v) noexcept;
+  /// Scales a velocity to the limits; by how much.
+  double scale_to_limits(Eigen::VectorXd& velocity, Reduction& reduction) const noexcept;
+  /// Writes `command.input_change`, and raises the status where what was asked for is reduced.
+  void judge_input() noexcept;
+  /// [rad/s | m/s] By how much a joint may be off a velocity of all and count as following it.
+  double joint_tolerance(const Eigen::VectorXd& asked, Eigen::Index j) const noexcept;
+  /// Whether that is the velocity or twist that was asked for, within InputTolerance.
+  bool follows(const Eigen::VectorXd& v) const noexcept;
+  /// Whether that change of velocity is more than a share of the tolerance of what was asked for.
+  bool differs(const Eigen::VectorXd& change, double share) const noexcept;
+  bool slows_trajectory() const noexcept;
   void begin_trajectory(TrajectoryOrder& order) noexcept;
   void follow_trajectory(const TrajectoryOrder& order) noexcept;
   double starting_rate(const JointTrajectory& path, double s) noexcept;
@@ -223,6 +256,9 @@ class Controller::Impl : private StepState {
   std::string explain_lag() const;
   /// What it gives way to though nobody told its velocity; empty where there is nothing.
   std::string explain_closing() const;
+  /// What makes it slower, before the program; empty where nothing does.
+  std::string explain_reduction() const;
+  std::string explain_singular() const;
   /// Why the last step moved as it did; how far the goal is counts from the arm to the goal that was set, wherever a path or a
   /// sub-goal leads first.
   Diagnosis diagnosis() const;
@@ -371,9 +407,12 @@ class Controller::Impl : private StepState {
   Eigen::MatrixXd held_;                                // directions that limits hold, orthonormal (nv × 6)
   Eigen::Index held_clearance_ = -1, held_joint_ = -1;  // what holds the first of them, of a velocity or twist; -1: none
   bool held_upper_ = false;                             // at that joint's upper limit
-  KinematicState twist_state_;
-  Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian_transposed_, projected_;
-  Eigen::VectorXd most_v_, most_a_;  // limits that motions use
+  Eigen::VectorXd best_v_, ahead_q_, off_;
+  KinematicState twist_state_, ahead_;
+  FrameJacobian jacobian_transposed_, projected_, jacobian_ahead_;
+  Eigen::Matrix<double, 6, 6> principal_ = Eigen::Matrix<double, 6, 6>::Identity();  // directions of the Jacobian
+  Vector6d squares_ = Vector6d::Zero();                                              // of its singular values
+  Eigen::VectorXd most_v_, most_a_;                                                  // limits that motions use
   Eigen::VectorXd seen_q_, seen_v_, seen_a_, path_step_;
   bool pending_ = false;  // a trajectory out of the way, found and not followed yet
   Eigen::MatrixXd places_, lowered_places_;

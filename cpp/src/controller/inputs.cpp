@@ -1,5 +1,4 @@
 // Velocities and twists: how they are set, and what acceleration follows them.
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -12,12 +11,11 @@
 namespace sidestep {
 namespace {
 
-constexpr double limit_room = 0.03;      // [rad] to a position limit, where a twist does not move a joint on
-constexpr double sliding_room = 0.2;     // the same of joints that slide [m/rad]
-constexpr double limit_rate = 3.0;       // [1/s] at which joints come to there
-constexpr double clearance_rate = 6.0;   // [1/s] at which clearances come to their margins
-constexpr double bound_rounding = 1e-9;  // [rad/s]
-constexpr double least_free = 0.05;      // share of a bound's direction that those held leave
+constexpr double limit_room = 0.03;     // [rad] to a position limit, where a twist does not move a joint on
+constexpr double sliding_room = 0.2;    // the same of joints that slide [m/rad]
+constexpr double limit_rate = 3.0;      // [1/s] at which joints come to there
+constexpr double clearance_rate = 6.0;  // [1/s] at which clearances come to their margins
+constexpr double least_free = 0.05;     // share of a bound's direction that those held leave
 
 }  // namespace
 
@@ -36,7 +34,7 @@ void Controller::Impl::set_velocity(const Eigen::VectorXd& v) {
   put(VelocityOrder{v});
 }
 
-void Controller::Impl::set_twist(const std::string& frame, const Vector6d& twist, bool local) {
+void Controller::Impl::set_twist(const std::string& frame, const Vector6d& twist, bool local, TwistFreedom free) {
   if (!twist.allFinite()) {
     std::string numbers;
     for (const double number : twist) {
@@ -44,7 +42,7 @@ void Controller::Impl::set_twist(const std::string& frame, const Vector6d& twist
     }
     throw std::invalid_argument("controller: twist of frame '" + frame + "' is (" + numbers + "), allowed: finite numbers");
   }
-  put(TwistOrder{moved_frame(arm.robot(), frame, "controller: twist"), twist, local});
+  put(TwistOrder{moved_frame(arm.robot(), frame, "controller: twist"), twist, local, free});
 }
 
 void Controller::Impl::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour) {
@@ -61,7 +59,6 @@ void Controller::Impl::begin_input() noexcept {
     begin_trajectory(*trajectory);
   } else if (const auto* twist = std::get_if<TwistOrder>(&order); twist != nullptr && has_last_wanted_v_) {
     solve_twist(*twist);  // where the arm was before: what the arm's motion changes in it is followed without a lag
-    scale_to_limits(wanted_v_);
     last_wanted_v_ = wanted_v_;
   } else {
     has_last_wanted_v_ = false;
@@ -80,27 +77,31 @@ void Controller::Impl::follow_input() noexcept {
 void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const TwistOrder* twist) noexcept {
   twist_state_.update(arm.robot(), q_, v_);
   held_clearance_ = held_joint_ = -1;
+  reduction_ = Reduction{};
   if (twist != nullptr && is_fresh()) {
     solve_twist(*twist);
   } else {
     path_v_.setZero();
     if (is_fresh()) {
       path_v_ = velocity->velocity;
-      scale_to_limits(path_v_);
+      scale_to_limits(path_v_, reduction_);
     }
     keep_bounds(path_v_);
+    scale_to_limits(wanted_v_, reduction_);
     has_last_wanted_v_ = false;
   }
-  scale_to_limits(wanted_v_);
   wanted_v_ *= pace_;
   JointGoal& goal = std::get<JointGoal>(input_goal_);
   goal.position = q_.cwiseMax(arm.robot().limits().lower).cwiseMin(arm.robot().limits().upper);
   goal.velocity = wanted_v_;
   goal.acceleration.setZero();
-  path_a_ = settings.inputs.response * (wanted_v_ - v_);
-  if (has_last_wanted_v_) {  // its own change, while the order is the same
-    path_a_ += ((wanted_v_ - last_wanted_v_) / settings.period).cwiseMax(-most_a_).cwiseMin(most_a_);
+  if (!has_ideal_v_) {
+    ideal_v_ = v_;
+    has_ideal_v_ = true;
   }
+  respond(ideal_v_);
+  ideal_v_ += settings.period * path_a_;
+  respond(v_);
   // What bounds hold of the velocity is held: its pull needs no barriers, and is the damping's.
   JointGoal& pull = std::get<JointGoal>(input_pull_);
   pull.position = goal.position;
@@ -109,6 +110,21 @@ void Controller::Impl::follow_velocity(const VelocityOrder* velocity, const Twis
   pulls_ = true;
   last_wanted_v_ = wanted_v_;
   has_last_wanted_v_ = twist != nullptr && is_fresh();
+}
+
+// Limits scale it as a whole: joints that reach their velocities one after the other would move the arm across what is asked.
+void Controller::Impl::respond(const Eigen::VectorXd& v) noexcept {
+  path_a_ = settings.inputs.response * (wanted_v_ - v);
+  if (has_last_wanted_v_) {  // its own change, while the order is the same
+    path_a_ += ((wanted_v_ - last_wanted_v_) / settings.period).cwiseMax(-most_a_).cwiseMin(most_a_);
+  }
+  double share = 1.0;
+  for (Eigen::Index j = 0; j < v.size(); ++j) {
+    if (std::abs(path_a_[j]) > most_a_[j]) {
+      share = std::min(share, most_a_[j] / std::abs(path_a_[j]));
+    }
+  }
+  path_a_ *= share;
 }
 
 // Barriers hold back what a pull does towards obstacles, also where it brakes a motion away from them: that much is given to the
@@ -126,51 +142,17 @@ void Controller::Impl::pull(const Eigen::VectorXd& velocity, const Eigen::Vector
   pulls_ = true;
 }
 
-void Controller::Impl::scale_to_limits(Eigen::VectorXd& velocity) const noexcept {
+double Controller::Impl::scale_to_limits(Eigen::VectorXd& velocity, Reduction& reduction) const noexcept {
   double share = 1.0;
   for (Eigen::Index j = 0; j < velocity.size(); ++j) {
-    if (std::abs(velocity[j]) > most_v_[j]) {
-      share = std::min(share, most_v_[j] / std::abs(velocity[j]));
+    if (std::abs(velocity[j]) * share > most_v_[j]) {
+      share = most_v_[j] / std::abs(velocity[j]);
+      reduction.by = Reduction::By::speed;
+      reduction.joint = j;
     }
   }
   velocity *= share;
-}
-
-// v = v_h + P Jᵀ U f(Λ) Uᵀ (V − J v_h) with J P Jᵀ = U Λ Uᵀ and f = 1/λ, damped where σ = √λ is below σ₀: 1/(λ + (1 − λ/σ₀²)
-// σ₀²). P projects on what is left free: position limits and clearances g·v ≥ b that v would not keep are held, one after the
-// other, the worst first, at g·v_h = b, and the free motion makes up for it as far as it can.
-void Controller::Impl::solve_twist(const TwistOrder& order) noexcept {
-  const KinematicState::Link& link = twist_state_.link(order.frame.joint);
-  const Eigen::Vector3d p = link.p_WL + link.R_WL * order.frame.X_JF.translation();
-  Vector6d twist = order.twist;
-  if (order.local) {
-    const Eigen::Matrix3d R = link.R_WL * order.frame.X_JF.linear();
-    twist << R * order.twist.head<3>(), R * order.twist.tail<3>();
-  }
-  jacobian_transposed_.setZero();
-  for (int j = order.frame.joint; j >= 0; j = twist_state_.link(j).parent) {
-    const KinematicState::Link& mover = twist_state_.link(j);
-    jacobian_transposed_.row(mover.coordinate).head<3>() += (mover.screw.linear + mover.screw.angular.cross(p)).transpose();
-    jacobian_transposed_.row(mover.coordinate).tail<3>() += mover.screw.angular.transpose();
-  }
-  projected_ = jacobian_transposed_;
-  held_v_.setZero();
-  const double least = settings.inputs.singular * settings.inputs.singular;
-  for (Eigen::Index held = 0;; ++held) {
-    const Eigen::Matrix<double, 6, 6> gram = projected_.transpose().lazyProduct(projected_);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> principal(gram);
-    const Vector6d left = twist - jacobian_transposed_.transpose().lazyProduct(held_v_);
-    Vector6d along = principal.eigenvectors().transpose() * left;
-    for (Eigen::Index i = 0; i < 6; ++i) {
-      const double square = std::max(0.0, principal.eigenvalues()[i]);
-      along[i] /= square < least ? square + (1.0 - square / least) * least : square;
-    }
-    const Vector6d force = principal.eigenvectors() * along;
-    wanted_v_ = held_v_ + projected_.lazyProduct(force);
-    if (held == held_.cols() || !hold_worst(held)) {
-      return;
-    }
-  }
+  return share;
 }
 
 void Controller::Impl::keep_bounds(const Eigen::VectorXd& velocity) noexcept {
@@ -184,24 +166,28 @@ void Controller::Impl::keep_bounds(const Eigen::VectorXd& velocity) noexcept {
   }
 }
 
-bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
-  double worst = bound_rounding, bound = 0.0, length = 1.0;
-  auto direction = held_.col(held);
+// [rad/s | m/s] How fast a joint may move on towards its limit.
+double Controller::Impl::joint_room(Eigen::Index j, bool up) const noexcept {
   const JointLimits& limits = arm.robot().limits();
-  Eigen::Index joint = -1, clearance = -1;
-  for (Eigen::Index j = 0; j < wanted_v_.size(); ++j) {
-    const double side = wanted_v_[j] > 0.0 ? 1.0 : -1.0, at = twist_state_.q()[j];
-    const double off = settings.position_margin + limit_room * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_room : 1.0);
-    const double most = limit_rate * std::max(0.0, (side > 0.0 ? limits.upper[j] - at : at - limits.lower[j]) - off);
-    if (side * wanted_v_[j] - most > worst) {
-      worst = side * wanted_v_[j] - most;
-      bound = side * most;
-      joint = j;
+  const double at = twist_state_.q()[j];
+  const double off = settings.position_margin + limit_room * (is_sliding_[static_cast<std::size_t>(j)] ? sliding_room : 1.0);
+  return limit_rate * std::max(0.0, (up ? limits.upper[j] - at : at - limits.lower[j]) - off);
+}
+
+Controller::Impl::Bound Controller::Impl::find_worst(bool clearances, bool joints) const noexcept {
+  Bound worst;
+  worst.excess = bound_rounding;
+  for (Eigen::Index j = 0; joints && j < wanted_v_.size(); ++j) {
+    const double side = wanted_v_[j] > 0.0 ? 1.0 : -1.0, most = joint_room(j, side > 0.0);
+    if (side * wanted_v_[j] - most > worst.excess) {
+      worst.excess = side * wanted_v_[j] - most;
+      worst.least = side * most;
+      worst.joint = j;
     }
   }
   const Clearances& near = workspace.clearances;
   for (const Eigen::Index k : metric_coordinates_) {
-    if (near.nearest[k] < 0 || !(near.values[k] < infinity)) {
+    if (!clearances || near.nearest[k] < 0 || !(near.values[k] < infinity)) {
       continue;
     }
     const double norm = near.gradients.col(k).norm();
@@ -210,27 +196,38 @@ bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
     const double least =
         -comes - clearance_rate * std::max(0.0, near.values[k] - std::min(near.margins[k], settings.safety.margin));
     const double excess = norm > 0.0 ? (least - near.gradients.col(k).dot(wanted_v_)) / norm : 0.0;
-    if (excess > worst) {
-      worst = excess;
-      bound = least / norm;
-      length = norm;
-      clearance = k;
+    if (excess > worst.excess) {
+      worst.excess = excess;
+      worst.least = least / norm;
+      worst.length = norm;
+      worst.clearance = k;
     }
   }
-  if (clearance >= 0) {
-    direction = near.gradients.col(clearance) / length;
-  } else if (joint >= 0) {
+  return worst;
+}
+
+bool Controller::Impl::hold_worst(Eigen::Index held) noexcept {
+  const Bound worst = find_worst(true, true);
+  const bool holds = hold(worst, held);
+  if (holds && held == 0) {
+    held_clearance_ = worst.clearance;
+    held_joint_ = worst.clearance < 0 ? worst.joint : -1;
+    held_upper_ = worst.joint >= 0 && wanted_v_[worst.joint] > 0.0;
+  }
+  return holds;
+}
+
+bool Controller::Impl::hold(const Bound& bound, Eigen::Index held) noexcept {
+  auto direction = held_.col(held);
+  if (bound.clearance >= 0) {
+    direction = workspace.clearances.gradients.col(bound.clearance) / bound.length;
+  } else if (bound.joint >= 0) {
     direction.setZero();
-    direction[joint] = 1.0;
+    direction[bound.joint] = 1.0;
   } else {
     return false;
   }
-  if (held == 0) {
-    held_clearance_ = clearance;
-    held_joint_ = clearance < 0 ? joint : -1;
-    held_upper_ = joint >= 0 && wanted_v_[joint] > 0.0;
-  }
-  const double missing = bound - direction.dot(held_v_);
+  const double missing = bound.least - direction.dot(held_v_);
   for (Eigen::Index k = 0; k < held; ++k) {
     direction -= held_.col(k).dot(direction) * held_.col(k);
   }

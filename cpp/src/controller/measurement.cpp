@@ -138,7 +138,7 @@ void Controller::Impl::begin_anew() noexcept {
   }
   last_acceleration_.setZero();
   last_measured_v_ = arm_v_;
-  has_last_wanted_v_ = false;
+  has_last_wanted_v_ = has_ideal_v_ = false;
   avoiding_ = pending_ = false;
   clock_.rate = clock_.change = 0.0;  // a trajectory goes on from where its clock is
   clock_.seen = -1.0;

@@ -186,6 +186,7 @@ void Recorder::note(const Controller::Impl& newest) {
                             record.frame = twist.frame.name;
                             record.twist = twist.twist;
                             record.local = twist.local;
+                            record.free_rotation = twist.free == TwistFreedom::rotation;
                           },
                           [&](const Impl::TrajectoryOrder& trajectory) {
                             record.kind = RequestRecord::Kind::trajectory;

@@ -47,12 +47,13 @@ struct RequestRecord {
   std::vector<PoseRecord> poses;
   std::string frame;  // of a twist
   Vector6d twist = Vector6d::Zero();
+  bool free_rotation = false;
   bool local = false, steer = false;
   Eigen::MatrixXd q;
   Eigen::VectorXd times;
 };
 void describe(auto& archive, Of<RequestRecord> auto& r) {
-  archive(r.number, r.kind, r.position, r.velocity, r.acceleration, r.poses, r.frame, r.twist, r.local, r.steer, r.q, r.times);
+  archive(r.number, r.kind, r.position, r.velocity, r.acceleration, r.poses, r.frame, r.twist, r.free_rotation, r.local, r.steer, r.q, r.times);
 }
 
 struct ObstaclesRecord {
@@ -117,7 +118,7 @@ enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, ans
 /// Every field of a command with its name. A new field does not compile until it is named here: then recordings have it.
 template <class C, class Visit>
 void each_field(C& command, Visit&& visit) {
-  auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors,
+  auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors, input_change,
          tracking_error, deviation, delay, clearance, coordinate, point, bound_by, distance, speed, speed_limit, limits, system,
          program, avoiding, look_ahead_age, planner_age, pace, on_path] = command;
   visit("status", status);
@@ -130,6 +131,7 @@ void each_field(C& command, Visit&& visit) {
   visit("position", position);
   visit("disturbance", disturbance);
   visit("rotors", rotors);
+  visit("input_change", input_change);
   visit("tracking_error", tracking_error);
   visit("deviation", deviation);
   visit("delay", delay);

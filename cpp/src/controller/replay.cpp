@@ -390,7 +390,9 @@ Controller::Impl::Order Replay::order_of(const recording::RequestRecord& record,
       return Goal(std::move(*whole));
     }
     case Kind::velocity: return Impl::VelocityOrder{record.velocity};
-    case Kind::twist: return Impl::TwistOrder{moved_frame(robot, record.frame, "its twist"), record.twist, record.local};
+    case Kind::twist: 
+      return Impl::TwistOrder{moved_frame(robot, record.frame, "its twist"), record.twist, record.local,
+                              record.free_rotation ? TwistFreedom::rotation : TwistFreedom::none};
     case Kind::trajectory:
       return Impl::TrajectoryOrder{JointTrajectory(robot, record.q, record.times, impl.most_v_, impl.most_a_),
                                    record.steer ? TrajectoryBehaviour::steer : TrajectoryBehaviour::keep_path,

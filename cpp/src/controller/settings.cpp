@@ -77,7 +77,8 @@ const std::vector<Field<InputSettings>>& fields() {
       {"response", &S::response, "1/s", 1.0, 100.0, "to a velocity that is wanted: larger is quicker, and passes on its noise"},
       {"timeout", &S::timeout, "s", 0.001, none, "age from which a velocity or a twist counts as zero"},
       {"singular", &S::singular, "-", 1e-4, 1.0,
-       "singular value of a frame's Jacobian [m and rad] below which a twist is damped: larger is calmer and less exact there"},
+       "singular value of a frame's Jacobian [m and rad] near which a twist is slowed; it rests at a fifth of it: larger is calmer, and "
+       "stops farther from where the arm is stretched"},
       {"frequency", &S::frequency, "1/s", 1.0, 50.0,
        "of the return to a trajectory or to the planner's path: larger is stiffer"},
       {"lead", &S::lead, "rad", 0.001, 10.0,

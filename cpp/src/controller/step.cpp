@@ -187,6 +187,7 @@ void Controller::Impl::report(bool known) noexcept {
     command.disturbance = observer_->disturbance();
     command.rotors = observer_->rotors();
   }
+  command.input_change.setZero();
   command.deviation = command.delay = 0.0;
   if (const TrajectoryOrder* order = trajectory_order(); order != nullptr && known && !begins_input_) {
     command.deviation =
@@ -264,6 +265,7 @@ void Controller::Impl::report(bool known) noexcept {
   if (command.clearance < 0.0) {
     command.status = SafetyStatus::clearance_lost;
   }
+  judge_input();
   command.activity = judge_activity();
   if (is_slowed_by_age()) {
     command.status = std::max(command.status, SafetyStatus::limited);

@@ -12,6 +12,7 @@
 #include "sidestep/lookahead/avoidance_trajectory.hpp"
 #include "sidestep/planning/body_clearance.hpp"
 #include "sidestep/system/goal.hpp"
+#include "input.hpp"
 
 namespace sidestep {
 
@@ -79,9 +80,16 @@ struct StepState {
   double order_age_ = 0.0;  // [s]
   Eigen::VectorXd wanted_v_, last_wanted_v_, pulled_;
   bool has_last_wanted_v_ = false;
+  Reduction reduction_;
+  Vector6d twist_ = Vector6d::Zero();  // asked for, in axes of the world
+  Eigen::VectorXd ideal_v_;            // of an arm that responds to the wanted velocity and meets no limit
+  bool has_ideal_v_ = false;
+  double missed_for_ = 0.0;  // [s] for which the reference has been off that
+  bool is_bent_ = false;     // barriers keep it off that now
   struct Clock {
     double time = 0.0, rate = 0.0, change = 0.0;  // s [s], ds/dt, d²s/dt² [1/s]
     double free = 0.0, seen = -1.0;               // the path is free up to there; it is looked at there
+    double allowed = 1.0;                         // the rate that limits, errors and obstacles leave
     double delay = 0.0;                           // behind time, at the end the last [s]
     double room = 0.0;                            // clearance that is asked for [m]
     bool blocked = false;

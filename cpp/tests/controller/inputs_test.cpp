@@ -350,7 +350,8 @@ BOOST_AUTO_TEST_CASE(a_step_allocates_nothing_with_velocities_twists_and_traject
         if (kind == 0) {
           controller.set_velocity(Eigen::VectorXd::Constant(nv, 0.1));
         } else if (kind == 1) {
-          controller.set_twist("tip", Vector6d::Constant(0.1), true);
+          controller.set_twist("tip", Vector6d::Constant(0.1), true,
+                               k % 800 == 100 ? TwistFreedom::rotation : TwistFreedom::none);
         } else {
           controller.set_trajectory(q, times, kind == 2 ? TrajectoryBehaviour::keep_path : TrajectoryBehaviour::steer);
         }

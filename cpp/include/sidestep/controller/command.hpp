@@ -12,7 +12,7 @@ namespace sidestep {
 
 /// How safe a command is, by severity. Every command may be sent.
 enum class SafetyStatus {
-  ok,              ///< the motion is what the goal asks for
+  ok,              ///< the motion is what the goal asks for, or within 5 % of the velocity or twist that was asked for
   limited,         ///< a limit of the arm or a clearance changes it
   relaxed,         ///< limits of jerk, joint or Cartesian speed, or acceleration gave way to clearances, position
                    ///< or torque limits
@@ -56,6 +56,10 @@ struct Command {
   double deviation = 0.0;                  ///< of the reference from the straight lines between a trajectory's samples, in the
                                            ///< farthest joint [rad | m], see JointTrajectory::deviation
   double delay = 0.0;                      ///< how far the trajectory's clock is behind [s]
+  /// (nv) What is changed of the velocity, twist or trajectory that was asked for [rad/s | m/s]: velocity of the reference after
+  /// this period, less the velocity asked for. Of a twist V: J⁺ (J v − V), damped where it is singular, so that what the frame
+  /// does not feel does not count. Of a trajectory: its velocity at the clock, at full speed. Zero without one of these.
+  Eigen::VectorXd input_change;
 
   /// least clearance of the covering body [m], exact below the barriers' activation distances; inf: far; NaN: the state is
   /// unknown

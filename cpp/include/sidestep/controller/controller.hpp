@@ -26,6 +26,12 @@ namespace sidestep {
 
 class Recorder;
 
+/// Which part of a twist is not asked for.
+enum class TwistFreedom {
+  none,      ///< translation and rotation are both asked for
+  rotation,  ///< only the velocity of the frame's origin is: the frame may turn as it likes
+};
+
 /// The controller turns the arm's state into a safe command, once per period.
 ///
 ///   1. Reference: the goal, a point ahead of the arm on the planner's path, or a sub-goal out of a local minimum.
@@ -73,13 +79,15 @@ class Controller {
   void set_goal(Goal goal);
   // Each of these replaces the previous goal or order. They too throw std::invalid_argument, and the previous order then stays.
 
-  /// Wanted joint velocities (nv) [rad/s | m/s]; one factor scales them down to the limits. The arm slides along obstacles or
-  /// stops at them. After `inputs.timeout` without another order the arm stops.
+  /// Wanted joint velocities (nv) [rad/s | m/s]; one factor scales them down to the limits. A joint stops at its position limit
+  /// while the others go on. The arm slides along obstacles or stops at them. After `inputs.timeout` without another order the arm stops.
   void set_velocity(const Eigen::VectorXd& v);
   /// The wanted twist of a frame: velocity of its origin [m/s] and angular velocity [rad/s], in world axes or, with `local`, in
-  /// the frame's axes; rows as in frame_jacobian. Least squares gives the joint velocities. They are exact away from singular
-  /// configurations and limits; along these the arm slides.
-  void set_twist(const std::string& frame, const Vector6d& twist, bool local = false);
+  /// the frame's axes; rows as in frame_jacobian. The frame moves with s times the whole twist, with the largest s in [0, 1]
+  /// that joint limits and singular configurations leave. With `free` the rotation is not asked for, and its three numbers are
+  /// not read: for arms of less than six joints. Along obstacles the arm slides; status, `explain` and Command::input_change
+  /// say so.
+  void set_twist(const std::string& frame, const Vector6d& twist, bool local = false, TwistFreedom free = TwistFreedom::none);
   /// Joint positions q (nv × K) at times (K) [s] after the step that receives them, see JointTrajectory. If the first time is
   /// after zero, the arm has that long to reach the first sample, which may differ from its present state.
   void set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times,

@@ -63,7 +63,7 @@ struct TrackingSettings {
 struct InputSettings {
   double response = 20.0;   ///< k of a velocity that is wanted: acceleration k (v_d − v) [1/s]
   double timeout = 0.25;    ///< age from which a velocity or a twist counts as zero [s]
-  double singular = 0.05;   ///< singular value of a frame's Jacobian below which its direction is damped [m and rad]
+  double singular = 0.05;   ///< singular value of a frame's Jacobian near which a twist is slowed; rest at a fifth [m and rad]
   double frequency = 10.0;  ///< ω of the return to a trajectory or path, ω² e + 2 ω de/dt [1/s]
   /// |q_r − q*| from which a trajectory slows down; it waits at twice as much [rad]; of sliding joints a fifth [m].
   double lead = 0.1;
