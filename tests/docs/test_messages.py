@@ -14,6 +14,7 @@ SOURCES = (
     "controller/measurement.cpp",
     "controller/following.cpp",
     "controller/plausibility.cpp",
+    "controller/input_report.cpp",
     "controller/speed.cpp",
     "system/diagnosis.cpp",
 )

@@ -118,8 +118,8 @@ enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, ans
 /// Every field of a command with its name. A new field does not compile until it is named here: then recordings have it.
 template <class C, class Visit>
 void each_field(C& command, Visit&& visit) {
-  auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors, input_change,
-         tracking_error, deviation, delay, clearance, coordinate, point, bound_by, distance, speed, speed_limit, limits, system,
+  auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors,
+         tracking_error, deviation, delay, input_change, clearance, coordinate, point, bound_by, distance, speed, speed_limit, limits, system,
          program, avoiding, look_ahead_age, planner_age, pace, on_path] = command;
   visit("status", status);
   visit("activity", activity);
