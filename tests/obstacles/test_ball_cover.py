@@ -7,6 +7,7 @@ distance of a ball from the solid is a closed form, or Coal on the exact solid.
 from __future__ import annotations
 
 from pathlib import Path
+from time import process_time
 
 import coal
 import numpy as np
@@ -16,6 +17,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from sidestep import SceneObject
+from sidestep._core import distance_to_triangles
 from sidestep.distance.solid import object_solid
 from sidestep.obstacles import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere, pose_at
 from sidestep.obstacles.ball_cover import EXCESS
@@ -247,3 +249,89 @@ def test_what_asks_for_too_many_balls_is_refused() -> None:
         for shape in (Box((0.1, 0.1, 0.1)), Sphere(0.1), Capsule(0.1, 0.1)):
             with pytest.raises(ValueError, match=f"excess is {excess}, must be positive"):
                 shape.balls(excess)
+
+
+def tote(wall: float) -> trimesh.Trimesh:
+    """A box without a lid, 0.6 x 0.4 x 0.3 m, whose walls are solid."""
+    x, y, z = 0.3, 0.2, 0.3
+
+    def ring(x: float, y: float, z: float) -> list[list[float]]:
+        return [[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]]
+
+    corners = [
+        *ring(x, y, 0.0),
+        *ring(x, y, z),
+        *ring(x - wall, y - wall, z),
+        *ring(x - wall, y - wall, wall),
+    ]
+    faces = [[0, 2, 1], [0, 3, 2], [12, 13, 14], [12, 14, 15]]
+    for low, high in ((0, 4), (4, 8), (8, 12)):
+        for i in range(4):
+            j = (i + 1) % 4
+            faces += [[low + i, low + j, high + j], [low + i, high + j, high + i]]
+    return trimesh.Trimesh(corners, faces)
+
+
+def tote_of_parts(wall: float) -> trimesh.Trimesh:
+    """The same as five overlapping boxes in one file."""
+    x, y, z = 0.6, 0.4, 0.3
+    sides = [((x, y, wall), (0.0, 0.0, wall / 2))]
+    sides += [((wall, y, z), (s * (x - wall) / 2, 0.0, z / 2)) for s in (1, -1)]
+    sides += [((x, wall, z), (0.0, s * (y - wall) / 2, z / 2)) for s in (1, -1)]
+    parts = [trimesh.creation.box(size) for size, _ in sides]
+    for part, (_, middle) in zip(parts, sides, strict=True):
+        part.apply_translation(middle)
+    return trimesh.util.concatenate(parts)
+
+
+def sheet(x: float, y: float) -> trimesh.Trimesh:
+    corners = [[-x / 2, -y / 2, 0.0], [x / 2, -y / 2, 0.0], [x / 2, y / 2, 0.0], [-x / 2, y / 2, 0.0]]
+    return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])
+
+
+FLAT = {  # meshes of large flat faces, and the most balls that they may take
+    "tote": (tote(0.004), 72_000),
+    "tote of parts": (tote_of_parts(0.004), 78_000),
+    "plate": (trimesh.creation.box((0.003, 1.0, 0.6)), 38_000),
+    "table": (trimesh.creation.box((1.2, 0.8, 0.04)), 22_500),
+    "guard": (sheet(1.0, 1.0), 130_000),
+}
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_large_flat_faces_are_covered_at_once_and_hollow_stays_hollow(name: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    mesh, at_most = FLAT[name]
+    mesh.export(tmp_path / "thing.stl")
+    shape = MeshShape(tmp_path / "thing.stl", pose=random_pose(rng))
+    start = process_time()
+    centres, radii = shape.balls()
+    assert process_time() - start < 5.0  # 0.2 to 0.9 s were measured; 10 to 25 s, or refused, before
+    assert len(radii) <= at_most
+    assert len(left_out(surface_points(shape, rng), centres, radii)) == 0
+    # The distance of a ball's centre from the surface is its depth: it reaches out by no more than the excess.
+    few = rng.permutation(len(radii))[:500]
+    triangles = np.array(shape.mesh().triangles)
+    every = np.tile(np.arange(len(triangles)), (len(few), 1))
+    depth = distance_to_triangles(centres[few], triangles, every)
+    assert (radii[few] - depth).max() <= EXCESS + ROUNDING
+    if name.startswith("tote"):
+        middle = shape.pose[:3, :3] @ [0.0, 0.0, 0.15] + shape.pose[:3, 3]
+        assert (np.linalg.norm(centres - middle, axis=1) - radii).min() > 0.146 - EXCESS - ROUNDING
+
+
+def test_a_box_of_triangles_is_solid(tmp_path: Path) -> None:
+    trimesh.creation.box((0.2, 0.2, 0.2)).export(tmp_path / "cube.stl")
+    centres, radii = MeshShape(tmp_path / "cube.stl").balls()
+    points = np.random.default_rng(0).uniform(-0.05, 0.05, (2000, 3))
+    assert len(left_out(points, centres, radii)) == 0
+
+
+def test_an_excess_that_asks_for_too_many_balls_is_refused_with_one_that_does_not(tmp_path: Path) -> None:
+    sheet(3.0, 2.0).export(tmp_path / "guard.stl")
+    shape = MeshShape(tmp_path / "guard.stl")
+    with pytest.raises(
+        ValueError, match=r"the excess of 2 mm asks for about 7.5e\+05 balls, .* 3.5 mm needs few"
+    ):
+        shape.balls()
+    assert len(shape.balls(0.0035)[0]) < 300_000
