@@ -1,10 +1,14 @@
 """Recordings of steps: a replay gives the same commands bit for bit, or names the first that differs."""
 
 import json
+import os
 import struct
+import subprocess
+import sys
 import threading
 import time
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -372,6 +376,76 @@ def test_what_is_no_recording_is_refused(tmp_path):
         ss.replay(tmp_path / "none.step")
     with pytest.raises(FileNotFoundError):
         controller_of(ss.Arm.load("planar2")).record(tmp_path / "no" / "folder.step")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_is_told_when_the_recording_ends(arm):
+    controller = controller_of(arm)
+    recording = controller.record("/dev/full")
+    moved(controller, Q, np.zeros(7), 5)
+    with pytest.raises(OSError, match="No space left"):
+        recording.stop()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+def test_steps_do_not_wait_for_a_slow_disk_and_what_is_lost_is_counted(arm, tmp_path):
+    pipe = tmp_path / "slow.step"
+    os.mkfifo(pipe)
+    disk = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # takes nothing yet
+    settings = ss.ControllerSettings(output="torque", planner=None, look_ahead=None)
+    controller = ss.Controller(arm, settings)
+    recording = controller.record(pipe)
+    mass, bias, v = arm.mass_matrix(Q), arm.bias(Q, np.zeros(7)), np.zeros(7)
+    steps = 18_000  # of 1.2 kB: more than 16 MiB
+    for _ in range(steps):
+        controller.step(Q, v, mass, bias)
+    taken = []
+
+    def take():
+        while not over.is_set() or (taken and taken[-1]):
+            try:
+                taken.append(os.read(disk, 1 << 20))
+            except BlockingIOError:
+                time.sleep(0.001)
+
+    over = threading.Event()
+    thread = threading.Thread(target=take, daemon=True)
+    thread.start()
+    with pytest.warns(
+        RuntimeWarning, match=r"the disk was too slow, so that \d+ steps after step \d+ are lost"
+    ):
+        summary = recording.stop()
+    over.set()
+    thread.join()
+    os.close(disk)
+    assert summary.lost > 0
+    assert summary.steps + summary.lost == steps
+    (tmp_path / "read.step").write_bytes(b"".join(taken))
+    result = ss.replay(tmp_path / "read.step")
+    assert result.equal
+    assert result.complete
+    assert (result.steps, result.lost) == (summary.steps, summary.lost)
+
+
+def test_a_program_that_is_killed_leaves_what_it_has_recorded(tmp_path):
+    path = tmp_path / "killed.step"
+    program = f"""
+import os, time
+import numpy as np
+import sidestep as ss
+controller = ss.Controller(ss.Arm.load("planar2"), ss.ControllerSettings(synchronous=True))
+recording = controller.record({str(path)!r})
+for _ in range(50):
+    controller.step(np.zeros(2), np.zeros(2))
+time.sleep(0.5)  # the writer looks every 2 ms
+os.kill(os.getpid(), 9)
+"""
+    assert subprocess.run([sys.executable, "-c", program]).returncode == -9
+    result = ss.replay(path)
+    assert result.equal
+    assert not result.complete
+    assert result.steps == 50
 
 
 def test_a_variable_has_every_controller_recorded(arm, tmp_path, monkeypatch):

@@ -8,6 +8,7 @@
 #include "sidestep/controller/controller.hpp"
 #include "support/allocations.hpp"
 #include "support/covered_arm.hpp"
+#include "support/numbers.hpp"
 
 using namespace sidestep;
 using test::covered_arm;
