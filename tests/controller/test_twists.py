@@ -99,6 +99,19 @@ def test_a_stretched_arm_comes_to_rest_says_so_and_comes_back(name: str, directi
     assert c.explain() == "following the commanded velocity"
 
 
+def test_a_stretched_arm_under_torque_comes_back() -> None:
+    """Torques change at a limited rate: an arm that passed the stretched pose would be held by joint 4 at its limit."""
+    c, q, frame = controller(FR3, output="torque"), FR3.neutral, FRAMES["fr3"]
+    begin = FR3.robot.pose(q, frame)[:3, 3]
+    q, v, _ = drive(c, q, 0.0 * q, frame, [0, 0, 0.3, 0, 0, 0], 3000)
+    end = FR3.robot.pose(q, frame)[:3, 3]
+    assert end[2] - begin[2] > 0.1
+    assert np.linalg.norm((end - begin)[:2]) < 0.01  # 7 mm while torques follow
+    assert c.explain().endswith("as the arm is stretched")
+    q, _, _ = drive(c, q, v, frame, [0, 0, -0.3, 0, 0, 0], 700)  # 0.33 s, and the response
+    assert end[2] - FR3.robot.pose(q, frame)[2, 3] > 0.1
+
+
 def test_out_of_a_configuration_that_is_exactly_singular() -> None:
     """A UR at zeros is stretched: no joint velocity moves the hand inwards at first order."""
     q = np.zeros(6)

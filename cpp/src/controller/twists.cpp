@@ -10,7 +10,7 @@ namespace {
 
 // Singular value where a twist comes to rest, as a share of inputs.singular: the last 0.2 mm of an arm of 1 m.
 constexpr double rest_share = 0.2;
-constexpr double singular_rate = 6.0;  // [1/s] at which singular values come to there: as clearances to their margins
+constexpr double singular_rate = 3.0;  // [1/s] at which singular values come to there: as joints to their limits
 // Singular values that may come to rest within the response, as a multiple of inputs.singular.
 constexpr double watched = 6.0;
 constexpr double look_ahead = 0.005;     // [rad] largest joint motion over which a singular value's rate is measured
