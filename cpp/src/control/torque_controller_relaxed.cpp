@@ -28,8 +28,8 @@ void TorqueController::widen_bounds() noexcept {
   if (settings_.hard_bounds) {
     return;
   }
-  // To the overruns, which nothing exceeds: neither what position limits ask for nor, where torques change at a limited rate, what could
-  // not be taken back in time. Feedback has its own factor.
+  // To the overruns, which nothing exceeds: neither what position limits ask for nor, where torques change at a limited rate,
+  // what could not be taken back in time. Feedback has its own factor.
   for (int i = 0; i < nv_; ++i) {
     const double most = std::max(settings_.acceleration_overrun, acceleration_factor_) * limits_.acceleration[i];
     const double fastest = settings_.velocity_overrun * limits_.velocity[i];

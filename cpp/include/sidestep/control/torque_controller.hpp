@@ -102,7 +102,8 @@ struct TorqueControllerSettings {
   double slack_weight = 1e3;
   /// For clearances and torque limits the velocity limits give way up to this factor, in [1, inf) [-].
   double velocity_overrun = 1.2;
-  /// And the acceleration limits up to this one, in [1, inf) [-]. Where effort has a rate, both as far as it can be taken back in time.
+  /// And the acceleration limits up to this one, in [1, inf) [-]. Where effort has a rate, both only as far as they can be taken
+  /// back in time.
   double acceleration_overrun = 10.0;
   /// What is kept of the clearances, where they are given.
   SafetySettings safety = {};
