@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import sleep
 from typing import Any
@@ -140,24 +141,25 @@ def replay_all(
 
 def cases() -> list[Case]:
     """All there are: reach problems, poses, what moves, scenarios, inputs, outputs, held objects, real time."""
-    reach = [Case(f"reach-{name}", lambda name=name: _reach(name)) for name in REACH_ROBOTS]
+    reach = [Case(f"reach-{name}", partial(_reach, name)) for name in REACH_ROBOTS]
     return [
         *reach,
-        Case("reach-torque", lambda: _reach("fr3", torque=True)),
-        Case("reach-poses", lambda: _reach("fr3", poses=True)),
-        Case("reach-moving", lambda: _reach("fr3", moving=0.2)),
-        *(Case(name, lambda name=name: _scenario(name)) for name in SCENARIOS),
+        Case("reach-torque", partial(_reach, "fr3", torque=True)),
+        Case("reach-poses", partial(_reach, "fr3", poses=True)),
+        Case("reach-moving", partial(_reach, "fr3", moving=0.2)),
+        Case("dynamic", _dynamic),
+        *(Case(name, partial(_scenario, name)) for name in SCENARIOS),
         *(
-            Case(f"drive-{name}-{output}", lambda name=name, output=output: _drive(name, output))
+            Case(f"drive-{name}-{output}", partial(_drive, name, output))
             for name in ("fr3", "panda", "ur10")
             for output in ("acceleration", "torque")
         ),
         Case("twist", _twist),
         Case("trajectory", _trajectory),
         Case("moving-goal", _moving_goal),
-        Case("position-output", lambda: _disturbed("position")),
-        Case("velocity-output", lambda: _disturbed("velocity")),
-        Case("noisy-torque", lambda: _disturbed("torque")),
+        Case("position-output", partial(_disturbed, "position")),
+        Case("velocity-output", partial(_disturbed, "velocity")),
+        Case("noisy-torque", partial(_disturbed, "torque")),
         Case("impedance", _impedance),
         Case("speed-limits", _speed_limits),
         Case("bad-states", _bad_states),
@@ -179,6 +181,14 @@ def _reach(name: str, *, torque: bool = False, poses: bool = False, moving: floa
     motion = MotionSettings(duration=REACH_SECONDS, torque=torque, poses=poses)
     for index in range(3):
         ControllerMover(robot, arm).move(generator.problem(index), motion)
+
+
+def _dynamic() -> None:
+    """One problem of each kind of `sidestep bench dynamic`."""
+    from sidestep.bench.dynamic import run_dynamic
+    from sidestep.bench.scenes import SceneSettings
+
+    run_dynamic(SceneSettings(robot="fr3", motion=MotionSettings(duration=REACH_SECONDS)), count=1)
 
 
 def _scenario(name: str) -> None:
