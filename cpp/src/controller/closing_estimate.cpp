@@ -11,11 +11,11 @@ namespace sidestep {
 namespace {
 
 constexpr double reach = 0.15;  // [m] of clearance: three sets at 10 Hz see 0.3 m/s before it is 0.09 m; farther takes longer
-constexpr double same = 1e-9;   // [m] change of a clearance that is rounding: the same set again
-constexpr double least_spacing = 0.008;  // [s] between changes that are kept; sets that come faster are summed up
-constexpr double longest_spacing = 0.4;  // [s] beyond it two sets do not make a motion
-constexpr double slowest = 0.02;         // [m/s] slower is for the margin, see SafetySettings::margin
-constexpr double fastest = 5.0;          // [m/s] faster is no motion but another obstacle
+constexpr double unchanged = 1e-9;        // [m] change of a clearance that is rounding: the same set again
+constexpr double least_spacing = 0.008;   // [s] between changes that are kept; sets that come faster are summed up
+constexpr double longest_spacing = 0.4;   // [s] beyond it two sets do not make a motion
+constexpr double slowest_closing = 0.02;  // [m/s] slower is for the margin, see SafetySettings::margin
+constexpr double fastest = 5.0;           // [m/s] faster is no motion but another obstacle
 constexpr double least_way =
     0.003;  // [m] lost in a window: beyond the noise of good depth cameras and the softness of the mean
 constexpr double times_noise = 5.0;    // [-] of the noise, lost in a window: more than independent errors lose
@@ -74,7 +74,7 @@ void ClosingEstimate::take(const Obstacles& now, double time) noexcept {
   bool other = false;
   for (Eigen::Index k = 0; k < speeds_.size(); ++k) {
     const double a = before_.values[k], b = now_.values[k];
-    other = other || (a != b && !(std::abs(a - b) <= same));
+    other = other || (a != b && !(std::abs(a - b) <= unchanged));
   }
   for (Eigen::Index k = 0; other && k < speeds_.size(); ++k) {
     Track& track = tracks_[static_cast<std::size_t>(k)];
@@ -121,7 +121,7 @@ double ClosingEstimate::agreed(const Track& track, bool closes) noexcept {
     way += track.change[static_cast<std::size_t>(n) - 1];
     time += track.duration[static_cast<std::size_t>(n) - 1];
     const double speed = way / time;
-    if (way < least || speed < slowest || speed > fastest || (speed > brisk && n < 3)) {
+    if (way < least || speed < slowest_closing || speed > fastest || (speed > brisk && n < 3)) {
       continue;
     }
     bool steady = true;

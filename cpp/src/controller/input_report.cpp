@@ -9,13 +9,13 @@
 namespace sidestep {
 namespace {
 
-constexpr double settling = 4.0;          // time constants of the response after which a motion is there, to 2 % [-]
-constexpr double joint_rest = 5e-4;       // [rad/s] of a joint that counts as rest
-constexpr double sliding_rest = 0.1;      // the same of joints that slide [m/rad]
-constexpr double cross_share = 0.01;      // share of the fastest joint that others may be off
-constexpr double least_deviation = 0.01;  // [rad] from a trajectory: what counts as arrived
-constexpr double bent_share = 0.5;        // of the tolerance that barriers take away and are named for
-constexpr double outwards = 0.5;          // cosine to the line from the shoulder from which an arm is stretched
+constexpr double response_settling = 4.0;  // time constants of the response after which a motion is there, to 2 % [-]
+constexpr double joint_rest = 5e-4;        // [rad/s] of a joint that counts as rest
+constexpr double sliding_rest = 0.1;       // the same of joints that slide [m/rad]
+constexpr double cross_share = 0.01;       // share of the fastest joint that others may be off
+constexpr double least_deviation = 0.01;   // [rad] from a trajectory: what counts as arrived
+constexpr double bent_share = 0.5;         // of the tolerance that barriers take away and are named for
+constexpr double outwards = 0.5;           // cosine to the line from the shoulder from which an arm is stretched
 
 /// A number with some digits, and no sign where they are all zero.
 std::string in_digits(double value, int digits) {
@@ -109,7 +109,7 @@ void Controller::Impl::judge_input() noexcept {
     off_ = (wanted_ - path_a_) / settings.inputs.response;
     is_bent_ = misses && differs(off_, bent_share);
     missed_for_ = misses ? missed_for_ + settings.period : 0.0;
-    reduced = reduced || is_bent_ || !follows(wanted_v_) || missed_for_ * settings.inputs.response > settling;
+    reduced = reduced || is_bent_ || !follows(wanted_v_) || missed_for_ * settings.inputs.response > response_settling;
   }
   if (reduced && command.status == SafetyStatus::ok) {
     command.status = SafetyStatus::limited;
@@ -135,7 +135,7 @@ std::string Controller::Impl::explain_input() const {
   if (clearance < 0 && is_reduced && held_joint_ >= 0) {
     by = "joint '" + arm.robot().coordinate_names()[static_cast<std::size_t>(held_joint_)] + "' and its " +
          (held_upper_ ? "upper" : "lower") + " limit";
-  } else if (clearance < 0 && !on_trajectory && (is_bent_ || missed_for_ * settings.inputs.response > settling)) {
+  } else if (clearance < 0 && !on_trajectory && (is_bent_ || missed_for_ * settings.inputs.response > response_settling)) {
     clearance = system->diagnose(workspace).coordinate;
   }
   if (clearance >= 0) {
@@ -158,7 +158,7 @@ std::string Controller::Impl::explain_input() const {
   if (why.empty() && is_bent_) {
     return lag + ", bent by barriers";
   }
-  if (why.empty() && missed_for_ * settings.inputs.response <= settling) {
+  if (why.empty() && missed_for_ * settings.inputs.response <= response_settling) {
     const std::size_t numbers = lag.find(": ");
     return "on the way to the commanded velocity: " + (numbers == std::string::npos ? lag : lag.substr(numbers + 2));
   }

@@ -260,7 +260,8 @@ void Recorder::end_step(Controller::Impl& arm) noexcept {
     }
     if (const auto* found = taken.trajectory) {
       const AvoidanceTrajectory& t = found->trajectory;
-      out(TakenKind::trajectory, found->time, found->goal_number, found->avoid, found->duration, t.target(), t.position(), t.velocity());
+      out(TakenKind::trajectory, found->time, found->goal_number, found->avoid, found->duration, t.target(), t.position(),
+          t.velocity());
     }
     if (const auto* look = taken.look) {
       out(TakenKind::look, look->time, look->duration);

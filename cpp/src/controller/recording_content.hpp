@@ -53,7 +53,8 @@ struct RequestRecord {
   Eigen::VectorXd times;
 };
 void describe(auto& archive, Of<RequestRecord> auto& r) {
-  archive(r.number, r.kind, r.position, r.velocity, r.acceleration, r.poses, r.frame, r.twist, r.free_rotation, r.local, r.steer, r.q, r.times);
+  archive(r.number, r.kind, r.position, r.velocity, r.acceleration, r.poses, r.frame, r.twist, r.free_rotation, r.local,
+          r.steer, r.q, r.times);
 }
 
 struct ObstaclesRecord {
@@ -119,8 +120,8 @@ enum class TakenKind : std::uint8_t { end, posture, activations, trajectory, ans
 template <class C, class Visit>
 void each_field(C& command, Visit&& visit) {
   auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors,
-         tracking_error, deviation, delay, input_change, clearance, coordinate, point, bound_by, distance, speed, speed_limit, limits, system,
-         program, avoiding, look_ahead_age, planner_age, pace, on_path] = command;
+         tracking_error, deviation, delay, input_change, clearance, coordinate, point, bound_by, distance, speed, speed_limit,
+         limits, system, program, avoiding, look_ahead_age, planner_age, pace, on_path] = command;
   visit("status", status);
   visit("activity", activity);
   visit("torque", torque);

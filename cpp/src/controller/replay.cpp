@@ -390,7 +390,7 @@ Controller::Impl::Order Replay::order_of(const recording::RequestRecord& record,
       return Goal(std::move(*whole));
     }
     case Kind::velocity: return Impl::VelocityOrder{record.velocity};
-    case Kind::twist: 
+    case Kind::twist:
       return Impl::TwistOrder{moved_frame(robot, record.frame, "its twist"), record.twist, record.local,
                               record.free_rotation ? TwistFreedom::rotation : TwistFreedom::none};
     case Kind::trajectory:

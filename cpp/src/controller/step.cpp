@@ -104,8 +104,8 @@ void Controller::Impl::take_obstacles() noexcept {
     Obstacles& before = obstacle_orders_.current().obstacles;
     before.advance(settings.period);
     closing_.leave(arm_q_, before);
+    obstacle_orders_.update();  // one that comes after the question above is taken by the next step
   }
-  obstacle_orders_.update();
   if (obstacle_orders_.current().number != obstacle_number_) {
     obstacle_number_ = obstacle_orders_.current().number;
     obstacle_age_ = 0.0;

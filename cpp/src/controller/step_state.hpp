@@ -42,7 +42,7 @@ struct StepState {
     Eigen::Index farthest = 0;             // joint
     double elapsed = 0.0;                  // since the last step, by the machine's clock [s]
     double replayed_elapsed = std::numeric_limits<double>::quiet_NaN();  // in its place, of a recording; NaN: there is none
-    double moved_until = 0.0;              // [s] until when that is worth a word
+    double moved_until = 0.0;                                            // [s] until when that is worth a word
     std::chrono::steady_clock::time_point stepped_at{};
   } measurement_;
   bool begins_anew_ = false;  // where the next usable sample is
@@ -97,10 +97,10 @@ struct StepState {
   } clock_;
   Eigen::VectorXd begin_q_, begin_v_, path_q_, path_v_, path_a_;
   bool avoiding_ = false;
-  double looked_at_ = 0.0;    // time of the state that the look-ahead which is followed began with [s]
-  double look_excess_ = 0.0;  // by which that look took longer by the machine's clock than by the steps' [s]
+  double looked_at_ = 0.0;       // time of the state that the look-ahead which is followed began with [s]
+  double look_excess_ = 0.0;     // by which that look took longer by the machine's clock than by the steps' [s]
   double pending_excess_ = 0.0;  // the same of the one that is followed next [s]
-  double pace_ = 1.0;         // share of its speed that the look-ahead's age leaves the arm
+  double pace_ = 1.0;            // share of its speed that the look-ahead's age leaves the arm
   AvoidanceTrajectory trajectory_;
 };
 
