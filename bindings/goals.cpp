@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "system.hpp"
 #include "sidestep/controller/posture_search.hpp"
@@ -60,6 +61,16 @@ Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
   }
   pose.linear() = matrix.topLeftCorner<3, 3>();
   pose.translation() = matrix.topRightCorner<3, 1>();
+  const Eigen::Matrix3d R = pose.linear();
+  const double off = rotation_defect(R);
+  if (off >= rotation_tolerance && off <= rotation_rounding && R.determinant() > 0.0) {
+    std::ostringstream words;
+    words.precision(2);
+    words << "pose: its rotation R was rounded, an entry of R^T R - 1 is " << off
+          << "; the nearest rotation is taken: give more digits, or normalise the quaternion";
+    warn(words.str());
+    pose.linear() = nearest_rotation(R);
+  }
   return pose;
 }
 
@@ -112,6 +123,8 @@ void bind_goals(nb::module_& m) {
       "orientation_stiffness k_R [1/s^2]. rest (nv,) with posture_stiffness [1/s^2]: a configuration that the joints are\n"
       "drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin\n"
       "[m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.\n"
+      "Where an entry of R^T R - 1 is up to 0.01, as of a quaternion of three digits, the nearest rotation is taken, with a\n"
+      "warning that says by how much.\n"
       "Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is\n"
       "none, a number that is not finite, a stiffness out of range. A pose out of reach gives a status in the step.")
       .def(

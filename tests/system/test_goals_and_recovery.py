@@ -6,6 +6,7 @@ import pytest
 import sidestep as ss
 from sidestep import thesis
 from sidestep.controller import MotionState
+from sidestep.obstacles import pose_at
 from sidestep.system import (
     ClearanceBarrier,
     CoordinateKind,
@@ -59,6 +60,30 @@ def test_the_pull_of_a_pose_is_the_gradient_of_its_potential(
             np.testing.assert_allclose(step.goal_gradient, slopes, atol=1e-7)  # rounding of U over the step
 
 
+def test_a_rotation_of_three_digits_is_normalised_with_a_warning(robot: ss.Robot) -> None:
+    x, y, z, w = 0.924, -0.383, 0.01, 0.005  # as in a message, used as if its norm were 1
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    off = np.abs(rotation.T @ rotation - np.eye(3)).max()
+    with pytest.warns(
+        RuntimeWarning, match=rf"an entry of R\^T R - 1 is {off:.2g}; the nearest rotation is taken"
+    ):
+        goal = ss.PoseGoal(robot, "fr3_hand", pose_at([0.4, 0.0, 0.4], rotation))
+    R = np.asarray(goal.pose)[:3, :3]
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)  # rounding
+    assert np.abs(R - rotation).max() < off  # no farther than it was off
+    with pytest.warns(RuntimeWarning, match="the nearest rotation is taken"):
+        box = ss.Box((0.1, 0.1, 0.1), pose_at([0.4, 0.0, 0.4], rotation))
+    np.testing.assert_allclose(box.pose[:3, :3], R, atol=1e-12)  # rounding
+    with pytest.raises(ValueError, match=r"an entry of R\^T R - 1 is 0.0"):  # two digits: 1 degree is lost
+        ss.PoseGoal(robot, "fr3_hand", pose_at([0.4, 0.0, 0.4], np.diag([1.0, 0.99, 0.99])))
+
+
 def test_a_bad_pose_is_named(robot: ss.Robot, system: GeometricSystem) -> None:
     with pytest.raises(ValueError, match="fr3_hand"):  # lists the known ones
         ss.PoseGoal(robot, "gripper", np.eye(4))
@@ -67,8 +92,10 @@ def test_a_bad_pose_is_named(robot: ss.Robot, system: GeometricSystem) -> None:
         match=r"no joint of robot 'fr3' moves frame 'fr3_link0'; those that one moves: .*fr3_link1",
     ):
         ss.PoseGoal(robot, "fr3_link0", np.eye(4))
-    with pytest.raises(ValueError, match="not a rotation"):
+    with pytest.raises(ValueError, match=r"not a rotation: an entry of R\^T R - 1 is 3, "):
         ss.PoseGoal(robot, "fr3_hand", 2.0 * np.eye(4))
+    with pytest.raises(ValueError, match="mirrors, so it is not a rotation"):
+        ss.PoseGoal(robot, "fr3_hand", np.diag([1.0, 1.0, -1.0, 1.0]))
     q, free = robot.neutral, ss.Obstacles.none()
     with pytest.raises(ValueError, match=r"pose\[0, 0\] is nan, must be a finite number"):
         ss.PoseGoal(robot, "fr3_hand", np.full((4, 4), np.nan))

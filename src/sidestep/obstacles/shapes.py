@@ -331,8 +331,8 @@ class MeshShape:
     def balls(self, excess: float = EXCESS) -> Balls:
         """Balls inside the solid where the mesh is closed, else on its triangles.
 
-        Large flat faces take a fraction of a second, many small ones may take seconds. The balls of a file's content are
-        kept until the program ends.
+        Large flat faces take a fraction of a second, many small ones may take seconds. The balls of a content are kept
+        until the program ends.
         """
         from sidestep.robot.mesh import MeshFile
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import real_array
-from sidestep.robot.matrices import product
+from sidestep.robot.matrices import determinant, product
 
 Array = npt.NDArray[np.float64]
 
+ROUNDED = (
+    0.01  # largest entry of |R Rᵀ - 1| that counts as rounding: a quaternion of three digits has up to 0.008
+)
 NO_TURN = 1e-9  # sine of an angle that is none, or half a turn
 ROUNDED_NORM = 0.01  # from 1: four entries of a quaternion that are rounded to two digits
 
@@ -124,25 +128,46 @@ def checked_pose(value: npt.ArrayLike, owner: str, *, tolerance: float = 1e-6) -
     Args:
         value: the pose.
         owner: what an error calls it.
-        tolerance: on R Rᵀ - 1; by default that of a pose which was written down with a few digits.
+        tolerance: on R Rᵀ - 1. Up to 0.01, as of a pose that was written down with three digits, the nearest rotation
+            is taken, with a warning that says by how much.
 
     Raises:
-        ValueError: it is not a rigid transform with finite entries.
+        ValueError: it is not a rigid transform with finite entries; says by how much.
     """
     X = real_array(value, owner).copy()
     if X.shape != (4, 4):
         raise ValueError(f"{owner} has shape {X.shape}, expected (4, 4): a rigid transform")
-    rotation = X[:3, :3]
-    rigid = (
-        np.isfinite(X).all()
-        and np.array_equal(X[3], [0.0, 0.0, 0.0, 1.0])
-        and np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance)
-        and np.linalg.det(rotation) > 0.0
-    )
-    if not rigid:
+    if not (np.isfinite(X).all() and np.array_equal(X[3], [0.0, 0.0, 0.0, 1.0])):
         raise ValueError(f"{owner} is not a rigid transform (rotation, translation, last row 0 0 0 1):\n{X}")
+    X[:3, :3] = checked_rotation(X[:3, :3], owner, tolerance=tolerance)
     X.setflags(write=False)
     return X
+
+
+def checked_rotation(R: Array, owner: str, *, tolerance: float) -> Array:
+    """The rotation (3, 3) that a matrix is but for rounding; warns where that is more than `tolerance` on R Rᵀ - 1.
+
+    Raises:
+        ValueError: the matrix mirrors, or is no rotation by more than rounding; says by how much.
+    """
+    off = float(np.abs(product(R, R.T) - np.eye(3)).max())
+    mirrors = float(determinant(R)) <= 0.0
+    if off <= ROUNDED and not mirrors:
+        if off <= tolerance:
+            return R
+        warnings.warn(
+            f"{owner}: its rotation R was rounded, an entry of R Rᵀ - 1 is {off:.2g}; the nearest rotation is taken: "
+            "give more digits, or normalise the quaternion",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+        U, _, V = np.linalg.svd(R)
+        return np.asarray(U @ V)
+    why = "it mirrors" if mirrors and off <= ROUNDED else f"an entry of R Rᵀ - 1 is {off:.2g}, not 0"
+    raise ValueError(
+        f"{owner} is not a rigid transform (rotation, translation, last row 0 0 0 1): {why}; a quaternion must have "
+        f"norm 1, and scale has no place in a pose:\n{R}"
+    )
 
 
 def pose_matrix(vector: Array) -> Array:

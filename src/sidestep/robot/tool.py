@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from sidestep import _core
 from sidestep.robot.link import Geometry, Inertial, Link
+from sidestep.robot.pose import checked_rotation, pose_at
 from sidestep.robot.tree import KinematicTree
 
 _ROTATION_TOLERANCE = 1e-9  # on R^T R - I; poses are written with at least this accuracy
@@ -37,9 +38,9 @@ def tree_with_tool(
     X = np.eye(4) if pose is None else _core.real_array(pose, f"pose of tool {name!r}")
     if X.shape != (4, 4) or not np.isfinite(X).all() or not np.array_equal(X[3], [0.0, 0.0, 0.0, 1.0]):
         raise ValueError(f"pose of tool {name!r} must be a homogeneous matrix (4, 4), got {X}")
-    R = X[:3, :3]
-    if np.abs(R.T @ R - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(R) < 0.0:
-        raise ValueError(f"pose of tool {name!r} must hold a rotation, got {R}")
+    X = pose_at(
+        X[:3, 3], checked_rotation(X[:3, :3], f"pose of tool {name!r}", tolerance=_ROTATION_TOLERANCE)
+    )
     geometry = shape if isinstance(shape, Geometry) else _mesh_file(shape)
     tool = Link(name, _uniform(geometry, mass) if mass > 0.0 else None, (geometry,), (geometry,))
     holder = robot.frames[known.index(link)]
