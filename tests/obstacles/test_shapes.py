@@ -107,6 +107,15 @@ def test_a_box_has_its_corners_among_the_samples() -> None:
     assert len(np.unique(samples, axis=0)) == len(samples)
 
 
+def test_a_scale_below_zero_mirrors_as_in_urdf(l_shape: Path) -> None:
+    plain, mirrored = MeshShape(l_shape, 0.001).mesh(), MeshShape(l_shape, (0.001, -0.001, 0.001)).mesh()
+    np.testing.assert_allclose(mirrored.bounds[:, 1], -plain.bounds[::-1, 1], atol=ROUNDING)
+    np.testing.assert_allclose(mirrored.bounds[:, [0, 2]], plain.bounds[:, [0, 2]], atol=ROUNDING)
+    assert mirrored.volume == pytest.approx(plain.volume)  # its triangles look outwards still
+    centres, radii = MeshShape(l_shape, (0.001, -0.001, 0.001)).balls()
+    assert (centres[:, 1] - radii).min() >= mirrored.bounds[0, 1] - 0.002 - ROUNDING  # the excess
+
+
 def test_a_mesh_is_scaled_and_placed(l_shape: Path) -> None:
     mesh = MeshShape(l_shape, scale=0.001, pose=pose_at([1.0, 2.0, 3.0])).mesh()
     np.testing.assert_allclose(

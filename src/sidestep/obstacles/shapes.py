@@ -299,14 +299,15 @@ class MeshShape:
 
     Args:
         path: a file that trimesh reads: .stl, .obj, .dae, .ply, .glb …
-        scale: factor on the file's coordinates, one or (3,), so that they become metres.
+        scale: factor on the file's coordinates, one or (3,), so that they become metres; below 0 it
+            mirrors, as in URDF.
         pose: pose (4, 4) in the world.
         velocity: (3,) [m/s] in the world.
         name: what messages call it.
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: the scale is not positive, the pose not rigid, or the velocity not finite; names the value.
+        ValueError: the scale is 0 or not finite, the pose not rigid, or the velocity not finite; names the value.
     """
 
     path: str | Path
@@ -320,8 +321,8 @@ class MeshShape:
         if not Path(self.path).is_file():
             raise FileNotFoundError(f"mesh file '{self.path}' does not exist")
         scale = real_array(self.scale, f"mesh '{self.path}': scale")
-        if scale.shape not in ((), (3,)) or not (np.isfinite(scale).all() and (scale > 0.0).all()):
-            raise ValueError(f"{owner}: scale is {self.scale}, must be one or three positive numbers")
+        if scale.shape not in ((), (3,)) or not (np.isfinite(scale).all() and (scale != 0.0).all()):
+            raise ValueError(f"{owner}: scale is {self.scale}, must be one or three numbers that are not 0")
         _set_motion(self, owner)
 
     def sample(self, spacing: float) -> Points:
