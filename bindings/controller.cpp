@@ -195,6 +195,33 @@ void bind_command(nb::module_& m) {
       .def_ro("pace", &Command::pace,
               "Share of its speed that the age of the look-ahead leaves the arm, beside what moves: 1 up to `look_ahead.slow_after`\n"
               "delays, then linear, 0 from `look_ahead.rest_after` delays on.")
+      .def("__getstate__",
+           [](const Command& c) {
+             nb::dict state;
+             each_field(c, [&](const char* name, const auto& value) {
+               using Value = std::remove_cvref_t<decltype(value)>;
+               if constexpr (std::is_same_v<Value, Eigen::VectorXd>) {
+                 state[name] = to_numpy(value);
+               } else {
+                 state[name] = value;
+               }
+             });
+             return state;
+           },
+           nb::sig("def __getstate__(self) -> dict[str, typing.Any]"))
+      .def("__setstate__",
+           [](Command& c, const nb::dict& state) {
+             new (&c) Command(static_cast<int>(nb::len(nb::object(state["position"]))));
+             each_field(c, [&](const char* name, auto& value) {
+               using Value = std::remove_cvref_t<decltype(value)>;
+               if constexpr (std::is_same_v<Value, Eigen::VectorXd>) {
+                 value = as_vector(state[name], name);
+               } else {
+                 value = nb::cast<Value>(state[name]);
+               }
+             });
+           },
+           nb::sig("def __setstate__(self, state: dict[str, typing.Any], /) -> None"))
       .def("__repr__", [](const Command& c) {
         return std::string("Command(") + to_string(c.status) + ", " + to_string(c.activity) + ", clearance=" + in_short(c.clearance) +
                " m, speed=" + in_short(c.speed) + " m/s)";
@@ -419,7 +446,7 @@ void bind_controller(nb::module_& m) {
             with_os_errors(path, [&] { self.record(path); });
             return RecordingInProgress{&self, path, {}};
           },
-          nb::arg("path"), nb::keep_alive<0, 1>(), nb::sig("def record(self, path: str | os.PathLike) -> Recording"),
+          nb::arg("path"), nb::keep_alive<0, 1>(), nb::sig("def record(self, path: str | os.PathLike[str]) -> Recording"),
           "Records every input of every step and its command to a file, from which `replay` gives the same commands bit for bit.\n"
           "Before the first step; `with controller.record(path):` ends it with the block, else it ends with the controller. Steps\n"
           "allocate nothing for it and wait for nobody; where the disk is too slow it ends, and the steps after that are counted. Raises\n"

@@ -74,6 +74,33 @@ Eigen::Isometry3d as_pose(nb::handle value, bool position_only) {
   return pose;
 }
 
+nb::tuple pose_goal_state(const PoseGoal& g) {
+  const PoseGoal::MadeFor& made_for = g.made_for();
+  nb::list others;
+  for (const PoseGoal& other : g.others) {
+    others.append(pose_goal_state(other));
+  }
+  return nb::make_tuple(made_for.frame.name, made_for.frame.joint, to_numpy_matrix(made_for.frame.X_JF.matrix()), made_for.joints_hash,
+                        made_for.reach, to_numpy(made_for.shoulder), to_numpy_matrix(g.pose.matrix()), to_numpy(g.twist),
+                        g.settings.position_only, g.settings.position_stiffness, g.settings.orientation_stiffness,
+                        to_numpy(g.settings.rest), g.settings.posture_stiffness, others);
+}
+
+PoseGoal pose_goal_of(const nb::tuple& state) {
+  const auto number = [&](std::size_t k) { return nb::cast<double>(state[k]); };
+  Eigen::Isometry3d X_JF, pose;
+  X_JF.matrix() = as_matrix(state[2], "frame", 4, 4);
+  pose.matrix() = as_matrix(state[6], "pose", 4, 4);
+  PoseGoal goal({{nb::cast<std::string>(state[0]), nb::cast<int>(state[1]), X_JF}, nb::cast<std::uint64_t>(state[3]), number(4),
+                 as_vector(state[5], "shoulder", 3)},
+                pose, {nb::cast<bool>(state[8]), number(9), number(10), as_vector(state[11], "rest"), number(12)},
+                Vector6d(as_vector(state[7], "twist", 6)));
+  for (nb::handle other : nb::list(state[13])) {
+    goal.others.push_back(pose_goal_of(nb::cast<nb::tuple>(other)));
+  }
+  return goal;
+}
+
 }  // namespace
 
 void bind_goals(nb::module_& m) {
@@ -98,12 +125,14 @@ void bind_goals(nb::module_& m) {
       .def_prop_ro("velocity", [](const JointGoal& g) { return to_numpy(g.velocity); })
       .def_prop_ro("acceleration", [](const JointGoal& g) { return to_numpy(g.acceleration); })
       .def("__getstate__",
-           [](const JointGoal& g) { return nb::make_tuple(to_numpy(g.position), to_numpy(g.velocity), to_numpy(g.acceleration)); })
+           [](const JointGoal& g) { return nb::make_tuple(to_numpy(g.position), to_numpy(g.velocity), to_numpy(g.acceleration)); },
+           nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
       .def("__setstate__",
            [](JointGoal& g, const nb::tuple& state) {
              new (&g) JointGoal(as_finite_vector(state[0], "position"), as_finite_vector(state[1], "velocity"),
                                 as_finite_vector(state[2], "acceleration"));
-           })
+           },
+           nb::sig("def __setstate__(self, state: tuple[typing.Any, ...], /) -> None"))
       .def("__eq__",
            [](const JointGoal& g, nb::handle other) {
              if (!nb::isinstance<JointGoal>(other)) {
@@ -150,6 +179,16 @@ void bind_goals(nb::module_& m) {
       .def_prop_ro("frame", [](const PoseGoal& g) { return g.frame().name; })
       .def_prop_ro("pose", [](const PoseGoal& g) { return to_numpy_matrix(g.pose.matrix()); }, "(4, 4) in the world.")
       .def_prop_ro("position_only", [](const PoseGoal& g) { return g.settings.position_only; })
+      .def("__getstate__", [](const PoseGoal& g) { return pose_goal_state(g); }, nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
+      .def("__setstate__", [](PoseGoal& g, const nb::tuple& state) { new (&g) PoseGoal(pose_goal_of(state)); },
+           nb::sig("def __setstate__(self, state: tuple[typing.Any, ...], /) -> None"))
+      .def("__eq__",
+           [](const PoseGoal& g, nb::handle other) {
+             return nb::isinstance<PoseGoal>(other) &&
+                    nb::bytes(nb::module_::import_("pickle").attr("dumps")(pose_goal_state(g)))
+                        .equal(nb::bytes(nb::module_::import_("pickle").attr("dumps")(pose_goal_state(nb::cast<const PoseGoal&>(other)))));
+           },
+           nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__repr__", [](const PoseGoal& g) {
         return "PoseGoal('" + g.frame().name + "' at " + in_short(g.pose.translation()) + " m" +
                (g.settings.position_only ? ", position_only" : "") + (is_moving(g) ? ", moves)" : ")");

@@ -93,7 +93,8 @@ void bind_obstacles(nb::module_& m) {
                counts.append(count);
              }
              return nb::make_tuple(to_numpy_points(o.points()), to_numpy(o.radii()), to_numpy_points(o.velocities()), names, counts);
-           })
+           },
+           nb::sig("def __getstate__(self) -> tuple[typing.Any, ...]"))
       .def("__setstate__",
            [](Obstacles& self, const nb::tuple& state) {
              Eigen::Matrix3Xd points = as_points(state[0], "points");
@@ -103,7 +104,8 @@ void bind_obstacles(nb::module_& m) {
              }
              Obstacles made(std::move(points), as_vector(state[1], "radii"), as_points(state[2], "velocities"));
              new (&self) Obstacles(made.named(nb::cast<std::vector<std::string>>(state[3]), nb::cast<std::vector<Eigen::Index>>(state[4])));
-           })
+           },
+           nb::sig("def __setstate__(self, state: tuple[typing.Any, ...], /) -> None"))
       .def("__copy__", [](const Obstacles& o) { return Obstacles(o); })
       .def("__len__", &Obstacles::size)
       .def("__repr__", [](const Obstacles& o) { return in_words(o); })

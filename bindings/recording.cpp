@@ -82,7 +82,7 @@ void bind_recording(nb::module_& m) {
   m.def(
       "read_recording_header",
       [](const std::filesystem::path& path) { return with_os_errors(path, [&] { return read_recording_header(path); }); },
-      nb::arg("path"), "What made a recording. Raises OSError where it cannot be read, ValueError that says what is wrong with it.");
+      nb::arg("path"), nb::sig("def read_recording_header(path: str | os.PathLike[str]) -> RecordingHeader"), "What made a recording. Raises OSError where it cannot be read, ValueError that says what is wrong with it.");
   m.def(
       "replay",
       [](const std::filesystem::path& path, const std::optional<Arm>& arm, const std::optional<ControllerSettings>& settings) {
@@ -91,7 +91,7 @@ void bind_recording(nb::module_& m) {
         });
       },
       nb::arg("path"), nb::kw_only(), nb::arg("arm") = nb::none(), nb::arg("settings") = nb::none(),
-      nb::sig("def replay(path: str | os.PathLike, *, arm: Arm | None = None, settings: ControllerSettings | None = None) "
+      nb::sig("def replay(path: str | os.PathLike[str], *, arm: Arm | None = None, settings: ControllerSettings | None = None) "
               "-> ReplayResult"),
       "Gives a controller what a recording holds, step by step, and compares its commands with the recorded ones, bit for bit.\n"
       "The arm and the settings are in the recording; with others the notes name what differs. Raises OSError where the file cannot\n"

@@ -174,12 +174,14 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
   c.def(
        "to_dict", [parts](const Settings& self) { return to_dict(self, parts); }, nb::sig("def to_dict(self) -> dict[str, typing.Any]"),
        kept(std::string("All settings as a dict of numbers, texts and dicts, for YAML or JSON: ") + name + "(**d) gives them again."))
-      .def("__getstate__", [parts](const Settings& self) { return to_dict(self, parts); })
+      .def("__getstate__", [parts](const Settings& self) { return to_dict(self, parts); },
+           nb::sig("def __getstate__(self) -> dict[str, typing.Any]"))
       .def("__setstate__",
            [name, parts](Settings& self, const nb::dict& values) {
              new (&self) Settings();
              set_all(self, name, parts, values);
-           })
+           },
+           nb::sig("def __setstate__(self, values: dict[str, typing.Any], /) -> None"))
       .def("__copy__", [](const Settings& self) { return Settings(self); })
       .def(
           "__eq__",
@@ -188,7 +190,9 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
                    to_dict(self, parts).equal(to_dict(nb::cast<const Settings&>(other), parts));
           },
           nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"));
-  c.attr("__hash__") = nb::none();  // they can be changed
+  c.def("__hash__", [name](const Settings&) -> Py_hash_t {
+    throw nb::type_error((std::string("unhashable type: '") + name + "', which can be changed").c_str());
+  });
   for (const Field<Settings>& field : fields<Settings>()) {
     const std::string own = field.name;
     c.def_prop_rw(

@@ -5,6 +5,7 @@ C++ core of sidestep. Use the names re-exported by the sidestep package.
 from collections.abc import Sequence
 import enum
 import os
+import pathlib
 from typing import Any, Final, overload
 
 import numpy
@@ -224,6 +225,12 @@ class Obstacles:
     @staticmethod
     def none() -> Obstacles:
         """A workspace that is known to be free."""
+
+    def __getstate__(self) -> tuple[Any, ...]: ...
+
+    def __setstate__(self, state: tuple[Any, ...], /) -> None: ...
+
+    def __copy__(self) -> Obstacles: ...
 
     def __len__(self) -> int: ...
 
@@ -555,6 +562,12 @@ class JointGoal:
     @property
     def acceleration(self) -> numpy.typing.NDArray[numpy.float64]: ...
 
+    def __getstate__(self) -> tuple[Any, ...]: ...
+
+    def __setstate__(self, state: tuple[Any, ...], /) -> None: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
     def __repr__(self) -> str: ...
 
 class PoseGoal:
@@ -565,6 +578,8 @@ class PoseGoal:
     orientation_stiffness k_R [1/s^2]. rest (nv,) with posture_stiffness [1/s^2]: a configuration that the joints are
     drawn to where the pose leaves them free. twist (6,): how the goal moves in the world, velocity of its origin
     [m/s] and angular velocity [rad/s]. At half a turn both ways back are equally short; one is taken.
+    Where an entry of R^T R - 1 is up to 0.01, as of a quaternion of three digits, the nearest rotation is taken, with a
+    warning that says by how much.
     Raises ValueError on a frame that is unknown or that no joint moves (listing the allowed ones), a rotation that is
     none, a number that is not finite, a stiffness out of range. A pose out of reach gives a status in the step.
     """
@@ -580,6 +595,12 @@ class PoseGoal:
 
     @property
     def position_only(self) -> bool: ...
+
+    def __getstate__(self) -> tuple[Any, ...]: ...
+
+    def __setstate__(self, state: tuple[Any, ...], /) -> None: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
 
     def __repr__(self) -> str: ...
 
@@ -1273,6 +1294,21 @@ class SafetySettings:
     def __repr__(self) -> str:
         """What differs from the defaults."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: SafetySettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> SafetySettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
     @property
     def margin(self) -> float: ...
 
@@ -1650,6 +1686,21 @@ class PlannerSettings:
     def __repr__(self) -> str:
         """What differs from the defaults."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: PlannerSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> PlannerSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
     @property
     def margin(self) -> float: ...
 
@@ -1736,6 +1787,21 @@ class TimedPathSettings:
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: TimedPathSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> TimedPathSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     @property
     def wide(self) -> float: ...
@@ -2020,6 +2086,15 @@ class Arm:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes an .arm file in one piece. Raises OSError."""
 
+    def __getstate__(self) -> bytes: ...
+
+    def __setstate__(self, arg: bytes, /) -> None: ...
+
+    def __eq__(self, other: object, /) -> bool:
+        """By the content, see content_hash."""
+
+    def __hash__(self) -> int: ...
+
     @property
     def name(self) -> str:
         """The name of the robot."""
@@ -2120,6 +2195,150 @@ class Attachment:
 
     def __repr__(self) -> str: ...
 
+class RecordingSummary:
+    """What a recording holds."""
+
+    @property
+    def path(self) -> pathlib.Path:
+        """Its file."""
+
+    @property
+    def steps(self) -> int:
+        """Steps that it holds."""
+
+    @property
+    def lost(self) -> int:
+        """Steps made after those, when the disk was too slow."""
+
+    @property
+    def bytes(self) -> int:
+        """Size of the file."""
+
+    def __repr__(self) -> str: ...
+
+class Recording:
+    """
+    A recording of a controller's steps; as a context manager it ends with the block.
+    """
+
+    def stop(self) -> RecordingSummary:
+        """
+        Ends it. Returns its RecordingSummary; warns of lost steps. Raises OSError where writing failed.
+        """
+
+    def __enter__(self) -> Recording: ...
+
+    def __exit__(self, type: Any, value: Any, traceback: Any) -> None: ...
+
+    def __repr__(self) -> str: ...
+
+class RecordingHeader:
+    """What made a recording, and with what."""
+
+    @property
+    def format(self) -> int:
+        """Version of the file's format."""
+
+    @property
+    def sidestep_version(self) -> str: ...
+
+    @property
+    def compiler(self) -> str: ...
+
+    @property
+    def instruction_set(self) -> str:
+        """Of the inner loops, see `instruction_set`."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm (of the core) of the first step."""
+
+    @property
+    def settings(self) -> ControllerSettings:
+        """A copy."""
+
+    @property
+    def notes(self) -> list[str]:
+        """What this Sidestep does not know of it, or it not of this Sidestep."""
+
+    def __repr__(self) -> str: ...
+
+class ReplayDifference:
+    """The first field of a command that a replay gave differently."""
+
+    @property
+    def step(self) -> int:
+        """From 1."""
+
+    @property
+    def field(self) -> str:
+        """For example "torque[3]"."""
+
+    @property
+    def recorded(self) -> str:
+        """Its value, with 17 digits."""
+
+    @property
+    def replayed(self) -> str:
+        """Its value, with 17 digits."""
+
+    def __repr__(self) -> str: ...
+
+class ReplayResult:
+    """What a replay found."""
+
+    @property
+    def arm(self) -> str:
+        """Name of the recorded arm."""
+
+    @property
+    def steps(self) -> int:
+        """Steps replayed, the one that differs included."""
+
+    @property
+    def seconds(self) -> float:
+        """The same in time of the motion [s]."""
+
+    @property
+    def equal(self) -> bool:
+        """
+        Every recorded command is the same bit for bit (nan like nan), and the file is not damaged.
+        """
+
+    @property
+    def difference(self) -> ReplayDifference | None:
+        """The first; the replay ends there."""
+
+    @property
+    def damage(self) -> str:
+        """What is wrong with the file, and where; empty: nothing."""
+
+    @property
+    def complete(self) -> bool:
+        """The recording was ended, not cut off by the end of its program."""
+
+    @property
+    def lost(self) -> int:
+        """Steps that were made and not recorded."""
+
+    @property
+    def notes(self) -> list[str]:
+        """What differs between recording and replay beside the commands."""
+
+    def __repr__(self) -> str: ...
+
+def read_recording_header(path: str | os.PathLike[str]) -> RecordingHeader:
+    """
+    What made a recording. Raises OSError where it cannot be read, ValueError that says what is wrong with it.
+    """
+
+def replay(path: str | os.PathLike[str], *, arm: Arm | None = None, settings: ControllerSettings | None = None) -> ReplayResult:
+    """
+    Gives a controller what a recording holds, step by step, and compares its commands with the recorded ones, bit for bit.
+    The arm and the settings are in the recording; with others the notes name what differs. Raises OSError where the file cannot
+    be read, ValueError that says what is wrong with it.
+    """
+
 class BarrierSettings:
     """
     The spring that pulls to the goal, and the barriers that bend its way.
@@ -2143,6 +2362,21 @@ class BarrierSettings:
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: BarrierSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> BarrierSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     @property
     def stiffness(self) -> float: ...
@@ -2228,6 +2462,21 @@ class ArrivalSettings:
     def __repr__(self) -> str:
         """What differs from the defaults."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: ArrivalSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> ArrivalSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
     @property
     def joint(self) -> float: ...
 
@@ -2280,6 +2529,21 @@ class TrackingSettings:
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: TrackingSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> TrackingSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     @property
     def frequency(self) -> float: ...
@@ -2353,6 +2617,21 @@ class SpeedLimitSettings:
     def __repr__(self) -> str:
         """What differs from the defaults."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: SpeedLimitSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> SpeedLimitSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
     @property
     def near_speed(self) -> float: ...
 
@@ -2383,7 +2662,7 @@ class InputSettings:
 
         response [1/s], default 20.0, allowed 1 to 100: to a velocity that is wanted: larger is quicker, and passes on its noise
         timeout [s], default 0.25, allowed 0.001 to inf: age from which a velocity or a twist counts as zero
-        singular, default 0.05, allowed 0.0001 to 1: singular value of a frame's Jacobian [m and rad] below which a twist is damped: larger is calmer and less exact there
+        singular, default 0.05, allowed 0.0001 to 1: singular value of a frame's Jacobian [m and rad] near which a twist is slowed; it rests at a fifth of it: larger is calmer, and stops farther from where the arm is stretched
         frequency [1/s], default 10.0, allowed 1 to 50: of the return to a trajectory or to the planner's path: larger is stiffer
         lead [rad], default 0.1, allowed 0.001 to 10: error from which a trajectory slows down, to a halt at twice as much; of sliding joints a fifth [m]
 
@@ -2394,6 +2673,21 @@ class InputSettings:
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: InputSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> InputSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     @property
     def response(self) -> float: ...
@@ -2441,6 +2735,21 @@ class OnlinePlannerSettings:
     def __repr__(self) -> str:
         """What differs from the defaults."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: OnlinePlannerSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> OnlinePlannerSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
     @property
     def period(self) -> float: ...
 
@@ -2480,14 +2789,31 @@ class LookAheadSettings:
         delay [s], default 0.1, allowed 0.005 to 5: from one look to the next, from when on what it found is followed
         clearance [m], default 0.004, allowed -0.1 to 0.5: that a predicted motion has to keep from obstacles
         tries, default 500, allowed 1 to 100000: trajectories that are drawn in one look
+        slow_after, default 3.0, allowed 2 to 1000: age of a look, in delays, from which the arm is slowed beside what moves: smaller is safer where processor time is short
+        rest_after, default 10.0, allowed 2 to 10000: age of a look, in delays, at which the arm rests beside what moves
 
     Raises ValueError that names the setting, its value and what is allowed.
     """
 
-    def __init__(self, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 500) -> None: ...
+    def __init__(self, *, horizon: float = 2.0, period: float = 0.01, delay: float = 0.1, clearance: float = 0.004, tries: int = 500, slow_after: float = 3.0, rest_after: float = 10.0) -> None: ...
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: LookAheadSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> LookAheadSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     @property
     def horizon(self) -> float: ...
@@ -2519,6 +2845,18 @@ class LookAheadSettings:
     @tries.setter
     def tries(self, value: int, /) -> None: ...
 
+    @property
+    def slow_after(self) -> float: ...
+
+    @slow_after.setter
+    def slow_after(self, value: float, /) -> None: ...
+
+    @property
+    def rest_after(self) -> float: ...
+
+    @rest_after.setter
+    def rest_after(self, value: float, /) -> None: ...
+
 class LocalMinimumSettings:
     """
     Sub-goals where the arm is stuck and there is no path.
@@ -2535,6 +2873,21 @@ class LocalMinimumSettings:
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: LocalMinimumSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> LocalMinimumSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     @property
     def patience(self) -> float: ...
@@ -2605,6 +2958,21 @@ class ControllerSettings:
 
     def __repr__(self) -> str:
         """What differs from the defaults."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        All settings as a dict of numbers, texts and dicts, for YAML or JSON: ControllerSettings(**d) gives them again.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, values: dict[str, Any], /) -> None: ...
+
+    def __copy__(self) -> ControllerSettings: ...
+
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     @property
     def period(self) -> float: ...
@@ -2737,8 +3105,6 @@ class ControllerSettings:
         Raises ValueError that names the setting, its value and what is allowed.
         """
 
-    def __copy__(self) -> ControllerSettings: ...
-
     @property
     def speed_limits(self) -> SpeedLimitSettings | None: ...
 
@@ -2782,11 +3148,24 @@ class TrajectoryBehaviour(enum.Enum):
     steer = 1
     """Go around, and rejoin."""
 
+class TwistFreedom(enum.Enum):
+    """Which part of a twist is not asked for."""
+
+    none = 0
+    """Translation and rotation are both asked for."""
+
+    rotation = 1
+    """
+    Only the velocity of the frame's origin is: the frame may turn as it likes.
+    """
+
 class SafetyStatus(enum.IntEnum):
     """How safe a command is, by severity. Every command may be sent."""
 
     ok = 0
-    """The motion is what the goal asks for."""
+    """
+    The motion is what the goal asks for, or within 5 % of the velocity or twist that was asked for.
+    """
 
     limited = 1
     """A limit of the arm or a clearance bends it."""
@@ -2799,10 +3178,20 @@ class SafetyStatus(enum.IntEnum):
     margin_lost = 3
     """Not every safety margin can be kept; nothing is touched."""
 
-    stopping = 4
+    tracking_lost = 4
+    """
+    The arm is more than 0.1 s at its velocity limits from where it is commanded, or its measured position agrees with no motion: the arm comes to rest.
+    """
+
+    stale = 5
+    """
+    The obstacles are older than obstacle_timeout, or were never set although it is: the arm stops.
+    """
+
+    stopping = 6
     """The input is unusable or the program was not solved: a damped stop."""
 
-    clearance_lost = 5
+    clearance_lost = 7
     """An ellipsoid of the arm reaches into something."""
 
 class Activity(enum.Enum):
@@ -2823,10 +3212,12 @@ class Activity(enum.Enum):
     """The goal is reached."""
 
     blocked = 4
-    """No way leads to the goal now, see Controller.explain."""
+    """
+    No path leads to the goal, for 0.2 s at least, see Controller.explain; the arm goes as near as it can.
+    """
 
     stale = 5
-    """The obstacles are older than obstacle_timeout: the arm stops."""
+    """As SafetyStatus.stale: the arm stops."""
 
 class Command:
     """What one step of a Controller gives; arrays are copies."""
@@ -2880,12 +3271,25 @@ class Command:
         """(nv,) inertia that it found and the model lacks [kg m^2 | kg]."""
 
     @property
+    def input_change(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (nv,) what is changed of the velocity, twist or trajectory that was asked for [rad/s | m/s]: velocity of the
+        reference after this period, less the velocity asked for. Of a twist V: J^+ (J v - V), damped where it is
+        singular, so that what the frame does not feel does not count. Of a trajectory: its velocity at the clock, at
+        full speed. Zero without one of these.
+        """
+
+    @property
     def tracking_error(self) -> float:
         """Largest difference of the arm from the reference [rad | m]."""
 
     @property
     def deviation(self) -> float:
-        """Of the reference from a trajectory, in the farthest joint [rad | m]."""
+        """
+        Distance of the reference from the straight lines between a trajectory's samples, in the farthest joint [rad | m]: the
+        nearest of the lines within 0.05 s of where the trajectory's clock is. On the way to a first sample after zero: from
+        that way. How late it is: `delay`.
+        """
 
     @property
     def delay(self) -> float:
@@ -2943,6 +3347,30 @@ class Command:
     def on_path(self) -> bool:
         """Follows a path of the planner."""
 
+    @property
+    def look_ahead_age(self) -> float:
+        """
+        Time since the state from which the newest look-ahead that is followed was computed [s]: it grows where threads get too
+        little processor time, or steps come faster than real time. 0: the part is off, or runs inside `step`.
+        """
+
+    @property
+    def planner_age(self) -> float:
+        """
+        The same of the planner's newest look [s]; 0 also where there is nothing to plan.
+        """
+
+    @property
+    def pace(self) -> float:
+        """
+        Share of its speed that the age of the look-ahead leaves the arm, beside what moves: 1 up to `look_ahead.slow_after`
+        delays, then linear, 0 from `look_ahead.rest_after` delays on.
+        """
+
+    def __getstate__(self) -> dict[str, Any]: ...
+
+    def __setstate__(self, state: dict[str, Any], /) -> None: ...
+
     def __repr__(self) -> str: ...
 
 class Controller:
@@ -2962,28 +3390,41 @@ class Controller:
 
     def set_velocity(self, v: numpy.typing.ArrayLike) -> None:
         """
-        Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. Obstacles steer the
-        arm around them and stop it. After `inputs.timeout` without another order the arm stops. Raises ValueError that
-        names the joint and what is allowed; the order before stays.
+        Wanted joint velocities (nv,) [rad/s | m/s], as a whole scaled down to the limits; needs no goal. A joint stops at its
+        position limit while the others go on. Obstacles steer the arm around them and stop it. After `inputs.timeout` without
+        another order the arm stops. Raises ValueError that names the joint and what is allowed; the order before stays.
         """
 
-    def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False) -> None:
+    def set_twist(self, frame: str, twist: numpy.typing.ArrayLike, local: bool = False, free: TwistFreedom | str = 'none') -> None:
         """
         The same for the twist (6,) of a frame: the velocity of its origin [m/s] and its angular velocity [rad/s], in axes of
-        the world or, `local`, its own; rows as in `Robot.jacobian`. The arm slides along singular configurations and limits.
-        Raises ValueError that lists the frames that there are.
+        the world or, `local`, its own; rows as in `Robot.jacobian`. The frame moves with s times the whole twist, with the
+        largest s in [0, 1] that joint limits and singular configurations leave. With free="rotation" the rotation is not
+        asked for, and its three numbers are not read: for arms of less than six joints. Along obstacles the arm slides;
+        `command.status`, `command.input_change` and `explain` say so. Raises ValueError that lists the frames that there are,
+        or the names of what can be left free.
         """
 
     def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, behaviour: TrajectoryBehaviour | str = 'keep_path') -> None:
         """
-        Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing; cubics between them. A first
-        time after zero leaves that long to get to the first sample, which need not be where the arm is. `keep_path` slows
+        Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing. Cubics between them keep
+        monotone samples monotone and dwells still, and are within 0.01 rad (2 mm) of the straight lines. A first time after
+        zero, 3600 s at most, leaves that long to get to the first sample, which need not be where the arm is. Stamps that
+        limits do not allow because samples bunch up move by up to 0.2 s; where it is still too fast, the clock slows down.
+        Joints without limits take the short way from sample to sample, at most half a turn. `keep_path` slows
         down and waits before what blocks the path, `steer` goes around and rejoins; `command.deviation` and `command.delay`
         say how far off and behind it is. Raises ValueError that names sample, joint, value and what is allowed.
         """
 
     def clear_goal(self) -> None:
         """The arm comes to rest where it is, and goes on evading."""
+
+    def restart(self) -> None:
+        """
+        The next step begins where the arm is, as a first one does: call it where something else has moved the arm. The goal
+        stays. Without it the same happens once five measured positions in a row agree with each other and not with the
+        command, or at the first one after a pause of more than 0.1 s; until then the arm comes to rest.
+        """
 
     def set_obstacles(self, obstacles: Obstacles | sidestep.obstacles.Shape | Sequence[Obstacles | sidestep.obstacles.Shape]) -> None:
         """
@@ -3005,6 +3446,7 @@ class Controller:
         shape, or points (N, 3) in the object's frame. It keeps off obstacles and off the links that other joints move, and
         its mass counts. Links whose ellipsoids overlap with it now may stay as near as they are. With rests_on=["table"] the same
         holds of the obstacle 'table', until the object is lifted off it. Takes less than a second, in which steps go on. Raises ValueError that names what is wrong; nothing changes then.
+        Warns where the object is far away from the link, as with a pose in the world.
         """
 
     def detach(self, name: str) -> None:
@@ -3030,7 +3472,16 @@ class Controller:
         """
         One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)
         [Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError
-        while a RealTimeRun or `integrate` has the controller; so does what tells of the last step.
+        while a RealTimeRun or `integrate` has the controller, as does what tells of the last step, and where several
+        threads step it in turn.
+        """
+
+    def record(self, path: str | os.PathLike[str]) -> Recording:
+        """
+        Records every input of every step and its command to a file, from which `replay` gives the same commands bit for bit.
+        Before the first step; `with controller.record(path):` ends it with the block, else it ends with the controller. Steps
+        allocate nothing for it and wait for nobody; where the disk is too slow it ends, and the steps after that are counted. Raises
+        RuntimeError after the first step or where one was recorded already, OSError where the file cannot be written.
         """
 
     @property
@@ -3040,6 +3491,13 @@ class Controller:
     def explain(self) -> str:
         """
         One sentence: what the last command does and why, and what to do about it.
+        """
+
+    @property
+    def questions(self) -> list[str]:
+        """
+        What is hard to believe in the order and the obstacles that were set last, with value and likely cause, such as
+        millimetres for metres; setters warn of it, and it is followed all the same. The newest is the last.
         """
 
     @property
@@ -3098,6 +3556,12 @@ class Controller:
         """Whether the commands hold torque."""
 
     def __repr__(self) -> str: ...
+
+def looks_like_degrees(angle: float) -> bool:
+    """
+    Whether an angle [rad] is implausible in radians and plausible in degrees: more than one and a half turns, at most
+    three in degrees, and not a whole number of quarter turns.
+    """
 
 def unlimited_joints(robot: Robot) -> list[bool]:
     """

@@ -83,3 +83,33 @@ def test_an_arm_comes_back_with_what_it_is_prepared_from() -> None:
     assert again.robot.name == "fr3"
     core = pickle.loads(pickle.dumps(ss._core.Arm(arm)))
     assert core.content_hash == arm.content_hash
+
+
+def test_a_command_comes_back_whole() -> None:
+    arm = ss.Arm.load("planar2")
+    controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True, planner=None))
+    controller.set_goal(arm.neutral + 0.1)
+    controller.set_obstacles(ss.Obstacles([[0.6, 0.3, 0.0]], 0.05))
+    command = controller.step(arm.neutral, 0.0 * arm.neutral)
+    again = pickle.loads(pickle.dumps(command))
+    names = [name for name in dir(command) if not name.startswith("_")]
+    assert len(names) > 25
+    for name in names:
+        np.testing.assert_array_equal(getattr(again, name), getattr(command, name), err_msg=name)
+    np.testing.assert_array_equal(copy.deepcopy(command).acceleration, command.acceleration)
+
+
+def test_a_pose_goal_comes_back_and_is_followed_as_before() -> None:
+    arm = ss.Arm.load("fr3")
+    X = arm.robot.pose(arm.neutral + 0.1, "fr3_hand_tcp")
+    goal = ss.PoseGoal(arm.robot, "fr3_hand_tcp", X, rest=arm.neutral, posture_stiffness=0.2)
+    again = pickle.loads(pickle.dumps(goal))
+    assert again == goal
+    assert again != ss.PoseGoal(arm.robot, "fr3_hand", X)
+    commands = []
+    for one in (goal, again):
+        controller = ss.Controller(arm, ss.ControllerSettings(synchronous=True, seed=1))
+        controller.set_obstacles(ss.Obstacles.none())
+        controller.set_goal(one)
+        commands.append([controller.step(arm.neutral, 0.0 * arm.neutral).acceleration for _ in range(3)][-1])
+    np.testing.assert_array_equal(*commands)

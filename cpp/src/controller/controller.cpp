@@ -102,8 +102,14 @@ std::string Controller::Impl::question_of(const Order& order) const {
   if (const auto* velocity = std::get_if<VelocityOrder>(&order)) {
     return plausible_.question_velocity(velocity->velocity);
   }
-  const auto* twist = std::get_if<TwistOrder>(&order);
-  return twist == nullptr ? std::string() : plausible_.question_twist(twist->twist);
+  if (const auto* twist = std::get_if<TwistOrder>(&order)) {
+    Vector6d asked = twist->twist;
+    if (twist->free == TwistFreedom::rotation) {
+      asked.tail<3>().setZero();
+    }
+    return plausible_.question_twist(asked);
+  }
+  return {};
 }
 
 void Controller::Impl::put(Order order, std::string question) {

@@ -147,7 +147,7 @@ class Controller::Impl : private StepState {
     Eigen::Index num_places = 0;
     bool avoiding = false;
     AvoidanceTrajectory trajectory;
-    std::chrono::steady_clock::time_point written;
+    std::chrono::steady_clock::time_point written{};
   };
   /// Activation distances, and whether the target itself is inside a barrier.
   struct Activations {

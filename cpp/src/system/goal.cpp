@@ -61,11 +61,7 @@ JointGoal::JointGoal(Eigen::VectorXd q, Eigen::VectorXd v, Eigen::VectorXd a)
 
 PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Isometry3d& X, PoseGoalSettings s,
                    const Vector6d& V)
-    : pose(X),
-      twist(V),
-      settings(std::move(s)),
-      frame_(moved_frame(robot, frame, "pose goal")),
-      joints_hash_(robot.joints_hash()) {
+    : pose(X), twist(V), settings(std::move(s)), made_for_{moved_frame(robot, frame, "pose goal"), robot.joints_hash()} {
   check_stiffness(settings.position_stiffness, "position stiffness");
   check_stiffness(settings.orientation_stiffness, "orientation stiffness");
   check_stiffness(settings.posture_stiffness, "posture stiffness");
@@ -89,34 +85,39 @@ PoseGoal::PoseGoal(const Robot& robot, const std::string& frame, const Eigen::Is
     throw std::invalid_argument(text.str());
   }
   // Lengths from the tip inwards; a sliding joint adds its travel, a shoulder's own placement does not count.
-  reach_ = frame_.X_JF.translation().norm();
-  for (int j = frame_.joint; j >= 0;) {
+  made_for_.reach = made_for_.frame.X_JF.translation().norm();
+  for (int j = made_for_.frame.joint; j >= 0;) {
     const Joint& joint = robot.joints()[static_cast<std::size_t>(j)];
     if (joint.type == JointType::prismatic) {
       const JointLimits& limits = robot.limits();
-      reach_ += std::max(std::abs(joint.multiplier * limits.lower[joint.coordinate] + joint.offset),
-                         std::abs(joint.multiplier * limits.upper[joint.coordinate] + joint.offset));
+      made_for_.reach += std::max(std::abs(joint.multiplier * limits.lower[joint.coordinate] + joint.offset),
+                                  std::abs(joint.multiplier * limits.upper[joint.coordinate] + joint.offset));
     }
     if (joint.parent >= 0) {
-      reach_ += joint.X_PJ.translation().norm();
+      made_for_.reach += joint.X_PJ.translation().norm();
     } else {
-      shoulder_ = joint.X_PJ.translation();
+      made_for_.shoulder = joint.X_PJ.translation();
     }
     j = joint.parent;
   }
 }
 
+PoseGoal::PoseGoal(MadeFor made_for, const Eigen::Isometry3d& X, PoseGoalSettings s, const Vector6d& V)
+    : pose(X), twist(V), settings(std::move(s)), made_for_(std::move(made_for)) {}
+
 PoseGoal& PoseGoal::add(PoseGoal other) {
-  if (other.joints_hash_ != joints_hash_) {
-    throw std::invalid_argument("pose goal: the pose of frame '" + other.frame_.name + "' is of a robot with other joints");
+  if (other.made_for_.joints_hash != made_for_.joints_hash) {
+    throw std::invalid_argument("pose goal: the pose of frame '" + other.made_for_.frame.name +
+                                "' is of a robot with other joints");
   }
   std::vector<PoseGoal> more = std::move(other.others);
   other.others.clear();
   more.insert(more.begin(), std::move(other));
   for (PoseGoal& one : more) {
-    const auto same = [&](const PoseGoal& known) { return known.frame_.name == one.frame_.name; };
+    const auto same = [&](const PoseGoal& known) { return known.made_for_.frame.name == one.made_for_.frame.name; };
     if (same(*this) || std::any_of(others.begin(), others.end(), same)) {
-      throw std::invalid_argument("pose goal: frame '" + one.frame_.name + "' has two poses, allowed: one of each frame");
+      throw std::invalid_argument("pose goal: frame '" + one.made_for_.frame.name +
+                                  "' has two poses, allowed: one of each frame");
     }
     others.push_back(std::move(one));
   }

@@ -31,7 +31,7 @@ struct Plant {
                                    friction = Eigen::Vector2d::Zero();
   Eigen::Matrix2d payload = Eigen::Matrix2d::Zero();
   double noise = 0.0;  // [rad/s] of measured velocities, uniform
-  Eigen::VectorXd v = Eigen::Vector2d::Zero(), measured = v;
+  Eigen::VectorXd v = Eigen::Vector2d::Zero(), measured = Eigen::Vector2d::Zero();
   std::mt19937 random{7};
 
   void step(DisturbanceObserver& observer, const Eigen::Vector2d& wanted) {

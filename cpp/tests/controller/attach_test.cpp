@@ -154,7 +154,7 @@ BOOST_AUTO_TEST_CASE(steps_allocate_nothing_while_another_thread_attaches_and_de
   std::atomic<bool> done{false};
   std::thread other([&] {
     for (int k = 0; k < 12; ++k) {
-      k % 2 == 0 ? controller.attach(bar()) : controller.detach("bar");
+      k % 2 == 0 ? static_cast<void>(controller.attach(bar())) : controller.detach("bar");
       controller.set_goal(Eigen::VectorXd::Constant(nv, k % 4 < 2 ? 0.3 : -0.3));
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -226,7 +226,7 @@ BOOST_AUTO_TEST_CASE(the_command_is_the_same_object_through_every_change) {
   const Command& command = controller.command();
   Eigen::VectorXd q = Eigen::VectorXd::Constant(nv, 0.3), v = Eigen::VectorXd::Zero(nv);
   for (int k = 0; k < 5; ++k) {
-    k % 2 == 0 ? controller.attach(bar()) : controller.detach("bar");
+    k % 2 == 0 ? static_cast<void>(controller.attach(bar())) : controller.detach("bar");
     BOOST_TEST(&controller.step(q, v) == &command);
     BOOST_TEST(command.position == q);
   }

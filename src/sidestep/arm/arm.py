@@ -323,7 +323,7 @@ class RobotWithoutMeshes(_core.Robot):
 def _restored(content: bytes, request: tuple[str | Path, Mapping[str, Any]] | None, is_draft: bool) -> Arm:
     """A pickled arm; its description is read again when meshes are asked for."""
     core = _core.Arm.__new__(_core.Arm)
-    core.__setstate__(content)  # type: ignore[attr-defined]
+    core.__setstate__(content)
     describe = None
     if request is not None:
         source, given = request

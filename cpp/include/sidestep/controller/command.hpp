@@ -84,4 +84,41 @@ struct Command {
   bool on_path = false;  ///< follows a path of the planner
 };
 
+/// Calls visit(name, field) for every field. A new field does not compile until it is named here.
+template <class C, class Visit>
+void each_field(C& command, Visit&& visit) {
+  auto& [status, activity, torque, torque_without_gravity, wanted, acceleration, velocity, position, disturbance, rotors,
+         tracking_error, deviation, delay, input_change, clearance, coordinate, point, bound_by, distance, speed, speed_limit,
+         limits, system, program, avoiding, look_ahead_age, planner_age, pace, on_path] = command;
+  visit("status", status);
+  visit("activity", activity);
+  visit("torque", torque);
+  visit("torque_without_gravity", torque_without_gravity);
+  visit("wanted", wanted);
+  visit("acceleration", acceleration);
+  visit("velocity", velocity);
+  visit("position", position);
+  visit("disturbance", disturbance);
+  visit("rotors", rotors);
+  visit("input_change", input_change);
+  visit("tracking_error", tracking_error);
+  visit("deviation", deviation);
+  visit("delay", delay);
+  visit("clearance", clearance);
+  visit("coordinate", coordinate);
+  visit("point", point);
+  visit("bound_by", bound_by);
+  visit("distance", distance);
+  visit("speed", speed);
+  visit("speed_limit", speed_limit);
+  visit("limits", limits);
+  visit("system", system);
+  visit("program", program);
+  visit("avoiding", avoiding);
+  visit("look_ahead_age", look_ahead_age);
+  visit("planner_age", planner_age);
+  visit("pace", pace);
+  visit("on_path", on_path);
+}
+
 }  // namespace sidestep

@@ -163,7 +163,7 @@ class OnlinePlanner {
     std::uint64_t goal_number = 0;   // 0: none
     std::uint64_t route_number = 0;  // that it follows
     std::uint64_t stops = 0;         // how often the arm was stuck on the way to this goal
-    std::chrono::steady_clock::time_point written;
+    std::chrono::steady_clock::time_point written{};
   };
 
   void run();

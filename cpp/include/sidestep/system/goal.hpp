@@ -70,19 +70,27 @@ struct PoseGoal {
   PoseGoalSettings settings;
   std::vector<PoseGoal> others;  ///< see `add`; without others of their own
 
-  const Frame& frame() const noexcept { return frame_; }
+  /// What a goal keeps of the robot it was made for: enough to make it again where the robot is not at hand.
+  struct MadeFor {
+    Frame frame;
+    std::uint64_t joints_hash = 0;
+    double reach = 0.0;
+    Eigen::Vector3d shoulder = Eigen::Vector3d::Zero();
+  };
+  /// A goal again, of parts that another one had; they are not checked.
+  PoseGoal(MadeFor made_for, const Eigen::Isometry3d& pose, PoseGoalSettings settings, const Vector6d& twist);
+  const MadeFor& made_for() const noexcept { return made_for_; }
+
+  const Frame& frame() const noexcept { return made_for_.frame; }
   /// Whether it was made for a robot with these joints.
-  bool is_for(const Robot& robot) const noexcept { return joints_hash_ == robot.joints_hash(); }
+  bool is_for(const Robot& robot) const noexcept { return made_for_.joints_hash == robot.joints_hash(); }
   /// Farther than this from `shoulder` the frame cannot be: the lengths between its joints, added.
-  double reach() const noexcept { return reach_; }
+  double reach() const noexcept { return made_for_.reach; }
   /// The origin of the first joint that moves the frame, in the world [m].
-  const Eigen::Vector3d& shoulder() const noexcept { return shoulder_; }
+  const Eigen::Vector3d& shoulder() const noexcept { return made_for_.shoulder; }
 
  private:
-  Frame frame_;
-  std::uint64_t joints_hash_;
-  double reach_ = 0.0;
-  Eigen::Vector3d shoulder_ = Eigen::Vector3d::Zero();
+  MadeFor made_for_;
 };
 
 /// The frame of a name. Throws std::invalid_argument, beginning with `what`, where it is unknown or no joint moves it, with
