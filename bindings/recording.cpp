@@ -47,8 +47,8 @@ void bind_recording(nb::module_& m) {
       .def("__repr__", [](const RecordingInProgress& self) { return "Recording('" + self.path.string() + "')"; });
   nb::class_<RecordingHeader>(m, "RecordingHeader", "What made a recording, and with what.")
       .def_ro("format", &RecordingHeader::format, "Version of the file's format.")
-      .def_ro("sidestep_version", &RecordingHeader::sidestep_version)
-      .def_ro("compiler", &RecordingHeader::compiler)
+      .def_ro("sidestep_version", &RecordingHeader::sidestep_version, "The version of Sidestep that wrote it.")
+      .def_ro("compiler", &RecordingHeader::compiler, "The compiler of that Sidestep.")
       .def_ro("instruction_set", &RecordingHeader::instruction_set, "Of the inner loops, see `instruction_set`.")
       .def_ro("arm", &RecordingHeader::arm, "The arm (of the core) of the first step.")
       .def_prop_ro("settings", [](const RecordingHeader& h) { return ControllerSettings(h.settings); }, "A copy.")

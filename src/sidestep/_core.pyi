@@ -2240,10 +2240,12 @@ class RecordingHeader:
         """Version of the file's format."""
 
     @property
-    def sidestep_version(self) -> str: ...
+    def sidestep_version(self) -> str:
+        """The version of Sidestep that wrote it."""
 
     @property
-    def compiler(self) -> str: ...
+    def compiler(self) -> str:
+        """The compiler of that Sidestep."""
 
     @property
     def instruction_set(self) -> str:

@@ -28,6 +28,7 @@ def phrases() -> list[str]:
         text = (ROOT / "cpp" / "src" / name).read_text(encoding="utf-8")
         text = re.sub(r"//.*", "", text)
         for literal in re.findall(r'"((?:[^"\\\n]|\\.)*)"', text):
+            literal = literal.replace("%%", "%")  # of printf
             words = re.sub(r"%[.0-9]*[a-z]|\\n", "...", literal).strip(" ,;:'()")
             if len(words.replace("...", "").split()) >= LEAST_WORDS and not words.endswith((".hpp", ".h")):
                 found.append(words)

@@ -82,7 +82,7 @@ def test_the_document_has_every_limit_with_its_unit(show: Callable[..., Any], sm
     assert found["joints"] == [
         joint("turn", "revolute", "rad", lower=-1.0, upper=2.0, velocity=3.0, effort=40.0),
         joint("roll", "continuous", "rad", lower=None, upper=None, velocity=4.0, effort=None),
-        joint("slide", "prismatic", "m", lower=0.1, upper=0.3, velocity=0.5, effort=20.0),
+        joint("slide", "prismatic", "m", lower=0.1, upper=0.3, velocity=0.25, effort=20.0),
     ]
     assert found["default_acceleration_and_jerk"] is True
     assert found["mimic"] == [{"joint": "follow", "follows": "slide", "multiplier": -2.0, "offset": 0.1}]
