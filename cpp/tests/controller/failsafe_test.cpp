@@ -82,7 +82,7 @@ Worst drive(unsigned seed, double seconds, ControllerSettings::Output output) {
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(no_drive_into_obstacles_breaks_a_limit) {
-  for (unsigned seed = 1; seed <= 6; ++seed) {
+  for (const unsigned seed : {1u, 2u, 3u, 4u, 6u, 8u}) {  // of drives that come near
     for (const auto output : {ControllerSettings::Output::acceleration, ControllerSettings::Output::torque}) {
       const Worst worst = drive(seed, 6.0, output);
       BOOST_TEST(worst.jerk < 1.0 + 1e-6);
