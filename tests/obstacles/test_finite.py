@@ -84,3 +84,15 @@ def test_what_is_no_array_is_named() -> None:
             TypeError, match=r"(points|radii|pose) is None, must be an array of real numbers$"
         ):
             make()
+
+
+def test_points_that_are_not_finite_are_counted_and_it_is_said_what_to_do() -> None:
+    points = np.random.default_rng(0).uniform(size=(50, 3))
+    points[::7] = np.nan
+    with pytest.raises(
+        ValueError, match=r"point 0 is not finite, as are 8 of all 50; leave out .*np.isfinite"
+    ) as error:
+        ss.Obstacles(points)
+    kept = points[np.isfinite(points).all(axis=1)]  # as the error says
+    assert "points[np.isfinite(points).all(axis=1)]" in str(error.value)
+    assert len(ss.Obstacles(kept)) == 42

@@ -25,7 +25,13 @@ Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matr
   for (Eigen::Index i = 0; i < num; ++i) {
     const auto owner = [i] { return "obstacles: point " + std::to_string(i); };
     if (!points_.col(i).allFinite()) {
-      throw std::invalid_argument(owner() + " is not finite");
+      Eigen::Index bad = 0;
+      for (Eigen::Index k = i; k < num; ++k) {
+        bad += points_.col(k).allFinite() ? 0 : 1;
+      }
+      throw std::invalid_argument(owner() + " is not finite" +
+                                  (bad > 1 ? ", as are " + std::to_string(bad) + " of all " + std::to_string(num) : "") +
+                                  "; leave out what a camera did not see: points[np.isfinite(points).all(axis=1)]");
     }
     if (!(radii_[i] >= 0.0) || !(radii_[i] <= largest_radius)) {
       throw std::invalid_argument(owner() + " has radius " + std::to_string(radii_[i]) +
