@@ -89,3 +89,34 @@ def test_towards_goals_no_limit_breaks_where_a_payload_is_not_what_was_told(told
     assert np.abs(torques / limits.effort).max() <= WITHIN
     assert np.abs(np.diff(torques, axis=0) / PERIOD / limits.effort_rate).max() <= WITHIN
     assert max(errors) < 0.06  # [rad] 0.04 is the most in 28 such motions; the reference begins anew at 0.2
+
+
+@pytest.mark.slow  # 2 s each
+@pytest.mark.parametrize(("there", "event"), [(True, "dropped"), (False, None), (True, "detached")])
+def test_at_full_speed_no_limit_breaks_where_a_payload_that_was_told_is_not_there(there, event):
+    """On 0.2.0 up to 3.3 times the velocity limits and 29 mrad beyond a position limit."""
+    arm = ss.Arm.load("fr3")
+    limits, rng = arm.limits, np.random.default_rng(0)
+    controller = ss.Controller(arm, ss.ControllerSettings(output="torque", synchronous=True, look_ahead=None))
+    controller.set_obstacles(ss.Obstacles.none())
+    plant = Plant(arm.robot, arm.neutral)
+    plant.load(MASS * there)
+    controller.attach("cup", ss.Sphere(0.04), link="fr3_hand", pose=pose_at([0.0, 0.0, DOWN]), mass=MASS)
+    torques = [np.zeros(0)]
+    for k in range(3000):
+        if k % 400 == 0:
+            velocity = rng.uniform(-1.0, 1.0, 7) * limits.velocity
+        controller.set_velocity(velocity)
+        if k == 1400 and event == "dropped":
+            plant.load(0.0)
+        if k == 1400 and event == "detached":
+            controller.detach("cup")
+        q, v = plant.state()
+        assert np.all(limits.lower < q)
+        assert np.all(q < limits.upper)
+        assert np.abs(v / limits.velocity).max() <= WITHIN
+        torques.append(controller.step(q, v).torque)
+        plant.apply(torques[-1])
+    torques = np.array(torques[1:])
+    assert np.abs(torques / limits.effort).max() <= WITHIN
+    assert np.abs(np.diff(torques, axis=0) / PERIOD / limits.effort_rate).max() <= WITHIN

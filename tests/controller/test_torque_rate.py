@@ -128,3 +128,20 @@ def test_without_a_mass_matrix_the_stop_keeps_the_rate() -> None:
         q = q + PERIOD * v
     rate = np.abs(np.diff(sent, axis=0)) / PERIOD
     assert (rate <= arm.limits.effort_rate * (1.0 + 1e-6)).all()  # 1e-6: rounding of the differences
+
+
+@pytest.mark.parametrize("mass", [3.0, 6.0, 12.0])
+def test_no_torque_limit_breaks_where_gravity_takes_more_than_there_is(mass):
+    """A payload that the fr3 cannot hold: what the model says has held the arm until now is more than its limits."""
+    arm = ss.Arm.load("fr3")
+    controller = ss.Controller(arm, ss.ControllerSettings(output="torque", synchronous=True, look_ahead=None))
+    controller.set_obstacles(ss.Obstacles.none())
+    controller.attach(
+        "load", ss.Sphere(0.04), link="fr3_hand", pose=ss.obstacles.pose_at([0.0, 0.0, 0.1]), mass=mass
+    )
+    limits, q, torques = arm.limits, arm.neutral, []
+    for _ in range(50):
+        torques.append(controller.step(q, 0.0 * q).torque)
+    torques = np.array(torques)
+    assert np.abs(torques / limits.effort).max() <= 1.0 + 1e-9  # rounding
+    assert np.abs(np.diff(torques, axis=0) / 1e-3 / limits.effort_rate).max() <= 1.0 + 1e-6

@@ -65,6 +65,9 @@ void Controller::Impl::begin_reference() noexcept {
     reference_torque_ = last_torque_;
   } else if (dynamics_) {  // what has held the arm until now, nobody knows: what would hold it
     dynamics_->bias(arm_q_, arm_v_, *dynamics_workspace_, reference_torque_);
+    const double left = 1.0 - settings.effort_margin;  // more than there is has held it no more than all there is
+    const Eigen::VectorXd& effort = arm.robot().limits().effort;
+    reference_torque_ = reference_torque_.cwiseMax(-left * effort).cwiseMin(left * effort);
     last_torque_ = reference_torque_;
     has_last_torque_ = true;
   }
