@@ -155,6 +155,28 @@ def test_mass_matrices_and_unusable_states(arm, tmp_path):
     assert_equal(ss.replay(tmp_path / "run.step"), 60)
 
 
+def test_a_restart_and_a_pause_by_the_clock(arm, tmp_path):
+    """What the step reads of the machine's clock is an input too: a replay has no pause, and begins anew all the same."""
+    path = tmp_path / "run.step"
+    controller = controller_of(arm, output="position")
+    controller.set_obstacles(ss.Obstacles.none())
+    with controller.record(path):
+        controller.set_goal(Q + 0.2)
+        q, v = moved(controller, Q, 0.0 * Q, 200)
+        time.sleep(0.15)  # meanwhile something else moves the arm
+        q = q + 0.3
+        command = controller.step(q, 0.0 * q)
+        np.testing.assert_allclose(command.position, q, atol=1e-3)  # it begins there
+        q, v = moved(controller, command.position, command.velocity, 100)
+        controller.restart()
+        q, v = moved(controller, q, v, 100)
+        controller.set_twist("fr3_hand", [0.0, 0.0, 0.1, 9.0, 9.0, 9.0], free="rotation")
+        moved(controller, q, v, 100)
+    result = ss.replay(path)
+    assert result.equal, result.difference
+    assert result.steps == 501
+
+
 def test_obstacles_that_moved_before_they_were_set(arm, tmp_path):
     rng = np.random.default_rng(1)
     cloud = ss.Obstacles(

@@ -335,7 +335,7 @@ void Replay::give_taken(recording::Decoder& in) {
         impl.trajectories_.put(std::move(found));
         break;
       }
-      case TakenKind::restart: controller_.restart(); break;
+      case TakenKind::restart: impl.restart(); break;
       case TakenKind::elapsed: in(impl.measurement_.replayed_elapsed); break;
       case TakenKind::look: {
         OnlinePlanner::Looked look;
