@@ -156,7 +156,7 @@ def test_mass_matrices_and_unusable_states(arm, tmp_path):
 
 
 def test_a_restart_and_a_pause_by_the_clock(arm, tmp_path):
-    """What the step reads of the machine's clock is an input too: a replay has no pause, and begins anew all the same."""
+    """What a step reads of the machine's clock is an input: a replay has no pause, and begins anew all the same."""
     path = tmp_path / "run.step"
     controller = controller_of(arm, output="position")
     controller.set_obstacles(ss.Obstacles.none())

@@ -21,6 +21,7 @@ from sidestep._core import distance_to_triangles
 from sidestep.distance.solid import object_solid
 from sidestep.obstacles import Box, Capsule, Cylinder, MeshShape, Plane, Shape, Sphere, pose_at
 from sidestep.obstacles.ball_cover import EXCESS
+from sidestep.obstacles.solid_cover import box_balls
 
 ROUNDING = 1e-9  # [m] poses are applied in double precision at the scale of ten metres
 SOLVER = 2e-6  # [m] to which Coal's iterations find distances of convex solids
@@ -335,3 +336,21 @@ def test_an_excess_that_asks_for_too_many_balls_is_refused_with_one_that_does_no
     ):
         shape.balls()
     assert len(shape.balls(0.0035)[0]) < 300_000
+
+
+def test_a_large_plate_is_covered_at_once_and_without_gaps() -> None:
+    """A guard of 1 mm took seconds: a search for the fewest balls."""
+    size, excess = (0.001, 1.0, 0.6), 0.002
+    centres, radii = box_balls(size, excess)
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.5, 0.5, (2000, 3)) * size
+    sides = rng.integers(3, size=2000)
+    points[np.arange(2000), sides] = 0.5 * np.sign(points[np.arange(2000), sides]) * np.array(size)[sides]
+
+    # each point of the surface is in one of the balls whose centres are nearest; rounding of a sum
+    near = cKDTree(centres).query(points, k=8)
+    assert (near[0] - radii[near[1]]).min(axis=1).max() <= 1e-9
+    outside = np.linalg.norm(np.maximum(np.abs(centres) - 0.5 * np.array(size), 0.0), axis=1)
+    inside = np.clip(0.5 * np.array(size) - np.abs(centres), 0.0, None).min(axis=1)
+    assert (radii - inside + outside).max() <= excess * (1.0 + 1e-6)  # how far balls reach out
+    assert len(centres) < 1.25 * 50_286  # the fewest that the search found, which takes ten times as long

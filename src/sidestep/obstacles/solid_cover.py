@@ -9,15 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sidestep.obstacles.ball_cover import check_count, check_excess, cover, halved
+from sidestep.obstacles.flat_cover import flat_balls
 
 Array = NDArray[np.float64]
 
+SEARCHED = 20_000  # cells of a plate up to which fewer balls are searched for: it takes half a second
 OVERHANG = 0.1  # of the excess: what the hull of an arc may stick out of a round surface at first
 
 
 def box_balls(size: Sequence[float], excess: float) -> tuple[Array, Array]:
-    """Centres (N, 3) and radii (N,) [m] of balls that hold the surface of a box (3,) around the origin."""
-    return cover(_Box(np.asarray(size, dtype=np.float64)), excess)
+    """Centres (N, 3) and radii (N,) [m] of balls that hold the surface of a box (3,) around the origin.
+
+    Of a large plate that is no thicker than the excess, balls of squares at once: a search for fewer takes seconds and
+    spares a sixth of them.
+    """
+    check_excess(excess)
+    sides = np.asarray(size, dtype=np.float64)
+    x, y, z = sides
+    cells = 2.0 * (x * y + y * z + z * x) / _cell_size(0.5 * float(sides.min()), excess) ** 2
+    large = sides.min() <= excess and cells > SEARCHED
+    return _plate_balls(0.5 * sides, excess) if large else cover(_Box(sides), excess)
 
 
 def plane_balls(extent: float, excess: float) -> tuple[Array, Array]:
@@ -45,6 +56,22 @@ def capsule_balls(radius: float, length: float, excess: float) -> tuple[Array, A
     radii = np.full(count + 2, grown)
     radii[[0, -1]] = radius  # exact half-balls at the ends
     return centres, radii
+
+
+def _plate_balls(half: Array, excess: float) -> tuple[Array, Array]:
+    """Of a box with half sides (3,) [m]."""
+    signs = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    triangles, inward = [], []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            a, b, c, d = half * signs[signs[:, axis] == side]
+            triangles += [(a, b, c), (b, c, d)]
+            inward += 2 * [-side * np.eye(3)[axis]]
+
+    def fits(centres: Array, radius: float) -> NDArray[np.bool_]:
+        return np.asarray((half - np.abs(centres)).min(axis=1) >= radius * (1.0 - 1e-12))
+
+    return flat_balls(np.array(triangles), np.array(inward), fits, excess, float(half.min()))
 
 
 def _cell_size(depth: float, excess: float) -> float:
