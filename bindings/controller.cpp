@@ -427,8 +427,7 @@ void bind_controller(nb::module_& m) {
                                                     : self.step(position, velocity, as_matrix(mass_matrix, "mass_matrix", nv, nv),
                                                                 as_vector(bias, "bias", nv));
             if (self.stepped_in_turn()) {
-              throw std::runtime_error(
-                  "several threads step this controller in turn: give each loop a controller of its own, or step from one thread");
+              warn("several threads step this controller in turn: give each loop a controller of its own, or step from one thread");
             }
             return command;
           },
@@ -437,8 +436,8 @@ void bind_controller(nb::module_& m) {
                   "mass_matrix: numpy.typing.ArrayLike | None = None, bias: numpy.typing.ArrayLike | None = None) -> Command"),
           "One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)\n"
           "[Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError\n"
-          "while a RealTimeRun or `integrate` has the controller, as does what tells of the last step, and where several\n"
-          "threads step it in turn.")
+          "while a RealTimeRun or `integrate` has the controller; so does what tells of the last step. Warns where several threads\n"
+          "step it in turn.")
       .def(
           "record",
           [](Controller& self, const std::filesystem::path& path) {

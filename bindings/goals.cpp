@@ -139,9 +139,11 @@ void bind_goals(nb::module_& m) {
                return false;
              }
              const auto& o = nb::cast<const JointGoal&>(other);
-             return g.position == o.position && g.velocity == o.velocity && g.acceleration == o.acceleration;
+             return g.position.size() == o.position.size() && g.position == o.position && g.velocity == o.velocity &&
+                    g.acceleration == o.acceleration;
            },
            nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"))
+      .def("__hash__", [](const JointGoal& g) { return nb::hash(nb::bytes(g.position.data(), sizeof(double) * g.position.size())); })
       .def("__repr__", [](const JointGoal& g) { return "JointGoal(" + in_short(g.position) + (is_moving(g) ? ", moves)" : ")"); });
 
   nb::class_<PoseGoal>(
@@ -189,6 +191,7 @@ void bind_goals(nb::module_& m) {
                         .equal(nb::bytes(nb::module_::import_("pickle").attr("dumps")(pose_goal_state(nb::cast<const PoseGoal&>(other)))));
            },
            nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"))
+      .def("__hash__", [](const PoseGoal& g) { return nb::hash(nb::module_::import_("pickle").attr("dumps")(pose_goal_state(g))); })
       .def("__repr__", [](const PoseGoal& g) {
         return "PoseGoal('" + g.frame().name + "' at " + in_short(g.pose.translation()) + " m" +
                (g.settings.position_only ? ", position_only" : "") + (is_moving(g) ? ", moves)" : ")");

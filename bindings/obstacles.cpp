@@ -107,6 +107,17 @@ void bind_obstacles(nb::module_& m) {
            },
            nb::sig("def __setstate__(self, state: tuple[typing.Any, ...], /) -> None"))
       .def("__copy__", [](const Obstacles& o) { return Obstacles(o); })
+      .def("__eq__",
+           [](const Obstacles& o, nb::handle other) {
+             if (!nb::isinstance<Obstacles>(other)) {
+               return false;
+             }
+             const auto& p = nb::cast<const Obstacles&>(other);
+             return o.size() == p.size() && o.points() == p.points() && o.radii() == p.radii() && o.velocities() == p.velocities() &&
+                    o.groups() == p.groups();
+           },
+           nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"))
+      .def("__hash__", [](const Obstacles&) -> Py_hash_t { throw nb::type_error("unhashable type: 'Obstacles', which move"); })
       .def("__len__", &Obstacles::size)
       .def("__repr__", [](const Obstacles& o) { return in_words(o); })
       .def_prop_ro("points", [](const Obstacles& o) { return to_numpy_points(o.points()); })

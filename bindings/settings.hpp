@@ -180,6 +180,9 @@ nb::class_<Settings> bind_settings(nb::module_& m, const char* name, const std::
            [name, parts](Settings& self, const nb::dict& values) {
              new (&self) Settings();
              set_all(self, name, parts, values);
+             if constexpr (checked) {
+               self.validate();
+             }
            },
            nb::sig("def __setstate__(self, values: dict[str, typing.Any], /) -> None"))
       .def("__copy__", [](const Settings& self) { return Settings(self); })

@@ -232,6 +232,10 @@ class Obstacles:
 
     def __copy__(self) -> Obstacles: ...
 
+    def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
+
     def __len__(self) -> int: ...
 
     def __repr__(self) -> str: ...
@@ -568,6 +572,8 @@ class JointGoal:
 
     def __eq__(self, other: object, /) -> bool: ...
 
+    def __hash__(self) -> int: ...
+
     def __repr__(self) -> str: ...
 
 class PoseGoal:
@@ -601,6 +607,8 @@ class PoseGoal:
     def __setstate__(self, state: tuple[Any, ...], /) -> None: ...
 
     def __eq__(self, other: object, /) -> bool: ...
+
+    def __hash__(self) -> int: ...
 
     def __repr__(self) -> str: ...
 
@@ -3474,8 +3482,8 @@ class Controller:
         """
         One period at q (nv,) [rad | m] and v (nv,) [/s], perhaps with the arm's own mass matrix (nv, nv) and bias (nv,)
         [Nm | N] there. Values that are not finite give a damped stop. Raises ValueError on wrong shapes, RuntimeError
-        while a RealTimeRun or `integrate` has the controller, as does what tells of the last step, and where several
-        threads step it in turn.
+        while a RealTimeRun or `integrate` has the controller; so does what tells of the last step. Warns where several threads
+        step it in turn.
         """
 
     def record(self, path: str | os.PathLike[str]) -> Recording:

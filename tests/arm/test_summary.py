@@ -81,3 +81,11 @@ def test_a_line_says_how_far_and_how_long(monkeypatch: pytest.MonkeyPatch) -> No
     assert len(lines) == 2
     assert "preparing own.urdf:  30 % (cover of hand), about 23 s left" in lines[0]
     assert lines[1].endswith("done\n")
+
+
+def test_what_a_summary_calls_assumed_is_what_is_assumed() -> None:
+    from sidestep.arm import summary
+    from sidestep.robot import limits
+
+    assert summary.ASSUMED_ACCELERATION == limits.DEFAULT_ACCELERATION_LIMIT
+    assert summary.ASSUMED_JERK == limits._DEFAULT_JERK

@@ -61,6 +61,9 @@ def test_goals_and_obstacles_come_back() -> None:
     goal = ss.JointGoal([1.0, 2.0], [0.1, 0.2])
     assert pickle.loads(pickle.dumps(goal)) == goal
     assert copy.deepcopy(goal) != ss.JointGoal([1.0, 2.5], [0.1, 0.2])
+    assert hash(copy.deepcopy(goal)) == hash(goal)
+    assert ss.JointGoal([0.0] * 7) != ss.JointGoal([0.0] * 3)
+    assert ss.JointGoal([0.0] * 3) != ss.JointGoal([0.0] * 7)
     seen = ss.Obstacles([[1.0, 2.0, 3.0], [0.0, 1.0, 0.0]], [0.1, 0.2], [[0.0, 0.0, 1.0]] * 2)
     seen = seen.named(["table", "cup"], [1, 1])
     again = pickle.loads(pickle.dumps(seen))
@@ -68,6 +71,9 @@ def test_goals_and_obstacles_come_back() -> None:
     np.testing.assert_array_equal(again.radii, seen.radii)
     np.testing.assert_array_equal(again.velocities, seen.velocities)
     assert again.groups == seen.groups == [("table", 1), ("cup", 1)]
+    assert again == seen
+    assert again != ss.Obstacles(seen.points, seen.radii, seen.velocities)  # without names
+    assert again != ss.Obstacles.none()
     assert len(pickle.loads(pickle.dumps(ss.Obstacles.none()))) == 0
 
 

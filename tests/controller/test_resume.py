@@ -323,3 +323,30 @@ def test_a_push_that_stays_is_taken(arm: ss.Arm) -> None:
         assert command.status < ss.SafetyStatus.tracking_lost
         q, v = moved_on(arm, "torque", command, q, v)
     assert np.abs(q - arm.neutral).max() < 0.01  # [rad] of arrival
+
+
+@pytest.mark.parametrize("period", [0.001, 0.05, 0.1])
+def test_one_wrong_sample_moves_nothing_whatever_the_period(period: float) -> None:
+    """At 0.1 s every step was "after a pause", and one sample moved the command by 1.15 rad."""
+    arm = ss.Arm.load("fr3")
+    c = ss.Controller(arm, ss.ControllerSettings(output="position", synchronous=True, period=period))
+    c.set_obstacles(ss.Obstacles.none())
+    c.set_goal(arm.neutral)
+    q = arm.neutral.copy()
+    for _ in range(10):
+        q = c.step(q, 0.0 * q).position
+    wrong = q + np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    time.sleep(period)
+    command = c.step(wrong, 0.0 * q)
+    assert np.abs(command.position - q).max() < 1e-9
+    assert command.status == ss.SafetyStatus.tracking_lost
+
+
+def test_a_command_after_an_unusable_state_is_within_the_limits() -> None:
+    arm = ss.Arm.load("fr3")
+    c = ss.Controller(arm, ss.ControllerSettings(output="position", synchronous=True))
+    c.set_obstacles(ss.Obstacles.none())
+    q = arm.neutral.copy()
+    q[0] = arm.limits.upper[0] + 0.002  # by the noise of an encoder
+    assert c.step(q, 0.0 * q).position[0] <= arm.limits.upper[0]
+    assert c.step(q * np.nan, 0.0 * q).position[0] <= arm.limits.upper[0]

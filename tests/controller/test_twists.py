@@ -314,3 +314,12 @@ def test_what_is_said_of_velocities_and_twists_is_true(name: str, kind: str, amo
             q, v = command.position, command.velocity
     assert said["follows"] > 10
     assert said["on the way"] + said["less"] > 10
+
+
+def test_a_rotation_that_is_left_free_is_not_read() -> None:
+    arm = ss.Arm.load("fr3")
+    c = ss.Controller(arm, ss.ControllerSettings(synchronous=True))
+    c.set_twist("fr3_hand", [0.0, 0.0, 0.1, np.nan, np.inf, 9e9], free="rotation")
+    assert c.questions == []
+    with pytest.raises(ValueError, match="allowed: finite numbers"):
+        c.set_twist("fr3_hand", [np.nan, 0.0, 0.1, 0.0, 0.0, 0.0], free="rotation")

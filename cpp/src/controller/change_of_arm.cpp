@@ -37,6 +37,7 @@ void Controller::Impl::go_on_from(Impl& before) noexcept {
   static_cast<StepState&>(*this) = before;
   solution = before.solution;
   tracked_ = before.tracked_;
+  closing_.go_on_from(before.closing_);
   obstacle_orders_.update();
   if (obstacle_orders_.current().number == obstacle_number_) {  // as they have moved on until now
     std::swap(obstacle_orders_.current().obstacles, before.obstacle_orders_.current().obstacles);

@@ -34,12 +34,30 @@ constexpr double longest_doubt = 0.3;   // [s] three sets at 10 Hz; of what flic
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
+std::vector<std::string> links_of(const ClearanceField& field, const Body& body) {
+  std::vector<std::string> links;
+  for (int k = 0; k < field.size(); ++k) {
+    links.push_back(body.links[static_cast<std::size_t>(field.component(k))]);
+  }
+  return links;
+}
+
+Eigen::Matrix3Xd middles_of(const ClearanceField& field, const Body& body) {
+  Eigen::Matrix3Xd middles(3, field.size());
+  for (int k = 0; k < field.size(); ++k) {
+    middles.col(k) = body.means.col(field.component(k));
+  }
+  return middles;
+}
+
 }  // namespace
 
 ClosingEstimate::ClosingEstimate(const Robot& robot, const Body& body, double temperature, double margin)
     : robot_(robot),
       field_(robot, body, temperature),
       margin_(margin),
+      links_(links_of(field_, body)),
+      middles_(middles_of(field_, body)),
       state_(robot),
       rest_(Eigen::VectorXd::Zero(robot.num_coordinates())),
       before_(robot.num_coordinates(), field_.size()),
@@ -47,6 +65,33 @@ ClosingEstimate::ClosingEstimate(const Robot& robot, const Body& body, double te
       tracks_(static_cast<std::size_t>(field_.size()), Track{.noise = first_noise, .differences = assumed}),
       doubts_(tracks_.size()),
       speeds_(Eigen::VectorXd::Zero(field_.size())) {}
+
+void ClosingEstimate::go_on_from(const ClosingEstimate& before) noexcept {
+  begun_ = before.begun_;
+  last_set_ = before.last_set_;
+  last_kept_ = before.last_kept_;
+  late_ = before.late_;
+  time_ = before.time_;
+  for (std::size_t k = 0; k < tracks_.size(); ++k) {
+    double least = infinity;
+    for (std::size_t i = 0; i < before.tracks_.size(); ++i) {
+      if (links_[k] != before.links_[i]) {
+        continue;
+      }
+      const auto at = static_cast<Eigen::Index>(k), from = static_cast<Eigen::Index>(i);
+      const double apart = (middles_.col(at) - before.middles_.col(from)).norm();
+      if (apart < least) {
+        least = apart;
+        tracks_[k] = before.tracks_[i];
+        doubts_[k] = before.doubts_[i];
+        speeds_[at] = before.speeds_[from];
+        now_.values[at] = before.now_.values[from];
+      }
+    }
+  }
+  num_closing_ = static_cast<int>((speeds_.array() > 0.0).count());
+  advance(time_);
+}
 
 void ClosingEstimate::evaluate(const Obstacles& obstacles, Clearances& out) noexcept {
   out.clear();

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "sidestep/barrier/clearance_field.hpp"
@@ -42,6 +43,10 @@ class ClosingEstimate {
   void leave(ConstVectorRef q, const Obstacles& before) noexcept;
   /// After `leave`: `now` takes its place, at `time` [s]. The first set replaces nothing.
   void take(const Obstacles& now, double time) noexcept;
+
+  /// Goes on with what another one found, of a body of the same links: an ellipsoid takes over what was found for the nearest one of its
+  /// link. No allocation.
+  void go_on_from(const ClosingEstimate& before) noexcept;
 
   /// Moves on to `time` [s]: what is late ends. Once in each step, after `take`.
   void advance(double time) noexcept;
@@ -84,6 +89,8 @@ class ClosingEstimate {
   const Robot robot_;
   const ClearanceField field_;
   const double margin_;
+  const std::vector<std::string> links_;  // of the ellipsoids
+  const Eigen::Matrix3Xd middles_;        // of the ellipsoids, in the frames of their links [m]
   KinematicState state_;
   Eigen::VectorXd rest_;
   Clearances before_, now_;

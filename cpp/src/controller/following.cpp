@@ -179,9 +179,7 @@ std::string Controller::Impl::explain_trajectory() const {
     words += text;
   }
   if (command.deviation > 0.001) {
-    Eigen::Index farthest = 0;
-    (path_q_ - q_).cwiseAbs().maxCoeff(&farthest);
-    const bool slides = is_sliding_[static_cast<std::size_t>(farthest)];
+    const bool slides = is_sliding_[static_cast<std::size_t>(deviating_)];
     std::snprintf(text, sizeof text, "%s%.2g %s off %s", words.empty() ? "" : ", ", (slides ? 1e3 : 1.0) * command.deviation,
                   slides ? "mm" : "rad", words.empty() ? "the trajectory" : "it");
     words += text;

@@ -13,6 +13,7 @@ constexpr double response_settling = 4.0;  // time constants of the response aft
 constexpr double joint_rest = 5e-4;        // [rad/s] of a joint that counts as rest
 constexpr double sliding_rest = 0.1;       // the same of joints that slide [m/rad]
 constexpr double cross_share = 0.01;       // share of the fastest joint that others may be off
+constexpr double sliding_deviation = 0.2;  // the same of joints that slide, as a share of that [m/rad]
 constexpr double least_deviation = 0.01;   // [rad] from a trajectory: what counts as arrived
 constexpr double bent_share = 0.5;         // of the tolerance that barriers take away and are named for
 constexpr double outwards = 0.5;           // cosine to the line from the shoulder from which an arm is stretched
@@ -88,7 +89,9 @@ void Controller::Impl::judge_input() noexcept {
     if (clock_.time < trajectory->path.duration()) {
       command.input_change -= path_v_;
     }
-    reduced = reduced || slows_trajectory() || command.deviation > least_deviation;
+    reduced =
+        reduced || slows_trajectory() ||
+        command.deviation > (is_sliding_[static_cast<std::size_t>(deviating_)] ? sliding_deviation : 1.0) * least_deviation;
   } else {
     if (const auto* velocity = std::get_if<VelocityOrder>(&order)) {
       command.input_change = next_v_ - velocity->velocity;

@@ -35,7 +35,7 @@ void Controller::Impl::set_velocity(const Eigen::VectorXd& v) {
 }
 
 void Controller::Impl::set_twist(const std::string& frame, const Vector6d& twist, bool local, TwistFreedom free) {
-  if (!twist.allFinite()) {
+  if (!(free == TwistFreedom::rotation ? twist.head<3>().allFinite() : twist.allFinite())) {
     std::string numbers;
     for (const double number : twist) {
       numbers += (numbers.empty() ? "" : ", ") + std::to_string(number);
@@ -46,9 +46,9 @@ void Controller::Impl::set_twist(const std::string& frame, const Vector6d& twist
 }
 
 void Controller::Impl::set_trajectory(const Eigen::MatrixXd& q, const Eigen::VectorXd& times, TrajectoryBehaviour behaviour) {
-  put(TrajectoryOrder{JointTrajectory(arm.robot(), q, times, most_v_, most_a_), behaviour,
-                      std::make_shared<const TrajectorySamples>(TrajectorySamples{q, times})},
-      plausible_.question_trajectory(q, times));
+  TrajectoryOrder order{JointTrajectory(arm.robot(), q, times, most_v_, most_a_), behaviour,
+                        std::make_shared<const TrajectorySamples>(TrajectorySamples{q, times})};
+  put(std::move(order), plausible_.question_trajectory(q, times));
 }
 
 void Controller::Impl::begin_input() noexcept {

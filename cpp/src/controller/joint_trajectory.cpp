@@ -265,33 +265,43 @@ double JointTrajectory::stamp(double s) const noexcept {
   return stamps_[k] + (stamps_[k + 1] - stamps_[k]) * (s - times_[k]) / (times_[k + 1] - times_[k]);
 }
 
-double JointTrajectory::deviation(double s, const Eigen::VectorXd& q) const noexcept {
+JointTrajectory::Deviation JointTrajectory::deviation(double s, const Eigen::VectorXd& q) const noexcept {
   const Eigen::Index begin = led_ ? 1 : 0, num = times_.size();
   const auto off = [&](Eigen::Index k, Eigen::Index next) {  // from the straight line between two samples
-    double square = 0.0, along = 0.0, farthest = 0.0;
-    for (Eigen::Index j = 0; j < q_.rows(); ++j) {
-      const double way = q_(j, next) - q_(j, k);
+    double square = 0.0, along = 0.0, worst = -1.0;
+    Deviation farthest;
+    for (Eigen::Index j = 0; j < q_.rows(); ++j) {  // joints that slide and joints that turn, by what either may be off
+      const double way = (q_(j, next) - q_(j, k)) / corner_[j];
       square += way * way;
-      along += way * (q[j] - q_(j, k));
+      along += way * (q[j] - q_(j, k)) / corner_[j];
     }
     const double share = square > 0.0 ? std::clamp(along / square, 0.0, 1.0) : 0.0;
     for (Eigen::Index j = 0; j < q_.rows(); ++j) {
-      farthest = std::max(farthest, std::abs(q[j] - (1.0 - share) * q_(j, k) - share * q_(j, next)));
+      const double away = std::abs(q[j] - (1.0 - share) * q_(j, k) - share * q_(j, next));
+      if (away / corner_[j] > worst) {
+        worst = away / corner_[j];
+        farthest = {away, j};
+      }
     }
-    return farthest;
+    return std::pair(worst, farthest);
   };
   if (num == begin + 1) {
-    return off(begin, begin);
+    return off(begin, begin).second;
   }
   const Eigen::Index here = std::max(begin, span_at(s));
-  double least = off(here, here + 1);
+  auto least = off(here, here + 1);
+  const auto take_nearer = [&](const std::pair<double, Deviation>& other) {
+    if (other.first < least.first) {
+      least = other;
+    }
+  };
   for (Eigen::Index k = here; k-- > std::max(begin, here - most_lines) && times_[k + 1] >= s - deviation_window;) {
-    least = std::min(least, off(k, k + 1));
+    take_nearer(off(k, k + 1));
   }
   for (Eigen::Index k = here + 1; k < std::min(num - 1, here + most_lines) && times_[k] <= s + deviation_window; ++k) {
-    least = std::min(least, off(k, k + 1));
+    take_nearer(off(k, k + 1));
   }
-  return least;
+  return least.second;
 }
 
 double JointTrajectory::rate(double s) const noexcept {

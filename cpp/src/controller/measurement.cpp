@@ -15,6 +15,7 @@ namespace {
 
 constexpr int samples_to_begin_anew = 5;  // in a row that disagree with the reference: fewer are faults of the measurement
 constexpr double longest_gap = 0.1;       // [s] between two steps after which one sample is enough: no loop is so late
+constexpr double longest_periods = 5.0;   // the same, of loops of long periods [periods]
 constexpr double measuring_error =
     0.01;  // [rad] between two samples beside what velocities explain: two to ten times an encoder's noise
 constexpr double sliding_error = 0.2;        // the same of joints that slide, as a share of that [m/rad]
@@ -23,8 +24,8 @@ constexpr double most_lag = 0.1;             // [s] at the velocity limit that a
 constexpr double largest_speed = 1e3;        // [rad/s | m/s] of joints whose velocity has no limit, to compare their errors
 constexpr double moved_for = 1.0;            // [s] for which `explain` says that the arm was moved
 constexpr double velocity_leap = 0.1;        // of the velocity limit, by which no motor changes a velocity in a period [-]
-constexpr double least_velocity_leap = 0.1;  // [rad/s | m/s] the same, of slow joints: velocities are noisy
-constexpr double rest_jitter = 0.1;          // [rad/s | m/s] of an arm that may be measured at the same place again
+constexpr double least_velocity_leap = 0.1;  // [rad/s] the same, of slow joints: velocities are noisy
+constexpr double rest_jitter = 0.1;          // [rad/s] of an arm that may be measured at the same place again
 constexpr double rate_rounding = 1e-9;       // of a torque's largest change, relative: rounding of the program
 
 }  // namespace
@@ -34,8 +35,8 @@ void Controller::Impl::judge_sample() noexcept {
   const auto now = std::chrono::steady_clock::now();
   const double elapsed = m.elapsed =
       std::isnan(m.replayed_elapsed) ? std::chrono::duration<double>(now - m.stepped_at).count() : m.replayed_elapsed;
-  const bool paused = elapsed > longest_gap, was_unusable = std::exchange(m.unusable, false);
-  m.stepped_at = now;
+  const double longest = std::max(longest_gap, longest_periods * settings.period);
+  const bool paused = elapsed > longest, was_unusable = std::exchange(m.unusable, false);
   m.q = arm_q_;
   m.v = arm_v_;
   m.agrees = true;
@@ -82,7 +83,8 @@ void Controller::Impl::compare_sample(double elapsed, bool& is_near, bool& is_po
   // An arm whose drives track the reference comes nearer to it in a step that is late; one that is moved by torque moves on.
   const Measurement& m = measurement_;
   const double T = settings.period;
-  const double late = drives_track_ || settings.synchronous ? 0.0 : std::min(elapsed, longest_gap);
+  const double late =
+      drives_track_ || settings.synchronous ? 0.0 : std::min(elapsed, std::max(longest_gap, longest_periods * settings.period));
   const double most = drives_track_ ? settings.tracking.servo_lag : settings.tracking.largest_error;
   const double time = std::max(late, T * (1 + m.disagreeing));
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
@@ -98,7 +100,11 @@ void Controller::Impl::compare_sample(double elapsed, bool& is_near, bool& is_po
 void Controller::Impl::check_repetition() noexcept {
   // The same numbers again although the arm moves: they are old.
   Measurement& m = measurement_;
-  const bool same = m.q == m.last_q && m.v == m.last_v && m.v.cwiseAbs().maxCoeff() > rest_jitter;
+  bool same = m.q == m.last_q && m.v == m.last_v, moves = false;
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    moves = moves || std::abs(m.v[j]) > (is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0) * rest_jitter;
+  }
+  same = same && moves;
   m.repeated = same ? m.repeated + 1 : 0;
   if (!same || m.repeated * settings.period > longest_gap) {
     return;
@@ -118,7 +124,8 @@ void Controller::Impl::check_velocity() noexcept {
   bool any = false;
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
     const double moved = (m.q[j] - m.last_q[j]) / settings.period;
-    const bool leaps = std::abs(m.v[j] - expected_v_[j]) > std::max(velocity_leap * speed[j], least_velocity_leap) &&
+    const double noise = (is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0) * least_velocity_leap;
+    const bool leaps = std::abs(m.v[j] - expected_v_[j]) > std::max(velocity_leap * speed[j], noise) &&
                        std::abs(moved - m.v[j]) > std::abs(moved - expected_v_[j]);
     any = any || leaps;
     if (leaps && !stays) {

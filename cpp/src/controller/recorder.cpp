@@ -31,6 +31,9 @@ recording::PoseRecord to_record(const PoseGoal& goal) {
 }  // namespace
 
 bool RecordRing::has_room(std::uint64_t end) noexcept {
+  if (end - head_.load(std::memory_order_relaxed) > bytes_.size()) {
+    return false;  // one record alone is too large
+  }
   while (end - tail_.load(std::memory_order_acquire) > bytes_.size()) {
     if (!waits_.load(std::memory_order_relaxed)) {
       return false;
@@ -366,15 +369,15 @@ std::filesystem::path next_of_folder(const std::string& name) {
     stem += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '.' ? c : '_';
   }
   for (int n = 1; n <= most_recordings; ++n) {
-    char number[16];
+    char number[32];
     std::snprintf(number, sizeof number, "-%03d.step", n);
     const std::filesystem::path path = std::filesystem::path(folder) / (stem + number);
     if (std::FILE* const made = std::fopen(path.string().c_str(), "wbx")) {  // no other program takes this name
       std::fclose(made);
       return path;
     }
-    if (!std::filesystem::exists(path)) {
-      throw std::system_error(errno, std::generic_category(), "cannot write recording '" + path.string() + "'");
+    if (const int refused = errno; !std::filesystem::exists(path)) {
+      throw std::system_error(refused, std::generic_category(), "cannot write recording '" + path.string() + "'");
     }
   }
   throw std::runtime_error("there are too many recordings in '" + std::string(folder) + "'");

@@ -43,7 +43,6 @@ class ChunkReader {
     const std::uint64_t header = recording::tag_size + sizeof(std::uint64_t), check = sizeof(std::uint32_t);
     begin_ = at_;
     if (size_ - at_ < header + check) {
-      cut_ = size_ > at_;
       return false;
     }
     whole_.resize(static_cast<std::size_t>(header));
@@ -51,7 +50,6 @@ class ChunkReader {
     recording::Decoder in(std::span<const std::byte>(whole_).subspan(recording::tag_size));
     const auto length = in.take<std::uint64_t>();
     if (length > largest_chunk || length > size_ - at_ - check) {
-      cut_ = true;
       return false;
     }
     whole_.resize(static_cast<std::size_t>(header + length + check));
@@ -68,7 +66,6 @@ class ChunkReader {
   }
 
   bool damaged() const noexcept { return damaged_; }
-  bool cut() const noexcept { return cut_; }
   std::uint64_t begin() const noexcept { return begin_; }
 
   std::string_view tag;
@@ -86,7 +83,7 @@ class ChunkReader {
   std::filesystem::path path_;
   std::ifstream stream_;
   std::uint64_t size_ = 0, at_ = 0, begin_ = 0;
-  bool damaged_ = false, cut_ = false;
+  bool damaged_ = false;
   std::vector<std::byte> whole_;
 };
 

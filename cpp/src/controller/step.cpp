@@ -69,8 +69,9 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   }
   if (pace_ < 1.0 && !pulls_ && !is_fallback(status) &&
       !(guide && followed_ == &reference_ && guide->following().route_number != 0)) {
-    // Paths, trajectories and velocities are slowed themselves. What pulls straight is damped, at no pace like a stop.
-    wanted_ = pace_ * wanted_ - (1.0 - pace_) / settings.stop_time * v_;
+    // Paths, trajectories and velocities are slowed themselves. What pulls straight is damped, at no pace like a stop; the way out of
+    // a barrier is not.
+    wanted_ = pace_ * (wanted_ - workspace.recovery) - (1.0 - pace_) / settings.stop_time * v_ + workspace.recovery;
   }
   if (is_stale() || !measurement_.agrees) {
     wanted_ = -v_ / settings.stop_time;
@@ -96,6 +97,7 @@ const Command& Controller::Impl::step(ConstVectorRef q, ConstVectorRef v, const 
   last_torque_ = command.torque;
   last_acceleration_ = command.acceleration;
   has_last_torque_ = torque;
+  measurement_.stepped_at = std::chrono::steady_clock::now();  // a pause begins where a step ends, however long it planned
   return command;
 }
 
@@ -190,8 +192,13 @@ void Controller::Impl::report(bool known) noexcept {
   command.input_change.setZero();
   command.deviation = command.delay = 0.0;
   if (const TrajectoryOrder* order = trajectory_order(); order != nullptr && known && !begins_input_) {
-    command.deviation =
-        clock_.time < order->path.first() ? (path_q_ - q_).cwiseAbs().maxCoeff() : order->path.deviation(clock_.time, q_);
+    if (clock_.time < order->path.first()) {
+      command.deviation = (path_q_ - q_).cwiseAbs().maxCoeff(&deviating_);
+    } else {
+      const JointTrajectory::Deviation off = order->path.deviation(clock_.time, q_);
+      command.deviation = off.value;
+      deviating_ = off.joint;
+    }
     command.delay = clock_.delay;
   }
   command.wanted = wanted_;
@@ -212,10 +219,13 @@ void Controller::Impl::report(bool known) noexcept {
     command.activity = is_stale() ? Activity::stale : has_goal() ? Activity::waiting : Activity::no_goal;
     if (drives_track_ && known_before_) {
       command.velocity = next_v_;
-      command.position = next_q_ - turns_;
+      command.position = next_q_;
     } else {
       command.velocity.setZero();
-      command.position = last_arm_q_ - turns_;
+      command.position = last_arm_q_;
+    }
+    for (Eigen::Index j = 0; j < q_.size(); ++j) {
+      command.position[j] = within_limits(command.position[j], j) - turns_[j];
     }
     return;
   }

@@ -80,6 +80,7 @@ struct StepState {
   double order_age_ = 0.0;  // [s]
   Eigen::VectorXd wanted_v_, last_wanted_v_, pulled_;
   bool has_last_wanted_v_ = false;
+  Eigen::Index deviating_ = 0;  // joint that is farthest from its trajectory
   Reduction reduction_;
   Vector6d twist_ = Vector6d::Zero();  // asked for, in axes of the world
   Eigen::VectorXd ideal_v_;            // of an arm that responds to the wanted velocity and meets no limit

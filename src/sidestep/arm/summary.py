@@ -12,8 +12,10 @@ from sidestep import _core
 if TYPE_CHECKING:
     from sidestep.arm.arm import Arm
 
-ASSUMED_ACCELERATION = 10.0  # [rad/s^2 | m/s^2] `sidestep.robot.limits.DEFAULT_ACCELERATION_LIMIT`
-ASSUMED_JERK = 100.0  # [1/s] times the acceleration limit
+ASSUMED_ACCELERATION = (
+    10.0  # [rad/s^2 | m/s^2] of `sidestep.robot.limits`, which needs packages; a test compares
+)
+ASSUMED_JERK = 100.0  # [1/s] times the acceleration limit; likewise
 
 
 def summary_of(arm: Arm) -> str:
@@ -73,5 +75,5 @@ def _reach(tree: _core.Robot) -> float:
     return max(
         float(np.linalg.norm(tree.pose(q, name)[:3, 3]))
         for q in rng.uniform(lower, upper, (500, len(lower)))
-        for name in names[-3:]
+        for name in names[-3:]  # the outermost: none before them gets farther
     )

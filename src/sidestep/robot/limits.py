@@ -127,7 +127,10 @@ def _followers(urdf: Urdf, name: str, drives: Mapping[str, Drive]) -> list[tuple
 def _bounded_by_followers(
     urdf: Urdf, name: str, own: tuple[float, float], drives: Mapping[str, Drive]
 ) -> tuple[float, float]:
-    """Position limits `own` of a joint, less what takes those that mimic it beyond theirs."""
+    """Position limits `own` of a joint, less what takes those that mimic it beyond theirs.
+
+    Where that leaves no place, as of fingers that mimic the other way round with copied limits, its own alone.
+    """
     lower, upper = own
     said = [f"its own [{lower:g}, {upper:g}]"]
     for follower, drive in _followers(urdf, name, drives):
@@ -142,10 +145,12 @@ def _bounded_by_followers(
         ends = sorted((bound - drive.offset) / drive.multiplier for bound in (least, most))
         lower, upper = max(lower, ends[0]), min(upper, ends[1])
     if not lower < upper:
-        raise ValueError(
-            f"{urdf.label}: joint {name!r} = q has no place within the limits of itself and of the joints that mimic "
-            f"it: {', '.join(said)}; correct them, or lock {name!r}"
+        urdf.remarks.add(
+            "it has no place within the limits of itself and of the joints that mimic it, so that its own alone count: "
+            f"{', '.join(said)}; correct them",
+            f"joint {name!r} = q",
         )
+        return own
     return lower, upper
 
 

@@ -51,7 +51,12 @@ class JointTrajectory {
   void sample(double s, Eigen::VectorXd& q, Eigen::VectorXd& velocity, Eigen::VectorXd& acceleration) const noexcept;
   /// Distance of q from the straight lines between the samples, as they were given, in the farthest joint [rad | m]: the nearest
   /// of the lines within 0.05 s of s. No allocation.
-  double deviation(double s, const Eigen::VectorXd& q) const noexcept;
+  /// Joint: the farthest.
+  struct Deviation {
+    double value = 0.0;  ///< [rad | m]
+    Eigen::Index joint = 0;
+  };
+  Deviation deviation(double s, const Eigen::VectorXd& q) const noexcept;
   /// Time on the stamps as they were given, where the clock is at s.
   double stamp(double s) const noexcept;
   /// Time of the first sample.

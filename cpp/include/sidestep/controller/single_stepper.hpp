@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 
@@ -14,21 +15,22 @@ class SingleStepper {
       return false;
     }
     const std::thread::id now = std::this_thread::get_id();
-    changed_ = last_ != std::thread::id() && now != last_;
-    same_ = changed_ ? 0 : same_ + 1;
-    if (changed_) {
-      ++changes_;
+    const bool changed = last_ != std::thread::id() && now != last_;
+    same_ = changed ? 0 : std::min(same_ + 1, settled + 1);
+    if (changed) {
+      changes_ = std::min(changes_ + 1, most_changes + 1);
     } else if (same_ > settled) {
       changes_ = 0;
     }
     last_ = now;
+    in_turn_.store(changed && changes_ > most_changes, std::memory_order_relaxed);
     return true;
   }
   /// Ends the step of the thread that is inside.
   void leave() noexcept { inside_.store(false, std::memory_order_release); }
   /// Whether the last step came from another thread than the one before, and that again and again: two loops that share a
   /// controller, each with a state of its own. Handing a loop over to another thread is none.
-  bool in_turn() const noexcept { return changed_ && changes_ > most_changes; }
+  bool in_turn() const noexcept { return in_turn_.load(std::memory_order_relaxed); }
 
  private:
   static constexpr int settled = 1000;    // steps of one thread after which earlier changes do not count
@@ -37,7 +39,7 @@ class SingleStepper {
   std::atomic<bool> inside_{false};
   std::thread::id last_;
   int changes_ = 0, same_ = 0;
-  bool changed_ = false;
+  std::atomic<bool> in_turn_{false};
 };
 
 }  // namespace sidestep
