@@ -10,7 +10,8 @@
 
 namespace sidestep {
 
-/// How safe a command is, by severity. Every command may be sent.
+/// How safe a command is, by severity. Every command may be sent; before a usable state was known its position is NaN, and nothing
+/// is to be sent to drives that take positions.
 enum class SafetyStatus {
   ok,              ///< the motion is what the goal asks for, or within 5 % of the velocity or twist that was asked for
   limited,         ///< a limit of the arm or a clearance changes it
