@@ -73,6 +73,6 @@ def test_what_is_wrong_is_named() -> None:
     with pytest.raises(ValueError, match=r"joint 'fr3_joint4' of sample 1 is 3.0.*allowed: -3.0"):
         c.set_trajectory([ARM.neutral, np.where(np.arange(NV) == 3, 3.0, ARM.neutral)], [0.0, 1.0])
     with pytest.raises(ValueError, match=r"time 1 is 0.0"):
-        c.set_trajectory(np.array([ARM.neutral, ARM.neutral]), [0.0, 0.0])
+        c.set_trajectory(np.array([ARM.neutral, ARM.neutral + 0.01]), [0.0, 0.0])
     with pytest.raises(ValueError, match=r"controller: inputs.lead is 0 rad, allowed: 0.001"):
         controller(inputs=InputSettings(lead=0.0))

@@ -350,3 +350,54 @@ def test_a_command_after_an_unusable_state_is_within_the_limits() -> None:
     q[0] = arm.limits.upper[0] + 0.002  # by the noise of an encoder
     assert c.step(q, 0.0 * q).position[0] <= arm.limits.upper[0]
     assert c.step(q * np.nan, 0.0 * q).position[0] <= arm.limits.upper[0]
+
+
+@pytest.mark.parametrize("output", ["position", "velocity", "torque", "acceleration"])
+@without_pauses
+def test_a_loop_that_goes_on_in_degrees_stops(arm: ss.Arm, output: str) -> None:
+    """However many samples agree with each other: five are the first of another place only where an arm can be."""
+    controller, q, last = arrived(arm, output)
+    for k in range(100):
+        command = controller.step(np.degrees(q), np.zeros(len(q)))
+        assert (np.abs(command.position - last.position) <= PERIOD * arm.limits.velocity).all()
+        assert (command.position >= arm.limits.lower).all()
+        assert (command.position <= arm.limits.upper).all()
+        if k > SAMPLES:
+            assert command.status == ss.SafetyStatus.stopping
+            assert "in degrees?" in controller.explain()
+    command = controller.step(q, np.zeros(len(q)))
+    assert command.status < ss.SafetyStatus.tracking_lost
+    assert (np.abs(command.position - q) <= 0.01).all()  # [rad] of arrival
+
+
+@pytest.mark.parametrize("output", ["position", "velocity"])
+@without_pauses
+def test_an_arm_that_is_led_away_slowly_and_let_go_does_not_leap(arm: ss.Arm, output: str) -> None:
+    controller, q, _ = arrived(arm, output)
+    controller.clear_goal()
+    held, rest = q + np.array([0.0, 0.0, 0.5, 0, 0, 0, 0]), np.zeros(len(q))
+    for share in np.linspace(0.0, 1.0, 2000):  # 0.25 rad/s, which no sample alone gives away
+        controller.step(q + share * (held - q), rest)
+    for _ in range(400):  # it may only be late
+        command = controller.step(held, rest)
+    assert np.abs(command.position - held).max() > 0.4
+    for _ in range(200):
+        command = controller.step(held, rest)
+    assert np.abs(command.position - held).max() < 0.01
+    assert np.abs(command.velocity).max() < 0.01
+    assert command.status == ss.SafetyStatus.ok
+
+
+@without_pauses
+def test_what_leads_a_velocity_back_is_within_its_limits(arm: ss.Arm) -> None:
+    controller, q, last = arrived(arm, "velocity")
+    controller.clear_goal()
+    rest, before = np.zeros(len(q)), last.velocity
+    for k in range(300):  # off, back and unusable
+        away = q + (0.009 if k < 200 else 0.0) * np.array([1.0, 0, -1.0, 0, 1.0, 0, 0])
+        command = controller.step(np.full(len(q), np.nan) if 100 <= k < 120 else away, rest)
+        assert (np.abs(command.velocity - before) <= PERIOD * arm.limits.acceleration * (1 + 1e-9)).all()
+        assert (np.abs(command.velocity) <= arm.limits.velocity).all()
+        before = command.velocity
+        if k == 90:
+            assert command.velocity[0] == pytest.approx(-0.018, abs=0.002)  # drift_gain 2/s

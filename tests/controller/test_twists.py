@@ -323,3 +323,16 @@ def test_a_rotation_that_is_left_free_is_not_read() -> None:
     assert c.questions == []
     with pytest.raises(ValueError, match="allowed: finite numbers"):
         c.set_twist("fr3_hand", [np.nan, 0.0, 0.1, 0.0, 0.0, 0.0], free="rotation")
+
+
+def test_a_rotation_alone_is_not_said_to_be_stretched() -> None:
+    arm = ss.Arm.load("fr3")
+    for axis in range(3, 6):
+        for sign in (0.5, -0.5):
+            c, q, v, words = controller(arm), arm.neutral, np.zeros(7), ""
+            for _ in range(12):
+                q, v, _ = drive(c, q, v, "fr3_hand", [*(np.eye(6)[axis] * sign)], 500)
+                words += c.explain() + "\n"
+            assert "slower than asked" in words
+            assert "stretched" not in words
+            assert "folded" not in words

@@ -282,12 +282,16 @@ class Controller::Impl : private StepState {
   void judge_sample() noexcept;
   /// Whether the sample is near the reference, can be reached from the last one that was taken, and from the last sample.
   void compare_sample(double elapsed, bool& is_near, bool& is_possible, bool& is_steady) const noexcept;
+  /// Whether the arm rests away from what its drives were commanded, for longer than they lag.
+  bool rests_elsewhere() noexcept;
   /// Bridges a sample that is an old one again.
   void check_repetition() noexcept;
   /// Replaces velocities that leap alone.
   void check_velocity() noexcept;
   /// Begins where the arm is what a first step begins; the goal stays.
   void begin_anew() noexcept;
+  /// Adds to the commanded velocity what leads an arm back to its reference, within its limits of velocity and acceleration.
+  void add_drift(bool known) noexcept;
   /// Of a sample that was bridged: the clearances and the error that are reported.
   void look_at_sample() noexcept;
   /// The last guard of the torque's rate, for what comes from elsewhere than the program.

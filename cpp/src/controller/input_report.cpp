@@ -270,7 +270,7 @@ std::string Controller::Impl::explain_singular() const {
            "' like that; free='rotation' leaves its rotation free";
   }
   const Eigen::Vector3d lost = reduction_.lost.head<3>();
-  if (lost.norm() < reduction_.lost.tail<3>().norm()) {
+  if (twist_.head<3>().isZero() || lost.norm() < reduction_.lost.tail<3>().norm()) {
     return "as the arm is at a singular configuration, where '" + twist.frame.name + "' cannot turn that way";
   }
   const Eigen::Vector3d reach = p - origins[origins.size() - std::min<std::size_t>(2, origins.size())];  // from the shoulder

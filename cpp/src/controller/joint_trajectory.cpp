@@ -39,7 +39,8 @@ void check_samples(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::Ve
   }
   for (Eigen::Index k = 0; k < times.size(); ++k) {
     const double least = k == 0 ? 0.0 : times[k - 1];
-    if (!std::isfinite(times[k]) || (k == 0 ? times[k] < 0.0 : times[k] <= least)) {
+    const bool again = k > 0 && times[k] == least && q.col(k) == q.col(k - 1);  // a recorder may write a sample twice
+    if (!std::isfinite(times[k]) || (k == 0 ? times[k] < 0.0 : times[k] <= least && !again)) {
       refuse_trajectory("time " + std::to_string(k) + " is " + std::to_string(times[k]) +
                         " s, allowed: " + (k == 0 ? "0 or more" : "more than the one before, " + std::to_string(least)));
     }

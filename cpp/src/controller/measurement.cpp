@@ -26,6 +26,8 @@ constexpr double moved_for = 1.0;            // [s] for which `explain` says tha
 constexpr double velocity_leap = 0.1;        // of the velocity limit, by which no motor changes a velocity in a period [-]
 constexpr double least_velocity_leap = 0.1;  // [rad/s] the same, of slow joints: velocities are noisy
 constexpr double rest_jitter = 0.1;          // [rad/s] of an arm that may be measured at the same place again
+constexpr double still = 0.005;              // [rad] between the samples of an arm that rests
+constexpr double rest_to_begin_anew = 0.5;   // [s] of it, away from the command
 constexpr double rate_rounding = 1e-9;       // of a torque's largest change, relative: rounding of the program
 
 }  // namespace
@@ -54,13 +56,21 @@ void Controller::Impl::judge_sample() noexcept {
   } else {
     // Without a torque that depends on it the arm can wait until the samples agree with each other.
     m.disagreeing = drives_track_ && !is_steady ? 1 : m.disagreeing + 1;
-    if (m.disagreeing >= samples_to_begin_anew || paused || was_unusable) {
+    const bool anew = m.disagreeing >= samples_to_begin_anew || paused || was_unusable;
+    if (anew && plausible_.impossible(m.q, m.v).joint >= 0) {  // in another unit: not the arm, from the next sample on
+      plausible_before_ = false;
+      m.is_bridged = true;
+    } else if (anew) {
       m.disagreeing = 0;
       m.agrees = begins_anew_ = true;
       m.moved_until = time_ + moved_for;
     } else {
       m.is_bridged = !is_possible;
     }
+  }
+  if (drives_track_ && m.agrees && !begins && !begins_anew_ && rests_elsewhere()) {
+    begins_anew_ = true;
+    m.moved_until = time_ + moved_for;
   }
   if (!begins && !begins_anew_ && !drives_track_ && !m.is_bridged) {
     check_repetition();
@@ -95,6 +105,21 @@ void Controller::Impl::compare_sample(double elapsed, bool& is_near, bool& is_po
     is_possible = is_possible && error <= expected + speed * time + rounding;
     is_steady = is_steady && std::abs(m.q[j] - m.last_q[j]) <= speed * std::max(late, T) + rounding;
   }
+}
+
+bool Controller::Impl::rests_elsewhere() noexcept {
+  // Led away slowly, or kept from moving: no sample alone is impossible, yet drives that are let go would leap.
+  Measurement& m = measurement_;
+  bool moves = !m.is_far;
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    const double scale = is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0;
+    moves = moves || std::abs(m.q[j] - m.anchor[j]) > scale * still;
+  }
+  if (moves) {
+    m.anchor = m.q;
+    m.anchored_at = time_;
+  }
+  return time_ - m.anchored_at >= rest_to_begin_anew;
 }
 
 void Controller::Impl::check_repetition() noexcept {
@@ -144,6 +169,7 @@ void Controller::Impl::begin_anew() noexcept {
     next_v_ = (feedback_.array() * next_v_.array() > 0.0).select(0.0, next_v_);
   }
   last_acceleration_.setZero();
+  drift_.setZero();
   last_measured_v_ = arm_v_;
   has_last_wanted_v_ = has_ideal_v_ = false;
   avoiding_ = pending_ = false;
@@ -154,6 +180,17 @@ void Controller::Impl::begin_anew() noexcept {
   target_blocked_ = rests_ = false;
   num_lowered_ = -1;
   next_posture_ = next_look_ = 0.0;
+}
+
+void Controller::Impl::add_drift(bool known) noexcept {
+  const JointLimits& limits = arm.robot().limits();
+  for (Eigen::Index j = 0; j < q_.size(); ++j) {
+    const double last = v_[j] + drift_[j], step = limits.acceleration[j] * settings.period;
+    const double most = std::max(limits.velocity[j], std::abs(next_v_[j]));
+    const double wanted = next_v_[j] + (known ? settings.tracking.drift_gain * (q_[j] - arm_q_[j]) : 0.0);
+    command.velocity[j] = std::clamp(std::clamp(wanted, last - step, last + step), -most, most);
+  }
+  drift_ = command.velocity - next_v_;
 }
 
 void Controller::Impl::look_at_sample() noexcept {

@@ -220,6 +220,9 @@ void Controller::Impl::report(bool known) noexcept {
     if (drives_track_ && known_before_) {
       command.velocity = next_v_;
       command.position = next_q_;
+      if (settings.output == ControllerSettings::Output::velocity) {
+        add_drift(false);
+      }
     } else {
       command.velocity.setZero();
       command.position = last_arm_q_;
@@ -231,7 +234,7 @@ void Controller::Impl::report(bool known) noexcept {
   }
   command.velocity = next_v_;
   if (settings.output == ControllerSettings::Output::velocity) {
-    command.velocity += settings.tracking.drift_gain * (q_ - arm_q_);
+    add_drift(true);
   }
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
     command.position[j] = within_limits(next_q_[j], j) - turns_[j];

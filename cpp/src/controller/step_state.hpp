@@ -31,6 +31,8 @@ struct StepState {
     Eigen::VectorXd q, v, last_q, last_v;  // as measured, in this step and in the last
     Eigen::VectorXd predicted;             // where the arm is by the last step
     Eigen::VectorXd turns;                 // of the last sample that was taken
+    Eigen::VectorXd anchor;                // near which an arm that is far from its command has been since
+    double anchored_at = 0.0;              // [s]
     int disagreeing = 0;                   // samples in a row
     int repeated = 0;                      // samples in a row that are the same although the arm moves
     int leaps = 0;                         // samples in a row whose velocity leaps and whose position does not
@@ -46,6 +48,7 @@ struct StepState {
     std::chrono::steady_clock::time_point stepped_at{};
   } measurement_;
   bool begins_anew_ = false;  // where the next usable sample is
+  Eigen::VectorXd drift_;     // of an output of velocity, beside that of the reference [rad/s | m/s]
   bool has_last_torque_ = false;
   Eigen::VectorXd reference_torque_, last_torque_, last_acceleration_, expected_v_, last_measured_v_, coupling_, feedback_,
       gravity_, gravity_change_;
