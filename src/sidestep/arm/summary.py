@@ -22,11 +22,14 @@ def summary_of(arm: Arm) -> str:
     """Name, joints with limits, reach, mass, tip, body, and what was assumed; one fact a line."""
     tree, limits = _core.Arm(arm).robot, arm.limits
     slides = {joint.coordinate for joint in tree.joints if joint.type == _core.JointType.prismatic}
+    assumed = [
+        limits.acceleration[j] == ASSUMED_ACCELERATION
+        and limits.jerk[j] == ASSUMED_JERK * limits.acceleration[j]
+        for j in range(arm.num_coordinates)
+    ]
     lines = [f"{arm.name}: {arm.num_coordinates} joints, from {arm.provenance.source!r}"]
     for j, name in enumerate(tree.coordinate_names):
         unit = "m" if j in slides else "rad"
-        acceleration, jerk = limits.acceleration[j], limits.jerk[j]
-        assumed = acceleration == ASSUMED_ACCELERATION and jerk == ASSUMED_JERK * acceleration
         effort = (
             f", {limits.effort[j]:.4g} {'N' if j in slides else 'Nm'}"
             if np.isfinite(limits.effort[j])
@@ -34,7 +37,7 @@ def summary_of(arm: Arm) -> str:
         )
         lines.append(
             f"  {name}: {_range(limits.lower[j], limits.upper[j], unit)}, {limits.velocity[j]:.4g} {unit}/s, "
-            f"{acceleration:.4g} {unit}/s²{' (usual default)' if assumed else ''}{effort}"
+            f"{limits.acceleration[j]:.4g} {unit}/s²{' (usual default)' if assumed[j] else ''}{effort}"
         )
     tip = max(enumerate(tree.frames), key=lambda frame: (frame[1].joint, frame[0]))[1].name
     lines.append(f"  tip {tip!r}, up to {_reach(tree):.2f} m from the base")
@@ -49,11 +52,7 @@ def summary_of(arm: Arm) -> str:
     )
     if not np.isfinite(limits.effort).all():
         lines.append("  no effort limits in some joints: no torque output")
-    if all(
-        limits.acceleration[j] == ASSUMED_ACCELERATION
-        and limits.jerk[j] == ASSUMED_JERK * limits.acceleration[j]
-        for j in range(arm.num_coordinates)
-    ):
+    if all(assumed):
         lines.append(
             f"  acceleration {ASSUMED_ACCELERATION:g} /s² and jerk {ASSUMED_JERK * ASSUMED_ACCELERATION:g} /s³ in all "
             "joints are what is assumed where a description has none; acceleration_limits and jerk_limits set them"

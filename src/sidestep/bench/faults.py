@@ -16,16 +16,14 @@ from sidestep._core import Controller, Obstacles
 from sidestep.bench.campaign import Row, run_campaign
 from sidestep.bench.encounters import (
     Encounter,
-    EncounterJudge,
     IdealPlant,
     Plant,
     Sense,
     TorquePlant,
     as_it_is,
-    load_with_meshes,
     run_encounter,
 )
-from sidestep.bench.moving import ALL_COLUMNS, SEEN_EVERY, TWO_COLUMNS, EncounterMaker
+from sidestep.bench.moving import ALL_COLUMNS, SEEN_EVERY, TWO_COLUMNS, EncounterMaker, maker_and_judge
 from sidestep.bench.parallel import Progress
 from sidestep.distance import ExactClearance, SceneObject
 from sidestep.obstacles import Box, Capsule, Shape, Sphere, obstacles_from_shapes, pose_at
@@ -214,13 +212,9 @@ def run_faults(
 class _Worker:
     def __init__(self, settings: FaultSettings) -> None:
         self._settings = settings
-        self._arms: dict[str, tuple[EncounterMaker, EncounterJudge]] = {}
 
     def run(self, task: _Task) -> Row:
-        if task.robot not in self._arms:
-            arm, robot = load_with_meshes(task.robot)
-            self._arms[task.robot] = EncounterMaker(arm, robot), EncounterJudge(robot)
-        maker, judge = self._arms[task.robot]
+        maker, judge = maker_and_judge(task.robot)
         encounter = fault_encounter(maker, task.case, task.index, seed=self._settings.seed)
         torque = self._settings.torque
         plant: Plant = (

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -135,13 +135,9 @@ def run_moving(
 class _Worker:
     def __init__(self, settings: MovingSettings) -> None:
         self._settings = settings
-        self._makers: dict[str, tuple[EncounterMaker, EncounterJudge]] = {}
 
     def run(self, task: MovingTask) -> Row:
-        if task.robot not in self._makers:
-            arm, robot = load_with_meshes(task.robot)
-            self._makers[task.robot] = EncounterMaker(arm, robot), EncounterJudge(robot)
-        maker, judge = self._makers[task.robot]
+        maker, judge = maker_and_judge(task.robot)
         encounter = maker.make(task, seed=self._settings.seed)
         torque = self._settings.torque
         plant = TorquePlant(maker.robot, encounter.start) if torque else IdealPlant(encounter.start)
@@ -252,6 +248,13 @@ class EncounterMaker:
             if self._exact.among([solid]).distance(start).distance > FROM_ARM:
                 return solid
         return None
+
+
+@cache
+def maker_and_judge(robot: str) -> tuple[EncounterMaker, EncounterJudge]:
+    """Of a robot by its name, once in a process."""
+    arm, meshes = load_with_meshes(robot)
+    return EncounterMaker(arm, meshes), EncounterJudge(meshes)
 
 
 def _shape(solid: SceneObject, time: float, velocity: Array) -> Shape:

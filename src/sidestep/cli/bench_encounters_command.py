@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeAlias
 
@@ -43,19 +43,10 @@ def drives(
     Judged on exact meshes between samples. Steps beyond limits count before the first contact. Exit code: 0 when no
     drive touches anything from which there is a way out, and velocity, position and torque limits are kept; else 1.
     """
-    from sidestep.bench import DriveSettings, default_jobs, drive_table, parse_shard, run_drives
+    from sidestep.bench import DriveSettings, drive_table, run_drives
 
-    settings = DriveSettings(
-        **({"robots": tuple(robot)} if robot else {}), torque=torque, moving=moving, count=count, seed=seed
-    )
-    rows = _rows(
-        "drives",
-        quiet,
-        json,
-        lambda show: run_drives(
-            settings, file=file, shard=parse_shard(shard), jobs=jobs or default_jobs(), progress=show
-        ),
-    )
+    settings = DriveSettings(**_given(robots=robot), torque=torque, moving=moving, count=count, seed=seed)
+    rows = _rows("drives", run_drives, settings, file, shard, jobs, json, quiet)
     table = drive_table(rows)
     shown = figures_table(
         "robot", "drives", "contacts", "way out", "speeds [rad/s]", "self", "jerk", "acceleration", "others"
@@ -102,27 +93,14 @@ def moving(
     UR10 run every cell, other arms exact and untold. Judged on exact meshes between samples; for each contact a way out
     is searched. Exit code: 0 when nothing was touched from which there was a way out, else 1.
     """
-    from sidestep.bench import MovingSettings, Told, default_jobs, moving_table, parse_shard, run_moving
+    from sidestep.bench import MovingSettings, Told, moving_table, run_moving
 
     for item in told or ():
         if item not in list(Told):
             raise ValueError(f"--told is {item!r}; allowed: {', '.join(Told)}")
-    given: dict[str, Any] = {}
-    if robot:
-        given["robots"] = tuple(robot)
-    if told:
-        given["told"] = tuple(Told(item) for item in told)
-    if speed:
-        given["speeds"] = tuple(speed)
+    given = _given(robots=robot, told=[Told(item) for item in told or ()], speeds=speed)
     settings = MovingSettings(**given, runs=runs, torque=torque, seed=seed)
-    rows = _rows(
-        "moving",
-        quiet,
-        json,
-        lambda show: run_moving(
-            settings, file=file, shard=parse_shard(shard), jobs=jobs or default_jobs(), progress=show
-        ),
-    )
+    rows = _rows("moving", run_moving, settings, file, shard, jobs, json, quiet)
     table = moving_table(rows)
     columns = list(dict.fromkeys(name for cells in table.values() for name in cells))
     shown = figures_table("contacts (way out) / runs", *columns)
@@ -161,22 +139,11 @@ def faults(
     In MuJoCo under torque. Judged on exact meshes between samples; limits count before the first contact. Exit code:
     0 when nothing was touched, else 1.
     """
-    from sidestep.bench import FaultSettings, default_jobs, fault_table, parse_shard, run_faults
+    from sidestep.bench import FaultSettings, fault_table, run_faults
 
-    given: dict[str, Any] = {}
-    if robot:
-        given["robots"] = tuple(robot)
-    if case:
-        given["cases"] = tuple(case)
+    given = _given(robots=robot, cases=case)
     settings = FaultSettings(**given, runs=runs, torque=not acceleration, seed=seed)
-    rows = _rows(
-        "faults",
-        quiet,
-        json,
-        lambda show: run_faults(
-            settings, file=file, shard=parse_shard(shard), jobs=jobs or default_jobs(), progress=show
-        ),
-    )
+    rows = _rows("faults", run_faults, settings, file, shard, jobs, json, quiet)
     table = fault_table(rows)
     limits = ("position", "velocity", "torque", "torque rate")
     shown = figures_table("fault", "runs", "contacts", "silent", "self", *limits)
@@ -190,13 +157,29 @@ def faults(
     _end(shown, {"bench": "faults", "table": table, "rows": rows}, json, quiet, bad=bad)
 
 
+def _given(**options: Sequence[Any] | None) -> dict[str, Any]:
+    """The options that were given; the others have the defaults of the settings."""
+    return {name: tuple(values) for name, values in options.items() if values}
+
+
 def _rows(
     title: str,
-    quiet: bool,
+    run: Callable[..., list[Row]],
+    settings: object,
+    file: Path | None,
+    shard: str,
+    jobs: int | None,
     json: str | None,
-    run: Callable[[Callable[[int, int, str], None]], list[Row]],
+    quiet: bool,
 ) -> list[Row]:
-    return with_bar(console(quiet=quiet, to_stderr=json == "-"), title, run)
+    from sidestep.bench import default_jobs, parse_shard
+
+    part, processes = parse_shard(shard), jobs or default_jobs()
+    return with_bar(
+        console(quiet=quiet, to_stderr=json == "-"),
+        title,
+        lambda show: run(settings, file=file, shard=part, jobs=processes, progress=show),
+    )
 
 
 def _end(shown: object, document: Row, json: str | None, quiet: bool, *, bad: bool) -> NoReturn:
