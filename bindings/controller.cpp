@@ -334,7 +334,8 @@ void bind_controller(nb::module_& m) {
           nb::arg("q").none(), nb::arg("times").none(), nb::arg("behaviour").none() = "keep_path",
           nb::sig("def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, "
                   "behaviour: TrajectoryBehaviour | str = 'keep_path') -> None"),
-          "Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing. Cubics between them keep\n"
+          "Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing, but for a\n"
+          "sample that is there twice. Cubics between them keep\n"
           "monotone samples monotone and dwells still, and are within 0.01 rad (2 mm) of the straight lines. A first time after\n"
           "zero, 3600 s at most, leaves that long to get to the first sample, which need not be where the arm is. Stamps that\n"
           "limits do not allow because samples bunch up move by up to 0.2 s; where it is still too fast, the clock slows down.\n"

@@ -3417,7 +3417,8 @@ class Controller:
 
     def set_trajectory(self, q: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, behaviour: TrajectoryBehaviour | str = 'keep_path') -> None:
         """
-        Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing. Cubics between them keep
+        Joint positions q (K, nv) [rad | m] at times (K,) [s] from the next step on, increasing, but for a
+        sample that is there twice. Cubics between them keep
         monotone samples monotone and dwells still, and are within 0.01 rad (2 mm) of the straight lines. A first time after
         zero, 3600 s at most, leaves that long to get to the first sample, which need not be where the arm is. Stamps that
         limits do not allow because samples bunch up move by up to 0.2 s; where it is still too fast, the clock slows down.

@@ -98,7 +98,7 @@ void Controller::Impl::compare_sample(double elapsed, bool& is_near, bool& is_po
   const double most = drives_track_ ? settings.tracking.servo_lag : settings.tracking.largest_error;
   const double time = std::max(late, T * (1 + m.disagreeing));
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
-    const double scale = is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0, rounding = scale * measuring_error;
+    const double scale = error_scale(j), rounding = scale * measuring_error;
     const double speed = speed_excess * arm.robot().limits().velocity[j];
     const double error = std::abs(next_q_[j] - m.q[j]), expected = std::abs(next_q_[j] - m.predicted[j]);
     is_near = is_near && error <= scale * most;
@@ -112,7 +112,7 @@ bool Controller::Impl::rests_elsewhere() noexcept {
   Measurement& m = measurement_;
   bool moves = !m.is_far;
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
-    const double scale = is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0;
+    const double scale = error_scale(j);
     moves = moves || std::abs(m.q[j] - m.anchor[j]) > scale * still;
   }
   if (moves) {
@@ -122,12 +122,16 @@ bool Controller::Impl::rests_elsewhere() noexcept {
   return time_ - m.anchored_at >= rest_to_begin_anew;
 }
 
+double Controller::Impl::error_scale(Eigen::Index j) const noexcept {
+  return is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0;
+}
+
 void Controller::Impl::check_repetition() noexcept {
   // The same numbers again although the arm moves: they are old.
   Measurement& m = measurement_;
   bool same = m.q == m.last_q && m.v == m.last_v, moves = false;
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
-    moves = moves || std::abs(m.v[j]) > (is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0) * rest_jitter;
+    moves = moves || std::abs(m.v[j]) > error_scale(j) * rest_jitter;
   }
   same = same && moves;
   m.repeated = same ? m.repeated + 1 : 0;
@@ -136,7 +140,7 @@ void Controller::Impl::check_repetition() noexcept {
   }
   m.is_bridged = true;
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
-    const double scale = is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0;
+    const double scale = error_scale(j);
     m.agrees = m.agrees && std::abs(m.predicted[j] - m.q[j]) <= scale * measuring_error;
   }
 }
@@ -149,7 +153,7 @@ void Controller::Impl::check_velocity() noexcept {
   bool any = false;
   for (Eigen::Index j = 0; j < q_.size(); ++j) {
     const double moved = (m.q[j] - m.last_q[j]) / settings.period;
-    const double noise = (is_sliding_[static_cast<std::size_t>(j)] ? sliding_error : 1.0) * least_velocity_leap;
+    const double noise = error_scale(j) * least_velocity_leap;
     const bool leaps = std::abs(m.v[j] - expected_v_[j]) > std::max(velocity_leap * speed[j], noise) &&
                        std::abs(moved - m.v[j]) > std::abs(moved - expected_v_[j]);
     any = any || leaps;

@@ -36,7 +36,7 @@ struct TrajectorySamples {
 /// which the clock can still brake before all that follows.
 class JointTrajectory {
  public:
-  /// q (nv × K) [rad | m] at times (K) [s], increasing, the first from 0 to 3600 s; of `robot`, within its position limits.
+  /// q (nv × K) [rad | m] at times (K) [s], increasing but for samples that are there twice, the first from 0 to 3600 s; of `robot`, within its position limits.
   /// velocity, acceleration (nv): limits. Throws std::invalid_argument that names the sample, the joint, its value and what
   /// is allowed.
   JointTrajectory(const Robot& robot, const Eigen::MatrixXd& q, const Eigen::VectorXd& times, const Eigen::VectorXd& velocity,
