@@ -11,7 +11,7 @@
 #include <variant>
 #include <vector>
 
-#include "sidestep/barrier/link_pair.hpp"
+#include "sidestep/body/link_pair.hpp"
 
 namespace sidestep {
 class Obstacles;

@@ -1,5 +1,5 @@
-#include "sidestep/model/arm.hpp"
-#include "sidestep/model/attachment.hpp"
+#include "sidestep/arm/arm.hpp"
+#include "sidestep/arm/attachment.hpp"
 
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/pair.h>

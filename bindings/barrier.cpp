@@ -13,15 +13,15 @@
 
 #include "arguments.hpp"
 #include "module.hpp"
-#include "sidestep/barrier/clearance_barrier.hpp"
-#include "sidestep/barrier/clearance_table_barrier.hpp"
+#include "sidestep/attractor/clearance_barrier.hpp"
+#include "sidestep/attractor/clearance_table_barrier.hpp"
 #include "sidestep/thesis/collision_density.hpp"
-#include "sidestep/barrier/joint_limit_barrier.hpp"
+#include "sidestep/attractor/joint_limit_barrier.hpp"
 #include "sidestep/thesis/joint_limit_potential.hpp"
-#include "sidestep/barrier/self_collision_barrier.hpp"
+#include "sidestep/attractor/self_collision_barrier.hpp"
 #include "sidestep/thesis/sum.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
-#include "sidestep/kinematics/multiply_add_rate.hpp"
+#include "sidestep/math/instruction_set.hpp"
+#include "sidestep/math/multiply_add_rate.hpp"
 
 namespace sidestep::python {
 void check_fitted_to(const Robot& robot, const Body& body) {

@@ -10,10 +10,10 @@
 #include "arguments.hpp"
 #include "module.hpp"
 #include "settings.hpp"
-#include "sidestep/control/acceleration_bounds.hpp"
-#include "sidestep/control/acceleration_filter.hpp"
-#include "sidestep/control/quadratic_program.hpp"
-#include "sidestep/control/torque_controller.hpp"
+#include "sidestep/constraints/acceleration_bounds.hpp"
+#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/math/quadratic_program.hpp"
+#include "sidestep/constraints/torque_controller.hpp"
 
 namespace sidestep::python {
 namespace {

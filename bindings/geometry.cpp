@@ -1,6 +1,6 @@
 #include "arguments.hpp"
 #include "module.hpp"
-#include "sidestep/geometry/graph_metric.hpp"
+#include "sidestep/attractor/graph_metric.hpp"
 
 namespace sidestep::python {
 namespace {

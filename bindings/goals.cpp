@@ -6,7 +6,7 @@
 
 #include "system.hpp"
 #include "sidestep/controller/posture_search.hpp"
-#include "sidestep/system/goal.hpp"
+#include "sidestep/attractor/goal.hpp"
 
 namespace sidestep::python {
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include "sidestep/interruption.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/math/interruption.hpp"
+#include "sidestep/scene/obstacles.hpp"
 
 namespace sidestep::python {
 

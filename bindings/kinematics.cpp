@@ -4,7 +4,7 @@
 
 #include "arguments.hpp"
 #include "module.hpp"
-#include "sidestep/kinematics/kinematic_state.hpp"
+#include "sidestep/robot/kinematic_state.hpp"
 
 namespace sidestep::python {
 namespace {

@@ -1,4 +1,4 @@
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/scene/obstacles.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>

@@ -13,7 +13,7 @@
 #include "interruptible.hpp"
 #include "module.hpp"
 #include "settings.hpp"
-#include "sidestep/system/goal.hpp"
+#include "sidestep/attractor/goal.hpp"
 #include "sidestep/planning/online_planner.hpp"
 #include "sidestep/planning/rrt_connect.hpp"
 

@@ -13,9 +13,9 @@
 #include "system.hpp"
 #include "interruptible.hpp"
 #include "module.hpp"
-#include "sidestep/system/local_minimum_recovery.hpp"
-#include "sidestep/lookahead/look_ahead.hpp"
-#include "sidestep/system/progress_monitor.hpp"
+#include "sidestep/attractor/local_minimum_recovery.hpp"
+#include "sidestep/planning/look_ahead.hpp"
+#include "sidestep/math/progress_monitor.hpp"
 #include "sidestep/thesis/rollout.hpp"
 
 namespace sidestep::python {

@@ -6,7 +6,7 @@
 #include "arguments.hpp"
 #include "system.hpp"
 #include "module.hpp"
-#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
 
 namespace sidestep::python {
 namespace {

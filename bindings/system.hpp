@@ -5,7 +5,7 @@
 #include <string>
 
 #include "arguments.hpp"
-#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
 
 namespace sidestep::python {
 

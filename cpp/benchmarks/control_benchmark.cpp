@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "sidestep/control/acceleration_filter.hpp"
-#include "sidestep/control/torque_controller.hpp"
+#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/constraints/torque_controller.hpp"
 #include "support/serial_arm.hpp"
 
 namespace {

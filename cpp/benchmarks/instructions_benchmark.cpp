@@ -8,12 +8,12 @@
 #include <memory>
 
 #include "scenes.hpp"
-#include "sidestep/control/acceleration_filter.hpp"
-#include "sidestep/system/geometric_system.hpp"
-#include "sidestep/barrier/clearance_barrier.hpp"
+#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
+#include "sidestep/attractor/clearance_barrier.hpp"
 #include "sidestep/thesis/collision_density.hpp"
-#include "sidestep/barrier/joint_limit_barrier.hpp"
-#include "sidestep/barrier/self_collision_barrier.hpp"
+#include "sidestep/attractor/joint_limit_barrier.hpp"
+#include "sidestep/attractor/self_collision_barrier.hpp"
 
 int main(int argc, char** argv) {
   using namespace sidestep;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/kinematics/robot.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/robot/robot.hpp"
+#include "sidestep/scene/obstacles.hpp"
 
 // What the benchmarks time: an arm, its body and an obstacle, at the settings of the thesis's Table 6.1.
 namespace sidestep::benchmarks {

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "scenes.hpp"
-#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
 #include "sidestep/thesis/collision_density.hpp"
 #include "timing.hpp"
 

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
 #include "sidestep/thesis/collision_density.hpp"
-#include "sidestep/kinematics/robot.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/robot/robot.hpp"
+#include "sidestep/scene/obstacles.hpp"
 
 using namespace sidestep;
 

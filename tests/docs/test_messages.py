@@ -16,7 +16,7 @@ SOURCES = (
     "controller/plausibility.cpp",
     "controller/input_report.cpp",
     "controller/speed.cpp",
-    "system/diagnosis.cpp",
+    "attractor/diagnosis.cpp",
 )
 LEAST_WORDS = 3  # of a phrase; less only joins parts of a sentence
 

@@ -4,5 +4,5 @@
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/motion.hpp"
 #include "sidestep/controller/real_time.hpp"
-#include "sidestep/model/arm.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/arm/arm.hpp"
+#include "sidestep/scene/obstacles.hpp"

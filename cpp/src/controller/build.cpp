@@ -7,13 +7,13 @@
 #include <string>
 #include <utility>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
-#include "sidestep/barrier/clearance_barrier.hpp"
-#include "sidestep/barrier/clearance_table_barrier.hpp"
-#include "sidestep/barrier/holding_torque.hpp"
-#include "sidestep/barrier/joint_limit_barrier.hpp"
-#include "sidestep/barrier/self_collision_barrier.hpp"
+#include "sidestep/attractor/clearance_barrier.hpp"
+#include "sidestep/attractor/clearance_table_barrier.hpp"
+#include "sidestep/clearance/holding_torque.hpp"
+#include "sidestep/attractor/joint_limit_barrier.hpp"
+#include "sidestep/attractor/self_collision_barrier.hpp"
 
 namespace sidestep {
 namespace {

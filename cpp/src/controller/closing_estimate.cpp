@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 
 namespace sidestep {
 namespace {

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "sidestep/barrier/clearance_field.hpp"
-#include "sidestep/barrier/clearances.hpp"
+#include "sidestep/clearance/clearance_field.hpp"
+#include "sidestep/clearance/clearances.hpp"
 #include "sidestep/body/body.hpp"
-#include "sidestep/kinematics/kinematic_state.hpp"
-#include "sidestep/kinematics/robot.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/robot/kinematic_state.hpp"
+#include "sidestep/robot/robot.hpp"
+#include "sidestep/scene/obstacles.hpp"
 
 namespace sidestep {
 

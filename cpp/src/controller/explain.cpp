@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

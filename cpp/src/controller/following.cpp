@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

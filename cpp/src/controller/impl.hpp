@@ -15,17 +15,17 @@
 #include <variant>
 #include <vector>
 
-#include "sidestep/control/acceleration_filter.hpp"
-#include "sidestep/control/triple_buffer.hpp"
+#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/math/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 #include "sidestep/controller/motion.hpp"
 #include "sidestep/controller/plausibility.hpp"
 #include "sidestep/controller/posture_search.hpp"
-#include "sidestep/barrier/stopping_clearance.hpp"
-#include "sidestep/system/local_minimum_recovery.hpp"
-#include "sidestep/lookahead/look_ahead.hpp"
+#include "sidestep/clearance/stopping_clearance.hpp"
+#include "sidestep/attractor/local_minimum_recovery.hpp"
+#include "sidestep/planning/look_ahead.hpp"
 #include "closing_estimate.hpp"
-#include "failsafe.hpp"
+#include "../guard/failsafe.hpp"
 #include "step_state.hpp"
 
 namespace sidestep {

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 
-#include "sidestep/kinematics/kinematic_state.hpp"
+#include "sidestep/robot/kinematic_state.hpp"
 
 namespace sidestep {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

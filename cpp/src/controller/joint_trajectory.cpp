@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "../control/cholesky.hpp"
-#include "../settings.hpp"
+#include "../math/cholesky.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "../batch.hpp"
+#include "../math/batch.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

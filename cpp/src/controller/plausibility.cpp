@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 
 namespace sidestep {
 namespace {

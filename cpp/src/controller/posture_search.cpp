@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "../system/random_configuration.hpp"
-#include "../settings.hpp"
+#include "../attractor/random_configuration.hpp"
+#include "../math/settings.hpp"
 
 namespace sidestep {
 namespace {

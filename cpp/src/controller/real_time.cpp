@@ -11,7 +11,7 @@
 #include <sys/prctl.h>
 #endif
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 
 namespace sidestep {
 namespace {

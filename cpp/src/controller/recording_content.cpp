@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "../model/arm_file.hpp"
+#include "../arm/arm_file.hpp"
 
 namespace sidestep::recording {
 namespace {

@@ -9,7 +9,7 @@
 #include "recording_bytes.hpp"
 #include "sidestep/controller/command.hpp"
 #include "sidestep/controller/recording.hpp"
-#include "sidestep/kinematics/instruction_set.hpp"
+#include "sidestep/math/instruction_set.hpp"
 #include "sidestep/planning/timed_path.hpp"
 
 // What the chunks of a recording hold, see recording.hpp. Each `describe` serves both directions.

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

@@ -6,12 +6,12 @@
 #include <limits>
 #include <optional>
 
-#include "sidestep/control/disturbance_observer.hpp"
+#include "sidestep/constraints/disturbance_observer.hpp"
 #include "sidestep/controller/plausibility.hpp"
-#include "sidestep/kinematics/robot.hpp"
-#include "sidestep/lookahead/avoidance_trajectory.hpp"
-#include "sidestep/planning/body_clearance.hpp"
-#include "sidestep/system/goal.hpp"
+#include "sidestep/robot/robot.hpp"
+#include "sidestep/planning/avoidance_trajectory.hpp"
+#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/attractor/goal.hpp"
 #include "input.hpp"
 
 namespace sidestep {

@@ -4,8 +4,8 @@
 #include <limits>
 #include <numbers>
 
-#include "../control/cholesky.hpp"
-#include "../settings.hpp"
+#include "../math/cholesky.hpp"
+#include "../math/settings.hpp"
 #include "impl.hpp"
 
 namespace sidestep {

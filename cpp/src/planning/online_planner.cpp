@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 
 namespace sidestep {
 namespace {

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 #include "sidestep/planning/path_smoothing.hpp"
-#include "sidestep/planning/random_stream.hpp"
+#include "sidestep/math/random_stream.hpp"
 
 namespace sidestep {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 
 namespace sidestep {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "../kinematics/kernels/in_use.hpp"
+#include "../math/kernels/in_use.hpp"
 #include "kernels/density_kernel.hpp"
 
 namespace sidestep {

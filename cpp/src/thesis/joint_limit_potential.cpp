@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "../settings.hpp"
+#include "../math/settings.hpp"
 
 namespace sidestep {
 

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "../batch.hpp"
+#include "../math/batch.hpp"
 #include "rollout_rows.hpp"
 
 namespace sidestep {

@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "sidestep/controller/controller.hpp"
-#include "sidestep/barrier/body_ellipsoid.hpp"
-#include "sidestep/barrier/ellipsoid_gap.hpp"
+#include "sidestep/body/body_ellipsoid.hpp"
+#include "sidestep/clearance/ellipsoid_gap.hpp"
 #include "support/allocations.hpp"
 #include "support/covered_arm.hpp"
 #include "support/numbers.hpp"

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "sidestep/system/goal.hpp"
-#include "sidestep/model/arm.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/attractor/goal.hpp"
+#include "sidestep/arm/arm.hpp"
+#include "sidestep/scene/obstacles.hpp"
 #include "support/serial_arm.hpp"
 
 namespace sidestep::test {

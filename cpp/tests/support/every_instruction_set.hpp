@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "sidestep/kinematics/instruction_set.hpp"
+#include "sidestep/math/instruction_set.hpp"
 
 namespace sidestep::test {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "sidestep/obstacles/obstacles.hpp"
-#include "sidestep/planning/body_clearance.hpp"
+#include "sidestep/scene/obstacles.hpp"
+#include "sidestep/clearance/body_clearance.hpp"
 
 namespace sidestep::test {
 

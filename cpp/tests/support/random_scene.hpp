@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/kinematics/robot.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/robot/robot.hpp"
+#include "sidestep/scene/obstacles.hpp"
 #include "support/random.hpp"
 
 namespace sidestep::test {

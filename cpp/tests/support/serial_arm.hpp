@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "sidestep/kinematics/robot.hpp"
+#include "sidestep/robot/robot.hpp"
 #include "support/random.hpp"
 
 namespace sidestep::test {

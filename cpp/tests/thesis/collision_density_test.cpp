@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "sidestep/kinematics/instruction_set.hpp"
+#include "sidestep/math/instruction_set.hpp"
 #include "support/every_instruction_set.hpp"
 #include "support/random_scene.hpp"
 

@@ -15,7 +15,7 @@ from sidestep.body.cover import CoverSettings
 from sidestep.body.cover_problem import EFFORTS
 from sidestep.robot import Robot
 
-FORMAT_VERSION = 1  # to be raised with the version of the file format (cpp/src/model/arm_file.cpp)
+FORMAT_VERSION = 1  # to be raised with the version of the file format (cpp/src/arm/arm_file.cpp)
 
 
 def arm_path(

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "sidestep/interruption.hpp"
+#include "sidestep/math/interruption.hpp"
 
 namespace sidestep {
 

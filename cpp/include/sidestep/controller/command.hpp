@@ -4,9 +4,9 @@
 #include <limits>
 #include <vector>
 
-#include "sidestep/control/acceleration_bounds.hpp"
-#include "sidestep/control/torque_controller.hpp"
-#include "sidestep/system/geometric_system.hpp"
+#include "sidestep/constraints/acceleration_bounds.hpp"
+#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
 
 namespace sidestep {
 

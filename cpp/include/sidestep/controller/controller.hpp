@@ -16,11 +16,11 @@
 #include "sidestep/controller/recording.hpp"
 #include "sidestep/controller/settings.hpp"
 #include "sidestep/controller/single_stepper.hpp"
-#include "sidestep/system/goal.hpp"
+#include "sidestep/attractor/goal.hpp"
 #include "sidestep/planning/online_planner.hpp"
-#include "sidestep/model/arm.hpp"
-#include "sidestep/model/attachment.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
+#include "sidestep/arm/arm.hpp"
+#include "sidestep/arm/attachment.hpp"
+#include "sidestep/scene/obstacles.hpp"
 
 namespace sidestep {
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "sidestep/kinematics/robot.hpp"
+#include "sidestep/robot/robot.hpp"
 
 namespace sidestep {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sidestep/controller/controller.hpp"
-#include "sidestep/interruption.hpp"
+#include "sidestep/math/interruption.hpp"
 
 namespace sidestep {
 

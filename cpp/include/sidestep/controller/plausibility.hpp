@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "sidestep/kinematics/robot.hpp"
-#include "sidestep/obstacles/obstacles.hpp"
-#include "sidestep/system/goal.hpp"
+#include "sidestep/robot/robot.hpp"
+#include "sidestep/scene/obstacles.hpp"
+#include "sidestep/attractor/goal.hpp"
 
 namespace sidestep {
 

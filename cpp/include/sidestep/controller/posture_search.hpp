@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "sidestep/system/goal.hpp"
+#include "sidestep/attractor/goal.hpp"
 
 namespace sidestep {
 

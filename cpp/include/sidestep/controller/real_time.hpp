@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <thread>
 
-#include "sidestep/control/triple_buffer.hpp"
+#include "sidestep/math/triple_buffer.hpp"
 #include "sidestep/controller/controller.hpp"
 
 namespace sidestep {

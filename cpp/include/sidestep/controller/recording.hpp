@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "sidestep/controller/settings.hpp"
-#include "sidestep/interruption.hpp"
-#include "sidestep/model/arm.hpp"
+#include "sidestep/math/interruption.hpp"
+#include "sidestep/arm/arm.hpp"
 
 namespace sidestep {
 

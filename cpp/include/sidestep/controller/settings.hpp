@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "sidestep/control/safety_rows.hpp"
-#include "sidestep/control/speed_rows.hpp"
-#include "sidestep/system/local_minimum_recovery.hpp"
-#include "sidestep/lookahead/look_ahead.hpp"
-#include "sidestep/fields.hpp"
+#include "sidestep/constraints/safety_rows.hpp"
+#include "sidestep/constraints/speed_rows.hpp"
+#include "sidestep/attractor/local_minimum_recovery.hpp"
+#include "sidestep/planning/look_ahead.hpp"
+#include "sidestep/math/fields.hpp"
 #include "sidestep/planning/timed_path.hpp"
 #include "sidestep/planning/rrt_connect.hpp"
 

@@ -11,9 +11,9 @@
 #include <semaphore>
 #include <thread>
 
-#include "sidestep/control/triple_buffer.hpp"
-#include "sidestep/system/progress_monitor.hpp"
-#include "sidestep/planning/body_clearance.hpp"
+#include "sidestep/math/triple_buffer.hpp"
+#include "sidestep/math/progress_monitor.hpp"
+#include "sidestep/clearance/body_clearance.hpp"
 #include "sidestep/planning/plan.hpp"
 #include "sidestep/planning/timed_path.hpp"
 #include "sidestep/planning/rrt_connect.hpp"

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "sidestep/planning/body_clearance.hpp"
+#include "sidestep/clearance/body_clearance.hpp"
 
 namespace sidestep {
 

@@ -2,9 +2,9 @@
 
 #include <Eigen/Core>
 
-#include "sidestep/planning/body_clearance.hpp"
-#include "sidestep/planning/random_stream.hpp"
-#include "sidestep/interruption.hpp"
+#include "sidestep/clearance/body_clearance.hpp"
+#include "sidestep/math/random_stream.hpp"
+#include "sidestep/math/interruption.hpp"
 
 namespace sidestep {
 

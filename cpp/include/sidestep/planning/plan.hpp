@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "sidestep/barrier/embedding.hpp"
+#include "sidestep/attractor/embedding.hpp"
 
 namespace sidestep {
 

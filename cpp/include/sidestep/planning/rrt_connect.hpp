@@ -5,11 +5,11 @@
 #include <limits>
 #include <utility>
 
-#include "sidestep/fields.hpp"
-#include "sidestep/planning/body_clearance.hpp"
+#include "sidestep/math/fields.hpp"
+#include "sidestep/clearance/body_clearance.hpp"
 #include "sidestep/planning/path_smoothing.hpp"
 #include "sidestep/planning/plan.hpp"
-#include "sidestep/planning/random_stream.hpp"
+#include "sidestep/math/random_stream.hpp"
 #include "sidestep/planning/search_tree.hpp"
 
 namespace sidestep {

@@ -2,10 +2,10 @@
 
 #include <Eigen/Core>
 
-#include "sidestep/control/safety_rows.hpp"
-#include "sidestep/fields.hpp"
-#include "sidestep/model/dynamics.hpp"
-#include "sidestep/planning/body_clearance.hpp"
+#include "sidestep/constraints/safety_rows.hpp"
+#include "sidestep/math/fields.hpp"
+#include "sidestep/robot/dynamics.hpp"
+#include "sidestep/clearance/body_clearance.hpp"
 #include "sidestep/planning/path_timing.hpp"
 
 namespace sidestep {

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "sidestep/body/body.hpp"
-#include "sidestep/barrier/embedding.hpp"
+#include "sidestep/attractor/embedding.hpp"
 
 namespace sidestep {
 

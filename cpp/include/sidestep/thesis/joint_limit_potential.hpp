@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "sidestep/barrier/embedding.hpp"
+#include "sidestep/attractor/embedding.hpp"
 
 namespace sidestep {
 

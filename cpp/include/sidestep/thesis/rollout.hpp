@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "sidestep/system/geometric_system.hpp"
-#include "sidestep/interruption.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
+#include "sidestep/math/interruption.hpp"
 
 namespace sidestep {
 

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "sidestep/barrier/embedding.hpp"
+#include "sidestep/attractor/embedding.hpp"
 
 namespace sidestep {
 

@@ -1,13 +1,13 @@
 // Included by one file per instruction set, after density_kernel.hpp and intrinsics.hpp. Defines
 // add_density in an anonymous namespace.
 
-#include "../../kinematics/kernels/link_numbers.hpp"
+#include "../../robot/kernels/link_numbers.hpp"
 
 namespace sidestep::kernels {
 namespace {
 
-#include "../../kinematics/kernels/lanes.inl"
-#include "../../kinematics/kernels/vectors.inl"
+#include "../../robot/kernels/lanes.inl"
+#include "../../math/kernels/vectors.inl"
 
 constexpr double inverse_two_pi_cubed = 1.0 / 248.05021344239853;  // 1/(2π)³
 constexpr double least_exponent = -700.0;                          // below it a density is no normal number: taken as zero

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "sidestep/body/cover_refinement.hpp"
+#include "sidestep/arm/arm.hpp"
+#include "sidestep/scene/obstacles.hpp"
+
+namespace sidestep {
+
+/// An object that a link holds: a tool, something grasped. It is part of the arm: it keeps off obstacles and off the links
+/// that another joint moves, and its mass counts.
+struct Attachment {
+  std::string name;                                        ///< of its frame, which no other frame may have
+  std::string link;                                        ///< that holds it
+  Eigen::Isometry3d X_LA = Eigen::Isometry3d::Identity();  ///< its pose in the link's frame
+  SolidEllipsoids cover;                                   ///< ellipsoids that hold all of it, in its own frame
+  Inertial inertial;                                       ///< in its own frame; mass 0: unknown, or none
+  std::vector<std::string> may_touch;                      ///< links that get no clearance from it, as the fingers
+  std::vector<std::string> rests_on;  ///< names of obstacles that it stands on, until it is lifted; or `anything`
+
+  static constexpr const char* anything = "*";
+};
+
+/// The arm with an object attached: a frame, ellipsoids, pairs with every covered link that another joint moves, and its inertia
+/// with that of the link.
+/// At q (nv), where it is not empty, the object is apart from everything: a pair whose ellipsoids overlap there may stay as near as
+/// it is (LinkPair::contact), less `attached_room` [m].
+/// Throws std::invalid_argument that names the object and what is wrong: a name that is taken, a link that is unknown or that no
+/// joint moves, no ellipsoid or one that is none, an inertia that is none.
+Arm attach(const Arm& arm, const Attachment& object, const Eigen::VectorXd& q = {});
+
+/// What is implausible about the place of an object that an arm holds, in words that name the distance; empty: nothing. Its cover is
+/// farther from the links that move with its link than 2.5 times their size, that is 0.3 to 0.4 m. Or it is farther than 0.15 m,
+/// and its pose, read in the world's frame, puts it to them at q (nv), where that is not empty.
+std::string doubt(const Arm& holding, const Attachment& object, const Eigen::VectorXd& q = {});
+
+constexpr double attached_room = 0.001;
+
+/// An object that stands on something, and by how much its cover has given way there.
+struct RestingObject {
+  Attachment object;
+  /// The whole of an ellipsoid of the cover is within this distance of what is left of it [m], one per ellipsoid.
+  std::vector<double> given;
+};
+
+/// The object with ellipsoids cut down to smaller ones inside them, which keep `room` [m] off the points of obstacles that it rests
+/// on. With the ellipsoid {c + A u : |u| <= 1} and a plane at w·u = β there, w a unit vector, the smaller one is
+/// {c − (1 − β)/2 A w + A (√a I + (a − √a) w wᵀ) u}, a = (1 + β)/2: it touches the plane, and the ellipsoid on the other side.
+/// Throws std::invalid_argument that names the object and an obstacle: one that there is not, that it is more than
+/// `deepest_rest` [m] deep in, or that an ellipsoid lies wholly within the room of.
+RestingObject resting(const Robot& robot, const Attachment& object, const Eigen::VectorXd& q, const Obstacles& obstacles,
+                      double room);
+
+constexpr double deepest_rest = 0.03;
+
+}  // namespace sidestep

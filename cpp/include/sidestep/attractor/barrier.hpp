@@ -1,0 +1,73 @@
+#pragma once
+
+#include <algorithm>
+
+#include "sidestep/clearance/stopping_clearance.hpp"
+#include "sidestep/attractor/barrier_function.hpp"
+#include "sidestep/attractor/embedding.hpp"
+
+namespace sidestep {
+
+/// An embedding whose coordinates are barriers of clearances, ψ_k = f(h_k).
+///
+/// Every coordinate has an activation distance of its own, and whoever evaluates may ask for shorter ones
+/// (EmbeddingView::activations): where the arm has to come close, at its goal, the metric is else so steep that the
+/// pull to the goal is all but lost, and the arm creeps. The safety margin (SafetySettings) shrinks with it, of what is
+/// known and not seen: a link that has to come near another one can.
+class Barrier : public Embedding {
+ public:
+  int num_coordinates() const noexcept final { return static_cast<int>(activations_.size()); }
+
+  const BarrierFunction& function() const noexcept { return function_; }
+
+  /// The activation distance of every coordinate (m) [m | rad].
+  const Eigen::VectorXd& activations() const noexcept { return activations_; }
+
+  /// The floor of a coordinate: the barrier function's, shorter by as much as its own activation distance is.
+  double floor(Eigen::Index k) const noexcept { return function_.floor * activations_[k] / function_.activation; }
+
+  void write_activations(Eigen::Ref<Eigen::VectorXd> activations) const noexcept final { activations = activations_; }
+  void lower_activations(ConstVectorRef clearances, Eigen::Ref<Eigen::VectorXd> activations) const noexcept final;
+
+  /// Share of a clearance at the goal that remains of the activation distance there.
+  static constexpr double relaxed_share = 0.9;
+  /// No activation distance is made shorter than this many floors of the barrier function.
+  static constexpr double relaxed_floors = 2.0;
+  /// No more of an activation distance is kept as a safety margin, of what is not seen.
+  static constexpr double margin_share = 0.5;
+  /// Two links that usually are nearer than this [m] have an activation distance of a share of what is usual: one that they cannot
+  /// leave would hold them to no purpose, as of a wrist whose parts pass 4 mm apart all the way round. No shorter than `least_usual`.
+  static constexpr double usually_near = 0.011, least_usual = 0.001;
+
+ protected:
+  /// Throws std::invalid_argument that names `owner`, the setting at fault, its value and what is allowed.
+  Barrier(Robot robot, const BarrierFunction& function, const char* owner);
+
+  void set_num_coordinates(int num) { activations_.setConstant(num, function_.activation); }
+  /// Makes the activation distance of a coordinate shorter than the barrier function's.
+  void shorten_activation(int k, double most) { activations_[k] = std::min(activations_[k], most); }
+
+  /// For two links, by the median of their clearances over the whole range, if that is near.
+  void shorten_for_usual(int k, double median) {
+    if (median > 0.0 && median < usually_near) {
+      shorten_activation(k, std::max(relaxed_share * median, least_usual));
+    }
+  }
+
+  /// Within which what approaches is looked for: the activation distance beyond what can be closed while the arm stops.
+  Horizon horizon(const KinematicState& state) const noexcept {
+    return {Horizon::of_stop(state.v(), robot().limits()), function_.activation};
+  }
+
+  /// Adds ψ_k = f(h_k) with its derivatives, for every clearance that `out.clearances` holds.
+  void add_barriers(EmbeddingView out) const noexcept;
+
+  /// Whether the clearances are from points that a sensor sees, with errors that the safety margin covers.
+  virtual bool is_seen() const noexcept { return false; }
+
+ private:
+  BarrierFunction function_;
+  Eigen::VectorXd activations_;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <limits>
+#include <string>
+
+#include "sidestep/attractor/embedding.hpp"
+#include "sidestep/scene/obstacles.hpp"
+
+namespace sidestep {
+
+/// What the motion of one step is about.
+enum class MotionState {
+  free,             ///< on the way, nothing in it
+  sliding,          ///< on the way, bent by a barrier
+  arriving,         ///< as near to the goal as counts as there
+  stuck,            ///< at rest short of the goal: a local minimum, or a pose out of reach
+  blocked_at_goal,  ///< stuck, and the goal itself is inside a barrier
+  inside_barrier,   ///< a clearance is below its floor: moving out
+  fallback,         ///< the step is a fallback, nothing is known
+};
+
+/// Short names, for example "blocked_at_goal".
+const char* name(MotionState state) noexcept;
+
+/// What counts as what; the same for every robot and scene.
+namespace judgement {
+constexpr double arrived_joint = 0.05;     // [rad | m] as everywhere in this project
+constexpr double arrived_position = 0.01;  // [m]
+constexpr double arrived_rotation = 0.05;  // [rad]
+constexpr double slow = 0.02;              // |v| [rad/s]: at rest, but for what creeps
+constexpr double held = 0.05;              // share of the goal's pull that is left where an arm is stuck
+constexpr double vanished = 0.0025;        // |∂U| [rad/s²] that is none: a tenth of that of K = 0.5 at arrived_joint
+constexpr double noticed = 0.05;           // share of the pull that has to be blocked to be called sliding
+}  // namespace judgement
+
+/// Why a motion is what it is, from one step alone.
+///
+/// The goal pulls with −∂U; the metric lets −G⁻¹ ∂U through and holds back
+///
+///     b = ∂U − G⁻¹ ∂U = JᵀJ G⁻¹ ∂U = Σ_k b_k,      b_k = J_k (J_k · G⁻¹ ∂U),
+///
+/// an exact sum over the coordinates. The share of coordinate k is b_k·b / |b|², and the largest share dominates.
+///
+/// Stuck, by this test: the speed is under `slow`, the goal is not reached, and |G⁻¹ ∂U| < held |∂U|: nearly all of the
+/// pull is along gradients of active barriers, so that no direction is left in which the arm could follow it. That is a
+/// local minimum. A pull ∂U that vanishes short of the goal (a pose out of reach, a singular posture) is one as well,
+/// with no coordinate to blame. An arm that creeps faster than `slow` without coming nearer is a matter of time, see
+/// ProgressMonitor.
+struct Diagnosis {
+  MotionState state = MotionState::fallback;
+  int coordinate = -1;  ///< the dominating embedding coordinate, see GeometricSystem::labels; -1: none
+  int point = -1;       ///< its nearest obstacle point; -1: none
+  double clearance = std::numeric_limits<double>::infinity();  ///< of it [m | rad], where it has one
+  double share = 0.0;    ///< its share of what is held back; of several opposed ones it can exceed 1
+  double blocked = 0.0;  ///< 1 − |G⁻¹ ∂U| / |∂U|, the part of the goal's pull that is held back
+  double speed = 0.0;    ///< |v| [rad/s]
+  // How far the goal is, as in GoalPull; NaN where it has no such part.
+  double joint_error = nan, position_error = nan, rotation_error = nan;
+  bool slides = false;  ///< the joint of `joint_error` slides, so that it is in m
+
+  /// How far the goal is, for example "0.31 rad", "12.0 mm" or "12.0 mm and 0.31 rad".
+  std::string way_left() const;
+  /// Whether that counts as there.
+  bool is_near() const noexcept;
+
+  /// In one English sentence, given the label of the dominating coordinate and, for their names, the obstacles of the
+  /// step.
+  std::string describe(const CoordinateLabel& label, const Obstacles& obstacles = Obstacles::none()) const;
+
+ private:
+  static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+};
+
+}  // namespace sidestep

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "sidestep/scene/obstacles.hpp"
+
+namespace sidestep {
+
+/// How far places are from the nearest obstacle ball, remembered on grids that are filled where they are asked.
+///
+/// A cell keeps the distance d of its centre c. As a distance changes no faster than the place,
+///
+///     distance(x) ≥ d(c) − |x − c|,
+///
+/// which costs a look-up once somebody has asked near x. There are coarse cells for what is far away and fine ones for
+/// what is near, in blocks under a hash of their place, so that no workspace has to be stated. One per thread.
+class DistanceField {
+ public:
+  DistanceField();
+
+  /// Among these obstacles from now on; forgets the others unless they are the same, see Obstacles::version().
+  void follow(const Obstacles& obstacles) noexcept;
+
+  /// A lower bound of the distance of x [m] from the obstacles that `follow` was told of, which must be as they were.
+  /// One that is `enough`, or else the best that cells give: the distance less the diagonal of a fine one, 7 cm, at
+  /// most.
+  double bound(const Eigen::Vector3d& x, double enough, const Obstacles& obstacles) noexcept;
+
+ private:
+  static constexpr double block_edge = 0.16;  // [m]
+  static constexpr int divisions = 4;         // of it into fine cells
+  static constexpr int most_blocks = 4096;    // what lies outside them is measured each time
+  static constexpr std::uint32_t slots = 2 * most_blocks;
+  using Block = std::array<float, 1 + divisions * divisions * divisions>;  // the coarse cell is the block
+  struct Slot {
+    std::uint64_t key = 0;
+    std::uint64_t generation = 0;  // of the obstacles; others are empty slots
+    int block = 0;
+  };
+
+  float* block_of(std::uint64_t key) noexcept;
+
+  std::vector<Slot> slots_;
+  Slot last_;  // that was asked for last: places asked for one after another are often near each other
+  std::vector<Block> blocks_;
+  int used_ = 0;
+  std::uint64_t generation_ = 1;
+  std::uint64_t version_ = 0;
+};
+
+/// The distance of x from the nearest ball [m], not above `limit`.
+double distance_to_obstacles(const Eigen::Vector3d& x, const Obstacles& obstacles, double limit) noexcept;
+
+}  // namespace sidestep

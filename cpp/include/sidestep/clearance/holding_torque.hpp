@@ -1,0 +1,69 @@
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "sidestep/attractor/barrier.hpp"
+#include "sidestep/robot/dynamics.hpp"
+
+namespace sidestep {
+
+/// Which configurations an arm can rest in: where the torque that holds it against gravity is within the effort limits.
+///
+///     h_j(q) = (effort_j − |g_j(q)|) / weight_j  [m],
+///
+/// with the weight of all that joint j carries: how much farther out its centre of mass may be. (Of a sliding joint it is a share of
+/// that weight.) Where h_j is negative no controller can hold the arm, and it sinks onto what is below.
+class HoldingTorque {
+ public:
+  /// Of the joints that may come nearer to their limit than an activation distance of `most` [m] in any configuration; of the others
+  /// none can. `effort` (nv) [Nm | N] may be infinite.
+  HoldingTorque(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most);
+
+  /// What a joint holds, or several that share a coordinate.
+  struct Load {
+    struct Carrier {
+      int joint;
+      std::vector<int> carried;  // joints, the carrier first
+    };
+    int coordinate;
+    double effort;             ///< [Nm | N]
+    double weight;             ///< [N]
+    double activation;         ///< [m], no longer than a tenth of effort / weight
+    Eigen::VectorXd steepest;  ///< bounds |∂h/∂q| (nv) [m/rad]; infinite below a sliding joint without limits
+    Eigen::MatrixXd bend;      ///< bounds |∂²h/∂q²| (nv × nv) [m/rad²]
+    std::vector<Carrier> carriers;
+  };
+  const std::vector<Load>& loads() const noexcept { return loads_; }
+  const Robot& robot() const noexcept { return robot_; }
+
+  /// h [m]; its gradient into `gradient` (nv), its rate and its curvature at q̈ = 0. No allocation.
+  struct Room {
+    double value, rate, curvature;
+  };
+  Room at(const Load& load, const KinematicState& state, Eigen::Ref<Eigen::VectorXd> gradient) const noexcept;
+  /// h alone [m].
+  double value(const Load& load, const KinematicState& state) const noexcept;
+
+ private:
+  Robot robot_;
+  std::vector<Inertial> inertials_;
+  Eigen::Vector3d gravity_;
+  std::vector<Load> loads_;
+};
+
+/// One coordinate per load of HoldingTorque, a barrier of its room: the motion bends before it comes to where the arm would sink.
+/// It is no clearance from anything, so that Clearances::least says nothing of it.
+class HoldingTorqueBarrier final : public Barrier {
+ public:
+  /// Throws std::invalid_argument that names the setting, or if there is no load.
+  HoldingTorqueBarrier(HoldingTorque holding, BarrierFunction barrier);
+
+  void add_to(EmbeddingView out, const KinematicState& state, const Obstacles& obstacles) const noexcept override;
+  CoordinateLabel label(int k) const override;
+
+ private:
+  HoldingTorque holding_;
+};
+
+}  // namespace sidestep

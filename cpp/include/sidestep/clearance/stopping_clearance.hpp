@@ -1,0 +1,66 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sidestep/clearance/boltzmann_mean.hpp"
+#include "sidestep/robot/robot.hpp"
+
+namespace sidestep {
+
+/// How far ahead what approaches is looked for.
+///
+/// An arm that stops along its path in the time 2τ, every closing speed falling in proportion to time, comes to a
+/// clearance of h + τ h' where it closes in a straight line, and of more where it passes. The sample by which that is
+/// smallest is the critical sample: not always the nearest, past which the arm may move.
+struct Horizon {
+  double time = 0.0;                                           ///< τ [s]
+  double distance = -std::numeric_limits<double>::infinity();  ///< h + τ h' below which a sample counts [m]
+
+  static constexpr double longest = 0.5;  ///< τ [s] at most, whatever the limits
+  /// τ [s] at least for obstacles, unless an avoidance trajectory leads the arm past them: they may come at an arm at rest, and motors
+  /// may brake less hard than the limits say.
+  static constexpr double of_obstacles = 0.3;
+
+  /// τ = max_j |v_j| / (acceleration limit)_j / 2.
+  static double of_stop(const Eigen::VectorXd& v, const JointLimits& limits) noexcept {
+    double time = 0.0;
+    for (Eigen::Index j = 0; j < v.size(); ++j) {
+      time = std::max(time, 0.5 * std::abs(v[j]) / limits.acceleration[j]);  // keeps `time` if not a number
+    }
+    return std::min(time, longest);
+  }
+
+  /// The speed at which what moves with v may close in on what is seen at x from it, at most: n·v, where the unit
+  /// vector n goes from somewhere in a ball to somewhere x away in it. Given along = x·v, |x|, the ball's radius and
+  /// |v|.
+  static double closing_speed(double along, double distance, double radius, double speed) noexcept {
+    const double sine = radius / distance, component = along / distance;
+    const double cosine = std::sqrt(std::max(0.0, 1.0 - sine * sine));
+    if (!(sine < 1.0) || component >= speed * cosine) {
+      return speed;
+    }
+    return component * cosine + std::sqrt(std::max(0.0, speed * speed - component * component)) * sine;
+  }
+};
+
+/// Reduces samples of a clearance to the critical one, see Horizon: the means of h, h', h'' and ∂h, with
+/// weights exp(−(h + τ h')/T).
+class StoppingClearance {
+ public:
+  StoppingClearance(double temperature, double horizon) noexcept : inverse_T_(1.0 / temperature), horizon_(horizon) {}
+
+  void add(const ClearanceSample& sample) noexcept;
+
+  /// The mean of what was added; not to be called before.
+  ClearanceSample result() const noexcept;
+
+ private:
+  double inverse_T_, horizon_;
+  double reference_ = std::numeric_limits<double>::infinity();
+  double weight_ = 0.0;
+  ClearanceSample sum_{};
+};
+
+}  // namespace sidestep

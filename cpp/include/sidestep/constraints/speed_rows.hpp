@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sidestep/math/fields.hpp"
+#include "sidestep/robot/kinematic_state.hpp"
+#include "sidestep/robot/robot.hpp"
+
+namespace sidestep {
+
+// From a limit of Cartesian speed that depends on distance to linear constraints on the acceleration.
+//
+// Allowed speed. Let d be the distance to the nearest obstacle. Between (d₀, V₀), near, and (d₁, V₁), far,
+//     V(d)² = V₀² + 2 B (d − d₀),      B = (V₁² − V₀²) / 2 (d₁ − d₀),
+// is what braking along the way with B leaves: who comes nearer by its own motion, by V at most, brakes with V' V = B
+// wherever that is, 1.2 m/s² by default. What comes at w as well takes B (1 + w/V): most where V is small. A line from V₀
+// to V₁ would ask for the most where the arm is fastest.
+//
+// One frame at p. Its speed s = |ṗ| changes by n·p̈ with n = ṗ/s, and p̈ = J q̈ + J̇ v. With V₊ the limit after this
+// period, the room V − s shrinks to no less than the share 1 − kT of it if
+//     n·J q̈ ≤ (V₊ − V)/T + k (V − s) − n·J̇ v,      k = 50/s, no more than half per period.
+// So a limit is neared without a step in acceleration (the jerk k n·p̈ is half of the default jerk limit), and where it
+// is exceeded (an obstacle that appears), the excess decays by k. V stands for 98 % of the limit: the rest is for terms of
+// order T², |p̈|² T²/2s, and for the onset of closing.
+//
+// What a row may ask for: no more than its share of the stop along the path, n·J q̈ ≥ −s/τ with τ = max_j |v_j| /
+// (acceleration limit)_j. As −v/τ slows every frame by that, and is within the acceleration limits, one and the same
+// acceleration meets all rows. Where clearances or torque limits do not let it, rows give way together.
+
+struct SpeedLimitSettings {
+  double near_speed = 0.25;    ///< V₀ [m/s], kept at near_distance and nearer
+  double near_distance = 0.1;  ///< d₀ [m]
+  double far_speed = 1.5;      ///< V₁ [m/s], kept at far_distance and farther
+  double far_distance = 1.0;   ///< d₁ [m]
+
+  /// V [m/s] at a distance [m].
+  double allowed(double distance) const noexcept;
+  /// Throws std::invalid_argument that names the setting, its value and what is allowed.
+  void validate() const;
+};
+template <>
+const std::vector<Field<SpeedLimitSettings>>& fields();
+
+/// One linear constraint on the acceleration per frame that joints move: normal·q̈ ≤ upper, with unit normals.
+class SpeedRows {
+ public:
+  explicit SpeedRows(const Robot& robot);
+
+  /// The speed of the fastest frame [m/s], and which it is (-1: none moves).
+  struct Fastest {
+    double speed = 0.0;
+    int frame = -1;
+  };
+  Fastest fastest(const KinematicState& state) const noexcept;
+
+  /// The rows at a state whose frames may move with `limit` [m/s] now and `next_limit` after the period. No allocation.
+  void update(const KinematicState& state, const JointLimits& limits, double limit, double next_limit, double period) noexcept;
+
+  /// Whether every acceleration with box_lower <= q̈ <= box_upper satisfies row k.
+  bool satisfied_within(int k, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper) const noexcept;
+
+  int size() const noexcept { return size_; }
+  int max_size() const noexcept { return static_cast<int>(frames_.size()); }
+
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> normals;  ///< (max, nv), the first size() in use
+  Eigen::VectorXd upper;                                                           ///< (max) [rad/s²]
+  Eigen::VectorXd lengths;                                                         ///< (max) |n·J| [m/rad]
+  std::vector<int> frames;  ///< (max) which frame of the robot a row belongs to
+
+ private:
+  struct Place {
+    int frame, joint;
+    Eigen::Vector3d p;  // of the joint's child
+  };
+  std::vector<Place> frames_;
+  int size_ = 0;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,158 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <random>
+#include <variant>
+#include <vector>
+
+#include "sidestep/constraints/acceleration_filter.hpp"
+#include "sidestep/constraints/torque_controller.hpp"
+#include "sidestep/math/fields.hpp"
+#include "sidestep/math/interruption.hpp"
+#include "sidestep/planning/avoidance_trajectory.hpp"
+#include "sidestep/robot/dynamics.hpp"
+#include "sidestep/scene/obstacles.hpp"
+#include "sidestep/attractor/geometric_system.hpp"
+#include "sidestep/attractor/goal.hpp"
+
+namespace sidestep {
+
+struct LookAheadSettings {
+  double horizon = 2.0;      ///< [s] how far is looked ahead
+  double period = 0.01;      ///< [s] of the steps of the motions looked at; made shorter to go into `delay` whole times
+  double delay = 0.1;        ///< [s] from one look to the next, from when on is followed what it found
+  double clearance = 0.004;  ///< [m] that a motion has to keep from obstacles
+  int tries = 500;           ///< trajectories that are drawn in one look
+  std::uint64_t seed = 0;
+  // Of a Controller whose look-ahead runs in a thread. With enough processor time a look is at most two delays and one wake-up old.
+  double slow_after = 3.0;   ///< age of a look from which the arm is slowed, in delays
+  double rest_after = 10.0;  ///< age of a look at which the arm rests, in delays: 1 s, in which a person walks 1.6 m
+
+  /// The share of its speed that an arm may move at beside what moves, with a look of this age [s]: 1 up to slow_after delays,
+  /// then linear, to 0 at rest_after.
+  double pace(double age) const noexcept;
+
+  /// Throws std::invalid_argument that names the setting, its value and what is allowed.
+  void validate() const;
+};
+template <>
+const std::vector<Field<LookAheadSettings>>& fields();
+
+/// Leads an arm out of the way of what moves, in time: a barrier backs off along the line of approach until a joint
+/// limit stops the arm, where a step aside would have let it pass.
+///
+/// In a look the system, with clearances and limits as an AccelerationFilter keeps them or, where the dynamics are
+/// given, a TorqueController, is integrated from where the arm will be when the look has ended, with the obstacles
+/// moving on as they do. If on its way to the goal that comes nearer to an obstacle than `clearance`, and so does the
+/// trajectory that is followed already, trajectories to random configurations are drawn: near ones, far ones and such
+/// as are near that of the trajectory followed. They are filtered in three stages. Those come first whose references,
+/// without a filter, get farthest before the body is deep in an obstacle, which is quick to say. They are integrated by
+/// steps of 0.05 s, as many as there is time for; then those that keep farthest away by steps of `period`, until one is
+/// found that keeps `clearance`. If none does, that is followed whose least clearance is largest, or of those that go
+/// through an obstacle the one that comes to it last. The goal is followed again as soon as its own way is free.
+///
+/// A trajectory is no motion of the system, whose barriers would push the arm off it. The filter or the torque
+/// controller, which have to be there, keep the arm off obstacles and itself, and within limits. Where nothing moves,
+/// nothing is looked at.
+///
+/// Towards a goal without a pull, such as one outside the limits, the arm is taken to come to rest, as it does.
+///
+/// `look` is for another thread than the loop's: it takes as long as some thousand steps. `pursue` does the same in
+/// simulated time. One thread at a time.
+class LookAhead {
+ public:
+  /// Moves a goal on for a duration [s] while the arm is at q, v (nv): along a path, for example. Empty: as the goal's own
+  /// velocity says (`advance`). Each motion that is looked at has a copy.
+  using Leader = std::function<void(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double duration, Goal& goal)>;
+
+  /// Throws std::invalid_argument if there is no system, it has no clearances to obstacles, or a setting is at fault,
+  /// which it names. `dynamics`: of an arm that is moved by torque; of the system's robot.
+  explicit LookAhead(std::shared_ptr<const GeometricSystem> system, LookAheadSettings settings = {},
+                     std::optional<RigidBodyDynamics> dynamics = std::nullopt);
+
+  /// Looks ahead from q, v (nv) [rad | m, /s], which are of now, as are the obstacles and the trajectory that is
+  /// followed, if there is one. What is to be followed from `delay` on: a trajectory, or the system to the goal where
+  /// it is empty, as it is if nothing moves or the state is unusable. Allocates.
+  std::optional<AvoidanceTrajectory> look(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                          const Obstacles& obstacles,
+                                          const std::optional<AvoidanceTrajectory>& followed = std::nullopt,
+                                          const Leader& leader = {});
+
+  /// The trajectory to follow in a step of `period` [s] of a simulation, null where the goal is followed: looks every
+  /// `delay`, and follows what the look before found.
+  const AvoidanceTrajectory* pursue(const Goal& goal, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                    const Obstacles& obstacles, double period, const Leader& leader = {});
+  /// Whether the next `pursue` looks.
+  bool is_due(double period) const noexcept { return !(until_look_ > 0.5 * period); }
+  /// Before another motion is pursued: what was found is forgotten.
+  void reset() noexcept;
+  /// As if `pursue` had found a trajectory before. No allocation after the first time.
+  void resume(const AvoidanceTrajectory& trajectory) { found_ = pursued_ = trajectory; }
+
+  /// Ends a look once it says so, by an Interruption: what was found before stays.
+  void interrupt_when(Interrupted interrupted) { interrupted_ = std::move(interrupted); }
+
+  /// How many trajectories were found.
+  int count() const noexcept { return count_; }
+  const LookAheadSettings& settings() const noexcept { return settings_; }
+  int num_coordinates() const noexcept { return system_->robot().num_coordinates(); }
+
+ private:
+  /// An arm that follows a trajectory or, where it is empty, the system to a goal.
+  struct Motion {
+    Eigen::VectorXd q, v;
+    Obstacles obstacles;
+    Goal goal;
+    Leader leader;
+    std::optional<AvoidanceTrajectory> flight;
+  };
+  struct Tried {
+    double clearance;
+    AvoidanceTrajectory flight;
+  };
+  /// What integrates motions by a period [s].
+  struct Stepper {
+    double period;
+    std::variant<AccelerationFilter, TorqueController> limiter;  // the latter where the dynamics are given
+    int steps = 0;                                               // integrated so far
+
+    Stepper(const Robot& robot, double period, bool by_torque);
+  };
+
+  void check_interrupted() const;
+  /// Moves on by one period; the least clearance from obstacles at its beginning [m].
+  double advance(Motion& motion, Stepper& stepper);
+  /// The least clearance [m] of a motion up to the horizon, or any of it that is no more than `enough`. Of one that
+  /// goes through an obstacle less, by what is left of the horizon then, at 1 m/s.
+  double least_clearance(Motion motion, Stepper& stepper, double enough);
+  double obstacle_clearance() const noexcept;
+  /// Random trajectories from a state, those first whose references get farthest before the body is deep in an
+  /// obstacle.
+  std::vector<AvoidanceTrajectory> draw_flights(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
+  /// The trajectories from a state that keep farthest away in coarse steps, best first.
+  std::vector<Tried> promising(const Motion& now, const std::optional<AvoidanceTrajectory>& followed);
+  Eigen::VectorXd draw(const Eigen::VectorXd& q, double spread);
+
+  std::shared_ptr<const GeometricSystem> system_;
+  LookAheadSettings settings_;
+  GeometricSystem::Workspace workspace_;
+  int periods_;  // of a delay
+  std::optional<RigidBodyDynamics> dynamics_;
+  std::optional<RigidBodyDynamics::Workspace> dynamics_workspace_;
+  Eigen::MatrixXd mass_;  // of the state that is looked at
+  Eigen::VectorXd bias_;
+  Stepper fine_, coarse_;
+  TorqueSolution filtered_;
+  std::vector<Eigen::Index> of_obstacles_;  // coordinates
+  std::mt19937_64 random_;
+  std::optional<AvoidanceTrajectory> found_, pursued_;
+  double until_look_ = 0.0;
+  int count_ = 0;
+  Interrupted interrupted_ = never_interrupted;
+};
+
+}  // namespace sidestep

@@ -1,0 +1,470 @@
+#include "sidestep/clearance/clearance_field.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "../math/kernels/in_use.hpp"
+#include "../math/settings.hpp"
+#include "kernels/clearance_kernel.hpp"
+#include "sidestep/clearance/boltzmann_mean.hpp"
+
+namespace sidestep {
+namespace {
+
+kernels::ClearanceKernel clearance_kernel() noexcept { return SIDESTEP_KERNEL_IN_USE(kernels::clearance_kernel)(); }
+
+void copy(const Eigen::Vector3d& from, double* to) noexcept { Eigen::Vector3d::Map(to) = from; }
+
+kernels::LinkMotion motion_of(const KinematicState::Link& link) noexcept {
+  kernels::LinkMotion motion;
+  Eigen::Matrix3d::Map(motion.rotation) = link.R_WL;
+  copy(link.velocity.angular, motion.angular);
+  copy(link.velocity.linear, motion.linear);
+  copy(link.bias.angular, motion.bias_angular);
+  copy(link.bias.linear, motion.bias_linear);
+  motion.turning = link.velocity.angular.norm();
+  // the columns of a rotation are the rows of its inverse
+  Eigen::Matrix3f::Map(motion.to_link) = link.R_WL.cast<float>();
+  return motion;
+}
+
+kernels::Points points_of(const PointTree& tree) noexcept {
+  kernels::Points points{
+      {tree.coordinate(0), tree.coordinate(1), tree.coordinate(2)}, tree.radii(), tree.common_radius(), {}, {}, {}};
+  if (tree.size() > 0) {
+    points.leaf_balls = tree.leaf_balls();
+    points.leaf_boxes = tree.leaf_boxes();
+  }
+  for (int axis = 0; axis < 3 && tree.moves(); ++axis) {
+    points.velocity[axis] = tree.velocity(axis);
+  }
+  return points;
+}
+
+static_assert(PointTree::leaf_size == kernels::most_points);
+
+/// Begins again, with what is known of the smallest.
+void restart(kernels::Query& query) noexcept {
+  query.begun = query.stale = false;
+  query.candidates.size = 0;
+}
+
+void reset(kernels::Query& query) noexcept {
+  query.reference = query.ahead = infinity;
+  query.nearest = query.minded = 0;
+  query.near = query.approached = false;
+  restart(query);
+}
+
+/// The means of a query's points, with wrenches about the world origin.
+class Means {
+ public:
+  Means(const kernels::Query& query, const Eigen::Vector3d& centre, double inverse_T) noexcept
+      : query_(query), centre_(centre), inverse_T_(inverse_T) {
+    for (int i = 0; i < kernels::sums; ++i) {
+      sums_[i] = Eigen::Map<const Eigen::Matrix<double, kernels::most_lanes, 1>>(query.lane_sums[i]).sum();
+    }
+    const double* A = query.squared_axes;
+    const Eigen::Array3d per_twist(A[1] - A[2], A[2] - A[0], A[0] - A[1]);
+    for (const int first : {of_weights, of_heights, kernels::approach + 4}) {
+      Eigen::Array3d::Map(sums_ + first + 3) *= per_twist;
+    }
+    sums_[2] -= of_bias(of_weights);
+    sums_[6] -= of_bias(of_heights);
+    sums_[kernels::approach + 3] -= of_bias(kernels::approach + 4);
+  }
+
+  /// With w' = −w h'/T.
+  ClearanceSample nearest() const noexcept {
+    const double *s = sums_, k = inverse_T_;
+    ClearanceSample mean = BoltzmannMean::Sums{s[0], -k * s[1],       k * (k * s[3] - s[2]),
+                                               s[4], s[1] - k * s[5], s[2] - k * (2.0 * s[3] + s[6] - k * s[7])}
+                               .mean();
+    mean.gradient = wrench(((1.0 + k * mean.value) * gradient(of_weights) - k * gradient(of_heights)) * (1.0 / s[0]));
+    mean.value += query_.reference;
+    return mean;
+  }
+
+  ClearanceSample approach() const noexcept {
+    const double* s = sums_ + kernels::approach;
+    const double share = 1.0 / s[0];
+    return {s[1] * share, s[2] * share, s[3] * share, wrench(gradient(kernels::approach + 4) * share)};
+  }
+
+ private:
+  static constexpr int of_weights = 8, of_heights = 14;  // of force and moment
+
+  Vector6d gradient(int first) const noexcept { return Vector6d::Map(sums_ + first); }
+  /// What the bias of the link makes of sums of h'', from those of the gradient.
+  double of_bias(int first) const noexcept {
+    return Eigen::Vector3d::Map(query_.bias_linear).dot(gradient(first).head<3>()) +
+           Eigen::Vector3d::Map(query_.bias_angular).dot(gradient(first).tail<3>());
+  }
+  WrenchPair wrench(const Vector6d& gradient) const noexcept {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(query_.axes);
+    const Eigen::Vector3d force = -(axes.transpose() * gradient.head<3>());
+    return {{centre_.cross(force) - axes.transpose() * gradient.tail<3>(), force}, {}};
+  }
+
+  const kernels::Query& query_;
+  Eigen::Vector3d centre_;
+  double inverse_T_;
+  double sums_[kernels::sums];
+};
+
+}  // namespace
+
+ClearanceField::ClearanceField(const Robot& robot, const Body& body, double temperature, double window)
+    : temperature_(temperature), window_(window) {
+  constexpr const char* owner = "clearance field";
+  if (!(temperature > 0.0) || temperature == infinity) {
+    throw std::invalid_argument(std::string(owner) + ": temperature is " + std::to_string(temperature) +
+                                " m, must be positive and finite");
+  }
+  constexpr double most_window = 600.0;  // beyond e^−700 the exponential of the sums ends
+  if (!(window >= 1.0 && window <= most_window)) {
+    throw std::invalid_argument(std::string(owner) + ": window is " + std::to_string(window) +
+                                " temperatures, must be from 1 to 600");
+  }
+  for (const BodyEllipsoid& ellipsoid : body_ellipsoids(robot, body, owner)) {
+    if (ellipsoid.joint >= 0) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(ellipsoid.shape);
+      Eigen::Matrix3d axes = eigen.eigenvectors();
+      axes.col(0) *= axes.determinant();  // right-handed, as cross products are taken in these axes
+      ellipsoids_.push_back({ellipsoid, axes.transpose(), eigen.eigenvalues().cwiseSqrt()});
+    }
+  }
+  if (ellipsoids_.empty()) {
+    throw std::invalid_argument(std::string(owner) + ": no ellipsoid of the body lies on a link that a joint of robot '" +
+                                robot.name() + "' moves");
+  }
+  for (int first = 0; first < size();) {
+    const auto at = [this](int k) -> const Ellipsoid& { return ellipsoids_[static_cast<std::size_t>(k)]; };
+    const auto link = [&](int k) -> const std::string& { return body.links[static_cast<std::size_t>(component(k))]; };
+    static_assert(Cluster::most == kernels::most_queries);
+    static_assert(decltype(Cluster::principal)::ColsAtCompileTime == kernels::principal_numbers);
+    Cluster cluster{first, 0, Eigen::Vector3d::Zero(), 0.0, 0.0, decltype(Cluster::principal)::Ones()};
+    while (first + cluster.size < size() && cluster.size < Cluster::most && link(first + cluster.size) == link(first)) {
+      cluster.centre += at(first + cluster.size++).body.mean;
+    }
+    cluster.centre /= cluster.size;
+    for (int k = first; k < first + cluster.size; ++k) {
+      const double distance = (at(k).body.mean - cluster.centre).norm();
+      cluster.radius = std::max(cluster.radius, distance + at(k).body.extent);
+      cluster.inner_radius = std::max(cluster.inner_radius, distance + at(k).semi_axes.minCoeff());
+      const Eigen::Array3d a = at(k).semi_axes;
+      float row_of_axes[9];
+      auto row = cluster.principal.row(k - first);
+      Eigen::Matrix<float, 3, 3, Eigen::RowMajor>::Map(row_of_axes) = at(k).axes_T.cast<float>();
+      row << Eigen::Map<const Eigen::Matrix<float, 1, 9>>(row_of_axes), a.square().matrix().transpose().cast<float>(),
+          a.matrix().transpose().cast<float>(), static_cast<float>(a.minCoeff() * a.minCoeff() / a.maxCoeff());
+    }
+    clusters_.push_back(cluster);
+    first += cluster.size;
+  }
+}
+
+/// Looks for the points that weigh in the means of one cluster's ellipsoids after another.
+class ClearanceField::Search {
+ public:
+  Search(const ClearanceField& field, const PointTree& tree, double reach, const Horizon& horizon) noexcept
+      : field_(field), tree_(tree), points_(points_of(tree)), kernel_(clearance_kernel()), reach_(reach), horizon_(horizon) {
+    group_.inverse_T = 1.0 / field.temperature_;
+    group_.reach = reach;
+    group_.reach_ahead = horizon.distance;
+    group_.window = field.window_ * field.temperature_;
+    group_.window_ahead = window_ahead * field.temperature_;
+    group_.horizon = horizon.time;
+    group_.fastest = tree.fastest();
+  }
+
+  /// Whether any may matter.
+  bool find(const Cluster& cluster, const KinematicState::Link& link) noexcept {
+    cluster_ = &cluster;
+    link_ = &link;
+    is_placed_ = false;
+    surround();
+    // Leaves beyond the reach may weigh beside what is found within it: they are put off, as far as there is room.
+    kernels::Limits within = limits(reach_, horizon_.distance);
+    const kernels::Limits beyond = limits(reach_ + group_.window, horizon_.distance + group_.window_ahead);
+    int num_put_off = 0;
+    visit(within, beyond, [&](int leaf, bool is_within) {
+      if (is_within && take(leaf, beyond)) {
+        within = limits(std::min<double>(reach_, largest(group_.near_leaf)),
+                        std::min<double>(horizon_.distance, largest(group_.ahead_leaf)));
+      } else if (!is_within) {
+        if (num_put_off < most_put_off) {
+          put_off_[static_cast<std::size_t>(num_put_off)] = leaf;
+        }
+        ++num_put_off;
+      }
+    });
+    if (!is_waiting() && !is_placed_) {
+      return false;
+    }
+    const bool is_full = num_put_off > most_put_off;
+    int next = 0;
+    while (next < num_put_off && !is_full && is_waiting() && !take(put_off_[static_cast<std::size_t>(next++)], beyond)) {
+    }
+    collect();
+    const bool goes_beyond = is_known_beyond(reach_, horizon_.distance);
+    while (goes_beyond && !is_full && next < num_put_off) {
+      take(put_off_[static_cast<std::size_t>(next++)], beyond);
+    }
+    collect();
+    // So may what was missed in leaves that were looked at before; and sums that were begun, for want of room, may hold
+    // what lies too far above what was found later.
+    bool is_missing = goes_beyond && is_full;
+    for (int pass = 0; pass < most_passes; ++pass, is_missing = false) {
+      kernels::Limits again = limits(-infinity, -infinity);
+      for (int k = 0; k < cluster.size; ++k) {
+        kernels::Query& query = group_.queries[k];
+        if (query.begun) {
+          kernel_.sum(group_, k, points_);
+        }
+        const double to = query.near ? group_.near[k] : -infinity, to_ahead = query.approached ? group_.ahead[k] : -infinity;
+        if (is_missing || query.stale || group_.missed[k] < to || group_.missed_ahead[k] < to_ahead) {
+          limit(k, to, to_ahead);
+          restart(query);
+          again = limits(std::max<double>(again.near, to), std::max<double>(again.ahead, to_ahead));
+        } else {  // is asked no more
+          limit_leaves(k, -infinity, -infinity);
+        }
+      }
+      if (!(std::max(again.near, again.ahead) > -infinity)) {
+        break;
+      }
+      visit(again, again, [&](int leaf, bool) { take(leaf, again); });
+      collect();
+    }
+    return true;
+  }
+
+  /// Writes the means of ellipsoid k of the cluster.
+  void write(int k, const KinematicState& state, ClearanceView& out) noexcept {
+    const kernels::Query& query = group_.queries[k];
+    if (!query.near && !query.approached) {
+      return;
+    }
+    kernel_.sum(group_, k, points_);
+    if (!(std::min(query.reference, query.ahead) < infinity)) {
+      return;
+    }
+    const Means means(query, {group_.centre[0][k], group_.centre[1][k], group_.centre[2][k]}, group_.inverse_T);
+    const Eigen::Index at = cluster_->first + k;
+    const ClearanceSample approach = means.approach();
+    const ClearanceSample nearest = query.reference < infinity ? means.nearest() : approach;
+    const bool within = query.reference < infinity && nearest.value < reach_;
+    if (within || query.ahead < horizon_.distance) {
+      sidestep::write(within ? nearest : approach, approach, state, ellipsoid(k).body.joint, at, out);
+      out.least[at] = query.reference;
+      out.nearest[at] = tree_.order()[static_cast<std::size_t>(within ? query.nearest : query.minded)];
+    }
+  }
+
+ private:
+  static constexpr int most_put_off = 1024, most_passes = 3;
+
+  const Ellipsoid& ellipsoid(int k) const noexcept { return field_.ellipsoids_[static_cast<std::size_t>(cluster_->first + k)]; }
+
+  void surround() noexcept {
+    const Eigen::Vector3d centre = link_->p_WL + link_->R_WL * cluster_->centre;
+    const Eigen::Vector3d& angular = link_->velocity.angular;
+    copy(centre, ball_.centre);
+    ball_.radius = static_cast<float>(cluster_->radius);
+    Eigen::Vector3f::Map(ball_.velocity) = (link_->velocity.linear + angular.cross(centre)).cast<float>();
+    Eigen::Vector3f::Map(ball_.angular) = angular.cast<float>();
+    ball_.turning = static_cast<float>(angular.norm());
+    ball_.horizon = static_cast<float>(horizon_.time);
+    ball_.fastest = static_cast<float>(tree_.fastest());
+  }
+
+  static kernels::Limits limits(double near, double ahead) noexcept {
+    return {static_cast<float>(near), static_cast<float>(ahead)};
+  }
+  void limit(int k, double to, double to_ahead) noexcept {
+    group_.near[k] = static_cast<float>(to);
+    group_.ahead[k] = static_cast<float>(to_ahead);
+    limit_leaves(k, to, to_ahead);
+    group_.missed[k] = group_.missed_ahead[k] = std::numeric_limits<float>::infinity();
+  }
+  void limit_leaves(int k, double to, double to_ahead) noexcept {
+    group_.near_leaf[k] = static_cast<float>(to);
+    group_.ahead_leaf[k] = static_cast<float>(to_ahead);
+  }
+
+  void place() noexcept {
+    copy(Eigen::Vector3d::Map(ball_.centre), group_.origin);
+    motion_ = motion_of(*link_);
+    group_.link = &motion_;
+    group_.principal = cluster_->principal.data();
+    group_.size = cluster_->size;
+    for (int k = 0; k < cluster_->size; ++k) {
+      const Eigen::Vector3d p = link_->p_WL + link_->R_WL * ellipsoid(k).body.mean;
+      for (int axis = 0; axis < 3; ++axis) {
+        group_.centre[axis][k] = p[axis];
+        group_.offset[axis][k] = static_cast<float>(p[axis] - ball_.centre[axis]);
+      }
+      group_.extent[k] = static_cast<float>(ellipsoid(k).body.extent);
+      group_.axes_T[k] = ellipsoid(k).axes_T.data();
+      group_.semi_axes[k] = ellipsoid(k).semi_axes.data();
+      limit(k, reach_, horizon_.distance);
+      group_.near[k] += static_cast<float>(group_.window);
+      group_.ahead[k] += static_cast<float>(group_.window_ahead);
+      reset(group_.queries[k]);
+    }
+    for (int k = cluster_->size; k < kernels::most_queries; ++k) {  // registers are filled up
+      group_.offset[0][k] = group_.offset[1][k] = group_.offset[2][k] = group_.extent[k] = 0.0f;
+    }
+    kernel_.begin(group_);
+    is_placed_ = true;
+  }
+
+  double largest(const float* limits) const noexcept { return *std::max_element(limits, limits + cluster_->size); }
+  /// Whether a limit below which something is known is beyond these.
+  bool is_known_beyond(double near, double ahead) const noexcept {
+    for (int k = 0; k < cluster_->size; ++k) {
+      const kernels::Query& query = group_.queries[k];
+      if ((query.near && group_.near[k] > near) || (query.approached && group_.ahead[k] > ahead)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Calls leaf(number, whether it is within) for the leaves that may be below `beyond`.
+  template <class Leaf>
+  void visit(const kernels::Limits& within, const kernels::Limits& beyond, Leaf&& leaf) const noexcept {
+    const auto measure = [&](const Balls& balls, const Boxes& boxes, int first, int count, PointTree::Bounds& bounds) {
+      return kernel_.measure(ball_, balls, boxes, first, count, within, beyond, bounds.data());
+    };
+    tree_.visit(measure, [&](int first, unsigned bits) {
+      for (unsigned left = bits & 0xffffu; left != 0; left &= left - 1) {
+        const int i = std::countr_zero(left);
+        leaf(first + i, (bits >> (i + 16) & 1) != 0);
+      }
+    });
+  }
+
+  /// Leaves are looked at many at a time; returns whether they were. Of those wider than the cluster and what is within
+  /// reach of it only points are taken that may be below the limits.
+  bool take(int leaf, const kernels::Limits& limits) noexcept {
+    kernels::Leaves& leaves = group_.leaves;
+    kernels::LoosePoints& loose = group_.loose;
+    const int count = tree_.count(leaf), first = leaf * PointTree::leaf_size;
+    if (points_.leaf_balls.radius[leaf] > cluster_->radius + std::max(reach_, 0.0)) {
+      unsigned left = kernel_.measure_points(ball_, points_, first, count, limits, limits) & 0xffffu;
+      for (; left != 0; left &= left - 1) {
+        const int n = first + std::countr_zero(left), to = loose.num++;
+        loose.point[to] = n;
+        loose.radius[to] = static_cast<float>(points_.radius[n]);
+        for (int axis = 0; axis < 3; ++axis) {
+          loose.position[axis][to] = static_cast<float>(points_.position[axis][n] - ball_.centre[axis]);
+          loose.own[axis][to] = points_.velocity[0] != nullptr ? static_cast<float>(points_.velocity[axis][n]) : 0.0f;
+        }
+      }
+    } else {
+      leaves.leaf[leaves.num] = leaf;
+      leaves.count[leaves.num++] = count;
+    }
+    if (leaves.num < kernels::most_leaves && loose.num <= kernels::most_loose - PointTree::leaf_size) {
+      return false;
+    }
+    collect();
+    return true;
+  }
+
+  /// Whether anything was taken that has not been looked at.
+  bool is_waiting() const noexcept { return group_.leaves.num > 0 || group_.loose.num > 0; }
+
+  void collect() noexcept {
+    if (!is_waiting()) {
+      return;
+    }
+    if (!is_placed_) {
+      place();
+    }
+    kernel_.collect(group_, points_);
+    group_.leaves.num = group_.loose.num = 0;
+  }
+
+  const ClearanceField& field_;
+  const PointTree& tree_;
+  kernels::Points points_;
+  kernels::ClearanceKernel kernel_;
+  double reach_;
+  Horizon horizon_;
+  const Cluster* cluster_ = nullptr;
+  const KinematicState::Link* link_ = nullptr;
+  kernels::MovingBall ball_;
+  kernels::LinkMotion motion_;
+  bool is_placed_ = false;
+  kernels::QueryGroup group_;
+  std::array<int, most_put_off> put_off_;
+};
+
+void ClearanceField::evaluate(const KinematicState& state, const Obstacles& obstacles, double reach, const Horizon& horizon,
+                              ClearanceView out) const noexcept {
+  Search search(*this, obstacles.tree(), reach, horizon);
+  for (const Cluster& cluster : clusters_) {
+    if (search.find(cluster, state.link(ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint))) {
+      for (int k = 0; k < cluster.size; ++k) {
+        search.write(k, state, out);
+      }
+    }
+  }
+}
+
+bool ClearanceField::touches(const KinematicState& state, const Obstacles& obstacles, double depth) const noexcept {
+  const PointTree& tree = obstacles.tree();
+  for (const Cluster& cluster : clusters_) {
+    const KinematicState::Link& link = state.link(ellipsoids_[static_cast<std::size_t>(cluster.first)].body.joint);
+    const Eigen::Vector3d centre = link.p_WL + link.R_WL * cluster.centre;
+    bool found = false;
+    const auto distance = [&](double x, double y, double z, double radius) {
+      return (Eigen::Vector3d(x, y, z) - centre).norm() - (cluster.inner_radius + radius - depth);
+    };
+    const auto measure = [&](const Balls& balls, const Boxes&, int first, int count, PointTree::Bounds& bounds) {
+      unsigned near = 0;
+      for (int i = 0; i < count && !found; ++i) {
+        const int n = first + i;
+        const double bound = distance(balls.x[n], balls.y[n], balls.z[n], balls.radius[n]);
+        bounds[static_cast<std::size_t>(i)] = static_cast<float>(bound);
+        near |= (bound < 0.0 ? 1u : 0u) << i;
+      }
+      return near;
+    };
+    const auto look_at = [&](int n) {
+      const Eigen::Vector3d x(tree.coordinate(0)[n], tree.coordinate(1)[n], tree.coordinate(2)[n]);
+      if (!(distance(x.x(), x.y(), x.z(), tree.radii()[n]) < 0.0)) {
+        return;
+      }
+      const Eigen::Vector3d in_link = link.R_WL.transpose() * (x - link.p_WL);
+      for (int k = cluster.first; k < cluster.first + cluster.size; ++k) {
+        const Ellipsoid& ellipsoid = ellipsoids_[static_cast<std::size_t>(k)];
+        const double within = ellipsoid.semi_axes.minCoeff() + tree.radii()[n] - depth;
+        found = found || (within > 0.0 && (in_link - ellipsoid.body.mean).squaredNorm() < within * within);
+      }
+    };
+    tree.visit(measure, [&](int first, unsigned leaves) {
+      for (; leaves != 0; leaves &= leaves - 1) {
+        const int leaf = first + std::countr_zero(leaves), begin = leaf * PointTree::leaf_size;
+        for (int n = begin; n < begin + tree.count(leaf) && !found; ++n) {
+          look_at(n);
+        }
+      }
+    });
+    if (found) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace sidestep

@@ -1,0 +1,203 @@
+#include "sidestep/clearance/holding_torque.hpp"
+
+#include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace sidestep {
+namespace {
+
+constexpr double range_share = 0.1;  // of effort / weight, within which the barrier acts
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+SpatialMotion moved(const SpatialMotion& by, const SpatialMotion& screw) noexcept {
+  return {by.angular.cross(screw.angular), by.angular.cross(screw.linear) + by.linear.cross(screw.angular)};
+}
+
+/// How far from the origin of its parent a joint's can be [m].
+double farthest_place(const Robot& robot, const Joint& joint) noexcept {
+  double length = joint.X_PJ.translation().norm();
+  if (joint.type == JointType::prismatic) {
+    for (const double end : {robot.limits().lower[joint.coordinate], robot.limits().upper[joint.coordinate]}) {
+      length = std::max(length, joint.X_PJ.translation().norm() + std::abs(joint.multiplier * end + joint.offset));
+    }
+  }
+  return length;
+}
+
+}  // namespace
+
+HoldingTorque::HoldingTorque(const RigidBodyDynamics& dynamics, const Eigen::VectorXd& effort, double most)
+    : robot_(dynamics.robot()), inertials_(dynamics.inertials()), gravity_(dynamics.gravity()) {
+  const std::vector<Joint>& joints = robot_.joints();
+  const auto num = joints.size();
+  const auto nv = robot_.num_coordinates();
+  // Mass, and the largest moment about the joint's origin, of what every joint carries.
+  std::vector<double> mass(num), moment(num);
+  std::vector<std::vector<int>> carried(num);
+  for (std::size_t i = num; i-- > 0;) {
+    mass[i] += inertials_[i].mass;
+    moment[i] += inertials_[i].mass * inertials_[i].com.norm();
+    carried[i].insert(carried[i].begin(), static_cast<int>(i));
+    if (joints[i].parent >= 0) {
+      const auto parent = static_cast<std::size_t>(joints[i].parent);
+      mass[parent] += mass[i];
+      moment[parent] += moment[i] + (mass[i] > 0.0 ? mass[i] * farthest_place(robot_, joints[i]) : 0.0);
+      carried[parent].insert(carried[parent].end(), carried[i].begin(), carried[i].end());
+    }
+  }
+  const double g = gravity_.norm();
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(nv), weight = largest;
+  // Derivatives of the potential energy are bounded by the moment, or the weight, of what the last of their joints carries, if those
+  // are on one chain; what slides turns nothing.
+  const auto bound = [&](std::initializer_list<int> of) {
+    const int last = std::max(of);
+    double product =
+        g *
+        (joints[static_cast<std::size_t>(last)].type == JointType::revolute ? moment : mass)[static_cast<std::size_t>(last)];
+    bool slid = false;
+    for (const int i : of) {
+      const Joint& joint = joints[static_cast<std::size_t>(i)];
+      const std::vector<int>& below = carried[static_cast<std::size_t>(i)];
+      const bool slides = joint.type == JointType::prismatic;
+      if (std::find(below.begin(), below.end(), last) == below.end() || (slides && (i != last || slid))) {
+        return 0.0;
+      }
+      slid = slid || slides;
+      product *= std::abs(joint.multiplier);
+    }
+    return product;
+  };
+  const auto all = static_cast<int>(num);
+  for (int i = 0; i < all; ++i) {
+    const Joint& joint = joints[static_cast<std::size_t>(i)];
+    largest[joint.coordinate] += bound({i});
+    weight[joint.coordinate] += std::abs(joint.multiplier) * g * mass[static_cast<std::size_t>(i)];
+  }
+  for (int c = 0; c < nv; ++c) {
+    if (!(weight[c] > 0.0) || !(effort[c] < infinite)) {
+      continue;
+    }
+    const double activation = std::min(most, range_share * effort[c] / weight[c]);
+    if (largest[c] + activation * weight[c] <= effort[c]) {
+      continue;
+    }
+    Load load{c, effort[c], weight[c], activation, Eigen::VectorXd::Zero(nv), Eigen::MatrixXd::Zero(nv, nv), {}};
+    for (int i = 0; i < all; ++i) {
+      if (joints[static_cast<std::size_t>(i)].coordinate != c) {
+        continue;
+      }
+      load.carriers.push_back({i, carried[static_cast<std::size_t>(i)]});
+      for (int j = 0; j < all; ++j) {
+        const int to = joints[static_cast<std::size_t>(j)].coordinate;
+        load.steepest[to] += bound({i, j}) / weight[c];
+        for (int k = 0; k < all; ++k) {
+          load.bend(to, joints[static_cast<std::size_t>(k)].coordinate) += bound({i, j, k}) / weight[c];
+        }
+      }
+    }
+    loads_.push_back(std::move(load));
+  }
+}
+
+double HoldingTorque::value(const Load& load, const KinematicState& state) const noexcept {
+  double torque = 0.0;
+  for (const Load::Carrier& carrier : load.carriers) {
+    const SpatialMotion& S = state.link(carrier.joint).screw;
+    for (const int b : carrier.carried) {
+      const KinematicState::Link& link = state.link(b);
+      const Inertial& body = inertials_[static_cast<std::size_t>(b)];
+      const Eigen::Vector3d com = link.p_WL + link.R_WL * body.com;
+      torque -= body.mass * (S.linear + S.angular.cross(com)).dot(gravity_);
+    }
+  }
+  return (load.effort - std::abs(torque)) / load.weight;
+}
+
+HoldingTorque::Room HoldingTorque::at(const Load& load, const KinematicState& state,
+                                      Eigen::Ref<Eigen::VectorXd> gradient) const noexcept {
+  // With the screw (ω, u) of the joint, what it carries, of mass m and moment c = Σ m x about the world origin, takes the torque
+  //     g = −ω · (c × γ) − m u · γ,   γ gravity.
+  // Where link V carries a screw, that changes by V × S, and a body's x by V.linear + V.angular × x.
+  gradient.setZero();
+  double torque = 0.0, curvature = 0.0;
+  for (const Load::Carrier& carrier : load.carriers) {
+    const KinematicState::Link& own = state.link(carrier.joint);
+    const SpatialMotion& S = own.screw;
+    const Eigen::Vector3d normal = gravity_.cross(S.angular);  // ω · (x × γ) = x · (γ × ω)
+    double mass = 0.0;
+    Eigen::Vector3d c = Eigen::Vector3d::Zero(), c1 = c, c2 = c;
+    for (const int b : carrier.carried) {
+      const KinematicState::Link& link = state.link(b);
+      const Inertial& body = inertials_[static_cast<std::size_t>(b)];
+      const Eigen::Vector3d com = link.p_WL + link.R_WL * body.com;
+      const Eigen::Vector3d speed = link.velocity.linear + link.velocity.angular.cross(com);
+      mass += body.mass;
+      c += body.mass * com;
+      c1 += body.mass * speed;
+      c2 += body.mass * (link.bias.linear + link.bias.angular.cross(com) + link.velocity.angular.cross(speed));
+      for (int k = b; k >= 0; k = state.link(k).parent) {
+        const KinematicState::Link& joint = state.link(k);
+        gradient[joint.coordinate] -= body.mass * (joint.screw.linear + joint.screw.angular.cross(com)).dot(normal);
+      }
+    }
+    const Eigen::Vector3d moment = c.cross(gravity_);
+    const auto of = [&](const SpatialMotion& screw) { return -screw.angular.dot(moment) - mass * screw.linear.dot(gravity_); };
+    torque += of(S);
+    for (int k = own.parent; k >= 0; k = state.link(k).parent) {
+      gradient[state.link(k).coordinate] += of(moved(state.link(k).screw, S));
+    }
+    curvature -= c2.dot(normal);
+    if (own.parent >= 0) {
+      const KinematicState::Link& above = state.link(own.parent);
+      const SpatialMotion first = moved(above.velocity, S);
+      curvature += of(moved(above.bias, S)) + of(moved(above.velocity, first)) - 2.0 * first.angular.dot(c1.cross(gravity_));
+    }
+  }
+  const double per = (torque > 0.0 ? -1.0 : 1.0) / load.weight;
+  gradient *= per;
+  return {(load.effort - std::abs(torque)) / load.weight, gradient.dot(state.v()), per * curvature};
+}
+
+HoldingTorqueBarrier::HoldingTorqueBarrier(HoldingTorque holding, BarrierFunction barrier)
+    : Barrier(holding.robot(), barrier, "holding torque barrier"), holding_(std::move(holding)) {
+  if (holding_.loads().empty()) {
+    throw std::invalid_argument("holding torque barrier: no joint of robot '" + robot().name() +
+                                "' can come near its effort limit");
+  }
+  set_num_coordinates(static_cast<int>(holding_.loads().size()));
+  for (std::size_t k = 0; k < holding_.loads().size(); ++k) {
+    shorten_activation(static_cast<int>(k), holding_.loads()[k].activation);
+  }
+}
+
+void HoldingTorqueBarrier::add_to(EmbeddingView out, const KinematicState& state,
+                                  const Obstacles& /*obstacles*/) const noexcept {
+  const Horizon ahead = horizon(state);
+  for (std::size_t i = 0; i < holding_.loads().size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const HoldingTorque::Room room = holding_.at(holding_.loads()[i], state, out.clearances.gradients.col(k));
+    if (!(room.value < activations()[k]) && !(room.value + ahead.time * room.rate < activations()[k])) {
+      continue;
+    }
+    out.clearances.values[k] = room.value;
+    out.clearances.rates[k] = room.rate;
+    out.clearances.curvatures[k] = room.curvature;
+    ClearanceStateView& approach = out.clearances.approach;
+    approach.values[k] = room.value;
+    approach.rates[k] = room.rate;
+    approach.curvatures[k] = room.curvature;
+    approach.gradients.col(k) = out.clearances.gradients.col(k);
+    out.clearances.nearest[k] = 0;
+  }
+  add_barriers(out);
+}
+
+CoordinateLabel HoldingTorqueBarrier::label(int k) const {
+  const int coordinate = holding_.loads()[static_cast<std::size_t>(k)].coordinate;
+  return {CoordinateLabel::Kind::effort, robot().coordinate_names()[static_cast<std::size_t>(coordinate)], {}, floor(k)};
+}
+
+}  // namespace sidestep

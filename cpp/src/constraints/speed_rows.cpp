@@ -1,0 +1,125 @@
+#include "sidestep/constraints/speed_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "../math/settings.hpp"
+
+namespace sidestep {
+namespace {
+
+constexpr double aimed = 0.98;           // of a limit
+constexpr double decay = 50.0;           // k [1/s]
+constexpr double most_per_period = 0.5;  // of what is left, and of an excess
+constexpr double slowest = 1e-3;         // [m/s] of frames whose direction means something
+constexpr double shortest = 1e-6;        // [m/rad]
+
+struct PlaceMotion {
+  Eigen::Vector3d p, p_dot;
+};
+
+PlaceMotion motion_of(const KinematicState::Link& link, const Eigen::Vector3d& p_LF) noexcept {
+  const Eigen::Vector3d p = link.p_WL + link.R_WL * p_LF;
+  return {p, link.velocity.linear + link.velocity.angular.cross(p)};
+}
+
+}  // namespace
+
+template <>
+const std::vector<Field<SpeedLimitSettings>>& fields() {
+  using S = SpeedLimitSettings;
+  static const std::vector<Field<S>> all{
+      {"near_speed", &S::near_speed, "m/s", 0.02, 10.0,
+       "that no frame of the arm exceeds at near_distance from an obstacle, and nearer"},
+      {"near_distance", &S::near_distance, "m", 0.0, 10.0, "to obstacles, up to which near_speed is the limit"},
+      {"far_speed", &S::far_speed, "m/s", 0.02, 10.0, "that no frame of the arm exceeds anywhere"},
+      {"far_distance", &S::far_distance, "m", 0.01, 10.0,
+       "to obstacles, from which far_speed is the limit: the nearer to near_distance, the harder the arm brakes between"},
+  };
+  return all;
+}
+
+double SpeedLimitSettings::allowed(double distance) const noexcept {
+  const double share = std::clamp((distance - near_distance) / (far_distance - near_distance), 0.0, 1.0);
+  return std::sqrt(near_speed * near_speed + share * (far_speed * far_speed - near_speed * near_speed));
+}
+
+void SpeedLimitSettings::validate() const {
+  check_fields("speed_limits: ", *this);
+  require(near_speed <= far_speed, "speed_limits: near_speed", near_speed, "no more than far_speed");
+  require(near_distance < far_distance, "speed_limits: near_distance", near_distance, "less than far_distance");
+}
+
+SpeedRows::SpeedRows(const Robot& robot) {
+  for (std::size_t f = 0; f < robot.frames().size(); ++f) {
+    const Frame& frame = robot.frames()[f];
+    const Eigen::Vector3d p = frame.X_JF.translation();
+    const auto same = [&](const Place& place) { return place.joint == frame.joint && place.p == p; };
+    if (frame.joint >= 0 && std::none_of(frames_.begin(), frames_.end(), same)) {
+      frames_.push_back({static_cast<int>(f), frame.joint, p});
+    }
+  }
+  normals.setZero(max_size(), robot.num_coordinates());
+  upper.setZero(max_size());
+  lengths.setZero(max_size());
+  frames.assign(frames_.size(), -1);
+}
+
+SpeedRows::Fastest SpeedRows::fastest(const KinematicState& state) const noexcept {
+  Fastest found;
+  for (const Place& place : frames_) {
+    const double speed = motion_of(state.link(place.joint), place.p).p_dot.norm();
+    if (speed > found.speed) {
+      found = {speed, place.frame};
+    }
+  }
+  return found;
+}
+
+void SpeedRows::update(const KinematicState& state, const JointLimits& limits, double limit, double next_limit,
+                       double period) noexcept {
+  size_ = 0;
+  const double k = std::min(decay, most_per_period / period);
+  const double falls = aimed * (next_limit - limit) / period;
+  const double stop_time = state.v().cwiseAbs().cwiseQuotient(limits.acceleration).maxCoeff();
+  for (const Place& place : frames_) {
+    const KinematicState::Link& link = state.link(place.joint);
+    const auto [p, p_dot] = motion_of(link, place.p);
+    const double speed = p_dot.norm();
+    if (!(speed > slowest)) {
+      continue;
+    }
+    const Eigen::Vector3d n = p_dot / speed;
+    const Eigen::Vector3d bias = link.bias.linear + link.bias.angular.cross(p) + link.velocity.angular.cross(p_dot);
+    auto normal = normals.row(size_);
+    normal.setZero();
+    const SpatialForce along{p.cross(n), n};
+    for (int j = place.joint; j >= 0; j = state.link(j).parent) {
+      const KinematicState::Link& joint = state.link(j);
+      normal[joint.coordinate] += joint.screw.angular.dot(along.angular) + joint.screw.linear.dot(along.linear);
+    }
+    const double length = normal.norm();
+    if (!(length > shortest)) {
+      continue;
+    }
+    normal /= length;
+    // Without acceleration limits a stop takes no time, and a row may ask for anything.
+    const double stop = stop_time > 0.0 ? -speed / stop_time : -speed / period;
+    upper[size_] = std::max(falls + k * (aimed * limit - speed) - n.dot(bias), stop) / length;
+    lengths[size_] = length;
+    frames[static_cast<std::size_t>(size_++)] = place.frame;
+  }
+}
+
+bool SpeedRows::satisfied_within(int k, const Eigen::VectorXd& box_lower, const Eigen::VectorXd& box_upper) const noexcept {
+  double largest = 0.0;
+  for (Eigen::Index j = 0; j < box_lower.size(); ++j) {
+    const double n = normals(k, j);
+    if (n != 0.0) {
+      largest += n > 0.0 ? n * box_upper[j] : n * box_lower[j];
+    }
+  }
+  return largest <= upper[k];
+}
+
+}  // namespace sidestep

@@ -1,9 +1,0 @@
-#include "distance_kernel.hpp"
-
-#include "../../kinematics/kernels/in_use.hpp"
-
-namespace sidestep::kernels {
-
-Distances distances() noexcept { return SIDESTEP_KERNEL_IN_USE(distances)(); }
-
-}  // namespace sidestep::kernels

@@ -1,0 +1,145 @@
+#include "sidestep/scene/obstacles.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "../math/finite.hpp"
+
+namespace sidestep {
+Obstacles::Obstacles(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities)
+    : points_(std::move(points)), radii_(std::move(radii)), velocities_(std::move(velocities)) {
+  const Eigen::Index num = points_.cols();
+  if (num == 0) {
+    throw std::invalid_argument(
+        "obstacles: the cloud is empty; a sensor that sees nothing is not a free workspace. "
+        "Use Obstacles.none() if the workspace is known to be free");
+  }
+  if (radii_.size() != num || velocities_.cols() != num) {
+    throw std::invalid_argument("obstacles: " + std::to_string(num) + " points, " + std::to_string(radii_.size()) +
+                                " radii and " + std::to_string(velocities_.cols()) + " velocities; the numbers must be equal");
+  }
+  for (Eigen::Index i = 0; i < num; ++i) {
+    const auto owner = [i] { return "obstacles: point " + std::to_string(i); };
+    if (!points_.col(i).allFinite()) {
+      Eigen::Index bad = 0;
+      for (Eigen::Index k = i; k < num; ++k) {
+        bad += points_.col(k).allFinite() ? 0 : 1;
+      }
+      throw std::invalid_argument(owner() + " is not finite" +
+                                  (bad > 1 ? ", as are " + std::to_string(bad) + " of all " + std::to_string(num) : "") +
+                                  "; leave out what a camera did not see: points[np.isfinite(points).all(axis=1)]");
+    }
+    if (!(radii_[i] >= 0.0) || !(radii_[i] <= largest_radius)) {
+      throw std::invalid_argument(owner() + " has radius " + std::to_string(radii_[i]) +
+                                  ", must be finite, >= 0 and at most 1e9 m");
+    }
+    if (!velocities_.col(i).allFinite()) {
+      throw std::invalid_argument(owner() + " has a velocity that is not finite");
+    }
+  }
+  tree_ = PointTree(points_, radii_, velocities_);
+}
+
+Obstacles Obstacles::in_order(Eigen::Matrix3Xd points, Eigen::VectorXd radii, Eigen::Matrix3Xd velocities,
+                              std::vector<int> order) {
+  Obstacles made(std::move(points), std::move(radii), std::move(velocities));
+  std::vector<int> sorted = order;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t n = 0; n < sorted.size(); ++n) {
+    if (sorted.size() != static_cast<std::size_t>(made.size()) || sorted[n] != static_cast<int>(n)) {
+      throw std::invalid_argument("obstacles: the order has another number than each point once");
+    }
+  }
+  if (order != made.tree_.order()) {
+    made.tree_ = PointTree(made.points_, made.radii_, made.velocities_, std::move(order));
+  }
+  return made;
+}
+
+Obstacles Obstacles::named(std::vector<std::string> names, const std::vector<Eigen::Index>& counts) const {
+  if (names.size() != counts.size()) {
+    throw std::invalid_argument("obstacles: " + std::to_string(names.size()) + " names and " + std::to_string(counts.size()) +
+                                " counts; the numbers must be equal");
+  }
+  std::vector<Eigen::Index> ends;
+  Eigen::Index total = 0;
+  for (std::size_t k = 0; k < counts.size(); ++k) {
+    if (counts[k] < 0 || counts[k] > size() - total) {
+      throw std::invalid_argument("obstacles: '" + names[k] + "' has count " + std::to_string(counts[k]) +
+                                  ", must be between 0 and " + std::to_string(size() - total) +
+                                  ", the number of points that are left");
+    }
+    total += counts[k];
+    ends.push_back(total);
+  }
+  if (total != size()) {
+    throw std::invalid_argument("obstacles: counts are of " + std::to_string(total) + " points, there are " +
+                                std::to_string(size()));
+  }
+  Obstacles copy = *this;
+  copy.names_ = std::make_shared<const Names>(Names{std::move(names), std::move(ends)});
+  return copy;
+}
+
+std::vector<std::pair<std::string, Eigen::Index>> Obstacles::groups() const {
+  std::vector<std::pair<std::string, Eigen::Index>> result;
+  if (!names_) {
+    if (size() > 0) {
+      result.emplace_back("", size());
+    }
+    return result;
+  }
+  Eigen::Index begin = 0;
+  for (std::size_t k = 0; k < names_->ends.size(); begin = names_->ends[k++]) {
+    result.emplace_back(names_->names[k], names_->ends[k] - begin);
+  }
+  return result;
+}
+
+std::string_view Obstacles::name_of(Eigen::Index point) const noexcept {
+  if (!names_ || point < 0 || point >= size()) {
+    return {};
+  }
+  // The first end beyond the point: points are counted from 0, and things without points end where the next begins.
+  const auto end = std::upper_bound(names_->ends.begin(), names_->ends.end(), point);
+  return names_->names[static_cast<std::size_t>(end - names_->ends.begin())];
+}
+
+bool Obstacles::advance(double duration) noexcept {
+  if (!std::isfinite(duration)) {
+    return false;
+  }
+  if (!tree_.moves()) {
+    return true;
+  }
+  if (!all_finite(points_ + duration * velocities_)) {
+    return false;
+  }
+  points_ += duration * velocities_;
+  tree_.advance(duration);
+  version_ = next_version();
+  return true;
+}
+
+std::string Obstacles::words_for(Eigen::Index point) const {
+  const std::string_view name = name_of(point);
+  if (name.empty() && point < 0) {
+    return "an obstacle";
+  }
+  if (name.empty()) {
+    return "obstacle point " + std::to_string(point);
+  }
+  std::string quoted(1, '\'');
+  return quoted.append(name).append(1, '\'');
+}
+
+std::uint64_t Obstacles::next_version() noexcept {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
+}  // namespace sidestep

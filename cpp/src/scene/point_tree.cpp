@@ -1,0 +1,176 @@
+#include "sidestep/scene/point_tree.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+
+#include "../math/settings.hpp"
+
+namespace sidestep {
+namespace {
+
+struct Item {
+  Eigen::Vector3d point;
+  int index;
+};
+
+/// Points are halved across the axis along which they spread most until no more than this is left: those of one
+/// register lie together. Where surfaces meet, halving by the variance leaves smaller boxes than halving the longest
+/// side.
+constexpr std::ptrdiff_t smallest_group = 4;
+static_assert(PointTree::leaf_size % smallest_group == 0);
+
+/// Where to cut `count` points in two: the first part fills whole leaves, whole nodes, whole nodes of nodes.
+std::ptrdiff_t first_part(std::ptrdiff_t count) noexcept {
+  std::ptrdiff_t part = smallest_group;
+  while (2 * part < count) {
+    part *= 2;
+  }
+  return part;
+}
+
+void cut(std::vector<Item>::iterator begin, std::vector<Item>::iterator end) {
+  if (end - begin <= smallest_group) {
+    return;
+  }
+  const Eigen::Vector3d origin = begin->point;  // near: squares cancel little
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), sum_of_squares = sum;
+  for (auto item = begin; item != end; ++item) {
+    const Eigen::Vector3d offset = item->point - origin;
+    sum += offset;
+    sum_of_squares += offset.cwiseAbs2();
+  }
+  // The first axis of those that are as good but for rounding, which depends on the order of points and on the machine.
+  const Eigen::Vector3d spread = sum_of_squares - sum.cwiseAbs2() / static_cast<double>(end - begin);
+  const double enough = (1.0 - 1e-9) * spread.maxCoeff();
+  const Eigen::Index axis = spread[0] >= enough ? 0 : spread[1] >= enough ? 1 : 2;
+  const auto middle = begin + first_part(end - begin);
+  std::nth_element(begin, middle, end, [axis](const Item& a, const Item& b) {
+    return a.point[axis] < b.point[axis] || (a.point[axis] == b.point[axis] && a.index < b.index);
+  });
+  cut(begin, middle);
+  cut(middle, end);
+}
+
+/// Neighbours stand together, whatever the order of the input; the same on every machine.
+std::vector<int> spatial_order(const Eigen::Matrix3Xd& points) {
+  std::vector<int> order(static_cast<std::size_t>(points.cols()));
+  std::iota(order.begin(), order.end(), 0);
+  if (points.cols() <= PointTree::leaf_size) {
+    return order;
+  }
+  std::vector<Item> items;
+  items.reserve(order.size());
+  for (const int n : order) {
+    items.push_back({points.col(n), n});
+  }
+  cut(items.begin(), items.end());
+  std::transform(items.begin(), items.end(), order.begin(), [](const Item& item) { return item.index; });
+  const auto group = static_cast<std::size_t>(smallest_group);
+  for (std::size_t n = 0; n < order.size(); n += group) {
+    std::sort(order.begin() + static_cast<std::ptrdiff_t>(n),
+              order.begin() + static_cast<std::ptrdiff_t>(std::min(n + group, order.size())));
+  }
+  return order;
+}
+
+std::size_t groups(std::size_t count, int of) {
+  return (count + static_cast<std::size_t>(of) - 1) / static_cast<std::size_t>(of);
+}
+
+}  // namespace
+
+PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities)
+    : PointTree(points, radii, velocities, spatial_order(points)) {}
+
+PointTree::PointTree(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& radii, const Eigen::Matrix3Xd& velocities,
+                     std::vector<int> order)
+    : order_(std::move(order)), fastest_(velocities.size() == 0 ? 0.0 : velocities.colwise().norm().maxCoeff()) {
+  if (order_.empty()) {
+    return;
+  }
+  common_radius_ = (radii.array() == radii[0]).all() ? radii[0] : -1.0;
+  const std::size_t leaves = groups(order_.size(), leaf_size);
+  for (int c = 0; c < 7; ++c) {
+    columns_[static_cast<std::size_t>(c)].assign(leaves * leaf_size, c < 3 ? padding : 0.0);
+    for (std::size_t n = 0; n < order_.size(); ++n) {
+      columns_[static_cast<std::size_t>(c)][n] = c < 3    ? points(c, order_[n])
+                                                 : c == 3 ? radii[order_[n]]
+                                                          : velocities(c - 4, order_[n]);
+    }
+  }
+  levels_.emplace_back(static_cast<int>(leaves));
+  while (levels_.back().size > 1) {
+    levels_.emplace_back(static_cast<int>(groups(static_cast<std::size_t>(levels_.back().size), fan_out)));
+  }
+  refit();
+}
+
+PointTree::Level::Level(int count) : size(count) {
+  const std::size_t room = groups(static_cast<std::size_t>(count), fan_out) * fan_out + leaf_size - fan_out;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    centre[axis].assign(room, padding);
+    half[axis].assign(room, 0.0);
+  }
+  largest.assign(room, 0.0);
+  radius.assign(room, 0.0);
+}
+
+void PointTree::refit() noexcept {
+  for (std::size_t level = 0; level < levels_.size(); ++level) {
+    for (int node = 0; node < levels_[level].size; ++node) {
+      fit(level, node);
+    }
+  }
+}
+
+void PointTree::fit(std::size_t level, int node) noexcept {
+  Level& at = levels_[level];
+  const bool leaf = level == 0;
+  const Level& below = levels_[leaf ? 0 : level - 1];
+  const auto n = static_cast<std::size_t>(node);
+  const std::size_t per_node = leaf ? leaf_size : fan_out;
+  const std::size_t begin = n * per_node;
+  const std::size_t end = std::min(begin + per_node, leaf ? order_.size() : static_cast<std::size_t>(below.size));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& x = leaf ? columns_[axis] : below.centre[axis];
+    double low = infinity, high = -infinity;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double half = leaf ? 0.0 : below.half[axis][i];
+      low = std::min(low, x[i] - half);
+      high = std::max(high, x[i] + half);
+    }
+    at.centre[axis][n] = 0.5 * (low + high);
+    at.half[axis][n] = 0.5 * (high - low);
+  }
+  at.radius[n] = at.largest[n] = 0.0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const Ball member =
+        leaf ? Ball{columns_[0][i], columns_[1][i], columns_[2][i], columns_[3][i]} : below.ball(static_cast<int>(i));
+    const Eigen::Vector3d away(member.x - at.centre[0][n], member.y - at.centre[1][n], member.z - at.centre[2][n]);
+    at.radius[n] = std::max(at.radius[n], away.norm() + member.radius);
+    at.largest[n] = std::max(at.largest[n], leaf ? member.radius : below.largest[i]);
+  }
+}
+
+void PointTree::advance(double duration) noexcept {
+  if (!moves()) {
+    return;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t n = 0; n < order_.size(); ++n) {
+      columns_[axis][n] += duration * columns_[4 + axis][n];
+    }
+  }
+  refit();
+}
+
+void PointTree::freeze() noexcept {
+  fastest_ = 0.0;
+  for (std::size_t axis = 4; axis < 7; ++axis) {
+    std::fill(columns_[axis].begin(), columns_[axis].end(), 0.0);
+  }
+}
+
+}  // namespace sidestep

@@ -1,0 +1,113 @@
+// The nearest point against a plain scan of all points.
+#include "sidestep/scene/point_tree.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include "support/allocations.hpp"
+#include "support/random_scene.hpp"
+
+using namespace sidestep;
+using test::Random;
+
+namespace {
+
+constexpr double single = 1e-6;  // [m] rounding of distances of some metres
+
+double scanned(const Obstacles& obstacles, const Eigen::Vector3d& place, double limit) {
+  for (Eigen::Index n = 0; n < obstacles.size(); ++n) {
+    limit = std::min(limit, (obstacles.points().col(n) - place).norm() - obstacles.radii()[n]);
+  }
+  return limit;
+}
+
+/// Distance of a place from what is in a box, or a ball.
+double measured(const Boxes& boxes, int n, const Eigen::Vector3d& place) {
+  const Eigen::Vector3d offset = place - Eigen::Vector3d(boxes.x[n], boxes.y[n], boxes.z[n]);
+  const Eigen::Vector3d half(boxes.half_x[n], boxes.half_y[n], boxes.half_z[n]);
+  return (offset.cwiseAbs() - half).cwiseMax(0.0).norm() - boxes.radius[n];
+}
+double measured(const Balls& balls, int n, const Eigen::Vector3d& place) {
+  return (Eigen::Vector3d(balls.x[n], balls.y[n], balls.z[n]) - place).norm() - balls.radius[n];
+}
+
+/// Nearest to a place; `looked` counts the balls and boxes that were measured.
+PointTree::Nearest nearest(const PointTree& tree, const Eigen::Vector3d& place, double limit, double stop, int& looked) {
+  return tree.nearest(limit, stop, [&](const auto& nodes, int first, int count, double least, float* values) {
+    unsigned near = 0;
+    for (int i = 0; i < count; ++i) {
+      values[i] = static_cast<float>(measured(nodes, first + i, place));
+      near |= (values[i] < least ? 1u : 0u) << i;
+    }
+    looked += count;
+    return near;
+  });
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(finds_the_nearest_point_of_a_plain_scan) {
+  Random random(1);
+  for (int trial = 0; trial < 200; ++trial) {
+    Obstacles obstacles = test::random_obstacles(random, random.integer(1, 3000));
+    if (trial % 2 == 1) {
+      obstacles.advance(random.uniform(0.0, 2.0));
+    }
+    const PointTree& tree = obstacles.tree();
+    BOOST_TEST(tree.size() == obstacles.size());
+    for (int query = 0; query < 20; ++query) {
+      const Eigen::Vector3d place = 0.6 * random.matrix(3, 1);
+      const double limit = query == 0 ? -0.01 : random.magnitude(1e-3, 10.0);
+      int looked = 0;
+      const PointTree::Nearest found = nearest(tree, place, limit, -10.0, looked);
+      BOOST_TEST(std::abs(found.distance - scanned(obstacles, place, limit)) < single);
+      BOOST_TEST((found.point >= 0) == (found.distance < limit));
+      if (found.point >= 0) {
+        const int n = tree.order()[static_cast<std::size_t>(found.point)];
+        BOOST_TEST(std::abs((obstacles.points().col(n) - place).norm() - obstacles.radii()[n] - found.distance) < single);
+      }
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(looks_at_few_points_and_stops_when_told) {
+  Random random(2);
+  const Obstacles obstacles(random.matrix(3, 20000), Eigen::VectorXd::Zero(20000), Eigen::Matrix3Xd::Zero(3, 20000));
+  int looked = 0;
+  nearest(obstacles.tree(), Eigen::Vector3d(0.3, 0.2, 0.1), 10.0, -10.0, looked);
+  BOOST_TEST(looked < 2000);  // a tenth of a scan
+  int stopped = 0;
+  BOOST_TEST(nearest(obstacles.tree(), Eigen::Vector3d(0.3, 0.2, 0.1), 10.0, 10.0, stopped).distance < 10.0);
+  BOOST_TEST(stopped < looked);
+}
+
+BOOST_AUTO_TEST_CASE(a_plane_a_line_and_one_point_have_a_tree) {
+  for (const int dimensions : {0, 1, 2}) {
+    Random random(2);
+    Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 50);
+    points.topRows(dimensions) = random.matrix(dimensions, 50);
+    const Obstacles obstacles(points, Eigen::VectorXd::Zero(50), Eigen::Matrix3Xd::Zero(3, 50));
+    int looked = 0;
+    for (const Eigen::Vector3d& place : {Eigen::Vector3d(0.0, 0.0, 2.0), Eigen::Vector3d(1e300, 0.0, 0.0)}) {
+      BOOST_TEST(nearest(obstacles.tree(), place, 1e6, -1.0, looked).distance ==
+                 static_cast<float>(scanned(obstacles, place, 1e6)));
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(no_points_and_no_place_find_nothing) {
+  int looked = 0;
+  BOOST_TEST(nearest(Obstacles::none().tree(), Eigen::Vector3d::Zero(), 1e6, 0.0, looked).point == -1);
+  Random random(3);
+  const Obstacles obstacles = test::random_obstacles(random, 10);
+  BOOST_TEST(nearest(obstacles.tree(), Eigen::Vector3d::Constant(std::nan("")), 1.0, 0.0, looked).point == -1);
+}
+
+BOOST_AUTO_TEST_CASE(queries_allocate_nothing) {
+  Random random(4);
+  const Obstacles obstacles = test::random_obstacles(random, 500);
+  int looked = 0, found = -1;
+  const std::size_t allocations =
+      test::allocations_of([&] { found = nearest(obstacles.tree(), Eigen::Vector3d::Zero(), 1.0, -1.0, looked).point; });
+  BOOST_TEST(found >= 0);
+  BOOST_TEST(allocations == 0);
+}
