@@ -11,11 +11,13 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "reference" / "messages.md").read_text(encoding="utf-8")
 SOURCES = (
     "controller/explain.cpp",
-    "controller/measurement.cpp",
-    "controller/following.cpp",
+    "controller/explain_goal.cpp",
+    "controller/explain_input.cpp",
+    "controller/measured_state.cpp",
     "controller/plausibility.cpp",
-    "controller/input_report.cpp",
-    "controller/speed.cpp",
+    "controller/speed_limiter.cpp",
+    "controller/trajectory_follower.cpp",
+    "controller/words.cpp",
     "attractor/diagnosis.cpp",
 )
 LEAST_WORDS = 3  # of a phrase; less only joins parts of a sentence

@@ -7,88 +7,45 @@
 
 namespace sidestep {
 
-void Controller::Impl::take_orders_of(Impl& before) {
-  Order order;
-  std::shared_ptr<const Obstacles> obstacles;
-  Questions questions;
-  {
-    const std::lock_guard lock(before.mutex_);
-    order = before.shown_order_;
-    goal_count_ = before.goal_count_;
-    obstacle_count_ = before.obstacle_count_;
-    obstacles = before.shown_obstacles_;
-    questions = before.questions_;
+void Controller::Impl::take_requests_of(Impl& before) {
+  if (const Eigen::VectorXd q = before.board_.last_measured(); q.size() != 0) {
+    board_.measured().put(q);
   }
-  if (const Eigen::VectorXd q = before.last_q(); q.size() != 0) {
-    measured_.put(q);
-  }
-  const std::lock_guard lock(mutex_);
-  if (guide && !settings.synchronous) {
-    guide->set_obstacles(*obstacles);
-  }
-  questions_ = std::move(questions);
-  shown_order_ = order;
-  shown_obstacles_ = obstacles;
-  goal_orders_.put({goal_count_, std::move(order)});
-  obstacle_orders_.put({obstacle_count_, *obstacles});
+  board_.take_over(before.board_, [this](const Obstacles& shared) { share_with_planner(shared); });
 }
 
 void Controller::Impl::go_on_from(Impl& before) noexcept {
-  static_cast<StepState&>(*this) = before;
-  solution = before.solution;
-  tracked_ = before.tracked_;
-  closing_.go_on_from(before.closing_);
-  obstacle_orders_.update();
-  if (obstacle_orders_.current().number == obstacle_number_) {  // as they have moved on until now
-    std::swap(obstacle_orders_.current().obstacles, before.obstacle_orders_.current().obstacles);
-  }
-  goal_orders_.update();
-  GoalOrder& order = goal_orders_.current();
-  taken_.goal = order.number;
-  taken_.obstacles = obstacle_orders_.current().number;
-  if (order.number == goal_number_) {
-    std::swap(order.order, before.goal_orders_.current().order);
-    goal_ = before.goal_ == nullptr               ? nullptr
-            : before.goal_ == &before.input_goal_ ? &input_goal_
-                                                  : std::get_if<Goal>(&order.order);
-  }
-  // The target stays; a way to it is looked for anew.
-  target_blocked_ = false;
-  next_posture_ = next_look_ = 0.0;
-  if (guide && has_target_) {
-    guide->set_goal(target_);
-  }
-  wakes_worker_ = true;
-  begins_goal_ = begins_goal_ || (goal_ != nullptr && !moves_ && !has_target_);
-  if (avoiding_ && evasion_ && settings.synchronous) {
-    guarded([&] { evasion_->resume(trajectory_); });
-  }
-  // What the arm weighs more by the new model, the observer has seen before.
-  if (dynamics_ && known_before_) {
-    twist_state_.update(arm.robot(), arm_q_, arm_v_);
-    dynamics_->gravity(twist_state_, *dynamics_workspace_, gravity_change_);
-    feedback_ = gravity_change_ - gravity_;
-    gravity_ = gravity_change_;
-    if (observer_) {
-      observer_->change_model(feedback_);
-    }
+  // First what does not depend on the body, then what it changes.
+  state_ = before.state_;
+  state_.followed = nullptr;
+  state_.next_look = 0.0;
+  reference_ = before.reference_;
+  last_ = before.last_;
+  solution_ = before.solution_;
+  measured_.go_on_from(before.measured_);
+  activity_.go_on_from(before.activity_);
+  tracker_.go_on_from(before.tracker_);
+  sources_.go_on_from(before.sources_);
+  inputs_.go_on_from(before.inputs_);
+  taken_.request = inputs_.request().handed_over();
+  taken_.obstacles = sources_.handed_over();
+  board_.guarded([&] { look_ahead_.go_on_from(before.look_ahead_); });
+  dynamics_.go_on_from(before.dynamics_);
+  if (dynamics_.has_model() && measured_.was_known()) {
+    dynamics_.change_weight(measured_.position(), measured_.velocity());
   }
   // Bounds of this step are those of the clearances of the last.
-  twist_state_.update(arm.robot(), q_, v_);
-  has_last_wanted_v_ = false;
-  static_cast<void>(system->acceleration(q_, v_, input_pull_, obstacles(), workspace));
-  clock_.seen = -1.0;
-  clock_.free = clock_.time;
-  clock_.blocked = false;
-  clock_.blocker = {};
+  attractor_.look_at_reference(reference_, inputs_.input().attraction(), obstacles());
 }
 
 bool Controller::Impl::is_lifted() const noexcept {
-  const auto is_free = [this](const Resting& one) {
-    return workspace.clearances.least[one.coordinate] >= one.clearance &&
-           (!apart_ || arm_workspace_.clearances.least[one.coordinate] >= one.clearance);
-  };
-  return known_before_ && std::all_of(resting_.begin(), resting_.end(), is_free);
+  return measured_.was_known() &&
+         resting_.is_lifted(attractor_.at_reference().clearances, state_.apart ? &attractor_.at_arm().clearances : nullptr);
+}
+
+void Controller::Impl::restart() noexcept {
+  taken_.restarts = true;
+  measured_.restart();
 }
 
 void Controller::take_over() noexcept {
@@ -142,9 +99,9 @@ void Controller::install(std::unique_ptr<Impl> fresh, const Arm& whole, std::vec
     if (recorder_) {
       recorder_->add_arm(*fresh, held);
     }
-    fresh->take_orders_of(last);
+    fresh->take_requests_of(last);
     if (lifted != nullptr) {
-      lifted->take_orders_of(last);
+      lifted->take_requests_of(last);
     }
     passed_over.reset(next_.exchange(nullptr));
     old = retired_.exchange(nullptr, std::memory_order_acquire);  // before `fresh` can be among them
@@ -199,8 +156,8 @@ std::string Controller::attach(const Attachment& object) {
   std::optional<Obstacles> around;
   {
     const std::lock_guard orders(setters_);
-    last.q = newest().last_q();
-    around = newest().newest_obstacles();
+    last.q = newest().board().last_measured();
+    around = *newest().board().newest_obstacles();
   }
   if (!object.rests_on.empty()) {
     if (last.q.size() == 0) {

@@ -10,7 +10,7 @@ namespace sidestep {
 constexpr double bound_rounding = 1e-9;  // [rad/s] or [m/s] by which a bound counts as kept
 
 /// How far the velocity of a frame may be from the twist that was asked for and count as the same; translation and rotation
-/// each. Joints: see Controller::Impl::joint_tolerance.
+/// each. Joints: see joint_tolerance.
 struct InputTolerance {
   static constexpr double share = 0.05;  // of what is asked
   // A turn of 1 rad/s may move the frame's origin as 0.1 m/s may, a translation of 1 m/s may turn it as 1 rad/s may.
@@ -43,5 +43,16 @@ struct Reduction {
   bool upper = false;                ///< the upper position limit
   Vector6d lost = Vector6d::Zero();  ///< unit direction in which the frame hardly moves, on the side that was asked for
 };
+
+/// Limits that velocities, twists and trajectories may use of each joint; the rest is for feedback.
+struct UsableLimits {
+  Eigen::VectorXd velocity, acceleration;  ///< (nv) [rad/s | m/s] and per s
+
+  /// Scales a velocity as a whole to the limits, and writes which joint asks for that; the share that is left.
+  double scale(Eigen::VectorXd& v, Reduction& reduction) const noexcept;
+};
+
+/// [rad/s | m/s] By how much joint j may be off a velocity of all and count as following it.
+double joint_tolerance(const Eigen::VectorXd& asked, Eigen::Index j, bool slides) noexcept;
 
 }  // namespace sidestep

@@ -8,6 +8,7 @@
 
 #include "../math/settings.hpp"
 #include "impl.hpp"
+#include "sidestep/controller/motion.hpp"
 
 namespace sidestep {
 namespace {

@@ -93,19 +93,19 @@ bool RecordRing::take(std::vector<std::byte>& record, std::uint64_t end) {
 Recorder::Recorder(const std::filesystem::path& path, const Controller::Impl& first, std::mutex& setters)
     : path_(path),
       setters_(setters),
-      ring_(ring_capacity, first.settings.synchronous),
-      synchronous_(first.settings.synchronous) {
-  if (first.tick_ != 0) {
+      ring_(ring_capacity, first.model.settings.synchronous),
+      synchronous_(first.model.settings.synchronous) {
+  if (first.state_.tick != 0) {
     throw std::runtime_error("controller: recording begins before the first step, but it has made " +
-                             std::to_string(first.tick_) + "; make another controller");
+                             std::to_string(first.state_.tick) + "; make another controller");
   }
   recording::HeadRecord head;
   head.sidestep_version = recording::sidestep_version();
   head.compiler = __VERSION__;
   head.instruction_set = name(instruction_set());
   head.arm_number = first.arm_number;
-  head.arm_file = recording::arm_bytes(first.arm);
-  head.settings = recording::to_records(first.settings);
+  head.arm_file = recording::arm_bytes(first.model.arm);
+  head.settings = recording::to_records(first.model.settings);
   head.fields = recording::fields_of_commands();
   recording::Bytes content;
   recording::Encoder<recording::Bytes> out(content);
@@ -131,23 +131,13 @@ void Recorder::add(std::string_view tag, const Record& record) {
 }
 
 void Recorder::note(const Controller::Impl& newest) {
-  using Impl = Controller::Impl;
   using recording::RequestRecord;
   if (closed_) {
     return;
   }
-  std::shared_ptr<const Obstacles> obstacles;
-  std::uint64_t request_number = 0, obstacle_number = 0;
-  Impl::Order order;
-  {
-    const std::lock_guard lock(newest.mutex_);
-    request_number = newest.goal_count_;
-    obstacle_number = newest.obstacle_count_;
-    obstacles = newest.shown_obstacles_;
-    if (request_number > noted_request_) {
-      order = newest.shown_order_;
-    }
-  }
+  const RequestBoard& board = newest.board();
+  const auto [obstacle_number, obstacles] = board.numbered_obstacles();
+  const std::uint64_t request_number = board.request_number();
   if (obstacle_number > noted_obstacles_) {
     noted_obstacles_ = obstacle_number;
     recording::ObstaclesRecord record{
@@ -180,24 +170,24 @@ void Recorder::note(const Controller::Impl& newest) {
                               record.poses.push_back(to_record(other));
                             }
                           },
-                          [&](const Impl::VelocityOrder& velocity) {
+                          [&](const VelocityRequest& velocity) {
                             record.kind = RequestRecord::Kind::velocity;
                             record.velocity = velocity.velocity;
                           },
-                          [&](const Impl::TwistOrder& twist) {
+                          [&](const TwistRequest& twist) {
                             record.kind = RequestRecord::Kind::twist;
                             record.frame = twist.frame.name;
                             record.twist = twist.twist;
                             record.local = twist.local;
                             record.free_rotation = twist.free == TwistFreedom::rotation;
                           },
-                          [&](const Impl::TrajectoryOrder& trajectory) {
+                          [&](const TrajectoryRequest& trajectory) {
                             record.kind = RequestRecord::Kind::trajectory;
                             record.q = trajectory.samples->q;
                             record.times = trajectory.samples->times;
                             record.steer = trajectory.behaviour == TrajectoryBehaviour::steer;
                           }},
-               order);
+               board.newest_request());
     add(recording::request_tag, record);
   }
 }
@@ -208,13 +198,13 @@ void Recorder::add_arm(const Controller::Impl& arm, const std::vector<Controller
   }
   recording::ArmRecord record;
   record.number = arm.arm_number;
-  record.file = recording::arm_bytes(arm.arm);
+  record.file = recording::arm_bytes(arm.model.arm);
   if (const Controller::Impl* const lifted = arm.lifted.load()) {
     record.lifted_number = lifted->arm_number;
-    record.lifted_file = recording::arm_bytes(lifted->arm);
+    record.lifted_file = recording::arm_bytes(lifted->model.arm);
   }
-  record.clearances.resize(static_cast<Eigen::Index>(arm.resting_.size()));
-  for (const auto& one : arm.resting_) {
+  record.clearances.resize(static_cast<Eigen::Index>(arm.resting().all().size()));
+  for (const RestingClearances::One& one : arm.resting().all()) {
     record.clearances[static_cast<Eigen::Index>(record.resting.size())] = one.clearance;
     record.resting.push_back(one.coordinate);
   }
@@ -247,29 +237,29 @@ void Recorder::end_step(Controller::Impl& arm) noexcept {
   }
   Controller::Impl::Taken& taken = arm.taken_;
   recording::Encoder<RecordRing> out(ring_);
-  out(arm.arm_number, arm.goal_number_, arm.obstacle_number_, taken.goal, taken.obstacles);
-  out(TakenKind::elapsed, arm.measurement_.elapsed);
+  out(arm.arm_number, arm.inputs_.request().number(), arm.sources_.number(), taken.request, taken.obstacles);
+  out(TakenKind::elapsed, arm.measured_.elapsed_time());
   if (taken.restarts) {
     out(TakenKind::restart);
   }
   if (!synchronous_) {
-    if (const auto* found = taken.posture) {
+    if (const auto* found = taken.goal.posture) {
       const Posture& p = found->posture;
-      out(TakenKind::posture, found->goal_number, found->attempt, p.q, p.position_error, p.rotation_error, p.room,
+      out(TakenKind::posture, found->request_number, found->attempt, p.q, p.position_error, p.rotation_error, p.room,
           p.touches_itself);
     }
     if (const auto* found = taken.activations) {
-      out(TakenKind::activations, found->goal_number, found->posture_attempt, found->values, found->target_blocked);
+      out(TakenKind::activations, found->request_number, found->posture_attempt, found->values, found->target_blocked);
     }
     if (const auto* found = taken.trajectory) {
       const AvoidanceTrajectory& t = found->trajectory;
-      out(TakenKind::trajectory, found->time, found->goal_number, found->avoid, found->duration, t.target(), t.position(),
+      out(TakenKind::trajectory, found->time, found->request_number, found->avoid, found->duration, t.target(), t.position(),
           t.velocity());
     }
-    if (const auto* look = taken.look) {
+    if (const auto* look = taken.goal.look) {
       out(TakenKind::look, look->time, look->duration);
     }
-    if (const auto* answer = taken.answer) {
+    if (const auto* answer = taken.goal.answer) {
       out(TakenKind::answer, answer->goal_number, answer->route_number, answer->path_number, answer->status, answer->progress,
           answer->route != nullptr);
       if (answer->route != nullptr) {
@@ -278,7 +268,7 @@ void Recorder::end_step(Controller::Impl& arm) noexcept {
     }
   }
   out(TakenKind::end);
-  recording::write_command(out, arm.command);
+  recording::write_command(out, arm.command_);
   if (!ring_.end()) {
     full_ = true;
     lost_.fetch_add(1, std::memory_order_relaxed);

@@ -196,7 +196,7 @@ class Replay {
   void give_obstacles(std::uint64_t number);
   void give_arm(std::uint64_t number);
   void give_taken(recording::Decoder& in);
-  Impl::Order order_of(const recording::RequestRecord& record, const Impl& impl) const;
+  Request request_of(const recording::RequestRecord& record, const Impl& impl) const;
 
   std::vector<recording::FieldRecord> fields_;
   Controller controller_;
@@ -237,7 +237,7 @@ std::optional<ReplayDifference> Replay::step(std::span<const std::byte> content)
   step_ = number;
   const Eigen::Ref<const Eigen::MatrixXd> M(mass_matrix);
   const Eigen::Ref<const Eigen::VectorXd> h(bias);
-  const Command& command = impl.step(q, v, dynamics ? &M : nullptr, dynamics ? &h : nullptr);
+  const Command& command = impl.step(q, v, dynamics ? ToldDynamics{&M, &h} : ToldDynamics{});
   std::optional<ReplayDifference> difference = recording::first_difference(fields_, in.rest(), command);
   if (impl.arm_number != arm) {
     difference = ReplayDifference{0, "arm", "number " + std::to_string(arm), "number " + std::to_string(impl.arm_number)};
@@ -258,8 +258,8 @@ void Replay::give_request(std::uint64_t number) {
   }
   request_ = number;
   controller_.tell([&](Impl& impl) {
-    impl.goal_count_ = number - 1;
-    impl.put(order_of(found->second, impl));
+    impl.board().number_next(number, 0);
+    impl.put(request_of(found->second, impl));
   });
   requests_.erase(requests_.begin(), found);  // the newest stays, for one that was taken twice
 }
@@ -282,7 +282,7 @@ void Replay::give_obstacles(std::uint64_t number) {
     }
   }
   controller_.tell([&](Impl& impl) {
-    impl.obstacle_count_ = number - 1;
+    impl.board().number_next(0, number);
     impl.set_obstacles(made);
   });
   obstacles_.erase(obstacles_.begin(), found);
@@ -297,7 +297,7 @@ void Replay::give_arm(std::uint64_t number) {
   const Arm arm = recording::arm_of(record.file);
   auto fresh = std::make_unique<Impl>(arm, controller_.settings_, controller_.command_, false);
   for (std::size_t k = 0; k < record.resting.size(); ++k) {
-    fresh->resting_.push_back({static_cast<Eigen::Index>(record.resting[k]), record.clearances[static_cast<Eigen::Index>(k)]});
+    fresh->resting().add({static_cast<Eigen::Index>(record.resting[k]), record.clearances[static_cast<Eigen::Index>(k)]});
   }
   if (record.lifted_number != 0) {
     fresh->lifted = new Impl(recording::arm_of(record.lifted_file), controller_.settings_, controller_.command_, false);
@@ -312,33 +312,33 @@ void Replay::give_taken(recording::Decoder& in) {
   for (TakenKind kind = in.take<TakenKind>(); kind != TakenKind::end; kind = in.take<TakenKind>()) {
     switch (kind) {
       case TakenKind::posture: {
-        Impl::FoundPosture found = impl.postures_.current();
+        FoundPosture found = impl.inputs_.goal().found_postures().current();
         Posture& p = found.posture;
-        in(found.goal_number, found.attempt, p.q, p.position_error, p.rotation_error, p.room, p.touches_itself);
-        impl.postures_.put(std::move(found));
+        in(found.request_number, found.attempt, p.q, p.position_error, p.rotation_error, p.room, p.touches_itself);
+        impl.inputs_.goal().found_postures().put(std::move(found));
         break;
       }
       case TakenKind::activations: {
-        Impl::Activations found;
-        in(found.goal_number, found.posture_attempt, found.values, found.target_blocked);
-        impl.activations_.put(std::move(found));
+        FoundActivations found;
+        in(found.request_number, found.posture_attempt, found.values, found.target_blocked);
+        impl.worker_.activations().put(std::move(found));
         break;
       }
       case TakenKind::trajectory: {
-        Impl::FoundTrajectory found = impl.trajectories_.current();
+        FoundTrajectory found = impl.look_ahead_.buffer().current();
         Eigen::VectorXd target, position, velocity;
-        in(found.time, found.goal_number, found.avoid, found.duration, target, position, velocity);
-        found.trajectory = AvoidanceTrajectory(impl.arm.robot().limits(), position, velocity, std::move(target));
-        impl.trajectories_.put(std::move(found));
+        in(found.time, found.request_number, found.avoid, found.duration, target, position, velocity);
+        found.trajectory = AvoidanceTrajectory(impl.model.arm.robot().limits(), position, velocity, std::move(target));
+        impl.look_ahead_.buffer().put(std::move(found));
         break;
       }
       case TakenKind::restart: impl.restart(); break;
-      case TakenKind::elapsed: in(impl.measurement_.replayed_elapsed); break;
+      case TakenKind::elapsed: impl.measured_.give_elapsed(in.take<double>()); break;
       case TakenKind::look: {
         OnlinePlanner::Looked look;
         in(look.time, look.duration);
-        if (impl.guide) {
-          impl.guide->give(look);
+        if (OnlinePlanner* const planner = impl.planner()) {
+          planner->give(look);
         }
         break;
       }
@@ -351,8 +351,8 @@ void Replay::give_taken(recording::Decoder& in) {
           describe(in, route);
           answer.route = std::make_shared<const TimedPath>(std::move(route));
         }
-        if (impl.guide) {
-          impl.guide->give(std::move(answer));
+        if (OnlinePlanner* const planner = impl.planner()) {
+          planner->give(std::move(answer));
         }
         break;
       }
@@ -361,9 +361,9 @@ void Replay::give_taken(recording::Decoder& in) {
   }
 }
 
-Controller::Impl::Order Replay::order_of(const recording::RequestRecord& record, const Impl& impl) const {
+Request Replay::request_of(const recording::RequestRecord& record, const Impl& impl) const {
   using Kind = recording::RequestRecord::Kind;
-  const Robot& robot = impl.arm.robot();
+  const Robot& robot = impl.model.arm.robot();
   switch (record.kind) {
     case Kind::none: return {};
     case Kind::joint_goal: return Goal(JointGoal(record.position, record.velocity, record.acceleration));
@@ -386,14 +386,15 @@ Controller::Impl::Order Replay::order_of(const recording::RequestRecord& record,
       }
       return Goal(std::move(*whole));
     }
-    case Kind::velocity: return Impl::VelocityOrder{record.velocity};
+    case Kind::velocity: return VelocityRequest{record.velocity};
     case Kind::twist:
-      return Impl::TwistOrder{moved_frame(robot, record.frame, "its twist"), record.twist, record.local,
-                              record.free_rotation ? TwistFreedom::rotation : TwistFreedom::none};
+      return TwistRequest{moved_frame(robot, record.frame, "its twist"), record.twist, record.local,
+                          record.free_rotation ? TwistFreedom::rotation : TwistFreedom::none};
     case Kind::trajectory:
-      return Impl::TrajectoryOrder{JointTrajectory(robot, record.q, record.times, impl.most_v_, impl.most_a_),
-                                   record.steer ? TrajectoryBehaviour::steer : TrajectoryBehaviour::keep_path,
-                                   std::make_shared<const TrajectorySamples>(TrajectorySamples{record.q, record.times})};
+      return TrajectoryRequest{
+          JointTrajectory(robot, record.q, record.times, impl.model.usable.velocity, impl.model.usable.acceleration),
+          record.steer ? TrajectoryBehaviour::steer : TrajectoryBehaviour::keep_path,
+          std::make_shared<const TrajectorySamples>(TrajectorySamples{record.q, record.times})};
   }
   throw std::invalid_argument("its request is of a kind that this Sidestep does not know");
 }

@@ -1,0 +1,65 @@
+#include "attractor_stage.hpp"
+
+#include <utility>
+
+namespace sidestep {
+
+AttractorStage::AttractorStage(std::shared_ptr<const GeometricSystem> system, const ControllerSettings& settings)
+    : system_(std::move(system)),
+      settings_(settings),
+      reference_(*system_),
+      arm_(*system_),
+      corrected_(system_->robot().num_coordinates(), system_->num_embedding_coordinates()),
+      arm_corrected_(corrected_) {}
+
+StepStatus AttractorStage::attract(const Lead& lead, const Reference& reference, const Obstacles& obstacles,
+                                   const ClosingEstimate& closing, Eigen::VectorXd& wanted) noexcept {
+  reference_.horizon = arm_.horizon = lead.avoidance != nullptr ? 0.0 : Horizon::of_obstacles;
+  const StepStatus status = system_->acceleration(reference.q, reference.v, lead.goal, obstacles, reference_);
+  wanted = reference_.acceleration;
+  if (!is_fallback(status)) {
+    if (lead.avoidance != nullptr) {
+      lead.avoidance->acceleration(reference.q, reference.v, settings_.period, wanted);
+    } else if (lead.kept_path != nullptr) {
+      wanted = *lead.kept_path + reference_.recovery;
+    }
+    if (lead.pace < 1.0) {
+      // Damped, at no pace like a stop; the way out of a barrier is not.
+      wanted = lead.pace * (wanted - reference_.recovery) - (1.0 - lead.pace) / settings_.stop_time * reference.v +
+               reference_.recovery;
+    }
+  }
+  if (lead.rests) {
+    wanted = -reference.v / settings_.stop_time;
+  } else if (closing.changes() && lead.avoidance == nullptr && !is_fallback(status)) {
+    wait_in_doubt(closing, wanted);
+  }
+  return status;
+}
+
+void AttractorStage::wait_in_doubt(const ClosingEstimate& closing, Eigen::VectorXd& wanted) const noexcept {
+  bool doubted = false;
+  for (std::size_t k = 0; k < system_->labels().size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    if (reference_.clearances.values[at] < system_->labels()[k].floor) {
+      if (!closing.is_doubted(at)) {
+        return;
+      }
+      doubted = true;
+    }
+  }
+  if (doubted) {
+    wanted -= reference_.recovery;
+  }
+}
+
+bool AttractorStage::look_at_arm(const Eigen::VectorXd& q, const Eigen::VectorXd& v, const Obstacles& obstacles) noexcept {
+  arm_.activations = reference_.activations;
+  return system_->embed(q, v, obstacles, arm_);
+}
+
+void AttractorStage::look_at_reference(const Reference& reference, const Goal& goal, const Obstacles& obstacles) noexcept {
+  static_cast<void>(system_->acceleration(reference.q, reference.v, goal, obstacles, reference_));
+}
+
+}  // namespace sidestep

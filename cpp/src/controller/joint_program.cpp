@@ -1,0 +1,59 @@
+#include "joint_program.hpp"
+
+namespace sidestep {
+
+Robot within_margins(const Robot& robot, const ControllerSettings& settings, double speed) {
+  JointLimits limits = robot.limits();
+  const double left = 1.0 - settings.limit_margin;
+  limits.velocity *= left * speed;
+  limits.acceleration *= left;
+  limits.jerk *= left;
+  limits.effort_rate *= left;
+  limits.effort *= 1.0 - settings.effort_margin;
+  return Robot(robot.name(), robot.joints(), robot.frames(), robot.coordinate_names(), std::move(limits));
+}
+
+JointProgram::JointProgram(const Robot& robot, const ControllerSettings& settings, bool torque, int max_speed_rows) {
+  if (!torque) {
+    acceleration_.emplace(robot, AccelerationFilterSettings{settings.period, settings.position_margin, settings.stop_time,
+                                                            settings.safety, max_speed_rows});
+    return;
+  }
+  TorqueControllerSettings program;
+  program.period = settings.period;
+  program.safety = settings.safety;
+  program.max_speed_rows = max_speed_rows;
+  program.position_margin = settings.position_margin;
+  program.stop_time = settings.stop_time;
+  program.stop_damping = settings.stop_damping;
+  program.torque_weight.setConstant(settings.torque_weight);
+  program.slack_weight = settings.slack_weight;
+  program.velocity_overrun = settings.velocity_overrun;
+  program.acceleration_overrun = settings.acceleration_overrun;
+  torque_.emplace(robot, program);
+}
+
+TorqueStatus JointProgram::stop(ConstVectorRef q, ConstVectorRef v, const Eigen::VectorXd& wanted, const ToldDynamics& told,
+                                const ArmDynamics& dynamics, const Eigen::VectorXd* last_torque,
+                                TorqueSolution& solution) noexcept {
+  if (!torque_) {
+    return acceleration_->apply(q, v, wanted, nullptr, solution);
+  }
+  const LastCommand last{nullptr, last_torque};
+  if (told.mass_matrix != nullptr && told.bias->size() == dynamics.bias().size() && told.bias->allFinite()) {
+    return torque_->solve(q, v, wanted, *told.mass_matrix, *told.bias, nullptr, {}, last, solution);
+  }
+  return torque_->solve(q, v, wanted, dynamics.mass(), dynamics.bias(), nullptr, {}, last, solution);
+}
+
+LastCommand near_last(const Eigen::VectorXd& acceleration, const Eigen::VectorXd* torque, const ArmDynamics& dynamics,
+                      double factor, bool binds) noexcept {
+  return {&acceleration,
+          torque,
+          dynamics.has_model() ? &dynamics.gravity() : nullptr,
+          dynamics.has_model() ? &dynamics.gravity_change() : nullptr,
+          factor,
+          binds};
+}
+
+}  // namespace sidestep

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace sidestep {
+
+/// The motion that the controller integrates and the arm tracks [rad | m] and its derivatives (nv each):
+///   q̇⁺ = q̇ + T q̈,   q⁺ = q + T q̇⁺.
+struct Reference {
+  explicit Reference(Eigen::Index nv)
+      : q(Eigen::VectorXd::Zero(nv)), v(q), a(q), smooth_a(q), next_q(q), next_v(q), torque(q) {}
+
+  /// The next period begins with an arm at q, velocity v (nv); nothing is known of an acceleration. `stops`: drives that are on the
+  /// way back to an old command stop with the new one.
+  void begin(const Eigen::VectorXd& at, const Eigen::VectorXd& velocity, bool stops) noexcept;
+  /// The next period begins where this one ends.
+  void go_on() noexcept {
+    q = next_q;
+    v = next_v;
+  }
+  /// Integrates over the period T [s]; an acceleration that is not finite leaves that of the period before.
+  /// `rises`: the acceleration goes beyond the jerk limits [/s³]; the next ones go on from what jerk allows.
+  void advance(const Eigen::VectorXd& acceleration, bool rises, const Eigen::VectorXd& jerk, double period) noexcept;
+
+  Eigen::VectorXd q, v;            ///< at the beginning of this period
+  Eigen::VectorXd a;               ///< in this period, and in the last one until `advance`
+  Eigen::VectorXd smooth_a;        ///< from which jerk goes on
+  Eigen::VectorXd next_q, next_v;  ///< at its end
+  Eigen::VectorXd torque;          ///< that its program gave last [Nm | N]
+};
+
+}  // namespace sidestep

@@ -1,0 +1,106 @@
+#include "request_board.hpp"
+
+#include <cstdio>
+#include <limits>
+
+namespace sidestep {
+
+RequestBoard::RequestBoard(Eigen::Index nv)
+    : requests_(NumberedRequest{}),
+      obstacles_(NumberedObstacles{}),
+      measured_(Eigen::VectorXd::Constant(nv, std::numeric_limits<double>::quiet_NaN())),
+      shown_obstacles_(std::make_shared<const Obstacles>(Obstacles::none())) {}
+
+void RequestBoard::put(Request request, std::string question) {
+  const std::lock_guard lock(mutex_);
+  questions_.order_is_newer = !question.empty();
+  questions_.order = std::move(question);
+  request_ = request;
+  posture_.reset();
+  requests_.put({++request_count_, std::move(request)});
+}
+
+void RequestBoard::show_obstacles(std::shared_ptr<const Obstacles> copy, std::string question, Obstacles obstacles) {
+  shown_obstacles_ = std::move(copy);
+  questions_.order_is_newer = questions_.order_is_newer && question.empty();
+  questions_.obstacles = std::move(question);
+  obstacles_.put({++obstacle_count_, std::move(obstacles)});
+}
+
+RequestBoard::All RequestBoard::all() const {
+  const std::lock_guard lock(mutex_);
+  return {request_, shown_obstacles_, questions_, request_count_, obstacle_count_};
+}
+
+void RequestBoard::show(const All& all) {
+  request_ = all.request;
+  shown_obstacles_ = all.obstacles;
+  questions_ = all.questions;
+  request_count_ = all.request_count;
+  obstacle_count_ = all.obstacle_count;
+  requests_.put({request_count_, all.request});
+  obstacles_.put({obstacle_count_, *all.obstacles});
+}
+
+void RequestBoard::number_next(std::uint64_t request, std::uint64_t obstacles) noexcept {
+  const std::lock_guard lock(mutex_);
+  request_count_ = request == 0 ? request_count_ : request - 1;
+  obstacle_count_ = obstacles == 0 ? obstacle_count_ : obstacles - 1;
+}
+
+void RequestBoard::show_posture(std::uint64_t request_number, const Posture& posture) {
+  const std::lock_guard lock(mutex_);
+  if (request_count_ == request_number) {
+    posture_ = posture;
+  }
+}
+
+void RequestBoard::note_fault(const char* what) noexcept {
+  try {
+    const std::lock_guard lock(mutex_);
+    std::snprintf(fault_.data(), fault_.size(), "%s", what);
+  } catch (...) {  // a mutex that fails: nothing is noted
+  }
+}
+
+std::uint64_t RequestBoard::request_number() const {
+  const std::lock_guard lock(mutex_);
+  return request_count_;
+}
+
+RequestBoard::NewestObstacles RequestBoard::numbered_obstacles() const {
+  const std::lock_guard lock(mutex_);
+  return {obstacle_count_, shown_obstacles_};
+}
+
+Request RequestBoard::request(std::uint64_t number) const {
+  const std::lock_guard lock(mutex_);
+  return request_count_ == number ? request_ : Request();
+}
+
+Request RequestBoard::newest_request() const {
+  const std::lock_guard lock(mutex_);
+  return request_;
+}
+
+std::shared_ptr<const Obstacles> RequestBoard::newest_obstacles() const {
+  const std::lock_guard lock(mutex_);
+  return shown_obstacles_;
+}
+
+std::optional<Posture> RequestBoard::posture() const {
+  const std::lock_guard lock(mutex_);
+  return posture_;
+}
+
+Questions RequestBoard::questions() const {
+  const std::lock_guard lock(mutex_);
+  return questions_;
+}
+
+std::string RequestBoard::fault() const {
+  const std::lock_guard lock(mutex_);
+  return fault_.data();
+}
+
+}  // namespace sidestep

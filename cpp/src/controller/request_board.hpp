@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "request.hpp"
+#include "sidestep/controller/plausibility.hpp"
+#include "sidestep/controller/posture_search.hpp"
+#include "sidestep/math/triple_buffer.hpp"
+
+namespace sidestep {
+
+/// What was set last, for any thread: requests and obstacles on their way to the step, copies of them for the worker and for
+/// `explain`, and what the worker found. The step itself never waits for it unless it is synchronous.
+class RequestBoard {
+ public:
+  explicit RequestBoard(Eigen::Index nv);
+
+  /// Hands a request over to the step; `question`: what is hard to believe in it, empty where nothing is.
+  void put(Request request, std::string question);
+  /// Hands obstacles over to the step. `share` gets a copy before any other obstacles can be put: the planner's.
+  template <class Share>
+  void put(Obstacles obstacles, std::string question, Share&& share) {
+    auto copy = std::make_shared<const Obstacles>(obstacles);
+    const std::lock_guard lock(mutex_);  // also of the planner's obstacles: the worker must not bring back older ones
+    share(*copy);
+    show_obstacles(std::move(copy), std::move(question), std::move(obstacles));
+  }
+  /// Calls share() unless newer obstacles than these have been put: who gets those knows them already.
+  template <class Share>
+  void share_if_newest(std::uint64_t obstacle_number, Share&& share) {
+    const std::lock_guard lock(mutex_);
+    if (obstacle_count_ == obstacle_number) {
+      share();
+    }
+  }
+  /// Takes over what stands on another board, and hands it over to the step. `share` as above.
+  template <class Share>
+  void take_over(const RequestBoard& before, Share&& share) {
+    const All all = before.all();
+    const std::lock_guard lock(mutex_);
+    share(*all.obstacles);
+    show(all);
+  }
+  /// The next request and the next obstacles put have these numbers, of a recording; 0: as they come.
+  void number_next(std::uint64_t request, std::uint64_t obstacles) noexcept;
+
+  /// The posture that was found for the request of that number.
+  void show_posture(std::uint64_t request_number, const Posture& posture);
+  /// Calls action(); what it throws costs its result, is kept for `explain`, and ends neither the thread nor the process.
+  template <class Action>
+  void guarded(Action&& action) noexcept {
+    try {
+      action();
+    } catch (const std::exception& error) {
+      note_fault(error.what());
+    } catch (...) {
+      note_fault("an unknown exception");
+    }
+  }
+
+  std::uint64_t request_number() const;
+  struct NewestObstacles {
+    std::uint64_t number = 0;
+    std::shared_ptr<const Obstacles> obstacles;
+  };
+  NewestObstacles numbered_obstacles() const;
+  /// The request of that number; none where there is a newer one.
+  Request request(std::uint64_t number) const;
+  Request newest_request() const;
+  std::shared_ptr<const Obstacles> newest_obstacles() const;
+  std::optional<Posture> posture() const;
+  Questions questions() const;
+  /// What the background work failed with; empty: nothing.
+  std::string fault() const;
+
+  TripleBuffer<NumberedRequest>& requests() noexcept { return requests_; }
+  TripleBuffer<NumberedObstacles>& obstacles() noexcept { return obstacles_; }
+  /// Where the arm was measured in the last step (nv); NaN before the first. Read by one thread at a time.
+  TripleBuffer<Eigen::VectorXd>& measured() noexcept { return measured_; }
+  /// The same; empty before the first step.
+  Eigen::VectorXd last_measured() {
+    const Eigen::VectorXd& q = measured_.get();
+    return q.allFinite() ? q : Eigen::VectorXd();
+  }
+
+ private:
+  struct All {
+    Request request;
+    std::shared_ptr<const Obstacles> obstacles;
+    Questions questions;
+    std::uint64_t request_count = 0, obstacle_count = 0;
+  };
+  All all() const;
+  // With the mutex locked.
+  void show(const All& all);
+  void show_obstacles(std::shared_ptr<const Obstacles> copy, std::string question, Obstacles obstacles);
+  void note_fault(const char* what) noexcept;
+
+  TripleBuffer<NumberedRequest> requests_;
+  TripleBuffer<NumberedObstacles> obstacles_;
+  TripleBuffer<Eigen::VectorXd> measured_;
+  mutable std::mutex mutex_;  // of what follows
+  Request request_;
+  std::uint64_t request_count_ = 0, obstacle_count_ = 0;
+  std::shared_ptr<const Obstacles> shown_obstacles_;
+  std::optional<Posture> posture_;
+  Questions questions_;
+  std::array<char, 160> fault_{};
+};
+
+}  // namespace sidestep

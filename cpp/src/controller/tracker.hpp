@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+#include "arm_dynamics.hpp"
+#include "attractor_stage.hpp"
+#include "joint_kinds.hpp"
+#include "joint_program.hpp"
+#include "measured_state.hpp"
+#include "reference.hpp"
+#include "sidestep/controller/settings.hpp"
+
+namespace sidestep {
+
+/// Whether position or velocity is commanded: then the arm's drives track the reference.
+inline bool drives_track(const ControllerSettings& settings) noexcept {
+  return settings.output == ControllerSettings::Output::position || settings.output == ControllerSettings::Output::velocity;
+}
+
+/// Stage `tracker`: the arm follows the reference by feedback at the measured state,
+///   q̈ = q̈_r + ω² (q_r − q) + 2 ζ ω (q̇_r − q̇),
+/// or as an impedance, within every limit.
+class Tracker {
+ public:
+  /// Throws std::invalid_argument where the settings ask for an impedance that the arm cannot have.
+  Tracker(const Robot& robot, const JointKinds& joints, const ControllerSettings& settings, bool torque, int max_speed_rows);
+
+  /// Writes the acceleration by which the reference gives way to an arm that cannot follow it (nv).
+  void write_coupling(const Reference& reference, const Eigen::VectorXd& arm_q, Eigen::VectorXd& coupling) const noexcept;
+
+  /// The arm at the moment of a step, where it is not exactly where the reference is.
+  struct Arm {
+    const Eigen::VectorXd& q;
+    const Eigen::VectorXd& v;
+    const Clearances& clearances;
+    const ArmDynamics& dynamics;  // there
+    const LastOutput& last;
+    const SpeedRows* speed;  // null: no limits
+  };
+  /// Writes the solution that tracks the reference; `tracking_error` [rad | m]: the largest of a joint. `decided`: what the program
+  /// of the reference ended with. Returns that, or what is worse.
+  TorqueStatus track(const Reference& reference, const Arm& arm, double tracking_error, TorqueStatus decided) noexcept;
+  /// The arm is where the reference is: it is commanded the same.
+  void follow(const TorqueSolution& reference) noexcept {
+    solution_.torque = reference.torque;
+    solution_.acceleration = reference.acceleration;
+  }
+  /// The last guard of the torque's rate, for what comes from elsewhere than the program: true where it changes the torque.
+  bool keep_torque_rate(const LastOutput& last, const ArmDynamics& dynamics, Eigen::VectorXd& torque) noexcept;
+  /// Writes the velocity that leads an arm back to its reference, for an output of velocities; `known`: where the arm is.
+  void write_velocity(const Reference& reference, const Eigen::VectorXd& arm_q, bool known, Eigen::VectorXd& velocity) noexcept;
+  void begin_anew() noexcept { drift_.setZero(); }
+  void go_on_from(const Tracker& before) noexcept;
+
+  bool drives_track() const noexcept { return drives_track_; }  ///< position or velocity is commanded
+  const TorqueSolution& solution() const noexcept { return solution_; }
+  TorqueSolution& solution() noexcept { return solution_; }
+
+ private:
+  static constexpr int most_of_impedance = 32;  // joints
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_of_impedance, most_of_impedance>;
+
+  bool is_impedance() const noexcept { return torque_ && settings_.tracking.stiffness > 0.0; }
+  /// ω of the feedback [1/s].
+  double feedback_frequency(const Reference& reference, const Arm& arm) const noexcept;
+  /// Writes the acceleration that an impedance around the reference asks for.
+  void write_impedance(const Reference& reference, const Arm& arm) noexcept;
+
+  const JointLimits& limits_;
+  const JointKinds& joints_;
+  const ControllerSettings& settings_;
+  const bool torque_, drives_track_;
+  const double frequency_;  // of the feedback, at most [1/s]
+  JointProgram program_;
+  TorqueSolution solution_;
+  Eigen::VectorXd feedback_;
+  Eigen::VectorXd drift_;  // of an output of velocity, beside the reference [rad/s | m/s]
+  Eigen::MatrixXd mass_cholesky_;
+  Eigen::SelfAdjointEigenSolver<Small> modes_;
+};
+
+}  // namespace sidestep
