@@ -41,9 +41,9 @@ import numpy as np
 
 import sidestep as ss
 from sidestep.bench.problems import balls
-from sidestep.body.cache import cache_directory
 from sidestep.distance import ExactClearance, SelfCollision
 from sidestep.robot import Robot, tip_of
+from sidestep.storage.user_cache import cache_root
 
 HOST, PORT = "127.0.0.1", 1337  # the port of the protocol
 SERVER = ("franka-sim==1.1.7", "numpy==1.26.4", "mujoco<3.3")
@@ -241,9 +241,7 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--duration", type=float, default=20.0, help="of a run at most, robot's time [s]")
     parser.add_argument("--seed", type=int, default=0, help="of the first run")
-    parser.add_argument(
-        "--cache", type=Path, default=cache_directory().parent / "franka-server", help="folder"
-    )
+    parser.add_argument("--cache", type=Path, default=cache_root() / "franka-server", help="folder")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keeps logs and measured motions there")
     parser.add_argument("--json", metavar="FILE")
     given = parser.parse_args()

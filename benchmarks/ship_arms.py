@@ -1,4 +1,4 @@
-"""Makes the arms that come with Sidestep, src/sidestep/arm/shipped/NAME.arm, of every robot that is installed.
+"""Makes the arms that come with Sidestep, src/sidestep/shipped_arms/NAME.arm, of every robot that is installed.
 
     python benchmarks/ship_arms.py [NAME ...] [--again]
 
@@ -14,7 +14,8 @@ import tempfile
 from pathlib import Path
 
 import sidestep as ss
-from sidestep.arm import prepare, shipped_arms
+from sidestep import shipped_arms
+from sidestep.arm import prepare
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ CODE = """
 import sys, threadpoolctl, numpy, scipy.linalg
 from pathlib import Path
 from sidestep import Robot
-from sidestep.arm import shipped_arms
+from sidestep import shipped_arms
 from sidestep.arm.preparation import prepare
 shipped_arms.FOLDER = Path(sys.argv[1])  # which is empty: nothing is taken from a shipped arm
 kernels = {pool.get("architecture") for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"}

@@ -7,20 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sidestep import Body, Obstacles, Robot
+from sidestep import Body, Obstacles, Robot, shipped_arms
 from sidestep._core import BarrierSettings, CoordinateKind
-from sidestep.arm import shipped_arms
 from sidestep.arm.clearance_tables import clearance_tables
 from sidestep.arm.link_pairs import barrier_pairs
 from sidestep.bench.methods import barrier_system
-from sidestep.body import cache
 from sidestep.distance import SelfCollision
+from sidestep.storage import user_cache
 from sidestep.system import ClearanceTable, ClearanceTableBarrier
 
 
 @pytest.fixture
 def _nothing_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(cache.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setenv(user_cache.CACHE_VARIABLE, str(tmp_path))
     monkeypatch.setattr(shipped_arms, "FOLDER", tmp_path / "nothing")
 
 

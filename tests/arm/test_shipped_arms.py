@@ -13,7 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 import sidestep as ss
-from sidestep.arm import clearance_tables, shipped_arms
+from sidestep import shipped_arms
+from sidestep.arm import clearance_tables
 from sidestep.arm.link_pairs import tables_and_pairs
 from sidestep.body.cover_certificate import certify
 from sidestep.body.cover_overshoot import overshoot

@@ -13,11 +13,11 @@ import trimesh
 
 from sidestep import Body, Robot, _core
 from sidestep._core import distance_to_triangles
-from sidestep.body.cover import CoverSettings, components_for
 from sidestep.body.cover_certificate import certify, complete
 from sidestep.body.cover_overshoot import overshoot, union_volume
 from sidestep.body.cover_problem import TradeOff
 from sidestep.body.cover_refine import OUTLINE, Ellipsoids, rearranged, refine
+from sidestep.body.cover_settings import CoverSettings, components_for
 from sidestep.body.cover_surface import LinkSurface
 from sidestep.body.sampling import sample_link
 

@@ -15,7 +15,6 @@ import pytest
 
 import sidestep as ss
 from sidestep import Scenario
-from sidestep.arm.shipped_arms import shipped_file
 from sidestep.bench.method import Method
 from sidestep.bench.methods import build_mover
 from sidestep.bench.motion import MotionSettings
@@ -23,6 +22,7 @@ from sidestep.bench.problems import ReachProblem
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
 from sidestep.scenario import run_scenario
 from sidestep.scenario.assembly import assemble
+from sidestep.shipped_arms import shipped_file
 from sidestep.simulation import ControllerDriver, Drive, KinematicRun, Simulation, SimulationRun
 from sidestep.studio.export import scenario_now
 from sidestep.studio.mover import ControllerMover

@@ -16,7 +16,8 @@ from sidestep.control import SafetySettings
 from sidestep.controller import SpeedLimitSettings, controller_settings_fields
 from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scenarios
 from sidestep.scenario import scenario as module
-from sidestep.scenario.config import OPTIONAL, controller_settings_of
+from sidestep.scenario.config import OPTIONAL
+from sidestep.scenario.controller_settings import controller_settings_of
 from sidestep.scenario.validation import check_document
 from sidestep.thesis.custom import program_from, torque_qp_of
 

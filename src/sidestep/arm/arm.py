@@ -13,9 +13,10 @@ import numpy.typing as npt
 from numpy.typing import ArrayLike
 
 from sidestep import _core
-from sidestep.arm.shipped_arms import SUFFIX, shipped_file
+from sidestep.arm.summary import summary_of
 from sidestep.arm.telling import Telling, somebody_watches
 from sidestep.extras import MissingExtraError
+from sidestep.shipped_arms import SUFFIX, shipped_file
 
 if TYPE_CHECKING:  # imported where they are used: a prepared arm loads without them
     from sidestep.arm.preparation import Progress
@@ -198,9 +199,7 @@ class Arm(_core.Arm):
 
     def summary(self) -> str:
         """What was read and prepared, for people: joints with their limits, reach, mass, tip, and what was assumed."""
-        from sidestep.arm.summary import summary_of
-
-        return summary_of(self)
+        return summary_of(_core.Arm(self), draft=self.is_draft)
 
     def __str__(self) -> str:
         return self.summary()

@@ -10,10 +10,11 @@ import numpy as np
 
 from sidestep import _core
 from sidestep.arm import clearance_tables, link_pairs
-from sidestep.body import cache as body_cache
-from sidestep.body.cover import CoverSettings
+from sidestep.body.cache import cache_path
 from sidestep.body.cover_problem import EFFORTS
+from sidestep.body.cover_settings import CoverSettings
 from sidestep.robot import Robot
+from sidestep.storage import user_cache
 
 FORMAT_VERSION = 1  # to be raised with the version of the file format (cpp/src/arm/arm_file.cpp)
 
@@ -35,7 +36,7 @@ def arm_path(
     if components:
         add(sorted(components.items()))
     add(FORMAT_VERSION, source, robot.name, sorted(sorted(pair) for pair in allowed))
-    add(body_cache.cache_path(robot, CoverSettings(effort="draft" if draft else "fine")).name)
+    add(cache_path(robot, CoverSettings(effort="draft" if draft else "fine")).name)
     pairs, tables = link_pairs, clearance_tables
     add(EFFORTS["draft" if draft else "fine"])
     add(tables.ALGORITHM_VERSION, tables.BEYOND, tables.NEAR, tables.STEP, tables.FULL)
@@ -54,10 +55,10 @@ def arm_path(
         inertials = ()
     for inertial in inertials:
         add(inertial.mass, inertial.com, inertial.inertia)
-    return body_cache.cache_root() / "arms" / f"{digest.hexdigest()}.arm"
+    return user_cache.cache_root() / "arms" / f"{digest.hexdigest()}.arm"
 
 
 def stored_or_made(path: Path, make: Callable[[], _core.Arm]) -> _core.Arm:
     """The arm of a file or, without one, what `make` gives, which is stored there."""
     warning = "arm is prepared again", "the prepared arm is not cached"
-    return body_cache.stored_or_made(path, _core.Arm.read, make, lambda file, arm: arm.save(file), warning)
+    return user_cache.stored_or_made(path, _core.Arm.read, make, lambda file, arm: arm.save(file), warning)

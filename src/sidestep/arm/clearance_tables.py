@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
+from sidestep import shipped_arms
 from sidestep._core import ClearanceTable, JointType
-from sidestep.arm import shipped_arms
 from sidestep.arm.pair_content import PairContent
-from sidestep.body import cache
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
+from sidestep.storage.user_cache import ContentStore
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Mask: TypeAlias = npt.NDArray[np.bool_]
@@ -104,7 +104,7 @@ def clearance_tables(
         return ClearanceTables(
             tuple(shipped.tables), tuple(pair.links for pair in found if pair.links not in measured)
         )
-    store = cache.ContentStore(FOLDER, "the clearance table of a pair", enabled=cached)
+    store = ContentStore(FOLDER, "the clearance table of a pair", enabled=cached)
     content = PairContent(robot)
     keys = {pair.links: content.key(*pair.links, _settings(robot, pair, effort)) for pair in found}
     known: dict[Pair, ClearanceTable | None] = {}

@@ -11,15 +11,16 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from sidestep import shipped_arms
 from sidestep._core import ClearanceTable, Obstacles, SelfCollisionBarrier
 from sidestep.arm import clearance_tables as tables_room
-from sidestep.arm import shipped_arms
 from sidestep.arm.clearance_tables import Progress, TableEffort, clearance_tables
 from sidestep.arm.pair_content import PairContent
-from sidestep.body import Body, cache
+from sidestep.body import Body
 from sidestep.distance import SelfCollision
 from sidestep.distance.travel import travel_per_joint
 from sidestep.robot import Robot
+from sidestep.storage.user_cache import ContentStore
 
 Array: TypeAlias = npt.NDArray[np.float64]
 LinkPair: TypeAlias = tuple[str, str, float]
@@ -181,7 +182,7 @@ def _find_pairs(
     progress: Progress | None,
 ) -> tuple[_Measured, ...]:
     pairs = [pair for pair in check.pairs if set(body.links).issuperset(pair)]
-    store = cache.ContentStore(FOLDER, "the contact of a pair", enabled=cached)
+    store = ContentStore(FOLDER, "the contact of a pair", enabled=cached)
     content = PairContent(robot, body)
     settings = ("contact", ALGORITHM_VERSION, FEW, TOUCHING, NEAR, MOST_LOST, SHARE, HALVINGS, effort)
     keys = {pair: content.key(*pair, settings) for pair in pairs}

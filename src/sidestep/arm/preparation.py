@@ -13,7 +13,8 @@ import numpy as np
 from sidestep import _core
 from sidestep.arm.link_pairs import DRAFT, FULL, tables_and_pairs
 from sidestep.body import Body
-from sidestep.body.cover import CoverProgress, CoverSettings
+from sidestep.body.cover import CoverProgress
+from sidestep.body.cover_settings import CoverSettings
 from sidestep.distance import SelfCollision
 from sidestep.robot import Robot
 

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sidestep import _core
-
-if TYPE_CHECKING:
-    from sidestep.arm.arm import Arm
 
 ASSUMED_ACCELERATION = (
     10.0  # [rad/s^2 | m/s^2] of `sidestep.robot.limits`, which needs packages; a test compares
@@ -18,9 +14,9 @@ ASSUMED_ACCELERATION = (
 ASSUMED_JERK = 100.0  # [1/s] times the acceleration limit; likewise
 
 
-def summary_of(arm: Arm) -> str:
+def summary_of(arm: _core.Arm, *, draft: bool) -> str:
     """Name, joints with limits, reach, mass, tip, body, and what was assumed; one fact a line."""
-    tree, limits = _core.Arm(arm).robot, arm.limits
+    tree, limits = arm.robot, arm.limits
     slides = {joint.coordinate for joint in tree.joints if joint.type == _core.JointType.prismatic}
     assumed = [
         limits.acceleration[j] == ASSUMED_ACCELERATION
@@ -47,7 +43,7 @@ def summary_of(arm: Arm) -> str:
         lines.append("  no inertias: torque output needs mass matrix and bias in every step")
     overshoot = max((proof.mean_overshoot for proof in arm.proof), default=math.nan)
     lines.append(
-        f"  body: {len(arm.body.weights)} ellipsoids{' (draft)' if arm.is_draft else ''}, "
+        f"  body: {len(arm.body.weights)} ellipsoids{' (draft)' if draft else ''}, "
         f"at most {1e3 * overshoot:.0f} mm outside a link in the mean"
     )
     if not np.isfinite(limits.effort).all():

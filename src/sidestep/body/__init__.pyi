@@ -1,10 +1,10 @@
 from .body import Body as Body
-from .cover import CoverSettings as CoverSettings
-from .cover import LinkCover as LinkCover
 from .cover_problem import TradeOff as TradeOff
 from .cover_report import CoverRow as CoverRow
 from .cover_report import cover_table as cover_table
 from .cover_report import plot_cover as plot_cover
+from .cover_settings import CoverSettings as CoverSettings
+from .cover_settings import LinkCover as LinkCover
 from .fitting import FitSettings as FitSettings
 from .fitting import LinkFit as LinkFit
 from .mixture import Mixture as Mixture

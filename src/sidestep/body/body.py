@@ -10,19 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sidestep import _core
-from sidestep.arm import shipped_arms
+from sidestep import _core, shipped_arms
 from sidestep.body import cache as fit_cache
 from sidestep.body import file as body_file
-from sidestep.body.cover import (
-    CoverProgress,
-    CoverSettings,
-    LinkCover,
-    components_for,
-    cover_mixtures,
-    density_fit,
-)
+from sidestep.body.cover import CoverProgress, cover_mixtures, density_fit
 from sidestep.body.cover_problem import EffortName
+from sidestep.body.cover_settings import CoverSettings, LinkCover, components_for
 from sidestep.body.fitting import Components, FitSettings, LinkFit, Progress, fit_links
 from sidestep.body.mixture import CovarianceType
 from sidestep.body.sampling import check_components, links_with_geometry

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from sidestep.body import cache
-from sidestep.body.cover import ALGORITHM_VERSION, CoverSettings, LinkCover
 from sidestep.body.cover_problem import EFFORTS, LinkProblem, TradeOff, Trial
 from sidestep.body.cover_refine import Ellipsoids
+from sidestep.body.cover_settings import ALGORITHM_VERSION, CoverSettings, LinkCover
 from sidestep.robot.fingerprint import surface_hash
+from sidestep.storage.user_cache import ContentStore
 
 if TYPE_CHECKING:
     import trimesh
@@ -80,7 +80,7 @@ class CoverStore:
     """
 
     def __init__(self, settings: CoverSettings, *, enabled: bool) -> None:
-        self._store = cache.ContentStore(FOLDER, "the cover of a link", enabled=enabled)
+        self._store = ContentStore(FOLDER, "the cover of a link", enabled=enabled)
         self._settings = (ALGORITHM_VERSION, EFFORTS[settings.effort], settings.seed)
         self._keys: dict[str, str] = {}
         self._known: dict[str, KnownCovers] = {}

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -14,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sidestep import _core
-from sidestep.body.cover import CoverSettings, LinkCover
 from sidestep.body.cover_problem import TradeOff
+from sidestep.body.cover_settings import CoverSettings, LinkCover
 from sidestep.body.fitting import FitSettings, LinkFit
 from sidestep.body.mixture import Mixture
 from sidestep.body.schema import mismatch, parse_json, shortened
 from sidestep.body.selection import CriterionCurve
+from sidestep.storage.whole_file import write_text
 
 if TYPE_CHECKING:
     from sidestep.robot import Robot
@@ -79,24 +78,6 @@ def write(path: str | Path, contents: BodyContents) -> None:
         "links": [_link_document(link) for link in contents.links],
     }
     write_text(Path(path), json.dumps(document, indent=1, allow_nan=False) + "\n")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a file in one piece, as `write_bytes`."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Writes a file in one piece: a reader sees the old file or the new one, never a part."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        Path(name).chmod(0o644)  # mkstemp makes files that only their owner reads
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def read(path: str | Path, robot: Robot) -> BodyContents:

@@ -12,8 +12,8 @@ def robots(json: JsonOption = None) -> None:
 
     Each moves without any other package; meshes come with the package of its robot.
     """
-    from sidestep.arm.shipped_arms import shipped_file
     from sidestep.robot import robots as known_robots
+    from sidestep.shipped_arms import shipped_file
 
     entries = known_robots()
     if json is not None:

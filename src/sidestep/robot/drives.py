@@ -11,7 +11,7 @@ import numpy as np
 
 from sidestep.robot.link import Array, Link
 from sidestep.robot.pose import about_axis, pose_at
-from sidestep.robot.urdf import Urdf, UrdfJoint
+from sidestep.robot.urdf_elements import Urdf, UrdfJoint
 
 MOST_CELLS = 2000  # of a link that several joints with a range move: each takes a millisecond
 LARGEST_TURN = 0.05  # [rad] between two poses of a sweep: 0.03 mm of 0.1 m are cut off the arc

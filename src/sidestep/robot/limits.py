@@ -13,7 +13,7 @@ from sidestep._core import JointLimits, real_array
 from sidestep.robot.drives import Drive
 from sidestep.robot.link import Array
 from sidestep.robot.plausibility import check_limits
-from sidestep.robot.urdf import Urdf, UrdfJoint
+from sidestep.robot.urdf_elements import Urdf, UrdfJoint
 
 LimitValues: TypeAlias = ArrayLike | Mapping[str, float]
 """A number for every joint, one per coordinate (nv,), or some by the names of their joints."""

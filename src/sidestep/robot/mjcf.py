@@ -28,7 +28,7 @@ from sidestep.robot.mjcf_joints import (
 )
 from sidestep.robot.pose import about_axis, from_quaternion, pose_at
 from sidestep.robot.source import is_text
-from sidestep.robot.urdf import Urdf, UrdfJoint, UrdfMimic
+from sidestep.robot.urdf_elements import Urdf, UrdfJoint, UrdfMimic
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
     import mujoco

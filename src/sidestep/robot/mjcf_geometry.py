@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from sidestep.robot.link import Array, Geometry
 from sidestep.robot.pose import from_quaternion, pose_at
+from sidestep.storage.user_cache import cache_root
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
     import mujoco
@@ -116,9 +117,7 @@ def _written(path: Path, content: bytes) -> Path:
 
 
 def _cache_folder() -> Path:
-    from sidestep.body.cache import cache_directory  # a body is made from robots: not at the top
-
-    return cache_directory().parent / "meshes"
+    return cache_root() / "meshes"
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from sidestep.robot.urdf import UrdfLimit
+from sidestep.robot.urdf_elements import UrdfLimit
 
 if TYPE_CHECKING:  # imported where it is used: URDF needs no MuJoCo
     import mujoco

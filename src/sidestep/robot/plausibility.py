@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +10,7 @@ from sidestep._core import Joint, JointType
 from sidestep.robot.link import Array, Geometry, Link
 from sidestep.robot.mesh_file import extents_of
 from sidestep.robot.remarks import Remarks
-
-if TYPE_CHECKING:
-    from sidestep.robot.urdf import UrdfJoint
+from sidestep.robot.urdf_elements import UrdfJoint
 
 _NEGATIVE = 1e-6  # of the largest principal inertia: rounding of a file
 _TRIANGLE = 1e-2  # of the largest principal inertia: files write three digits

@@ -17,7 +17,7 @@ from sidestep.robot.limits import LimitValues, limits_of, position_bounds, stand
 from sidestep.robot.link import Array, Link
 from sidestep.robot.plausibility import check_lengths, check_meshes
 from sidestep.robot.pose import checked_pose, from_roll_pitch_yaw, pose_at
-from sidestep.robot.urdf import Urdf, UrdfJoint
+from sidestep.robot.urdf_elements import Urdf, UrdfJoint
 
 CORE_TOLERANCE = 1e-9  # on R Rᵀ - 1, the core's own
 FOLLOWER_TOLERANCE = 1e-6  # [rad | m] of a locked mimic joint: values are written down with a few digits

@@ -23,7 +23,7 @@ from sidestep.obstacles.shapes import EXTENT
 from sidestep.robot.degrees import degrees_hint
 from sidestep.robot.mesh import read_mesh
 from sidestep.robot.pose import from_roll_pitch_yaw, pose_at
-from sidestep.scenario.config import controller_settings_of
+from sidestep.scenario.controller_settings import controller_settings_of
 from sidestep.scenario.perception import View, cloud_balls, seen_at, view_of
 from sidestep.scenario.plausibility import warn_of
 from sidestep.scenario.scenario import (

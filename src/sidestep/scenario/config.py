@@ -10,12 +10,9 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from sidestep._core import ControllerSettings, SpeedLimitSettings, controller_settings_fields
-
-if TYPE_CHECKING:
-    from sidestep.scenario.scenario import Scenario
 
 Section: TypeAlias = dict[str, Any]
 
@@ -147,25 +144,6 @@ def with_values(section: Mapping[str, Any], values: Mapping[str, Any]) -> Sectio
 def left_out(section: Mapping[str, Any], method: str) -> tuple[str, ...]:
     """The parts that the controller of a method does without."""
     return tuple(name for name in OPTIONAL if name in ABLATIONS[method] or section.get(name, {}) is None)
-
-
-def controller_settings_of(scenario: Scenario, *, synchronous: bool = True) -> ControllerSettings:
-    """The settings of the `Controller` that a scenario asks for.
-
-    Raises:
-        ValueError: names the setting, its value and what is allowed.
-    """
-    run = scenario.simulation
-    if run.integrator != "semi_implicit_euler":
-        raise ValueError(
-            f"simulation.integrator is {run.integrator!r}; the controller's commands are held for a "
-            "period: allowed is semi_implicit_euler"
-        )
-    missing = dict.fromkeys(left_out(scenario.controller, scenario.method))
-    output = "torque" if run.mode == "torque" else "acceleration"
-    elsewhere = {"synchronous": synchronous, "period": run.period, "output": output}
-    settings: ControllerSettings = made(ControllerSettings(), {**scenario.controller, **missing, **elsewhere})
-    return settings
 
 
 def made(usual: Any, values: Mapping[str, Any]) -> Any:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from sidestep.body.schema import mismatch
+from sidestep.scenario.config import section_schema
 
 if TYPE_CHECKING:
     import jsonschema
@@ -44,8 +45,6 @@ class ScenarioError(ValueError):
 @cache
 def schema_text() -> str:
     """The published JSON schema of scenario files, with the section `controller` as the core states its settings."""
-    from sidestep.scenario.config import section_schema
-
     text = (resources.files("sidestep.scenario") / "schema.json").read_text(encoding="utf-8")
     schema = json.loads(text)
     schema["$defs"]["controller"] = section_schema()

@@ -13,7 +13,7 @@ from sidestep.body import Body
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import description_of
-from sidestep.scenario.config import controller_settings_of
+from sidestep.scenario.controller_settings import controller_settings_of
 from sidestep.scenario.scenario import BodyConfig, MethodChoice
 from sidestep.studio.methods import METHODS
 from sidestep.studio.mover import ControllerMover

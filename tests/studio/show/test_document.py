@@ -119,7 +119,7 @@ def test_options_are_those_of_other_commands(show: Callable[..., Any], small: Pa
 
 
 def test_a_named_robot_and_its_arm_file_are_read_alike(show: Callable[..., Any]) -> None:
-    from sidestep.arm.shipped_arms import shipped_file
+    from sidestep.shipped_arms import shipped_file
 
     named, of_file = show("planar2"), show(shipped_file("planar2"))
     assert (named["kind"], of_file["kind"]) == ("named robot", "arm file")
@@ -157,7 +157,7 @@ def test_a_bad_file_is_one_line_and_exit_code_2(
 
 
 def test_options_that_do_not_suit_the_source_are_refused(show: Callable[..., Any]) -> None:
-    from sidestep.arm.shipped_arms import shipped_file
+    from sidestep.shipped_arms import shipped_file
 
     code, error = show(shipped_file("planar2"), "--tip", "tip")
     assert (code, "tip cannot be given for arm file" in error) == (2, True)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sidestep.arm.shipped_arms import shipped_file
 from sidestep.robot import Robot
+from sidestep.shipped_arms import shipped_file
 from sidestep.studio.show import touching as touching_module
 from sidestep.studio.show.reading import read
 from sidestep.studio.show.shapes import drawable_shapes

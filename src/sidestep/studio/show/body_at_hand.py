@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from sidestep.arm.shipped_arms import with_body_of
 from sidestep.body import Body
 from sidestep.body.cache import cache_path
-from sidestep.body.cover import CoverSettings
+from sidestep.body.cover_settings import CoverSettings
+from sidestep.shipped_arms import with_body_of
 from sidestep.studio.show.reading import Reading
 
 

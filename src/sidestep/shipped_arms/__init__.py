@@ -14,7 +14,7 @@ from sidestep import _core
 if TYPE_CHECKING:
     from sidestep.robot import Robot
 
-FOLDER = Path(__file__).parent / "shipped"  # made by benchmarks/ship_arms.py
+FOLDER = Path(__file__).parent  # made by benchmarks/ship_arms.py
 SUFFIX = ".arm"
 
 

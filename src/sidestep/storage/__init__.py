@@ -1,0 +1,1 @@
+"""Files that are written in one piece, and the user's cache."""
