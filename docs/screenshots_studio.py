@@ -139,14 +139,14 @@ def comparison(camera: Photographer) -> None:
         until(lambda: panel.running is not None and panel.running.last is not None, "the other method")
         other = panel.running
         assert other is not None
-        studio.view.send(m.Restart())
+        studio.view.loop.send(m.Restart())
         until(lambda: other.last is not None and MOMENT < other.last.time < 60.0, "its motion")
-        studio.view.send(m.SetRunning(False))
+        studio.view.loop.send(m.SetRunning(False))
         clock.sleep(1.0)
         camera.keep(studio, page, "comparison")
-        studio.view.send(m.SetRunning(True))
+        studio.view.loop.send(m.SetRunning(True))
         until(lambda: 6.0 < other.last.time < 60.0, "six seconds")  # type: ignore[union-attr]
-        studio.view.send(m.SetRunning(False))
+        studio.view.loop.send(m.SetRunning(False))
         clock.sleep(1.0)
         camera.keep(studio, page, "comparison-at-the-end")
 
@@ -155,7 +155,7 @@ def goals(camera: Photographer) -> None:
     """A goal out of reach, and one that is blocked."""
     with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
         assert studio.snapshot is not None
-        pose = studio.view.robot.pose(studio.snapshot.q, studio.view.tip)
+        pose = studio.view.loop.robot.pose(studio.snapshot.q, studio.view.loop.tip)
         for name, place in (("out-of-reach", [1.2, 0.2, 0.5]), ("blocked", [0.55, 0.0, 0.3])):
             aim = pose.copy()
             aim[:3, 3] = np.array(place)
@@ -171,7 +171,7 @@ def goals(camera: Photographer) -> None:
 def obstacles(camera: Photographer) -> None:
     """A new box with three sides of its own."""
     with camera.studio(SMALL, starting_scenario(), to_and_fro=True) as (studio, page):
-        studio.view.send(
+        studio.view.loop.send(
             m.AddObstacle(box("new box", np.array([0.75, 0.25, 0.5]), np.array([0.05, 0.3, 0.2])))
         )
         until(
@@ -200,7 +200,7 @@ def own_robot(camera: Photographer) -> None:
             content = file.read_text(encoding="utf-8")
             dropped = page.evaluate_handle(DROPPED, [content, file.name])
             page.dispatch_event("canvas", "drop", {"dataTransfer": dropped})
-            until(lambda studio=studio: studio.view.robot.num_coordinates == 3, "its picture")  # type: ignore[misc]
+            until(lambda studio=studio: studio.view.loop.robot.num_coordinates == 3, "its picture")  # type: ignore[misc]
             run_until(studio, MOMENT)
             camera.keep(studio, page, f"own-robot-{file.suffix[1:]}")
 

@@ -22,9 +22,9 @@ from sidestep.studio.gallery import GALLERY, MOUSE_BALL, OPENING, ends_of
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page.arm import link_meshes, reach
 from sidestep.studio.page.camera import HALF, Viewpoint, clear_view, extent
+from sidestep.studio.page.cameras import NEAR
 from sidestep.studio.page.mouse import on_plane, within_reach
 from sidestep.studio.page.obstacles import box_edges
-from sidestep.studio.page.view import NEAR
 from sidestep.studio.page.why import PATH_POINTS, PATH_STEP, along
 from sidestep.studio.robot_file import scenario_of_upload
 from sidestep.studio.scene_obstacle import ball, box, things_of

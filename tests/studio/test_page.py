@@ -40,7 +40,7 @@ def test_the_arm_is_on_the_page(studio: Studio, looker: Looker) -> None:
     studio.view.arm.root.visible = True
     changed = differ(with_arm, without)
     assert changed.sum() > 1500  # [px] the arm of one metre is some 150 x 20 pixels large here, or more
-    robot, q = studio.view.robot, last(studio).q
+    robot, q = studio.view.loop.robot, last(studio).q
     x, y = looker.on_screen(robot.pose(q, "link2")[:3, 3])
     assert changed[round(y) - 12 : round(y) + 12, round(x) - 12 : round(x) + 12].any()
 
@@ -90,9 +90,9 @@ def test_an_obstacle_dragged_into_the_way_is_not_touched(studio: Studio, looker:
     until(lambda: not last(studio).recording, "the end of the recording")
     rows = studio.view.recorder.rows
     things = rows[0].things
-    exact = ExactClearance(studio.view.robot, [solid for thing in things for solid in thing.solids])
+    exact = ExactClearance(studio.view.loop.robot, [solid for thing in things for solid in thing.solids])
     poses = np.array([solid_poses(things, row.poses) for row in rows])
-    tip = studio.view.robot.pose(before.q, studio.view.tip)[:3, 3]
+    tip = studio.view.loop.robot.pose(before.q, studio.view.loop.tip)[:3, 3]
     assert np.linalg.norm(poses[-1, 0, :3]) == pytest.approx(np.linalg.norm(tip), abs=0.1)  # [m] in its way
     worst = exact.decided_minimum(np.array([row.q for row in rows]), poses)
     assert rows[-1].time - rows[0].time > 3.0
@@ -118,7 +118,7 @@ def test_the_method_is_switched_on_the_page(studio: Studio, looker: Looker) -> N
         assert after.status.startswith("system ") == bool(densities)
         elapsed = changed.time - before.time
         assert elapsed > 0.0
-        fastest = studio.view.robot.limits.velocity
+        fastest = studio.view.loop.robot.limits.velocity
         assert (np.abs(changed.q - before.q) <= fastest * elapsed + 1e-9).all()  # no jump
     studio.send(m.SetRunning(False))
 
@@ -162,7 +162,7 @@ def test_all_words_can_be_read(studio: Studio, looker: Looker, monkeypatch: pyte
     heights, box = [], looker.page.locator("#words > div")
     for words, facts in (usual, longer):
         text = in_box(words, facts)
-        studio.view._words.content = stamped(text, 0)
+        studio.view.words._box.content = stamped(text, 0)
         until(lambda words=words: words[-20:] in box.inner_text(), "the words")  # type: ignore[misc]
         seen = box.evaluate(
             "e => ({content: e.scrollHeight, height: e.clientHeight, wide: e.scrollWidth, width: e.clientWidth})"
@@ -212,7 +212,7 @@ def test_the_curved_space_is_drawn_with_the_way_on_it(studio: Studio, looker: Lo
     assert differ(without, looker.image()).sum() > 1500  # [px] of a square of 1.2 m
     end = run_to(studio, 1.0)
     until(lambda: studio.view.shown[0] == end.time, "the end")
-    robot, goal = studio.view.robot, end.goal
+    robot, goal = studio.view.loop.robot, end.goal
     assert goal is not None
 
     def lies_on_it(mark: str, q: np.ndarray) -> bool:  # the surface is computed anew, and the marks follow
@@ -225,7 +225,7 @@ def test_the_curved_space_is_drawn_with_the_way_on_it(studio: Studio, looker: Lo
     way = np.array(surface.trail)
     here = surface.place_of("state")
     np.testing.assert_allclose(way[-1, :2], here[:2], atol=0.006)  # [m] points of the way are 5 mm apart
-    studio.send(m.SetPoseGoal(robot.pose(np.array([0.3, 0.9]), studio.view.tip)))
+    studio.send(m.SetPoseGoal(robot.pose(np.array([0.3, 0.9]), studio.view.loop.tip)))
     until(lambda: last(studio).goal_pose is not None, "a pose")
     mark = lambda: on_surface(robot, (0, 1), last(studio).posture.q, surface.heights)  # type: ignore[arg-type]  # noqa: E731
     until(lambda: np.allclose(surface.place_of("goal"), mark(), atol=1e-9), "its mark")
@@ -243,7 +243,7 @@ def test_the_metric_is_drawn_at_the_tip(studio: Studio, looker: Looker) -> None:
     looker.check("metric")
     until(lambda: studio.view.marks.metric.visible, "the metric")
     changed = differ(without, looker.image())
-    x, y = looker.on_screen(studio.view.robot.pose(last(studio).q, studio.view.tip)[:3, 3])
+    x, y = looker.on_screen(studio.view.loop.robot.pose(last(studio).q, studio.view.loop.tip)[:3, 3])
     assert changed[round(y) - 25 : round(y) + 25, round(x) - 25 : round(x) + 25].any()
     looker.check("metric")
     until(lambda: not studio.view.marks.metric.visible, "the end of the metric")
@@ -281,7 +281,7 @@ def test_the_thesis_is_one_click_away_with_its_arm_of_seven_joints(studio: Studi
     assert studio.view.plots.rows[0, 0] < GAP  # [s] seen from its start, however long its meshes took to load
     studio.send(m.SetRunning(False))
     until(lambda: not last(studio).running, "the pause")
-    robot, now = studio.view.robot, last(studio)
+    robot, now = studio.view.loop.robot, last(studio)
     assert robot.num_coordinates == len(now.q) == 7
     assert len(now.values) == 1  # one density, as the file says
     looker.tab("Goal")
@@ -309,17 +309,17 @@ def test_a_ghost_is_not_drawn_where_the_arm_is(studio: Studio, looker: Looker) -
 
 
 def test_a_body_has_the_colours_of_its_links(studio: Studio, looker: Looker) -> None:
-    tip = studio.view.robot.pose(last(studio).q, studio.view.tip)
+    tip = studio.view.loop.robot.pose(last(studio).q, studio.view.loop.tip)
     tip[1, 3] -= 0.15  # [m] the second link is near, the first is not
     studio.send(m.DragObstacle("ball", tip))
-    body = studio.view._body
+    body = studio.view.body
     assert body is not None
     until(lambda: studio.view.arm.shades.get("link2", 0) > 5, "a colour")
     until(lambda: body._shades == studio.view.arm.shades, "the same colours")
 
 
 def test_a_pose_goal_is_saved_and_loaded_on_the_page(studio: Studio, looker: Looker, folder: Path) -> None:
-    robot, tip = studio.view.robot, studio.view.tip
+    robot, tip = studio.view.loop.robot, studio.view.loop.tip
     aim = robot.pose(np.array([0.3, 0.9]), tip)
     studio.send(m.SetPoseGoal(aim))
     until(lambda: last(studio).goal_pose is not None, "the pose")
@@ -399,7 +399,7 @@ def test_numbers_and_choices_are_set_on_the_page(studio: Studio, looker: Looker)
     looker.unfold("Body", "ellipsoids")
     looker.choose("ellipsoids", "1")
     until(lambda: last(studio).numbers["controller"]["ellipsoids"] == 1, "the number of ellipsoids")
-    links = list(studio.view._body_now.links)  # type: ignore[union-attr]
+    links = list(studio.view.body.body.links)  # type: ignore[union-attr]
     assert len(links) == len(set(links))
     changed = {"stiffness": 3.0, "torque_slack_weight": 200.0, "ellipsoids": 1}
     assert last(studio).numbers["controller"] == before | changed

@@ -33,7 +33,7 @@ def test_a_cloud_is_added_dragged_thrown_and_removed(studio: Studio, looker: Loo
     until(lambda: thing.name in studio.view.obstacles.names, "its picture")
     assert differ(without, looker.image()).sum() > 200  # [px]
     now = last(studio)
-    exact = ExactClearance(studio.view.robot, thing.solids)
+    exact = ExactClearance(studio.view.loop.robot, thing.solids)
     for q in (now.q, now.posture.q):
         assert exact.distance(q, solid_poses((thing,), now.poses[1:])).distance > CLEAR
     before = now.poses[1][:3, 3]
@@ -65,7 +65,7 @@ def test_a_cloud_file_is_added(studio: Studio, looker: Looker, tmp_path: Path) -
         looker.press("Add a point cloud file …")
     chooser.value.set_files(tmp_path / f"{first.name}.npy")
     until(lambda: len(last(studio).things) == 3, "the other cloud")
-    until(lambda: studio.view.last is not None and len(studio.view.last.things) == 3, "its picture")
+    until(lambda: studio.view.loop.last is not None and len(studio.view.loop.last.things) == 3, "its picture")
     looker.tab("Scenario")
     looker.type("name", "clouds")
     with looker.page.expect_download() as download:
@@ -104,7 +104,7 @@ def test_a_ball_is_thrown_with_the_mouse(studio: Studio, looker: Looker) -> None
 
 def test_a_motion_is_recorded_and_replayed(studio: Studio, looker: Looker) -> None:
     recorder, view = studio.view.recorder, studio.view
-    view._metric.value = True
+    view.switches.metric.value = True
     looker.tab("Scenario")
     looker.press("Record")
     until(lambda: last(studio).recording and last(studio).time > 1.0, "a second of motion")
@@ -122,18 +122,18 @@ def test_a_motion_is_recorded_and_replayed(studio: Studio, looker: Looker) -> No
     looker.type("moment [s]", "0.5")
     shown = rows[int(np.searchsorted([row.time for row in rows], rows[0].time + 0.5))]
     until(lambda: np.array_equal(view.arm.q, shown.q), "the moment")
-    exact = ExactClearance(view.robot, [solid for thing in shown.things for solid in thing.solids])
+    exact = ExactClearance(view.loop.robot, [solid for thing in shown.things for solid in thing.solids])
     nearest = exact.distance(shown.q, solid_poses(shown.things, shown.poses))
     line = [nearest.point_on_link, nearest.point_on_obstacle]
     until(
         lambda: np.allclose(view.marks.nearest.points[0], line, atol=1e-4), "its nearest line"
     )  # single precision
-    tip = view.robot.pose(shown.q, view.tip)[:3, 3]
+    tip = view.loop.robot.pose(shown.q, view.loop.tip)[:3, 3]
     np.testing.assert_allclose(view.marks.trail.points[-1, 1], tip, atol=1e-6)
     np.testing.assert_allclose(view.marks.metric.position, tip, atol=1e-9)
     until(lambda: view.plots._handles[1].data[0][0] > -0.6, "half a second in the plots")
     assert not view.goal.gizmo.visible  # the goal is that of the live state
-    assert "Replay of" in view._text
+    assert "Replay of" in view.words.text
     with looker.page.expect_download() as download:
         looker.press("Download recording")
     kept = np.load(download.value.path())
@@ -142,7 +142,7 @@ def test_a_motion_is_recorded_and_replayed(studio: Studio, looker: Looker) -> No
     until(lambda: np.array_equal(view.arm.q, last(studio).q), "the live state")
     assert not recorder.replaying
     until(lambda: view.goal.gizmo.visible, "the goal")
-    view._metric.value = False
+    view.switches.metric.value = False
 
 
 def test_a_ball_dragged_while_paused_moves_and_its_numbers_follow(studio: Studio, looker: Looker) -> None:

@@ -520,7 +520,7 @@ def test_the_place_of_an_obstacle_that_flies_is_followed(
     view, now = SimpleNamespace(last=session.snapshot()), [10.0]
     monkeypatch.setattr(obstacle_panel, "clock", SimpleNamespace(monotonic=lambda: now[0]))
     vars(panel).update(
-        _view=view,
+        _loop=view,
         _chosen=SimpleNamespace(value="ball"),
         _place=SimpleNamespace(value=None),
         _box=SimpleNamespace(visible=False),

@@ -29,7 +29,7 @@ def test_arm_and_goal_are_between_the_panels_of_a_window_of_1280_by_800(
         assert box is not None
         panels = [window.page.get_by_text(text).first.bounding_box() for text in ("Now", "Sidestep")]
         assert all(panel is not None for panel in panels)
-        now, robot = last(studio), studio.view.robot
+        now, robot = last(studio), studio.view.loop.robot
         assert now.posture is not None
         for q in (now.q, now.posture.q):
             for frame in robot.frames:
@@ -88,7 +88,7 @@ def test_goals_in_turn_and_three_sliders(studio: Studio, looker: Looker) -> None
     before = last(studio).numbers["controller"]
     looker.check("goals in turn")
     until(lambda: len(last(studio).visited) == 2, "the goals")
-    np.testing.assert_allclose(last(studio).visited, ends_of(last(studio).scenario, studio.view.robot))
+    np.testing.assert_allclose(last(studio).visited, ends_of(last(studio).scenario, studio.view.loop.robot))
     looker.check("goals in turn")
     until(lambda: last(studio).visited == (), "one goal")
     looker.type("speed [%]", "50")
@@ -104,9 +104,9 @@ def test_the_scene_says_why(studio: Studio, looker: Looker) -> None:
     run_to(studio, 0.3)
     why = studio.view.why
     until(lambda: bool(why.path.visible) and bool(why.pull.visible), "path and pull")
-    tip = studio.view.robot.pose(last(studio).q, studio.view.tip)[:3, 3]
+    tip = studio.view.loop.robot.pose(last(studio).q, studio.view.loop.tip)[:3, 3]
     np.testing.assert_allclose(why.pull.points[0, 0], tip, atol=1e-3)
-    goal = studio.view.robot.pose(studio.view.goal.q, studio.view.tip)[:3, 3]
+    goal = studio.view.loop.robot.pose(studio.view.goal.q, studio.view.loop.tip)[:3, 3]
     np.testing.assert_allclose(why.path.points[-1, 1], goal, atol=1e-3)
     looker.tab("Show")
     looker.check("path, pull and what binds")
@@ -163,7 +163,7 @@ def test_a_robot_is_dropped_on_the_page(studio: Studio, looker: Looker) -> None:
     )
     looker.page.dispatch_event("canvas", "drop", {"dataTransfer": transfer})
     until(lambda: last(studio).scenario.robot.urdf is not None, "the robot")
-    until(lambda: studio.view.robot.num_coordinates == 3, "its picture")
+    until(lambda: studio.view.loop.robot.num_coordinates == 3, "its picture")
     assert len(last(studio).visited) == 2  # it moves at once
     assert [thing.name for thing in last(studio).things] == [MOUSE_BALL]
     studio.send(m.SetRunning(False))

@@ -76,7 +76,7 @@ class Studio:
         goals = ends_of(scenario, robot) if to_and_fro else ()
         self._loop = SessionProcess(Beginning(scenario, method, dict(numbers or {}), ellipsoids, goals))
         self.view: View = View(server, scenario, robot, self.send)
-        self._truth = ExactClearanceMonitor(self.view.take_clearances, self.view.report)
+        self._truth = ExactClearanceMonitor(self.view.take_clearances, self.view.loop.report)
         self._last_truth = 0.0
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -146,7 +146,7 @@ class Studio:
                 try:
                     self._draw(snapshot)
                 except Exception as error:  # the page goes on with the next state
-                    self.view.report("drawing failed", error)
+                    self.view.loop.report("drawing failed", error)
                 if self.snapshot is None or snapshot.edition != self.snapshot.edition:
                     self.send(m.Drawn(snapshot.edition))
                 self.snapshot = snapshot  # after it is on the page
@@ -157,6 +157,6 @@ class Studio:
     def _draw(self, snapshot: m.Snapshot) -> None:
         self.view.take_rows(self._loop.take_rows())
         row, now = self.view.show(snapshot), clock.monotonic()
-        if now - self._last_truth > STEP_OF_TRUTH and self.view.robot.num_coordinates == len(row.q):
+        if now - self._last_truth > STEP_OF_TRUTH and self.view.loop.robot.num_coordinates == len(row.q):
             self._last_truth = now
-            self._truth.look(self.view.robot, row, self.view.epoch)
+            self._truth.look(self.view.loop.robot, row, self.view.clearances.epoch)

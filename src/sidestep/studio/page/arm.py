@@ -135,6 +135,7 @@ class BodyView:
         unit = trimesh.creation.icosphere(subdivisions=2)
         links = np.asarray(body.links)
         levels = np.full(len(links), TWO_DEVIATIONS) if body.levels is None else np.asarray(body.levels)
+        self.body = body
         self._batches: dict[str, Any] = {}
         self._shades: dict[str, int] = {}
         for link in dict.fromkeys(body.links):

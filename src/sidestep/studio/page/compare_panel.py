@@ -12,12 +12,12 @@ from sidestep.studio.comparison import Comparison, Tally
 from sidestep.studio.methods import METHODS
 from sidestep.studio.page import colours
 from sidestep.studio.page.arm import ArmView, link_meshes
+from sidestep.studio.page.loop_link import LoopLink
 from sidestep.studio.page.note import add_note
 
 if TYPE_CHECKING:
     import viser
 
-    from sidestep.studio.page.view import View
 
 NOTE = (
     "Both start again, go to the same goal and see the same obstacles: the method that is chosen under Advanced as the "
@@ -28,8 +28,8 @@ NOTE = (
 class ComparePanel:
     """Starts and ends a comparison, and shows how it stands."""
 
-    def __init__(self, server: viser.ViserServer, view: View) -> None:
-        self._server, self._view = server, view
+    def __init__(self, server: viser.ViserServer, loop: LoopLink) -> None:
+        self._server, self._loop = server, loop
         self._labels = {method.label: method.name for method in METHODS.values()}
         gui = server.gui
         usual = METHODS["reactive"].label
@@ -79,8 +79,8 @@ class ComparePanel:
         self._table.content = ""
 
     def _begin(self, event: Any) -> None:
-        with self._view.telling(event.client):
-            last = self._view.last
+        with self._loop.telling(event.client):
+            last = self._loop.last
             if last is None:
                 raise ValueError("the loop does not run yet")
             method = self._labels[str(self._choice.value)]
@@ -88,16 +88,16 @@ class ComparePanel:
                 raise ValueError("this method moves the arm already; choose another one")
             self.stop()
             self._table.content = f'<div style="{BOX}">preparing …</div>'
-            view = self._view
-            view.send(m.VisitGoals(()))
-            comparison = Comparison(last, method, view.robot, view.report)
+            loop = self._loop
+            loop.send(m.VisitGoals(()))
+            comparison = Comparison(last, method, loop.robot, loop.report)
             self._ghost = ArmView(
-                self._server, view.robot, link_meshes(view.robot), "/other", ghost=colours.OTHER
+                self._server, loop.robot, link_meshes(loop.robot), "/other", ghost=colours.OTHER
             )
             self._comparison = comparison
             if last.goal is not None:
-                view.send(m.SetJointGoal(last.goal))
-            view.send(m.Restart())
+                loop.send(m.SetJointGoal(last.goal))
+            loop.send(m.Restart())
 
 
 BOX = "font-size:13px;line-height:1.4;padding:2px 10px"

@@ -7,6 +7,7 @@ import dataclasses
 import shutil
 import tempfile
 import time as clock
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ import numpy.typing as npt
 from sidestep.obstacles import load_point_cloud
 from sidestep.robot.pose import from_quaternion, pose_at
 from sidestep.studio import messages as m
+from sidestep.studio.page.goal import GoalControl
+from sidestep.studio.page.loop_link import LoopLink
 from sidestep.studio.page.note import add_note
 from sidestep.studio.page.placing import Ball, Camera, free_place
 from sidestep.studio.scene_obstacle import CLOUD_RADIUS, SceneObstacle, ball, box, cloud, scattered, thinned
@@ -23,7 +26,6 @@ from sidestep.studio.scene_obstacle import CLOUD_RADIUS, SceneObstacle, ball, bo
 if TYPE_CHECKING:
     import viser
 
-    from sidestep.studio.page.view import View
 
 Array = npt.NDArray[np.float64]
 
@@ -36,8 +38,8 @@ GIZMO_ROOM = 1.2  # of the length of its arrows: it is drawn on top of all, and 
 class ObstaclePanel:
     """One obstacle is chosen, by a click in the scene or in the list; the buttons act on it."""
 
-    def __init__(self, server: viser.ViserServer, view: View) -> None:
-        self._view = view
+    def __init__(self, server: viser.ViserServer, loop: LoopLink, goal: Callable[[], GoalControl]) -> None:
+        self._loop, self._goal = loop, goal
         gui = server.gui
         gui.add_markdown(
             "Drag an obstacle in the scene to move it; with **shift** held, letting go throws it. While the loop is "
@@ -107,12 +109,12 @@ class ObstaclePanel:
         self._show_place()
 
     def _index(self) -> int | None:
-        last = self._view.last
+        last = self._loop.last
         names = [] if last is None else [thing.name for thing in last.things]
         return names.index(self._chosen.value) if self._chosen.value in names else None
 
     def _show_place(self) -> None:
-        index, last = self._index(), self._view.last
+        index, last = self._index(), self._loop.last
         if index is not None and last is not None:
             x, y, z = (float(value) for value in last.poses[index][:3, 3].round(3))
             size = last.things[index].obstacle.shape.size
@@ -140,10 +142,10 @@ class ObstaclePanel:
         self._show_place()
 
     def _moved(self, event: Any) -> None:
-        index, last = self._index(), self._view.last
+        index, last = self._index(), self._loop.last
         if event.client is None or index is None or last is None:
             return
-        self._view.send(
+        self._loop.send(
             m.DragObstacle(self._chosen.value, pose_at(self._place.value, last.poses[index][:3, :3]))
         )
 
@@ -153,7 +155,7 @@ class ObstaclePanel:
         self._size.visible = self._kind.value != "box"
 
     def _resized(self, event: Any) -> None:
-        index, last = self._index(), self._view.last
+        index, last = self._index(), self._loop.last
         if event.client is None or index is None or last is None:
             return
         thing = last.things[index]
@@ -161,7 +163,7 @@ class ObstaclePanel:
         shape = dataclasses.replace(thing.obstacle.shape, size=(x, y, z))
         self._box_shown = self._chosen.value, tuple(map(float, self._box.value))
         item = dataclasses.replace(thing.obstacle, shape=shape)
-        self._view.send(m.ReplaceObstacle(SceneObstacle(thing.name, item, thing.folder)))
+        self._loop.send(m.ReplaceObstacle(SceneObstacle(thing.name, item, thing.folder)))
 
     def _add(self, event: Any) -> None:
         kind, size = str(self._kind.value), self._size.value / 100.0
@@ -172,12 +174,12 @@ class ObstaclePanel:
             made = box(name, nowhere, np.array(self._sides.value) / 100.0)
         else:
             made = self._cloud(name, scattered(size, seed=self._count))
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             self._put(made, event.client)
 
     def _upload(self, event: Any) -> None:
         file = event.target.value
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             with tempfile.TemporaryDirectory(
                 dir=self._folder
             ) as folder:  # apart from the clouds that are there
@@ -188,25 +190,25 @@ class ObstaclePanel:
 
     def _put(self, thing: SceneObstacle, client: Any, *, as_written: bool = False) -> None:
         """Adds a thing where it is free; `as_written`: where its file has it, if it is free there."""
-        view, last = self._view, self._view.last
+        loop, last = self._loop, self._loop.last
         if last is None:
             raise ValueError("the loop does not run yet")
         others = [
             (pose[:3, :3] @ present.middle + pose[:3, 3], present.size)
             for present, pose in zip(last.things, last.poses, strict=True)
         ]
-        gizmo, camera = view.goal.gizmo, client.camera
+        goal, camera = self._goal(), client.camera
         place = free_place(
-            view.robot,
-            (last.q, view.goal.q),
+            loop.robot,
+            (last.q, goal.q),
             [*others, *(ball for _, ball in self._sent)],
-            (np.array(gizmo.position), GIZMO_ROOM * gizmo.scale),
+            (np.array(goal.gizmo.position), GIZMO_ROOM * goal.gizmo.scale),
             thing.size,
             Camera(np.array(camera.position), from_quaternion(np.array(camera.wxyz)), camera.fov),
             first=(thing.middle,) if as_written else (),
         )
         self._sent.append((thing.name, (place, thing.size)))
-        view.send(m.AddObstacle(thing.at(pose_at(place - thing.middle))))
+        loop.send(m.AddObstacle(thing.at(pose_at(place - thing.middle))))
 
     def _cloud(self, name: str, points: Array, radius: float = CLOUD_RADIUS) -> SceneObstacle:
         path = self._folder / f"{name}.npy"
@@ -214,21 +216,21 @@ class ObstaclePanel:
         return cloud(name, np.zeros(3), path, radius)
 
     def _new_name(self, kind: str) -> str:
-        taken = () if self._view.last is None else {thing.name for thing in self._view.last.things}
+        taken = () if self._loop.last is None else {thing.name for thing in self._loop.last.things}
         while (name := f"{kind}{self._count}") in taken:
             self._count += 1
         self._count += 1
         return name
 
     def _throw(self, _: Any) -> None:
-        index, last = self._index(), self._view.last
+        index, last = self._index(), self._loop.last
         if index is None or last is None:
             return
-        way = self._view.robot.pose(last.q, self._view.tip)[:3, 3] - last.poses[index][:3, 3]
+        way = self._loop.robot.pose(last.q, self._loop.tip)[:3, 3] - last.poses[index][:3, 3]
         length = float(np.linalg.norm(way))
         if length > 0.0:
-            self._view.send(m.ThrowObstacle(self._chosen.value, self._speed.value * way / length))
+            self._loop.send(m.ThrowObstacle(self._chosen.value, self._speed.value * way / length))
 
     def _remove(self, _: Any) -> None:
         if self._index() is not None:
-            self._view.send(m.RemoveObstacle(self._chosen.value))
+            self._loop.send(m.RemoveObstacle(self._chosen.value))

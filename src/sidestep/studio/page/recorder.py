@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep.studio import messages as m
+from sidestep.studio.page.loop_link import LoopLink
 from sidestep.studio.page.note import add_note
 
 if TYPE_CHECKING:
     import viser
 
-    from sidestep.studio.page.view import View
 
 Array = npt.NDArray[np.float64]
 
@@ -27,8 +27,8 @@ class Recorder:
         rows: of the last recording. plotted: what the plots showed meanwhile.
     """
 
-    def __init__(self, server: viser.ViserServer, view: View) -> None:
-        self._view = view
+    def __init__(self, server: viser.ViserServer, loop: LoopLink) -> None:
+        self._loop = loop
         self.rows: list[m.Row] = []
         self.plotted: list[tuple[float, ...]] = []
         self._replaying, self._since, self._of_this_arm = False, 0.0, True
@@ -105,24 +105,24 @@ class Recorder:
         recording = event.target.value == "Record"
         if recording:
             self._begin()
-            self._view.send(m.SetRunning(True))
-        self._view.send(m.SetRecording(recording))
+            self._loop.send(m.SetRunning(True))
+        self._loop.send(m.SetRecording(recording))
 
     def _on_replay(self, event: Any) -> None:
         if event.target.value == "Live":
             if self._replaying and self._ran:
-                self._view.send(m.SetRunning(True))
+                self._loop.send(m.SetRunning(True))
             self.show_live()
             return
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             if not self._of_this_arm:
                 raise ValueError("the recording is of another robot model; it can be downloaded")
             if len(self.rows) < 2:
                 raise ValueError("nothing is recorded: press Record, then Stop")
             if not self._replaying:
-                self._ran = self._view.last is not None and self._view.last.running
-            self._view.send(m.SetRecording(False))
-            self._view.send(m.SetRunning(False))
+                self._ran = self._loop.last is not None and self._loop.last.running
+            self._loop.send(m.SetRecording(False))
+            self._loop.send(m.SetRunning(False))
             self._slider.max = max(round(self.length, 2), 0.01)
             self._slider.disabled = False
             self._replaying, self._since = True, clock.monotonic()

@@ -17,12 +17,11 @@ from sidestep.studio.export import (
     scenario_now,
     unpacked_scenario,
 )
+from sidestep.studio.page.loop_link import LoopLink
 from sidestep.studio.page.note import add_note
 
 if TYPE_CHECKING:
     import viser
-
-    from sidestep.studio.page.view import View
 
 
 THESIS = tuple(name.removeprefix("thesis-") for name in shipped_scenarios() if name.startswith("thesis-"))
@@ -31,8 +30,8 @@ THESIS = tuple(name.removeprefix("thesis-") for name in shipped_scenarios() if n
 class ScenarioPanel:
     """Loads scenarios, and saves the present state as one into the folder where the studio was started."""
 
-    def __init__(self, server: viser.ViserServer, view: View, folder: Path) -> None:
-        self._view, self._folder = view, folder
+    def __init__(self, server: viser.ViserServer, loop: LoopLink, folder: Path) -> None:
+        self._loop, self._folder = loop, folder
         gui = server.gui
         gui.add_button_group("thesis", THESIS).on_click(self._load_thesis)
         add_note(gui, "Scenarios of the thesis, by section, with the method they are written for.")
@@ -55,19 +54,19 @@ class ScenarioPanel:
         atexit.register(shutil.rmtree, self._uploads, ignore_errors=True)
 
     def _load_thesis(self, event: Any) -> None:
-        self._view.load(Scenario.load(f"thesis-{event.target.value}"))
+        self._loop.load(Scenario.load(f"thesis-{event.target.value}"))
 
     def _load_shipped(self, _: Any) -> None:
-        self._view.load(Scenario.load(str(self._shipped.value)))
+        self._loop.load(Scenario.load(str(self._shipped.value)))
 
     def _load_upload(self, event: Any) -> None:
         file = event.target.value
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             place = Path(tempfile.mkdtemp(dir=self._uploads))
-            self._view.load(unpacked_scenario(file.name, file.content, self._folder, place))
+            self._loop.load(unpacked_scenario(file.name, file.content, self._folder, place))
 
     def _save(self, event: Any) -> None:
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             scenario = self._now()
             try:
                 path = save_scenario(scenario, self._folder)
@@ -84,7 +83,7 @@ class ScenarioPanel:
 
         def answer(_: Any) -> None:
             modal.close()
-            with self._view.telling(client):
+            with self._loop.telling(client):
                 path = save_scenario(scenario, self._folder, replace=True)
                 self._told("Saved", str(path), client)
 
@@ -92,13 +91,13 @@ class ScenarioPanel:
         keep.on_click(lambda _: modal.close())
 
     def _download(self, event: Any) -> None:
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             name, content = packed_scenario(self._now())
             event.client.send_file_download(name, content, save_immediately=True)
             self._told("Downloaded", name, event.client)
 
     def _told(self, what: str, where: str, client: Any) -> None:
-        lost = "" if self._view.last is None else not_kept(self._view.last)
+        lost = "" if self._loop.last is None else not_kept(self._loop.last)
         colour = "orange" if lost else "green"
         client.add_notification(what, f"{where}. {lost}", color=colour, auto_close_seconds=8.0)
 
@@ -106,6 +105,6 @@ class ScenarioPanel:
         name = str(self._name.value)
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
             raise ValueError(f"name is {name!r}; allowed: letters, digits, dot, dash and underscore")
-        if self._view.last is None:
+        if self._loop.last is None:
             raise ValueError("the loop does not run yet")
-        return scenario_now(self._view.last, name=name)
+        return scenario_now(self._loop.last, name=name)

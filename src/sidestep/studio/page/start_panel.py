@@ -6,6 +6,7 @@ import atexit
 import shutil
 import tempfile
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from sidestep.studio.gallery import (
     with_following_ball,
 )
 from sidestep.studio.methods import method_named
+from sidestep.studio.page.loop_link import LoopLink
 from sidestep.studio.page.mouse import DROP, MouseBall
 from sidestep.studio.page.note import add_note
 from sidestep.studio.parameters import Numbers
@@ -32,7 +34,6 @@ from sidestep.studio.three_sliders import SLIDERS
 if TYPE_CHECKING:
     import viser
 
-    from sidestep.studio.page.view import View
 
 Array = npt.NDArray[np.float64]
 
@@ -43,8 +44,8 @@ SUFFIXES = ".urdf,.xacro,.xml,.mjcf,.zip"
 class StartPanel:
     """What most people need; everything else is in the other tabs."""
 
-    def __init__(self, server: viser.ViserServer, view: View) -> None:
-        self._view = view
+    def __init__(self, server: viser.ViserServer, loop: LoopLink, replays: Callable[[], bool]) -> None:
+        self._loop, self._replays = loop, replays
         gui = server.gui
         gui.add_button_group("scene", tuple(GALLERY)).on_click(self._load)
         self._turns: Any = gui.add_checkbox("goals in turn", False)
@@ -81,7 +82,7 @@ class StartPanel:
 
     def add_mouse(self, server: viser.ViserServer) -> None:
         """The hidden field of the mouse, where it is called: outside of tabs, which are not always there."""
-        self._mouse = MouseBall(server, self._view.send, self._ball, self._follows_now)
+        self._mouse = MouseBall(server, self._loop.send, self._ball, self._follows_now)
 
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows what the loop has."""
@@ -103,10 +104,10 @@ class StartPanel:
                     slider.value = value
 
     def _follows_now(self) -> bool:
-        return bool(self._follows.value) and not self._view.recorder.replaying
+        return bool(self._follows.value) and not self._replays()
 
     def _ball(self) -> Array | None:
-        last = self._view.last
+        last = self._loop.last
         names = [] if last is None else [thing.name for thing in last.things]
         if last is None or MOUSE_BALL not in names:
             return None
@@ -114,26 +115,26 @@ class StartPanel:
         return place
 
     def _load(self, event: Any) -> None:
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             scene = GALLERY[event.target.value]
-            self._view.load(scene.load(), to_and_fro=scene.to_and_fro)
+            self._loop.load(scene.load(), to_and_fro=scene.to_and_fro)
 
     def _set_turns(self, event: Any) -> None:
-        last = self._view.last
+        last = self._loop.last
         if event.client is None or last is None:
             return
-        goals = ends_of(last.scenario, self._view.robot) if self._turns.value else ()
-        with self._view.telling(event.client):
+        goals = ends_of(last.scenario, self._loop.robot) if self._turns.value else ()
+        with self._loop.telling(event.client):
             if self._turns.value and not goals:
                 self._turns.value = False
                 raise ValueError(
                     "this scenario has no start and goal between which the arm could go to and fro"
                 )
-            self._view.send(m.VisitGoals(goals))
+            self._loop.send(m.VisitGoals(goals))
 
     def _set_follows(self, event: Any) -> None:
         if event.client is not None and self._follows.value and self._ball() is None:
-            self._view.send(m.AddObstacle(ball(MOUSE_BALL, np.array(MOUSE_BALL_PLACE), MOUSE_BALL_RADIUS)))
+            self._loop.send(m.AddObstacle(ball(MOUSE_BALL, np.array(MOUSE_BALL_PLACE), MOUSE_BALL_RADIUS)))
 
     def _moved(self, event: Any) -> None:
         if event.client is None:
@@ -146,7 +147,7 @@ class StartPanel:
         self._timer.start()
 
     def _send_numbers(self) -> None:
-        last, changed = self._view.last, self._changed
+        last, changed = self._loop.last, self._changed
         self._changed = set()
         if last is None:
             return
@@ -156,11 +157,11 @@ class StartPanel:
             if item.label in changed:
                 numbers |= item.numbers(float(self._sliders[item.label].value), method)
         if numbers:
-            self._view.send(m.SetNumbers(method.name, numbers))
+            self._loop.send(m.SetNumbers(method.name, numbers))
 
     def _load_robot(self, event: Any) -> None:
         file = event.target.value
-        with self._view.telling(event.client):
+        with self._loop.telling(event.client):
             place = Path(tempfile.mkdtemp(dir=self._folder))
             scenario = scenario_of_upload(file.name, file.content, place)
-            self._view.load(with_following_ball(scenario), to_and_fro=True)
+            self._loop.load(with_following_ball(scenario), to_and_fro=True)

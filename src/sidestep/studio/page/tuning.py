@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS, method_named
+from sidestep.studio.page.loop_link import LoopLink
 from sidestep.studio.page.note import add_note
 from sidestep.studio.parameters import Method, Numbers, Parameter
 from sidestep.studio.snippet import python_snippet
@@ -15,7 +16,6 @@ from sidestep.studio.snippet import python_snippet
 if TYPE_CHECKING:
     import viser
 
-    from sidestep.studio.page.view import View
 
 SETTLE = 0.25  # [s] without a further change before the system is made anew
 STEPS = 1000  # of a slider
@@ -25,8 +25,8 @@ AS_IT_TAKES = "as many as it takes"  # None, of numbers of ellipsoids
 class TuningPanel:
     """Chooses among `METHODS` and sets their numbers while the loop runs, in a tab of the page."""
 
-    def __init__(self, server: viser.ViserServer, view: View, tab: Any) -> None:
-        self._view, self._server, self._tab = view, server, tab
+    def __init__(self, server: viser.ViserServer, loop: LoopLink, tab: Any) -> None:
+        self._loop, self._server, self._tab = loop, server, tab
         self._labels = {method.label: method.name for method in METHODS.values()}
         gui = server.gui
         self._choice: Any = gui.add_dropdown("method", tuple(self._labels))
@@ -51,7 +51,7 @@ class TuningPanel:
     def show(self, snapshot: m.Snapshot) -> None:
         """Shows the method and the numbers that the loop has."""
         method, numbers = method_named(snapshot.method), snapshot.numbers[snapshot.method]
-        units = frozenset(self._view.robot.coordinate_units)
+        units = frozenset(self._loop.robot.coordinate_units)
         if method is not self._shown or units != self._units:
             self._units = units
             self._lay_out(method, numbers)
@@ -92,7 +92,7 @@ class TuningPanel:
 
     def _chose(self, event: Any) -> None:
         if event.client is not None:
-            self._view.send(m.SetMethod(self._labels[self._choice.value]))
+            self._loop.send(m.SetMethod(self._labels[self._choice.value]))
 
     def _moved(self, event: Any, parameter: Parameter) -> None:
         if event.client is None:
@@ -105,7 +105,7 @@ class TuningPanel:
         self._timer.start()
 
     def _export(self, event: Any) -> None:
-        last = self._view.last
+        last = self._loop.last
         if last is None or event.client is None:
             return
         code = python_snippet(last)
@@ -121,12 +121,12 @@ class TuningPanel:
     def _send_numbers(self) -> None:
         changed, self._changed = self._changed, {}
         if self._shown is not None and changed:
-            self._view.send(m.SetNumbers(self._shown.name, changed))
+            self._loop.send(m.SetNumbers(self._shown.name, changed))
 
     def _reset(self, _: Any) -> None:
         if self._shown is not None:
             usual = {p.name: p.default for p in self._shown.parameters if not p.body}
-            self._view.send(m.SetNumbers(self._shown.name, usual))
+            self._loop.send(m.SetNumbers(self._shown.name, usual))
 
 
 def unit_for(unit: str, joints: Collection[str]) -> str:
