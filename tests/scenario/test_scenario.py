@@ -18,8 +18,8 @@ from sidestep.scenario import Scenario, ScenarioError, schema_text, shipped_scen
 from sidestep.scenario import scenario as module
 from sidestep.scenario.config import OPTIONAL
 from sidestep.scenario.controller_settings import controller_settings_of
+from sidestep.scenario.torque_program import program_from, torque_qp_of
 from sidestep.scenario.validation import check_document
-from sidestep.thesis.custom import program_from, torque_qp_of
 
 BASE = """\
 format: 1

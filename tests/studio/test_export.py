@@ -39,8 +39,8 @@ from sidestep.studio.scene_obstacle import CLOUD_LIMIT, CLOUD_RADIUS, box, cloud
 from sidestep.studio.session import Session
 from sidestep.studio.snippet import python_snippet
 from sidestep.studio.systems import as_file, numbers_of
-from sidestep.studio.thesis.methods import CUSTOM
 from sidestep.system import GeometricSystem
+from sidestep.thesis.studio.methods import CUSTOM
 
 SPRING = {"stiffness": 3.0, "damping": 2.0}
 SMALL_ARM: dict[str, Any] = {

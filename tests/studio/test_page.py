@@ -158,7 +158,7 @@ def test_all_words_can_be_read(studio: Studio, looker: Looker, monkeypatch: pyte
         "0.95 × real time<br>status: clearance_lost, moving",
     )
     longer = (usual[0] + " " + 60 * "w", "<br>".join(20 * [usual[1]]))
-    monkeypatch.setattr(studio.view, "_tell", lambda *_: None)  # what the loop says meanwhile
+    monkeypatch.setattr(studio.view.words, "_tell", lambda *_: None)  # what the loop says meanwhile
     heights, box = [], looker.page.locator("#words > div")
     for words, facts in (usual, longer):
         text = in_box(words, facts)

@@ -31,8 +31,8 @@ from .outcome import Judge as Judge
 from .outcome import Outcome as Outcome
 from .own_method import OwnMover as OwnMover
 from .parallel import default_jobs as default_jobs
-from .peers import PeerSettings as PeerSettings
-from .peers import run_peers as run_peers
+from .peers.run import run_peers as run_peers
+from .peers.way import PeerSettings as PeerSettings
 from .problem import Problem as Problem
 from .problem import SceneProblem as SceneProblem
 from .problem_file import read_problems as read_problems

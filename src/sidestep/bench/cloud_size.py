@@ -148,7 +148,7 @@ def points_around(robot: Robot, body: Body, q: Array, num: int, rng: np.random.G
 
 def draw_cloud_sizes(document: dict[str, Any], file: Path) -> None:
     """The step's median and 99 % against the number of points, on logarithmic axes, as a picture."""
-    from sidestep.thesis.reproduce import style  # here: it needs Matplotlib
+    from sidestep.drawing import style  # here: it needs Matplotlib
 
     with style.applied():
         figure = style.new_figure(7.0, width=11.0)

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from sidestep._core import BarrierSettings, Controller, ControllerSettings, GeometricSystem
 from sidestep.arm import Arm
 from sidestep.bench.method import Method
 from sidestep.bench.motion import ControllerMover, Mover
-from sidestep.bench.thesis import SystemMover
 from sidestep.body import Body
 from sidestep.body.cover import CoverProgress
+from sidestep.plugins import plugins
 from sidestep.robot import Robot
 from sidestep.scenario.config import ABLATIONS
-from sidestep.thesis import ThesisNumbers, thesis_system
+
+
+class BenchMethod(Protocol):
+    """A method beside the controller, which an entry point of the group "sidestep.bench" brings."""
+
+    def body(self, robot: Robot) -> Body:
+        """The body that it needs, from the user's cache or made now."""
+
+    def mover(self, robot: Robot, body: Body) -> Mover:
+        """What moves a robot through problems."""
 
 
 def build_body(
@@ -20,18 +31,22 @@ def build_body(
     """The body that a method needs, from the user's cache or made now; draft: where it covers, coarser, in seconds."""
     if method.safe:
         return Body.cover(robot, effort="draft" if draft else "fine", progress=progress)
-    return Body.fit(robot, components=ThesisNumbers().components)
+    return _brought(method).body(robot)
 
 
 def build_mover(method: Method, robot: Robot, body: Body | None = None) -> Mover:
     """What moves a robot by a method; by default with the body of `build_body`."""
     body = build_body(method, robot) if body is None else body
-    match method:
-        case Method.thesis:
-            return SystemMover(robot, thesis_system(robot, body))
-        case Method.unswitched:
-            return SystemMover(robot, thesis_system(robot, body, switched=False))
+    if not method.safe:
+        return _brought(method).mover(robot, body)
     return ControllerMover(robot, Arm.from_robot(robot, body), dict.fromkeys(ABLATIONS[method]))
+
+
+def _brought(method: Method) -> BenchMethod:
+    found: dict[str, BenchMethod] = plugins("sidestep.bench")
+    if method not in found:
+        raise ValueError(f"method {method.value!r} needs the room sidestep.thesis; it is not installed")
+    return found[method]
 
 
 def barrier_system(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from sidestep.studio.other_methods import other_methods
 from sidestep.studio.parameters import (
     ARRIVAL,
     BARRIERS,
@@ -18,8 +19,8 @@ from sidestep.studio.parameters import (
     Method,
     Numbers,
 )
-from sidestep.studio.thesis.methods import METHODS_OF_THESIS
 
+_OTHERS = other_methods()
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
@@ -56,7 +57,7 @@ METHODS: dict[str, Method] = {
             (*BARRIERS, *ARRIVAL, *TRACKING, *INPUTS, *SAFETY, *TORQUE),
             controlled=True,
         ),
-        *METHODS_OF_THESIS,
+        *(_OTHERS.METHODS if _OTHERS is not None else ()),
     )
 }
 

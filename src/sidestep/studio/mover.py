@@ -1,9 +1,10 @@
-"""What moves the arm: the `Controller`."""
+"""What moves the arm in the studio: the `Controller`, or another method."""
 
 from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +42,37 @@ class Account:
     metric: Array = field(default_factory=lambda: np.zeros((0, 0)))
     activations: Array = field(default_factory=lambda: np.zeros(0))
     reason: Reason = field(default_factory=Reason)
+
+
+class Mover(Protocol):
+    """Moves the arm of a session by one method."""
+
+    @property
+    def posture(self) -> IkSolution | None:
+        """Where the arm is led to; None where no posture for the pose is found yet."""
+
+    @property
+    def system(self) -> GeometricSystem:
+        """Whose curved space the page can show."""
+
+    @property
+    def metric(self) -> Array:
+        """(nv, nv) of the last step."""
+
+    def set_goal(self, pose: Array | None, q: Array, *, thorough: bool) -> None:
+        """Goes to q (nv,), or to a pose (4, 4) by a posture that is looked for near q; thorough: from everywhere."""
+
+    def step(self, q: Array, v: Array, mass_matrix: Array, bias: Array, obstacles: Obstacles) -> Array:
+        """The torque (nv,) [Nm | N] of one period."""
+
+    def look(self, q: Array, v: Array, obstacles: Obstacles) -> None:
+        """Takes a step without time passing."""
+
+    def account(self) -> Account | None:
+        """Of the last step; None before one."""
+
+    def moment(self) -> Moment | None:
+        """What events are told of, of the last step; None where there are none."""
 
 
 class ControllerMover:

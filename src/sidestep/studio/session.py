@@ -23,12 +23,12 @@ from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
 from sidestep.studio import messages as m
 from sidestep.studio.methods import METHODS, check_numbers, method_named
-from sidestep.studio.mover import NEAR_GOAL, STILL, Account, ControllerMover
+from sidestep.studio.mover import NEAR_GOAL, STILL, Account, ControllerMover, Mover
 from sidestep.studio.parameters import Method, Numbers
 from sidestep.studio.reason import Events
 from sidestep.studio.scene_obstacle import check_names, things_of
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
-from sidestep.studio.systems import Covering, Mover, Recipe, build_mover, numbers_of, recipe_of
+from sidestep.studio.systems import Covering, Recipe, build_mover, numbers_of, recipe_of
 from sidestep.studio.tip import at_tip
 
 Array = npt.NDArray[np.float64]

@@ -12,6 +12,7 @@ from sidestep.scenario.config import parts_of
 from sidestep.scenario.scenario import RobotConfig
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.methods import METHODS
+from sidestep.studio.other_methods import methods_of_custom
 from sidestep.studio.systems import as_file, settings_of
 
 WIDTH = 80  # [characters] that a window on the page shows
@@ -58,9 +59,7 @@ def python_snippet(snapshot: Snapshot) -> str:
     """
     method = METHODS[snapshot.method]
     written = as_file(method, snapshot.numbers[method.name], snapshot.scenario)
-    from sidestep.studio.thesis.snippet import custom_code
-
-    code = _controller_code if method.controlled else custom_code
+    code = _controller_code if method.controlled else methods_of_custom().custom_code
     lines = code(snapshot, written)
     used = set(re.findall(r"(?<!\.)\b[A-Z]\w+(?=\()", "\n".join(lines)))
     imports = [

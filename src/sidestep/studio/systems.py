@@ -16,16 +16,12 @@ from sidestep.scenario.assembly import description_of
 from sidestep.scenario.controller_settings import controller_settings_of
 from sidestep.scenario.scenario import BodyConfig, MethodChoice
 from sidestep.studio.methods import METHODS
-from sidestep.studio.mover import ControllerMover
+from sidestep.studio.mover import ControllerMover, Mover
+from sidestep.studio.other_methods import methods_of_custom
 from sidestep.studio.parameters import Method, Numbers
-from sidestep.studio.thesis.methods import custom_scenario, numbers_of_custom
-from sidestep.studio.thesis.mover import SystemMover
-from sidestep.thesis.custom import custom_system, torque_qp_of
 
 if TYPE_CHECKING:
     from sidestep.arm import Progress
-
-Mover = ControllerMover | SystemMover
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ def as_file(method: Method, numbers: Mapping[str, Any], scenario: Scenario) -> S
         held = dataclasses.replace(scenario.simulation, integrator="semi_implicit_euler")
         written = dataclasses.replace(scenario, method=cast("MethodChoice", method.name), simulation=held)
     else:
-        written = custom_scenario(method.name, numbers, scenario)
+        written = methods_of_custom().custom_scenario(method.name, numbers, scenario)
     return method.write(numbers, written)
 
 
@@ -109,17 +105,15 @@ def build_mover(
     if method.controlled:
         settings = settings_of(written, synchronous=synchronous)
         return ControllerMover(robot, arm or Arm.from_robot(robot, body), settings, tip)
-    system = custom_system(written.embedding, written.system, robot, body)
-    program = torque_qp_of(written, robot)
-    return SystemMover(robot, system, program, tip)
+    return methods_of_custom().mover_of(written, robot, body, tip)
 
 
 def numbers_of(scenario: Scenario) -> tuple[str, Numbers]:
     """The method that a scenario file asks for, and the numbers it has for it.
 
-    See `numbers_of_custom` for the method custom.
+    See `OtherMethods` for the method custom.
     """
     if scenario.method != "custom":
         method = METHODS[scenario.method]
         return method.name, {parameter.name: parameter.of(scenario) for parameter in method.parameters}
-    return numbers_of_custom(scenario)
+    return methods_of_custom().numbers_of_custom(scenario)

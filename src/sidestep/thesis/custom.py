@@ -1,9 +1,8 @@
-"""What moves the arm of a scenario of method `custom`: its density, embedding and switch, and a torque QP."""
+"""What moves the arm of a scenario of method `custom`: its density, embedding and switch. See `CustomMethod`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from sidestep._core import (
     BinarySwitch,
@@ -14,23 +13,19 @@ from sidestep._core import (
     GeometricSystem,
     HarmonicOnly,
     JointLimitPotential,
-    SafetySettings,
     SigmoidSwitch,
     Sum,
-    TorqueController,
     Unswitched,
 )
 from sidestep.body import Body
 from sidestep.robot import Robot
-from sidestep.scenario.config import PROGRAM, made, value_in
-from sidestep.scenario.scenario import EmbeddingConfig, Scenario, SwitchConfig, SystemConfig
+from sidestep.scenario.scenario import EmbeddingConfig, SwitchConfig, SystemConfig
+from sidestep.thesis.driver import SystemDriver as SystemDriver
 
 Switch: TypeAlias = Unswitched | HarmonicOnly | GeodesicOnly | BinarySwitch | SigmoidSwitch | DistanceSwitch
 
 
-def custom_system(
-    embedding: EmbeddingConfig, system: SystemConfig, robot: Robot, body: Body
-) -> GeometricSystem:
+def system_of(embedding: EmbeddingConfig, system: SystemConfig, robot: Robot, body: Body) -> GeometricSystem:
     """The system that a file writes out; raises ValueError where its switch does not fit the robot."""
     return GeometricSystem(
         _embeddings(embedding, robot, body),
@@ -70,18 +65,3 @@ def _switch(choice: SwitchConfig, robot: Robot) -> Switch:
                 )
             return DistanceSwitch(thresholds=thresholds, slope=slope)
     raise ValueError(f"switch of type {choice.type!r} lacks a number it needs, got {choice}")
-
-
-def torque_qp_of(scenario: Scenario, robot: Robot) -> TorqueController:
-    """The torque QP that a scenario asks for; raises ValueError that names the number at fault."""
-    return TorqueController(robot, period=scenario.simulation.period, **program_from(scenario.controller))
-
-
-def program_from(section: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments of a `TorqueController`, but for robot and period.
-
-    Raises:
-        ValueError: names the setting, its value and what is allowed.
-    """
-    numbers = {name: value_in(section, name) for name in PROGRAM}
-    return numbers | {"safety": made(SafetySettings(), section.get("safety", {}))}

@@ -5,7 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from sidestep.thesis.reproduce import PARTS, Figure, Table, performance, torch_autograd
+from sidestep.bench.peers import torch_autograd
+from sidestep.thesis.reproduce import PARTS, Figure, Table, performance
 from sidestep.thesis.reproduce import planar as toy
 
 pytestmark = pytest.mark.slow

@@ -10,8 +10,8 @@ import numpy as np
 from sidestep import Body, Obstacles, Robot
 from sidestep.body.sampling import sample_link
 from sidestep.body.selection import criterion_curve
+from sidestep.drawing import style
 from sidestep.thesis import CollisionDensity
-from sidestep.thesis.reproduce import style
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item
 from sidestep.thesis.reproduce.registry import Settings
 

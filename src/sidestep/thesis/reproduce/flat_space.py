@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from sidestep import Obstacles
+from sidestep.drawing import style
 from sidestep.system import GeometricSystem
 from sidestep.thesis import rollout
-from sidestep.thesis.reproduce import planar, style
+from sidestep.thesis.reproduce import planar
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item
 from sidestep.thesis.reproduce.registry import Settings
 

@@ -10,9 +10,10 @@ from itertools import product
 import numpy as np
 
 from sidestep import Obstacles
+from sidestep.drawing import style
 from sidestep.system import GeometricSystem
 from sidestep.thesis import BinarySwitch, GeodesicOnly, JointLimitPotential, Sum, rollout
-from sidestep.thesis.reproduce import planar, style
+from sidestep.thesis.reproduce import planar
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item, Table
 from sidestep.thesis.reproduce.registry import Settings
 

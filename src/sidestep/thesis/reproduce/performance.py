@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from sidestep import Body, Obstacles, Robot
+from sidestep.bench.peers import dense_analytic, torch_autograd
+from sidestep.bench.peers.serial_chain import SerialChain
 from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity, rollout
-from sidestep.thesis.reproduce import dense_analytic, torch_autograd
 from sidestep.thesis.reproduce.item import Array, Caption, Item, Table
 from sidestep.thesis.reproduce.registry import Settings
-from sidestep.thesis.reproduce.serial_chain import SerialChain
 
 ROBOTS = {2: "planar2", 3: "planar3", 7: "fr3_arm"}
 POINTS = {2: (0.6, 0.3, 0.0), 3: (0.6, 0.3, 0.0), 7: (0.4, 0.2, 0.5)}  # [m] beside the arm

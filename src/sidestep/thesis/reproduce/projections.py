@@ -9,10 +9,10 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from sidestep.drawing import style
 from sidestep.scenario.assembly import assemble
 from sidestep.scenario.scenario import Scenario
 from sidestep.thesis import CollisionDensity
-from sidestep.thesis.reproduce import style
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item
 from sidestep.thesis.reproduce.registry import Settings
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from sidestep._core import __version__
-from sidestep.thesis.reproduce import style
+from sidestep.drawing import style
 from sidestep.thesis.reproduce.item import Data, Figure, Item, Table
 from sidestep.thesis.reproduce.page import write_page
 from sidestep.thesis.reproduce.registry import Part, Settings, select

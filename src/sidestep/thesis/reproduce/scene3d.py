@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 
 from sidestep import Robot
 from sidestep.distance import SceneObject
-from sidestep.drawing import draw_arm
+from sidestep.drawing import draw_arm, style
 from sidestep.drawing.palette import BLUE
-from sidestep.thesis.reproduce import style
 from sidestep.thesis.reproduce.item import Array
 
 

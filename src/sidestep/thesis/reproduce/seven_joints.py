@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from sidestep import ExactClearance
+from sidestep.drawing import style
 from sidestep.scenario.assembly import Assembly, assemble
 from sidestep.scenario.scenario import Scenario
 from sidestep.system import GeometricSystem
@@ -24,7 +25,6 @@ from sidestep.thesis import (
     Unswitched,
     rollout,
 )
-from sidestep.thesis.reproduce import style
 from sidestep.thesis.reproduce.item import Caption, Figure, Item, Table
 from sidestep.thesis.reproduce.registry import Settings
 from sidestep.thesis.reproduce.scene3d import add_scene, tip_path

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from sidestep.drawing import style
 from sidestep.scenario import Scenario, ScenarioResult, run_scenario
 from sidestep.scenario.scenario import SwitchConfig
 from sidestep.simulation import SimulationRun
-from sidestep.thesis.reproduce import style
 from sidestep.thesis.reproduce.item import Caption, Figure, Item, Table
 from sidestep.thesis.reproduce.registry import Settings
 from sidestep.thesis.reproduce.scene3d import add_scene, tip_path

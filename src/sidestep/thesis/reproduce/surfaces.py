@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from sidestep.drawing import style
 from sidestep.thesis import geodesic_acceleration
-from sidestep.thesis.reproduce import planar, style
+from sidestep.thesis.reproduce import planar
 from sidestep.thesis.reproduce.item import Array, Caption, Figure, Item
 from sidestep.thesis.reproduce.registry import Settings
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sidestep._core import Body, JointType, Robot
-from sidestep.thesis.reproduce.item import Array
+from sidestep.bench.peers.way import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ import dataclasses
 from sidestep.scenario import Scenario
 from sidestep.scenario.config import parts_of
 from sidestep.scenario.scenario import SwitchConfig
+from sidestep.scenario.torque_program import program_from
 from sidestep.studio.messages import Snapshot
 from sidestep.studio.snippet import call, robot_code, state_code
 from sidestep.studio.systems import fit_arguments
-from sidestep.thesis.custom import program_from
 
 
 def custom_code(snapshot: Snapshot, written: Scenario) -> list[str]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sidestep.bench import PeerSettings, run_peers
+from sidestep.bench.peers import dense_analytic
 
 OPTIONAL = {"torch.autograd": "torch", "JAX, jitted": "jax", "CBFpy": "cbfpy"}
 
@@ -40,12 +41,10 @@ def test_ratios_are_to_the_core_in_the_same_group(document):
 
 
 def test_an_acceleration_that_differs_is_an_error(monkeypatch):
-    from sidestep.bench import peers
-
     def wrong(chain, q, v, goal, point, *, stiffness, damping):
         return np.zeros_like(q)
 
-    monkeypatch.setattr(peers.dense_analytic, "acceleration", wrong)
+    monkeypatch.setattr(dense_analytic, "acceleration", wrong)
     with pytest.raises(RuntimeError, match="NumPy, dense analytic: the acceleration is"):
         run_peers(PeerSettings(seconds=0.05))
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sidestep.thesis.reproduce.serial_chain import SerialChain, cross_matrix
+from sidestep.bench.peers.serial_chain import SerialChain, cross_matrix
 
 Array = npt.NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""What moves an arm through the problems of the benchmarks by one of the thesis's methods."""
+"""The thesis's methods in the benchmarks: what moves an arm through their problems. See `BenchMethod`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import numpy as np
 from sidestep._core import GeometricSystem, TorqueController, rollout
 from sidestep.bench.motion import CHUNK, Columns, Motion, MotionSettings, under_torque
 from sidestep.bench.problem import Problem
+from sidestep.body import Body
 from sidestep.robot import Robot
 from sidestep.thesis.driver import SystemDriver
+from sidestep.thesis.system import ThesisNumbers, thesis_system
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,3 +56,21 @@ class SystemMover:
             )
             q, v = part.q[-1], part.v[-1]
         return columns.motion(problem)
+
+
+@dataclass(frozen=True)
+class ThesisMethod:
+    """The thesis's system, switched (T6.2) or not (T2.12)."""
+
+    switched: bool
+
+    def body(self, robot: Robot) -> Body:
+        """A mixture with the thesis's number of Gaussians."""
+        return Body.fit(robot, components=ThesisNumbers().components)
+
+    def mover(self, robot: Robot, body: Body) -> SystemMover:
+        """The system alone."""
+        return SystemMover(robot, thesis_system(robot, body, switched=self.switched))
+
+
+SWITCHED, UNSWITCHED = ThesisMethod(switched=True), ThesisMethod(switched=False)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sidestep.thesis.reproduce.item import Array
-from sidestep.thesis.reproduce.serial_chain import SerialChain, cross_matrix
+from sidestep.bench.peers.serial_chain import SerialChain, cross_matrix
+from sidestep.bench.peers.way import Array
 
 
 @dataclass(frozen=True, eq=False)

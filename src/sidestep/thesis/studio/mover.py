@@ -6,12 +6,16 @@ import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import GeometricSystem, Obstacles, Step, TorqueController, TorqueSolution
+from sidestep.body import Body
 from sidestep.robot import Robot
+from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import POSTURE_STARTS
+from sidestep.scenario.torque_program import torque_qp_of
 from sidestep.simulation.pose_target import IkSolution, solve_ik
 from sidestep.simulation.run import status_name
 from sidestep.studio.mover import Account
 from sidestep.studio.reason import Reason
+from sidestep.thesis.custom import system_of
 
 Array = npt.NDArray[np.float64]
 
@@ -67,3 +71,13 @@ class SystemMover:
 
     def moment(self) -> None:
         """No events: nothing is planned or kept off."""
+
+
+def mover_of(written: Scenario, robot: Robot, body: Body, tip: str) -> SystemMover:
+    """What moves the arm, of a scenario of method custom.
+
+    Raises:
+        ValueError: names the number at fault.
+    """
+    system = system_of(written.embedding, written.system, robot, body)
+    return SystemMover(robot, system, torque_qp_of(written, robot), tip)

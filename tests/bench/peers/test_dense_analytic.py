@@ -3,10 +3,10 @@ import pytest
 
 from sidestep import Obstacles, Robot
 from sidestep._core import Body
+from sidestep.bench.peers import dense_analytic, torch_autograd
+from sidestep.bench.peers.serial_chain import SerialChain
 from sidestep.system import GeometricSystem
 from sidestep.thesis import CollisionDensity
-from sidestep.thesis.reproduce import dense_analytic, torch_autograd
-from sidestep.thesis.reproduce.serial_chain import SerialChain
 
 
 def body_of(robot, rng):

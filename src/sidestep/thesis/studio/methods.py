@@ -98,7 +98,7 @@ _SPRING = spring(
 _THRESHOLD = switch("threshold", "psi", 0.01, 5.0, 0.5, "Lower lets go of the goal farther from obstacles.")
 _DENSITY = (*DENSITY, *TORQUE)
 
-METHODS_OF_THESIS = (
+METHODS = (
     Method(
         "thesis",
         "thesis: distance switch",
@@ -207,7 +207,7 @@ def numbers_of_custom(scenario: Scenario) -> tuple[str, Numbers]:
     That is one of these where the file says exactly what one of them with its numbers is; else `CUSTOM`.
     """
     switched = _switch_numbers(scenario.system.switch)
-    for method in METHODS_OF_THESIS:
+    for method in METHODS:
         numbers = {
             p.name: switched.get(p.name, p.default) if p.place == SWITCH else p.of(scenario)
             for p in method.parameters

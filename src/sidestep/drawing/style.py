@@ -8,6 +8,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+import numpy.typing as npt
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -23,7 +24,8 @@ from sidestep.drawing.palette import PURPLE as PURPLE
 from sidestep.drawing.palette import SKY as SKY
 from sidestep.drawing.palette import VERMILLION as VERMILLION
 from sidestep.drawing.palette import YELLOW as YELLOW
-from sidestep.thesis.reproduce.item import Array
+
+Array = npt.NDArray[np.float64]
 
 JOINT_COLOURS = palette.SERIES
 

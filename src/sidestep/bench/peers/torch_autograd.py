@@ -1,5 +1,4 @@
-"""The same by automatic differentiation, as the thesis's other row: ψ written down, the rest from "
-"torch.autograd."""
+"""The same by automatic differentiation, as the thesis's other row: ψ written down, the rest from torch.autograd."""
 
 from __future__ import annotations
 
@@ -9,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from sidestep.thesis.reproduce.dense_analytic import from_metric
-from sidestep.thesis.reproduce.item import Array
-from sidestep.thesis.reproduce.serial_chain import SerialChain, cross_matrix
+from sidestep.bench.peers.dense_analytic import from_metric
+from sidestep.bench.peers.serial_chain import SerialChain, cross_matrix
+from sidestep.bench.peers.way import Array
 
 
 def available() -> bool:

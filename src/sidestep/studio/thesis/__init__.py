@@ -1,1 +1,0 @@
-"""The thesis's methods in the studio."""

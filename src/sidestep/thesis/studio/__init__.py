@@ -1,0 +1,24 @@
+"""The thesis's methods in the studio. See `OtherMethods`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sidestep.scenario import Scenario
+from sidestep.thesis.studio.methods import METHODS, custom_scenario, numbers_of_custom
+from sidestep.thesis.studio.mover import mover_of
+
+if TYPE_CHECKING:
+    from sidestep.studio.messages import Snapshot
+
+
+def custom_code(snapshot: Snapshot, written: Scenario) -> list[str]:
+    """Python that makes what moves the arm, of a scenario of method custom."""
+    from sidestep.thesis.studio import (
+        snippet,  # here: it needs the studio's list of methods, which needs this module
+    )
+
+    return snippet.custom_code(snapshot, written)
+
+
+__all__ = ["METHODS", "custom_code", "custom_scenario", "mover_of", "numbers_of_custom"]
