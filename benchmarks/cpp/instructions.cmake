@@ -1,6 +1,6 @@
 # Counts the instructions of one step of each kind with callgrind and compares them with instructions.txt, lines of
 # `kind count`. Fails where a count has grown by more than 10 %. With -D RECORD=ON it writes the file instead.
-#   cmake -D VALGRIND=valgrind -D PROGRAM=build/cpp/benchmarks/instructions_benchmark -P instructions.cmake
+#   cmake -D VALGRIND=valgrind -D PROGRAM=build/benchmarks/cpp/instructions_benchmark -P instructions.cmake
 #
 # The difference of two runs is that of the steps alone. Compilers differ by a few per cent; valgrind shows programs a
 # processor without AVX-512, so that the counts do not depend on the machine.
