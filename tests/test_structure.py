@@ -208,6 +208,8 @@ def test_attributes_and_long_functions(tmp_path):
                 height: int = 3
 
                 def draw(self):
+                    '''What
+                    it does.'''
                     self.width = 1
                     self.lines, other.name = [], 2
 

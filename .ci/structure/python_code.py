@@ -111,10 +111,10 @@ def room(module: str) -> str:
 
 
 def long_functions(path: Path, most: int) -> list[tuple[str, int]]:
-    """Functions of more than `most` lines, from `def` to the last."""
+    """Functions of more than `most` lines, from `def` to the last, without the docstring."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     found = [
-        (node.name, (node.end_lineno or 0) - node.lineno + 1)
+        (node.name, (node.end_lineno or 0) - node.lineno + 1 - len(_docstring_lines(node)))
         for node in ast.walk(tree)
         if isinstance(node, _FUNCTION)
     ]
@@ -153,13 +153,16 @@ def code_lines(path: Path) -> int:
         if line.strip() and not line.strip().startswith("#")
     }
     for node in ast.walk(ast.parse(text)):
-        if (
-            isinstance(node, (ast.Module, ast.ClassDef, *_FUNCTION))
-            and ast.get_docstring(node, clean=False) is not None
-        ):
-            docstring = node.body[0]
-            lines -= set(range(docstring.lineno, (docstring.end_lineno or 0) + 1))
+        if isinstance(node, (ast.Module, ast.ClassDef, *_FUNCTION)):
+            lines -= _docstring_lines(node)
     return len(lines)
+
+
+def _docstring_lines(node: ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> set[int]:
+    if ast.get_docstring(node, clean=False) is None:
+        return set()
+    docstring = node.body[0]
+    return set(range(docstring.lineno, (docstring.end_lineno or 0) + 1))
 
 
 _FUNCTION = (ast.FunctionDef, ast.AsyncFunctionDef)

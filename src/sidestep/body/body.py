@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +14,12 @@ from numpy.typing import ArrayLike
 from sidestep import _core, shipped_arms
 from sidestep.body import cache as fit_cache
 from sidestep.body import file as body_file
-from sidestep.body.cover import CoverProgress, cover_mixtures, density_fit
+from sidestep.body.cover import CoverProgress, cover_mixtures
 from sidestep.body.cover_problem import EffortName
 from sidestep.body.cover_settings import CoverSettings, LinkCover, components_for
 from sidestep.body.fitting import Components, FitSettings, LinkFit, Progress, fit_links
 from sidestep.body.mixture import CovarianceType
+from sidestep.body.of_arm import contents_of, fits_of
 from sidestep.body.sampling import check_components, links_with_geometry
 from sidestep.body.selection import MAX_COMPONENTS
 
@@ -305,23 +307,13 @@ class Body(_core.Body):
     @classmethod
     def of_arm(cls, arm: _core.Arm) -> Body:
         """The body of a prepared arm, with what is proven and measured of each link (`link_covers`)."""
-        return cls(**_contents_of(arm), robot_name=arm.name)
+        return cls(**contents_of(arm), robot_name=arm.name)
 
     @classmethod
     def _shipped(cls, arm: _core.Arm, robot: Robot, settings: CoverSettings) -> Body:
         """The cover of an arm that was made by these settings for the meshes of `robot`."""
-
-        def fits() -> list[LinkFit]:
-            body, owner = arm.body, np.asarray(arm.body.links)
-            return [
-                density_fit(
-                    robot, link, body.means[own], body.covariances[own], body.weights[own], settings.seed
-                )[0]
-                for link in dict.fromkeys(body.links)
-                for own in [owner == link]
-            ]
-
-        return cls(**_contents_of(arm), robot_name=robot.name, settings=settings, link_fits=fits)
+        fits = partial(fits_of, arm, robot, settings.seed)
+        return cls(**contents_of(arm), robot_name=robot.name, settings=settings, link_fits=fits)
 
     @classmethod
     def _made(
@@ -374,30 +366,3 @@ class Body(_core.Body):
                 for fit in self.link_fits
             ),
         )
-
-
-def _contents_of(arm: _core.Arm) -> dict[str, Any]:
-    """What arguments of `Body` an arm tells."""
-    body = arm.body
-    return {
-        "links": body.links,
-        "weights": body.weights,
-        "means": body.means,
-        "covariances": body.covariances,
-        "levels": body.levels,
-        "fingerprint": arm.provenance.fingerprint,
-        "link_covers": [
-            LinkCover(
-                link=proof.link,
-                num_components=body.links.count(proof.link),
-                coverage=proof.coverage,
-                mean_overshoot=proof.mean_overshoot,
-                max_overshoot=proof.max_overshoot,
-                volume_ratio=proof.volume_ratio,
-                volume_of=proof.volume_of,
-                interior_coverage=proof.interior_coverage,
-                slimness=proof.slimness,
-            )
-            for proof in arm.proof
-        ],
-    }

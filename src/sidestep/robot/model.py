@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zlib import crc32
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sidestep import _core
 from sidestep.robot import catalogue
-from sidestep.robot.degrees import degrees_hint
+from sidestep.robot.configurations import checked, finite_interval, finite_vector, random_configurations
 from sidestep.robot.descriptions import described
 from sidestep.robot.fingerprint import fingerprint_of
 from sidestep.robot.limits import LimitValues
@@ -111,9 +110,7 @@ class Robot(_core.Robot):
         """
         if is_mjcf(source):
             if package_dirs or xacro_arguments or srdf:
-                raise ValueError(
-                    "package_dirs, xacro_arguments and srdf are of URDF; the description is MJCF"
-                )
+                raise ValueError("package_dirs, xacro_arguments and srdf are of URDF; the file is MJCF")
             mjcf = read_mjcf(source)
             urdf = mjcf.urdf
         else:
@@ -332,12 +329,12 @@ class Robot(_core.Robot):
     @cached_property
     def neutral(self) -> Array:
         """A configuration (nv,) inside the limits: the middle of each interval, 0 without limits."""
-        lower, upper = self._finite_interval()
+        lower, upper = finite_interval(self.limits)
         return 0.5 * (lower + upper)
 
     def random_configuration(self, rng: np.random.Generator) -> Array:
         """A configuration (nv,), uniform within the limits; within ±pi where a coordinate has none."""
-        return rng.uniform(*self._finite_interval())
+        return rng.uniform(*finite_interval(self.limits))
 
     def random_configurations(self, count: int, *, seed: int = 0) -> Array:
         """Configurations (count, nv) as `random_configuration` gives.
@@ -345,13 +342,7 @@ class Robot(_core.Robot):
         The values of a coordinate depend on the seed, its name and its limits alone: they stay when another joint is
         added or dropped.
         """
-        lower, upper = self._finite_interval()
-        shares = [
-            np.random.default_rng((seed, crc32(name.encode()))).random(count)
-            for name in self.coordinate_names
-        ]
-        values: Array = lower + (upper - lower) * np.stack(shares, axis=1)
-        return values
+        return random_configurations(self, count, seed)
 
     def check_configuration(self, q: ArrayLike, name: str = "q") -> Array:
         """`q` as an array (nv,) after checking its shape, that it is finite, and the position limits.
@@ -362,31 +353,18 @@ class Robot(_core.Robot):
         Raises:
             ValueError: names `name`, the joint, its value and the interval allowed.
         """
-        array = _core.real_array(q, name)
-        if array.shape != (self.num_coordinates,):
-            raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
-        limits, rounding = self.limits, _core.JointLimits.rounding
-        for k, (joint, value, lower, upper) in enumerate(
-            zip(self.coordinate_names, array, limits.lower, limits.upper, strict=True)
-        ):
-            if not (np.isfinite(value) and lower - rounding <= value <= upper + rounding):
-                turns = {item.coordinate for item in self.joints if item.type == _core.JointType.revolute}
-                unit, hint = "rad" if k in turns else "m", degrees_hint(array[sorted(turns)])
-                raise ValueError(
-                    f"{name}: joint {joint!r} is {value} {unit}, allowed: [{lower}, {upper}] {unit}{hint}"
-                )
-        return array
+        return checked(self, q, name)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Joint-space inertia M(q) (nv, nv) [kg m^2, kg m, kg]; without rotor inertias."""
-        return self._dynamics.mass_matrix(self._vector(q, "q"))
+        return self._dynamics.mass_matrix(finite_vector(self, q, "q"))
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
         """Coriolis, centrifugal and gravity force (nv,) [Nm | N], gravity 9.81 m/s^2 along the world's -z.
 
         h(q, v) = C(q, v) v + g(q), so that M(q) a + h(q, v) = torque; no friction.
         """
-        return self._dynamics.bias(self._vector(q, "q"), self._vector(v, "v"))
+        return self._dynamics.bias(finite_vector(self, q, "q"), finite_vector(self, v, "v"))
 
     @cached_property
     def inertials(self) -> tuple[_core.Inertial, ...]:
@@ -420,20 +398,3 @@ class Robot(_core.Robot):
     @cached_property
     def _dynamics(self) -> _core.RigidBodyDynamics:
         return _core.RigidBodyDynamics(self, self.inertials)
-
-    def _vector(self, value: ArrayLike, name: str) -> Array:
-        array = _core.real_array(value, name)
-        if array.shape != (self.num_coordinates,):
-            raise ValueError(f"{name} has shape {array.shape}, expected ({self.num_coordinates},)")
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} must be finite, got {array}")
-        return array
-
-    def _finite_interval(self) -> tuple[Array, Array]:
-        """The position limits, with 2 pi from the one bound, or ±pi, where a coordinate is not bounded."""
-        lower, upper = np.array(self.limits.lower), np.array(self.limits.upper)
-        free = np.isinf(lower) & np.isinf(upper)
-        lower[free], upper[free] = -np.pi, np.pi
-        below, above = np.isinf(lower), np.isinf(upper)
-        lower[below], upper[above] = upper[below] - 2.0 * np.pi, lower[above] + 2.0 * np.pi
-        return lower, upper

@@ -47,8 +47,7 @@ class Cameras:
         frames = np.array([robot.pose(q, frame.name)[:3, 3] for q in ends for frame in robot.frames])
         self._view = clear_view(frames, solids)
 
-    def point(self, *, beside_surface: bool) -> Viewpoint:
+    def point(self, *, beside_surface: bool) -> None:
         """Points all windows, those to come as well, at the scene; the curved space has the upper left."""
-        viewpoint = Viewpoint.of(self._places, self._view, UNDER_CORNER if beside_surface else HIGH)
-        point_cameras(self._server, viewpoint)
-        return viewpoint
+        self.viewpoint = Viewpoint.of(self._places, self._view, UNDER_CORNER if beside_surface else HIGH)
+        point_cameras(self._server, self.viewpoint)

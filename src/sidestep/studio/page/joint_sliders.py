@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from sidestep._core import JointType
 from sidestep.robot import Robot
+from sidestep.robot.configurations import finite_interval
 from sidestep.studio.page.arm import short_names
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class JointSliders:
         ]
         self._q = np.array(robot.neutral)
         self._sliders: list[Any] = []
-        lower, upper = robot._finite_interval()
+        lower, upper = finite_interval(robot.limits)
         labels = short_names(robot.coordinate_names)
         for k, name in enumerate(robot.coordinate_names):
             low, high, rest = (float(self._factors[k] * value[k]) for value in (lower, upper, robot.neutral))

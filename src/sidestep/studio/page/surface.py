@@ -15,6 +15,7 @@ import numpy.typing as npt
 from sidestep._core import GeometricSystem, JointType, Obstacles
 from sidestep.body import Body
 from sidestep.robot import Robot
+from sidestep.robot.configurations import finite_interval
 from sidestep.robot.pose import pose_vector
 from sidestep.scenario import Scenario
 from sidestep.studio.messages import Snapshot
@@ -267,7 +268,7 @@ def seen(snapshot: Snapshot, *, bare: bool) -> tuple[Array, Array]:
 
 def ranges(robot: Robot, joints: tuple[int, int]) -> tuple[Array, Array]:
     """Lower and upper end (2,) of what is drawn of two joints [rad | m]."""
-    lower, upper = robot._finite_interval()
+    lower, upper = finite_interval(robot.limits)
     pick = list(joints)
     return np.array(lower[pick]), np.array(upper[pick])
 

@@ -149,7 +149,7 @@ class View:
         self.goal.ghost.hide_where_at(row.q)
         pair = self.switches.pair(tuple(robot.coordinate_names), draft=snapshot.draft)
         body = None if self.body is None else self.body.body
-        self.surface.show(snapshot, robot, body, pair, self._viewpoint)
+        self.surface.show(snapshot, robot, body, pair, self._cameras.viewpoint)
         added = self.plots.add(snapshot, self.clearances.nearest)
         if snapshot.recording and added is not None:
             self.recorder.plotted.append(added)
@@ -225,7 +225,7 @@ class View:
         self.surface.stop()
 
     def _point_cameras(self) -> None:
-        self._viewpoint = self._cameras.point(beside_surface=self.switches.curved.value)
+        self._cameras.point(beside_surface=self.switches.curved.value)
 
     def _set_robot(self, scenario: Scenario, robot: Robot) -> None:
         self._choice, self.loop.robot = scenario.robot, robot
