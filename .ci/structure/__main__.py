@@ -14,6 +14,7 @@ from typing import Any
 import cpp_code
 import cpp_tokens
 import python_code
+from files import Checkout
 from graph import between, circles
 
 MOST_MEMBERS = 25
@@ -25,31 +26,6 @@ EXAMPLES = {
     "shape": r"[Cc]apsule",
     "setting": r"\bdrift_gain\b",
 }
-
-
-class Checkout:
-    """The files of a checkout, by part; tests and documentation are none of them."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder.resolve()
-        self.core = self._files("cpp/src", "cpp/include", kinds=(".cpp", ".hpp", ".inl"))
-        self.bindings = self._files("bindings", kinds=(".cpp", ".hpp"))
-        self.python = self._files("src/sidestep", kinds=(".py",))
-        self.read = {path: cpp_code.read(path) for path in self.core + self.bindings}
-
-    def name(self, path: Path) -> str:
-        return path.relative_to(self.folder).as_posix()
-
-    def cpp_room(self, path: Path) -> str:
-        """The folder below cpp/src or cpp/include/sidestep."""
-        parts = path.relative_to(self.folder / "cpp").parts
-        below = parts[1:] if parts[0] == "src" else parts[2:]
-        return below[0] if len(below) > 1 else ""
-
-    def _files(self, *folders: str, kinds: tuple[str, ...]) -> list[Path]:
-        return sorted(
-            path for folder in folders for path in (self.folder / folder).rglob("*") if path.suffix in kinds
-        )
 
 
 def count(checkout: Checkout) -> dict[str, Any]:
@@ -66,7 +42,7 @@ def count(checkout: Checkout) -> dict[str, Any]:
         "circles of Python packages": _python_circles(checkout, by_room=True),
         "enums of the Python package": _bound_enums(checkout),
         "enums in public headers": _public_enums(checkout),
-        **{f"files that know the {kind}": _touched(checkout, pattern) for kind, pattern in EXAMPLES.items()},
+        **{f"files that know the {kind}": checkout.that_know(pattern) for kind, pattern in EXAMPLES.items()},
         "code lines of the core": sum(map(cpp_tokens.code_lines, checkout.core)),
         "code lines of the bindings": sum(map(cpp_tokens.code_lines, checkout.bindings)),
         "code lines of the Python wheel": sum(map(python_code.code_lines, checkout.python)),
@@ -157,11 +133,6 @@ def _bound_enums(checkout: Checkout) -> list[str]:
 def _public_enums(checkout: Checkout) -> list[str]:
     headers = [path for path in checkout.core if checkout.name(path).startswith("cpp/include/")]
     return sorted(name for path in headers for name in checkout.read[path].enums)
-
-
-def _touched(checkout: Checkout, pattern: str) -> list[str]:
-    files = [*checkout.core, *checkout.bindings, *checkout.python]
-    return [checkout.name(path) for path in files if re.search(pattern, path.read_text(encoding="utf-8"))]
 
 
 def amount(value: Any) -> int:
