@@ -227,4 +227,13 @@ std::vector<LinkPair> link_pairs(const Pairs& pairs) {
   return result;
 }
 
+Eigen::MatrixXd as_rows(nb::handle value, const char* name, Eigen::Index nv) {
+  const Array array = as_array(value, name);
+  if (array.ndim() != 2 || static_cast<Eigen::Index>(array.shape(1)) != nv) {
+    throw nb::value_error((std::string(name) + " must have shape (N, " + std::to_string(nv) + ")").c_str());
+  }
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      array.data(), static_cast<Eigen::Index>(array.shape(0)), nv);
+}
+
 }  // namespace sidestep::python

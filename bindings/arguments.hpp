@@ -71,6 +71,9 @@ Eigen::MatrixXd as_square_matrix(nb::handle value, const char* name, Eigen::Inde
 /// An (N, 3) array of points as 3 × N.
 Eigen::Matrix3Xd as_points(nb::handle value, const char* name);
 
+/// An array (N, nv); raises ValueError on another shape.
+Eigen::MatrixXd as_rows(nb::handle value, const char* name, Eigen::Index nv);
+
 /// A matrix argument of exactly this shape; -1: any number of rows or columns.
 Eigen::MatrixXd as_matrix(nb::handle value, const char* name, Eigen::Index rows, Eigen::Index cols);
 

@@ -1,9 +1,7 @@
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
-#include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
 #include <array>
@@ -15,11 +13,8 @@
 #include "module.hpp"
 #include "sidestep/attractor/clearance_barrier.hpp"
 #include "sidestep/attractor/clearance_table_barrier.hpp"
-#include "sidestep/thesis/collision_density.hpp"
 #include "sidestep/attractor/joint_limit_barrier.hpp"
-#include "sidestep/thesis/joint_limit_potential.hpp"
 #include "sidestep/attractor/self_collision_barrier.hpp"
-#include "sidestep/thesis/sum.hpp"
 #include "sidestep/math/instruction_set.hpp"
 #include "sidestep/math/multiply_add_rate.hpp"
 
@@ -92,29 +87,6 @@ void bind_embedding(nb::module_& m) {
           },
           nb::arg("q"), nb::arg("obstacles"),
           "d2psi/dq2, (nv, nv) where m = 1, else (m, nv, nv); exact. For tests and plots, not for the loop.");
-
-  nb::class_<CollisionDensity, Embedding>(
-      m, "CollisionDensity",
-      "The thesis's embedding: the body's Gaussian mixture at the obstacle points (Bosc 2024, T3.1-T3.7),\n"
-      "    psi(q) = sum_points sum_links sum_k pi_k N(x | o_l + R_l mu_k, R_l Sigma_k R_l^T + r^2 I)  [1/m^3].\n"
-      "`average` divides by the number of points. Links that no joint moves are left out.")
-      .def_prop_ro_static("operations_per_pair", [](nb::handle) { return CollisionDensity::operations_per_pair; },
-                           "Multiplications and additions for a Gaussian and a point at rest without radius.")
-      .def(
-          "__init__",
-          [](CollisionDensity* self, const Robot& robot, const Body& body, bool average) {
-            check_fitted_to(robot, body);
-            new (self) CollisionDensity(robot, body, average);
-          },
-          nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("average") = false);
-
-  nb::class_<JointLimitPotential, Embedding>(
-      m, "JointLimitPotential",
-      "Smooth steps at the joint limits (Bosc 2024, T5.7, corrected to a sum over the joints),\n"
-      "    zeta(q) = height sum_j [s(slope (q_j - upper_j)) + s(slope (lower_j - q_j))],  s(u) = 1/(1 + exp(-u)).\n"
-      "slope [1/rad]; height in the unit of the coordinate it is added to.")
-      .def(nb::init<const Robot&, double, double>(), nb::arg("robot"), nb::kw_only(), nb::arg("slope") = 30.0,
-           nb::arg("height") = 1.0);
 
   nb::class_<ClearanceBarrier, Embedding>(
       m, "ClearanceBarrier",
@@ -247,10 +219,6 @@ void bind_embedding(nb::module_& m) {
           nb::arg("robot"), nb::arg("body"), nb::kw_only(), nb::arg("point"), nb::arg("normal"), nb::arg("links"),
           nb::arg("activation") = 0.05, nb::arg("strength") = 0.02, nb::arg("power") = 2.0, nb::arg("floor") = 0.002,
           nb::arg("temperature") = 0.002, nb::arg("reach") = 0.0);
-
-  nb::class_<Sum, Embedding>(m, "Sum",
-                             "Embeddings added into the same coordinates, psi = sum_i psi_i (the thesis's T5.8).")
-      .def(nb::init<std::vector<std::shared_ptr<const Embedding>>>(), nb::arg("terms"));
 }
 
 }  // namespace sidestep::python

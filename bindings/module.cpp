@@ -21,4 +21,5 @@ NB_MODULE(_core, m) {
   sidestep::python::bind_recording(m);
   sidestep::python::bind_controller(m);
   sidestep::python::bind_real_time(m);
+  sidestep::python::bind_thesis(m);
 }

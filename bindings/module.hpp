@@ -18,5 +18,6 @@ void bind_arm(nanobind::module_& m);
 void bind_controller(nanobind::module_& m);
 void bind_real_time(nanobind::module_& m);
 void bind_recording(nanobind::module_& m);
+void bind_thesis(nanobind::module_& m);
 
 }  // namespace sidestep::python

@@ -265,7 +265,7 @@ void bind_dynamical_system(nb::module_& m) {
           nb::arg("goal"), nb::arg("obstacles"),
           nb::sig("def goal_clearance(self, goal: numpy.typing.ArrayLike | JointGoal, obstacles: Obstacles) -> float"),
           "The smallest clearance of any barrier at a goal configuration; inf beyond their reach.");
-  bind_rollout(m);
+  bind_look_ahead(m);
 }
 
 }  // namespace sidestep::python

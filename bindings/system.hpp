@@ -11,7 +11,7 @@ namespace sidestep::python {
 
 // What the files of system/ share.
 void bind_goals(nanobind::module_& m);
-void bind_rollout(nanobind::module_& m);
+void bind_look_ahead(nanobind::module_& m);
 
 /// An enumerator, or its name; raises ValueError that lists the allowed names.
 template <class Enum>

@@ -96,3 +96,8 @@ plugins.plugins("sidestep.commands")
     done = run(without_thesis, code)
     assert done.stdout == "{}\n"
     assert "No module named 'nowhere_at_all'" in done.stderr
+
+
+def test_one_binding_file_includes_the_thesis() -> None:
+    files = [path for path in (ROOT / "bindings").iterdir() if "thesis/" in path.read_text("utf-8")]
+    assert [path.name for path in files] == ["thesis.cpp"]

@@ -16,7 +16,6 @@
 #include "sidestep/attractor/local_minimum_recovery.hpp"
 #include "sidestep/planning/look_ahead.hpp"
 #include "sidestep/math/progress_monitor.hpp"
-#include "sidestep/thesis/rollout.hpp"
 
 namespace sidestep::python {
 namespace {
@@ -30,7 +29,7 @@ double as_period(double period) {
 
 }  // namespace
 
-void bind_rollout(nb::module_& m) {
+void bind_look_ahead(nb::module_& m) {
   nb::class_<ProgressMonitor>(m, "ProgressMonitor",
                               "Says when a motion has come no nearer to its goal for `patience` [s]: when the goal's\n"
                               "potential has not fallen by `fraction` of its least value.")
@@ -174,48 +173,6 @@ void bind_rollout(nb::module_& m) {
            },
            "Before another motion is pursued: what was found is forgotten.")
       .def_prop_ro("count", &LookAhead::count, "How many trajectories were found.");
-
-  nb::enum_<Integrator>(m, "Integrator", "How a step of length dt is taken.")
-      .value("semi_implicit_euler", Integrator::semi_implicit_euler, "v += a dt; q += v dt.")
-      .value("second_order", Integrator::second_order, "q += v dt + a dt^2/2; v += a dt (thesis 6.2.1).")
-      .value("runge_kutta_4", Integrator::runge_kutta_4, "The classical scheme, with the obstacles moved along.");
-
-  nb::class_<Rollout> result(m, "Rollout", "A kinematic motion: row k is at time k dt, steps + 1 rows.");
-  result.def_prop_ro("time", [](const Rollout& r) { return to_numpy(r.time); }, "[s]")
-      .def_ro("statuses", &Rollout::statuses, "One StepStatus per row.")
-      .def_prop_ro("step_seconds", [](const Rollout& r) { return to_numpy(r.step_seconds); },
-                   "(steps + 1,) wall time [s] of the acceleration of each row; empty without time_steps.");
-  matrix_property(result, "q", &Rollout::q, "(steps + 1, nv) [rad]");
-  matrix_property(result, "v", &Rollout::v, "(steps + 1, nv) [rad/s]");
-  matrix_property(result, "acceleration", &Rollout::acceleration, "(steps + 1, nv) [rad/s^2]");
-  matrix_property(result, "values", &Rollout::values, "psi (steps + 1, m)");
-  matrix_property(result, "switch", &Rollout::switch_weights, "Weights of the harmonic part (steps + 1, nv)");
-
-  m.def(
-      "rollout",
-      [](const GeometricSystem& system, const ArrayLike& q, const ArrayLike& v, nb::handle goal, const Obstacles& obstacles,
-         double period, int steps, nb::handle integrator, bool time_steps) {
-        const int nv = system.robot().num_coordinates();
-        const Eigen::VectorXd start = as_vector(q, "q", nv);
-        const Eigen::VectorXd velocity = as_vector(v, "v", nv);
-        const Goal target = as_goal(goal, nv);
-        RolloutSettings settings{period, steps, as_enum<Integrator>(integrator, "integrator"), time_steps};
-        const HeldObstacles held(obstacles);
-        return interruptible([&](const Interrupted& interrupted) {
-          settings.interrupted = interrupted;
-          return rollout(system, start, velocity, target, held, settings);
-        });
-      },
-      nb::arg("system"), nb::arg("q"), nb::arg("v"), nb::arg("goal"), nb::arg("obstacles"), nb::kw_only(),
-      nb::arg("period") = 0.001, nb::arg("steps"), nb::arg("integrator") = "semi_implicit_euler",
-      nb::arg("time_steps") = false,
-      nb::sig("def rollout(system: GeometricSystem, q: numpy.typing.ArrayLike, v: numpy.typing.ArrayLike, "
-              "goal: numpy.typing.ArrayLike | JointGoal | PoseGoal, obstacles: Obstacles, *, period: float = 0.001, "
-              "steps: int, "
-              "integrator: Integrator | str = 'semi_implicit_euler', time_steps: bool = False) -> Rollout"),
-      "Integrates the system alone from q, v (nv,) towards a goal, obstacles and goal moving at their velocities; nothing holds\n"
-      "limits or clearances: what has to keep them is a Controller, see `integrate`.\n"
-      "period dt [s]; steps: the record may have 8 GiB; integrator: an Integrator or its name; time_steps: measure every step, see step_seconds.");
 }
 
 }  // namespace sidestep::python
