@@ -194,11 +194,11 @@ def test_a_scenario_from_a_file_has_a_draft_that_moves_at_once(
 
             return Arm.from_robot(session.robot, Body.cover(session.robot, components=3))
 
-        session._refinement = Done()  # type: ignore[assignment]
+        session._prepared._refinement = Done()  # type: ignore[assignment]
         for _ in range(40):
             session.step()
         assert session.snapshot().draft  # it goes on with the draft until the finer one is there
-        session._hear("cover", "link1", 1, 3)
+        session._prepared._hear("cover", "link1", 1, 3)
         assert session.snapshot().refining == "ellipsoids around link1 (1 of 3)"
         Done.is_done = True
         for _ in range(20):

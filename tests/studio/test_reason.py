@@ -12,8 +12,9 @@ from sidestep import Scenario
 from sidestep._core import Activity, Limit, SafetyStatus
 from sidestep.studio import messages as m
 from sidestep.studio.gallery import ends_of
+from sidestep.studio.goals_in_turn import REST
 from sidestep.studio.reason import AGAIN, EVENTS, LASTING, Events, Moment, limit_in_words, path_from
-from sidestep.studio.session import REST, Session
+from sidestep.studio.session import Session
 
 MakeSession = Callable[..., Session]
 

@@ -8,43 +8,34 @@ from __future__ import annotations
 import re
 import time as clock
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sidestep._core import Obstacles, real_array
-from sidestep.arm import Arm, Refinement
-from sidestep.body import Body
 from sidestep.robot import Robot, tip_of
 from sidestep.scenario import Scenario
 from sidestep.scenario.assembly import coordinates, load_robot, start_velocity
 from sidestep.scenario.scenario import JointState
 from sidestep.studio import messages as m
+from sidestep.studio.goals_in_turn import GoalsInTurn
 from sidestep.studio.methods import METHODS, check_numbers, method_named
-from sidestep.studio.mover import NEAR_GOAL, STILL, Account, ControllerMover, Mover
+from sidestep.studio.mover import Account, ControllerMover, Mover
 from sidestep.studio.parameters import Method, Numbers
+from sidestep.studio.prepared_bodies import USUAL, Draft, Prepare, PreparedBodies
 from sidestep.studio.reason import Events
 from sidestep.studio.scene_obstacle import check_names, things_of
+from sidestep.studio.seen_things import SeenThings
 from sidestep.studio.simulated_scene import MovableObstacle, SimulatedScene
-from sidestep.studio.systems import Covering, Recipe, build_mover, numbers_of, recipe_of
+from sidestep.studio.systems import build_mover, numbers_of, recipe_of
 from sidestep.studio.tip import at_tip
 
 Array = npt.NDArray[np.float64]
-Prepare = Callable[[Robot, Recipe], Body]
-Draft = Callable[[Scenario], Arm]
 
 TIMED_STEPS = 2000  # whose times are kept: two seconds at 1 kHz
 LOOK_EVERY = 10  # steps between two looks for events
-STAGES = {  # of a preparation, in words for the page
-    "cover": "ellipsoids around",
-    "tables": "clearances between",
-    "pairs": "which links can touch:",
-}
-FAILED = "failed, see the events"  # of a fine body: the draft stays
-REST = 0.5  # [s] at a goal before the next one of several
-PATIENCE = 6.0  # [s] for which a goal of several may be out of reach before the next one is tried
 RECORD_EVERY = 5  # steps: 200 rows per second, between which an arm moves a millimetre in a straight line
 
 
@@ -77,14 +68,13 @@ class Session:
     time: float
     running: bool
     edition: int
-    _bodies: dict[str, Body]
-    _arms: dict[str, Arm]
+    _prepared: PreparedBodies
     _mover: Mover
+    _loaded_goal: tuple[Array | None, Array]
     _goal: tuple[
         Array | None, Array
     ]  # a pose (4, 4) or None, and the configuration, or one near that of the pose
     _goal_written: bool
-    _visited: tuple[Array, ...]
     _contacts: tuple[str, ...]
     _times: deque[float]
     _rows: list[m.Row]
@@ -103,8 +93,7 @@ class Session:
     ) -> None:
         self._prepare, self._draft = prepare, draft
         self._usual_ellipsoids, self._synchronous = ellipsoids, synchronous
-        self._refinement: Refinement | None = None
-        self._refining = ""
+        self._turns = GoalsInTurn()
         self._numbers = {name: method.defaults for name, method in METHODS.items()}
         self._method = method_named(method)
         self.edition = 0
@@ -117,12 +106,12 @@ class Session:
         """Does what a command says; raises ValueError or OSError, and stays as it was, where it cannot."""
         match command:
             case m.SetJointGoal(position):
-                self._visited = ()
+                self._turns.goals = ()
                 self._set_goal(None, self.robot.check_configuration(position, "goal"))
             case m.SetPoseGoal(pose, thorough):
                 last = None if self._goal[0] is None else self._mover.posture
                 near = self.stage.state()[0] if last is None else last.q
-                self._visited = ()
+                self._turns.goals = ()
                 self._set_goal(finite(pose, "the pose of the goal"), near, thorough=thorough)
             case m.AddObstacle(thing):
                 check_names([*(actor.thing for actor in self.stage.actors), thing])
@@ -158,10 +147,11 @@ class Session:
                 self._recording = recording
                 self._rows.clear()
             case m.Restart(until):
-                if self._visited:
-                    self._goal = None, self._visited[0]
+                if self._turns.goals:
+                    first = self._turns.goals[0]
+                    self._goal = None, first
                     written, loaded = self._loaded_goal
-                    self._goal_written = written is None and np.array_equal(loaded, self._visited[0])
+                    self._goal_written = written is None and np.array_equal(loaded, first)
                 self._use(self._method, self._numbers[self._method.name])  # remembers nothing
                 self._begin()
                 self.running, self._until = until > 0.0, until
@@ -200,7 +190,7 @@ class Session:
         else:
             self._contacts = ()
         if self._recording and self._count % RECORD_EVERY == 0:
-            self._rows.append(m.Row(self.time, q, self._things, self._poses(), self._mover.metric))
+            self._rows.append(m.Row(self.time, q, self._seen.things, self._poses(), self._mover.metric))
 
     def snapshot(self, *, real_time: float = 0.0) -> m.Snapshot:
         """The state now, and the rows recorded since the last snapshot."""
@@ -221,11 +211,11 @@ class Session:
             goal_pose=pose,
             posture=self._mover.posture,
             goal_written=self._goal_written,
-            draft=self._is_draft,
-            refining=self._refining if self._is_draft else "",
-            visited=self._visited,
+            draft=self._prepared.is_draft,
+            refining=self._prepared.refining,
+            visited=self._turns.goals,
             tip=self.tip,
-            things=self._things,
+            things=self._seen.things,
             poses=self._poses(),
             velocities=np.array([actor.velocity for actor in self.stage.actors]).reshape(-1, 3),
             courses=tuple(actor.course for actor in self.stage.actors),
@@ -260,10 +250,9 @@ class Session:
         goals: Sequence[Array],
     ) -> None:
         robot = load_robot(scenario)
-        bodies: dict[str, Body] = {}
-        arms: dict[str, Arm] = {}
+        prepared = PreparedBodies(self._prepare, self._draft)
         if self.edition and robot.fingerprint == self.robot.fingerprint:
-            robot, bodies, arms = self.robot, dict(self._bodies), dict(self._arms)
+            robot, prepared = self.robot, self._prepared
         start = coordinates(scenario.start, robot, "start.position")
         velocity = start_velocity(scenario.start, robot)
         goal = scenario.goal
@@ -274,14 +263,14 @@ class Session:
         visited = tuple(robot.check_configuration(q, "goals") for q in goals)
         stage = SimulatedScene(robot, things_of(scenario), period=scenario.simulation.period)
         numbers = self._numbers_for(scenario, given)
-        mover = self._mover_of(method, numbers[method.name], scenario, robot, bodies, arms)
+        mover = self._mover_of(method, numbers[method.name], scenario, robot, prepared)
         mover.set_goal(pose, near, thorough=True)
         self._mover, self._goal, self._goal_written = mover, (pose, near), True
-        self._visited, self._loaded_goal = visited, (pose, near)
+        self._turns.goals, self._loaded_goal = visited, (pose, near)
         if self.edition and robot is not self.robot:
             self.stop()
         self.scenario, self.robot, self.tip, self.stage = scenario, robot, tip_of(robot), stage
-        self._method, self._numbers, self._bodies, self._arms = method, numbers, bodies, arms
+        self._method, self._numbers, self._prepared = method, numbers, prepared
         self.period = scenario.simulation.period
         self._start = start, velocity
         self._begin()
@@ -304,40 +293,28 @@ class Session:
         self._contacts = ()
         self._torque = np.zeros(self.robot.num_coordinates)
         self._times = deque(maxlen=TIMED_STEPS)
-        self._events, self._late, self._arrived = Events(), 0.0, np.inf
+        self._events = Events()
+        self._turns.begin(0.0)
         self._recording = False  # time goes back: a recording is of one motion
         self._set_actors([MovableObstacle(actor.thing) for actor in self.stage.actors])
         self.stage.set_state(*self._start)
 
     def _visit(self, goals: Sequence[Array]) -> None:
         """Several goals in turn, beginning with the one that comes after the present one, if it is among them."""
-        self._visited = tuple(self.robot.check_configuration(q, "goals") for q in goals)
-        self._late = self.time
-        if self._visited:
-            self._set_goal(None, self._next_goal())
-
-    def _next_goal(self) -> Array:
-        """Of those that are visited: the one after the present goal."""
-        present = next((k for k, q in enumerate(self._visited) if np.array_equal(q, self._goal[1])), -1)
-        return self._visited[(present + 1) % len(self._visited)]
+        self._turns.set(tuple(self.robot.check_configuration(q, "goals") for q in goals), self.time)
+        if self._turns.goals:
+            self._set_goal(None, self._turns.after(self._goal[1]))
 
     def _look_back(self, q: Array) -> None:
         """Events of the last step, a finer body, and the next goal where the arm has been at this one for a while."""
-        if self._is_draft:
-            self._refine()
+        if self._prepared.is_draft:
+            self._take_finer()
         moment = self._mover.moment()
         if moment is not None:
             self._events.take(self.time, moment)
-        if not self._visited:
-            return
-        near = float(np.abs(q - self._goal[1]).max()) < NEAR_GOAL
-        if not near:
-            self._arrived = np.inf
-        elif np.isinf(self._arrived):
-            self._arrived = self.time
-        if self.time - self._arrived >= REST or self.time - self._late >= PATIENCE:
-            self._late, self._arrived = self.time, np.inf
-            self._set_goal(None, self._next_goal())
+        following = self._turns.due(self.time, q, self._goal[1])
+        if following is not None:
+            self._set_goal(None, following)
 
     def _set_goal(self, pose: Array | None, q: Array, *, thorough: bool = True) -> None:
         self._mover.set_goal(pose, q, thorough=thorough)
@@ -350,7 +327,7 @@ class Session:
         self._look()
 
     def _use(self, method: Method, numbers: Numbers) -> None:
-        mover = self._mover_of(method, numbers, self.scenario, self.robot, self._bodies, self._arms)
+        mover = self._mover_of(method, numbers, self.scenario, self.robot, self._prepared)
         (pose, near), found = self._goal, self._mover.posture
         if pose is not None and found is not None and found.found:
             near = found.q
@@ -365,88 +342,35 @@ class Session:
         numbers: Numbers,
         scenario: Scenario,
         robot: Robot,
-        bodies: dict[str, Body],
-        arms: dict[str, Arm],
+        prepared: PreparedBodies,
     ) -> Mover:
-        recipe = recipe_of(method, numbers, scenario)
-        name = str(recipe)
-        described = recipe == Covering(None) and scenario.robot.urdf is not None
-        if name not in bodies and described and self._draft is not None:
-            arms[name] = self._draft(scenario)
-            bodies[name] = arms[name].body
-        if name not in bodies:
-            bodies[name] = self._prepare(robot, recipe)
-        if isinstance(recipe, Covering) and name not in arms:
-            arms[name] = Arm.from_robot(robot, bodies[name])
-        return build_mover(
-            method,
-            robot,
-            bodies[name],
-            numbers,
-            scenario,
-            arm=arms.get(name),
-            synchronous=self._synchronous,
-        )
+        body, arm = prepared.get(recipe_of(method, numbers, scenario), scenario, robot)
+        return build_mover(method, robot, body, numbers, scenario, arm=arm, synchronous=self._synchronous)
 
-    @property
-    def _is_draft(self) -> bool:
-        """Whether the arm that moves is a draft, of which a finer one is on its way."""
-        arm = self._arms.get(str(Covering(None)))
-        return arm is not None and arm.is_draft
-
-    def _refine(self) -> None:
-        """Begins to make the fine body of a draft, or takes it over when it is there."""
-        name = str(Covering(None))
-        if self._refinement is None:
-            self._refining = "just begun"
-            self._refinement = Refinement(self._arms[name], progress=self._hear)
-            return
-        if not self._refinement.is_done or self._refining == FAILED:
-            return
+    def _take_finer(self) -> None:
+        """Lets a finer body be made, and takes it over when it is there."""
         try:
-            fine = self._refinement.wait(0.0)
+            fine = self._prepared.finer()
         except RuntimeError as error:
-            self._refining = FAILED
             self._events.tell(self.time, str(error))
             return
+        if fine is None:
+            return
         self._events.tell(self.time, "finer body taken over")
-        self._arms[name], self._bodies[name] = fine, fine.body
-        uses = str(recipe_of(self._method, self._numbers[self._method.name], self.scenario)) == name
-        if uses and isinstance(self._mover, ControllerMover):
+        recipe = recipe_of(self._method, self._numbers[self._method.name], self.scenario)
+        if str(recipe) == USUAL and isinstance(self._mover, ControllerMover):
             self._mover.set_arm(fine)
-        self._refinement = None
-
-    def _hear(self, stage: str, item: str, done: int, total: int) -> None:
-        """How far the fine body is, from a thread of its own."""
-        self._refining = in_words(stage, item, done, total)
 
     def stop(self) -> None:
         """Ends what runs beside the loop."""
-        if self._refinement is not None:
-            self._refinement.cancel()
-            self._refinement = None
+        self._prepared.stop()
 
     def _look(self) -> None:
-        """Lays out what is seen: points of each obstacle in its frame, and whose each point is."""
-        views = [actor.thing.seen(bare=not self._method.controlled) for actor in self.stage.actors]
-        self._views = [points for points, _ in views]
-        self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in views)])
-        counts = [len(points) for points in self._views]
-        self._owners = np.repeat(np.arange(len(counts)), counts)
-        self._things = tuple(actor.thing for actor in self.stage.actors)
+        things = [actor.thing for actor in self.stage.actors]
+        self._seen = SeenThings(things, bare=not self._method.controlled)
 
     def _obstacles(self) -> Obstacles:
-        actors = self.stage.actors
-        if not actors:
-            return Obstacles.none()
-        points = [
-            view @ actor.pose[:3, :3].T + actor.pose[:3, 3]
-            for view, actor in zip(self._views, actors, strict=True)
-        ]
-        velocities = np.array([actor.velocity for actor in actors])
-        velocities[np.linalg.norm(velocities, axis=1) < STILL] = 0.0
-        seen = Obstacles(np.concatenate(points), self._radii, velocities[self._owners])
-        return seen.named([thing.name for thing in self._things], [len(view) for view in self._views])
+        return self._seen.obstacles(self.stage.actors)
 
     def _poses(self) -> Array:
         return np.array([actor.pose for actor in self.stage.actors]).reshape(-1, 4, 4)
@@ -458,8 +382,3 @@ def finite(values: npt.ArrayLike, what: str) -> Array:
     if not np.isfinite(array).all():
         raise ValueError(f"{what} is {array.tolist()}; allowed: finite numbers")
     return array
-
-
-def in_words(stage: str, item: str, done: int, total: int) -> str:
-    """How far a preparation is, for the page."""
-    return f"{STAGES.get(stage, stage)} {item} ({done} of {total})"

@@ -29,7 +29,8 @@ from sidestep.robot import Robot
 from sidestep.scenario import Scenario
 from sidestep.studio import messages as m
 from sidestep.studio.command_queue import CommandQueue, add
-from sidestep.studio.session import Session, in_words
+from sidestep.studio.prepared_bodies import in_words
+from sidestep.studio.session import Session
 from sidestep.studio.systems import Covering, Recipe, draft_arm, make_body
 
 Array = npt.NDArray[np.float64]
